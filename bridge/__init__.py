@@ -1,0 +1,1 @@
+"""Carries blade segments to the tissue and the wrench back. Knows neither arm nor MuJoCo."""

@@ -1,0 +1,1 @@
+"""A tetrahedral body that a blade can cut. Tissue frame, SI units."""

@@ -1,0 +1,33 @@
+"""What the tissue is made of, in quantities that one can measure."""
+
+import math
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class Material:
+    """An isotropic soft tissue.
+
+    Raises:
+        ValueError: a quantity is not finite, or has the wrong sign.
+    """
+
+    young_modulus: float = 10e3
+    """Stiffness at small strain [Pa]."""
+    density: float = 1000.0
+    """[kg/m3]."""
+    toughness: float = 20.0
+    """Fracture toughness: the energy that a square metre of cut costs [J/m2]."""
+    viscous_damping: float = 5.0
+    """Drag on every node, as the rate at which its free motion dies away [1/s]."""
+    retardation_time: float = 2e-4
+    """Penalty-based damping, along springs only: the Kelvin-Voigt ratio of viscosity to stiffness [s]."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or value < 0.0:
+                raise ValueError(f"{field.name} is {value}; it must be finite and not negative")
+        for name in ("young_modulus", "density"):
+            if getattr(self, name) == 0.0:
+                raise ValueError(f"{name} is 0; it must be positive")

@@ -1,0 +1,121 @@
+"""Values that cross the border of the engine. Plain data, no behaviour.
+
+SI units. Every vector in this package is in the tissue frame. The suffixes `_t0` and `_t1` mean
+the start and the end of a step.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+class BladeSegment(NamedTuple):
+    """The cutting edge at one instant: the paper's thin line, and the way it faces."""
+
+    tip: FloatArray
+    """Sharp end [m], shape (3,)."""
+    heel: FloatArray
+    """End nearest the handle [m], shape (3,)."""
+    forward: FloatArray
+    """Unit vector across the edge, in the plane of the blade, in which it cuts; shape (3,)."""
+
+
+class BladeSweep(NamedTuple):
+    """The cutting edge at the start and at the end of a step."""
+
+    t0: BladeSegment
+    t1: BladeSegment
+
+
+class Wrench(NamedTuple):
+    """A force and a torque, and the point they act at."""
+
+    force: FloatArray
+    """[N], shape (3,)."""
+    torque: FloatArray
+    """[N m] about `point`, shape (3,)."""
+    point: FloatArray
+    """[m], shape (3,)."""
+
+
+class Profile(NamedTuple):
+    """Wall time of the stages of one step [s], under the names of the paper's Table 1."""
+
+    collision: float
+    """CD: active tetrahedra and the edges that the blade crossed."""
+    topology: float
+    """GC: insertion of nodes, marking, un-gluing, and the springs and masses that changed."""
+    relaxation: float
+    """RX: forces, edge anchors, Runge-Kutta."""
+
+
+class StepResult(NamedTuple):
+    """What one step did."""
+
+    wrench: Wrench
+    """What the tissue does to the blade, averaged over the step; `point` is the tip at t1."""
+    force_on_tissue: FloatArray
+    """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
+    bounds: FloatArray
+    """Lowest and highest corner of the tissue at t1 [m], shape (2, 3)."""
+    n_tetrahedra: int
+    n_nodes: int
+    n_active: int
+    """How many active tetrahedra there are: those that the cutting edge passes through."""
+    active_point_tetrahedron: int
+    """The tetrahedron that holds the tip, or -1 (paper, section 3)."""
+    anchored_length: float
+    """Length of the cutting edge that is in the tissue [m]."""
+    cut_area: float
+    """Area that the edge has cut since the start, on one side [m2]."""
+    work_of_blade: float
+    """Work that the blade has done on the tissue since the start [J]."""
+    work_of_cutting: float
+    """Toughness times area, since the start [J]."""
+    n_substeps: int
+    """Runge-Kutta steps taken in this step."""
+    profile: Profile
+
+
+class TetrahedralMesh(NamedTuple):
+    """A mesh as it comes from a file or a generator."""
+
+    positions: FloatArray
+    """[m], shape (n_nodes, 3)."""
+    tetrahedra: IntArray
+    """Node indices, shape (n_tets, 4); signed volumes are positive."""
+
+
+class Snapshot(NamedTuple):
+    """The whole state of the body at one instant. Copies."""
+
+    positions: FloatArray
+    """[m], shape (n_nodes, 3)."""
+    rest_positions: FloatArray
+    """[m], shape (n_nodes, 3)."""
+    velocities: FloatArray
+    """[m/s], shape (n_nodes, 3)."""
+    masses: FloatArray
+    """[kg], shape (n_nodes,)."""
+    tetrahedra: IntArray
+    """Shape (n_tets, 4)."""
+    fixed: BoolArray
+    """Nodes that do not move, shape (n_nodes,)."""
+
+
+class Surface(NamedTuple):
+    """The boundary triangles of the body: its skin and the faces that the blade made. Copies."""
+
+    positions: FloatArray
+    """[m], shape (n_vertices, 3)."""
+    rest_positions: FloatArray
+    """[m], shape (n_vertices, 3): three-dimensional texture coordinates, and what does not move."""
+    triangles: IntArray
+    """Indices into the vertices, shape (n_triangles, 3), counter-clockwise seen from outside."""
+    is_cut: BoolArray
+    """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
