@@ -1,0 +1,1 @@
+"""Files that hold tetrahedra, one format a module."""
