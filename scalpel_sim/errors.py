@@ -1,0 +1,37 @@
+"""Errors that a user can act on, and the exit code that each one means."""
+
+import difflib
+from collections.abc import Iterable
+
+EXIT_OK = 0
+EXIT_RUN_FAILED = 1
+EXIT_WRONG_USE = 2
+
+
+class UsageError(ValueError):
+    """What was asked for cannot be: an unknown name, a file that is no mesh. Exit code 2."""
+
+
+class RunError(RuntimeError):
+    """What was asked for is sound, and still failed: a port in use, a full disk. Exit code 1."""
+
+
+class Interrupted(RunError):
+    """The user, or the system, ended the run before its time. Exit code 1."""
+
+
+def exit_code(error: BaseException) -> int:
+    """Return the exit code for an error that reached the command line.
+
+    A `ValueError` is the language's own word for a wrong argument, and all parts of the project
+    raise one at their border; everything else went wrong on the way.
+    """
+    return EXIT_WRONG_USE if isinstance(error, ValueError) else EXIT_RUN_FAILED
+
+
+def unknown(kind: str, name: str, choices: Iterable[str]) -> UsageError:
+    """Return the error for a name that is not among `choices`: the nearest one, then all of them."""
+    choices = list(choices)
+    near = difflib.get_close_matches(name.lower(), choices, n=1, cutoff=0.5)
+    hint = f"Did you mean '{near[0]}'? " if near else ""
+    return UsageError(f"no {kind} is called '{name}'. {hint}Known: {', '.join(choices)}.")

@@ -1,0 +1,66 @@
+"""What happened in each frame, as one table of numbers."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tissue.types import FloatArray
+
+COLUMNS = (
+    "time_s",
+    "tip_x_m",
+    "tip_y_m",
+    "tip_z_m",
+    "force_x_n",
+    "force_y_n",
+    "force_z_n",
+    "torque_x_nm",
+    "torque_y_nm",
+    "torque_z_nm",
+    "cut_area_m2",
+    "tetrahedra",
+    "anchored_length_m",
+    "work_of_blade_j",
+    "cd_s",
+    "gc_s",
+    "rx_s",
+    "rd_s",
+    "frame_s",
+)
+"""Names and units. Vectors are in the world frame; force and torque are what the blade feels, the
+torque about the tip. `cd_s` to `rd_s` are wall times of the stages that the paper's Table 1 names;
+`frame_s` is the wall time of the whole frame without pictures (`rd_s`)."""
+
+FRAMES_AT_FIRST = 1024
+
+
+class Recording:
+    """Rows of `COLUMNS`, one a frame. Grows by doubling, so that a frame allocates nothing."""
+
+    def __init__(self, n_frames: int = FRAMES_AT_FIRST) -> None:
+        self._rows = np.zeros((max(n_frames, 1), len(COLUMNS)))
+        self._n = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def rows(self) -> FloatArray:
+        """All frames so far, shape (n_frames, n_columns). A view."""
+        return self._rows[: self._n]
+
+    def append(self, row: Sequence[float]) -> None:
+        """Add one frame: a number for each of `COLUMNS`."""
+        if self._n == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        self._rows[self._n] = row
+        self._n += 1
+
+    def column(self, name: str) -> FloatArray:
+        """Return one column, shape (n_frames,). A view."""
+        return self.rows[:, COLUMNS.index(name)]
+
+    def vector(self, name: str) -> FloatArray:
+        """Return the three columns of `tip`, `force` or `torque`, shape (n_frames, 3). A view."""
+        first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
+        return self.rows[:, first : first + 3]
