@@ -1,16 +1,44 @@
 """How a sweep reaches the tissue. The arm side cannot tell one link from another."""
 
-from typing import Protocol
+from __future__ import annotations
 
-from tissue.tissue import Tissue
-from tissue.types import BladeSweep, Snapshot, StepResult, Surface
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from tissue.material import Material
+from tissue.types import BladeSweep, FloatArray, Snapshot, StepResult, Surface
+
+if TYPE_CHECKING:  # the side without the tissue starts without its compiler
+    from tissue.tissue import Tissue
+
+
+class LinkError(ConnectionError):
+    """The tissue cannot be reached, does not answer, or answers what nobody can read."""
+
+
+class TissueDescription(NamedTuple):
+    """What the arm side must know of a body that it does not hold."""
+
+    scene: str
+    """What was built, as the command line names it."""
+    material: Material
+    bounds: FloatArray
+    """Lowest and highest corner now [m], shape (2, 3)."""
+    n_tetrahedra: int
+    n_nodes: int
 
 
 class TissueLink(Protocol):
-    """A tissue that is here, in another process, or on another machine."""
+    """A tissue that is here, or in another process."""
+
+    def describe(self) -> TissueDescription:
+        """Return what the arm side must know of the body now."""
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Let the tissue live through `dt` [s] while the blade does `sweep` (None: no blade near)."""
+        """Let the tissue live through `dt` [s] while the blade does `sweep` (None: no blade near).
+
+        Raises:
+            LinkError: the tissue is in another process and did not answer.
+        """
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
@@ -28,8 +56,19 @@ class TissueLink(Protocol):
 class InProcessLink:
     """A tissue in this process: a call is a call."""
 
-    def __init__(self, tissue: Tissue) -> None:
+    def __init__(self, tissue: Tissue, scene: str = "") -> None:
         self._tissue = tissue
+        self._scene = scene
+
+    def describe(self) -> TissueDescription:
+        """See `TissueLink.describe`."""
+        return TissueDescription(
+            self._scene,
+            self._tissue.material,
+            self._tissue.bounds,
+            self._tissue.n_tetrahedra,
+            self._tissue.n_nodes,
+        )
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """See `TissueLink.step`."""
