@@ -1,0 +1,151 @@
+// A flip-book: one packet for each instant, played in simulated time, in a loop.
+"use strict";
+
+const PAUSE_AT_END = 0.8; // [s] before the loop starts again
+
+class Player {
+    constructor(frames, times) {
+        this.frames = frames;
+        this.times = times;
+        this.first = times[0];
+        this.length = times[times.length - 1] - times[0];
+        this.speed = 1;
+        this.now = 0; // [s] since the first frame
+        this.shown = -1;
+        this.isPlaying = false;
+        const scrubber = element("scrubber");
+        scrubber.max = this.length;
+        scrubber.step = "any";
+        scrubber.addEventListener("input", () => { this.pause(); this.seek(Number(scrubber.value)); });
+        element("play").addEventListener("click", () => this.toggle());
+        element("speed").addEventListener("change", (event) => { this.speed = Number(event.target.value); });
+        window.addEventListener("keydown", (event) => {
+            if (event.key === " ") { event.preventDefault(); this.toggle(); }
+            if (event.key === "ArrowRight") this.turn(1);
+            if (event.key === "ArrowLeft") this.turn(-1);
+        });
+        this.seek(0);
+    }
+
+    play() {
+        this.isPlaying = true;
+        element("play").textContent = "❚❚ pause";
+        let before = performance.now();
+        const advance = (now) => {
+            if (!this.isPlaying) return;
+            const next = this.now + this.speed * (now - before) / 1000;
+            before = now;
+            this.seek(next > this.length + PAUSE_AT_END * this.speed ? 0 : next);
+            requestAnimationFrame(advance);
+        };
+        requestAnimationFrame(advance);
+    }
+
+    pause() {
+        this.isPlaying = false;
+        element("play").textContent = "▶ play";
+    }
+
+    toggle() {
+        if (this.isPlaying) this.pause();
+        else this.play();
+    }
+
+    turn(pages) {
+        this.pause();
+        const page = Math.min(Math.max(this.shown + pages, 0), this.frames.length - 1);
+        this.seek(this.times[page] - this.first);
+    }
+
+    seek(now) {
+        this.now = now;
+        element("scrubber").value = now;
+        let page = 0;
+        while (page + 1 < this.times.length && this.times[page + 1] - this.first <= now + 1e-9) page += 1;
+        if (page === this.shown) return;
+        this.shown = page;
+        viewer.handle_command(this.frames[page]);
+        chart.mark(page);
+    }
+}
+
+// Force over time, with a mark where the replay is.
+class Chart {
+    constructor(frames) {
+        this.forces = frames.map((frame) => {
+            const readings = frame.commands.find((command) => command.type === "set_readings");
+            return readings ? Math.hypot(...readings.force) : 0;
+        });
+        this.canvas = document.createElement("canvas");
+        this.canvas.id = "chart";
+        this.canvas.width = 2 * 204;
+        this.canvas.height = 2 * 54;
+        element("readings").append(this.canvas);
+    }
+
+    mark(page) {
+        const { width, height } = this.canvas;
+        const context = this.canvas.getContext("2d");
+        const peak = Math.max(...this.forces, 1e-9);
+        const x = (i) => 4 + (width - 8) * i / Math.max(this.forces.length - 1, 1);
+        const y = (force) => height - 6 - (height - 14) * force / peak;
+        context.clearRect(0, 0, width, height);
+        context.lineWidth = 3;
+        context.lineJoin = "round";
+        for (const [colour, end] of [["#c9b6b2", this.forces.length], ["#a33b30", page + 1]]) {
+            context.strokeStyle = colour;
+            context.beginPath();
+            this.forces.slice(0, end).forEach((force, i) => context.lineTo(x(i), y(force)));
+            context.stroke();
+        }
+        context.fillStyle = "#a33b30";
+        context.beginPath();
+        context.arc(x(page), y(this.forces[page]), 5, 0, 2 * Math.PI);
+        context.fill();
+    }
+}
+
+function decode(bytes) {
+    const { handle_command: apply } = viewer;
+    let decoded;
+    viewer.handle_command = (command) => { decoded = command; };
+    viewer.handle_command_bytearray(bytes);
+    viewer.handle_command = apply;
+    return decoded;
+}
+
+// Geometries are made once and kept for the next time round.
+function keepGeometries(frame) {
+    for (const command of frame.commands) {
+        if (command.type !== "set_object") continue;
+        command.geometry = geometryOf(command.object.geometries[0].data);
+        command.geometry.isKept = true;
+        command.object.geometries = [];
+    }
+    return frame;
+}
+
+async function unpack(script) {
+    const packed = await fetch(`data:application/octet-stream;base64,${script.textContent.trim()}`);
+    const body = packed.body.pipeThrough(new DecompressionStream("gzip"));
+    return decode(new Uint8Array(await new Response(body).arrayBuffer()));
+}
+
+let chart, player;
+
+async function start() {
+    const [opening, ...packed] = document.querySelectorAll("script.packet");
+    viewer.handle_command(await unpack(opening));
+    setWireframe(picture.wireframe);
+    const frames = [];
+    for (const script of packed) {
+        frames.push(keepGeometries(await unpack(script)));
+        script.remove();
+        if (frames.length === 1) viewer.handle_command(frames[0]);
+    }
+    chart = new Chart(frames);
+    player = new Player(frames, packed.map((script) => Number(script.dataset.time)));
+    player.play();
+}
+
+start().catch((error) => { element("status").textContent = `this replay cannot be shown: ${error}`; });
