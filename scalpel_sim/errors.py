@@ -30,7 +30,7 @@ def exit_code(error: BaseException) -> int:
 
 
 def unknown(kind: str, name: str, choices: Iterable[str]) -> UsageError:
-    """Return the error for a name that is not among `choices`: the nearest one, then all of them."""
+    """Return the error for a name that is not among `choices`: the nearest, then all."""
     choices = list(choices)
     near = difflib.get_close_matches(name.lower(), choices, n=1, cutoff=0.5)
     hint = f"Did you mean '{near[0]}'? " if near else ""

@@ -1,0 +1,6 @@
+"""`python -m scalpel_sim` is `scalpel-sim`."""
+
+from scalpel_sim.cli import main
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""Force and cut area over time, as one picture."""
+
+from pathlib import Path
+
+import numpy as np
+
+from scalpel_sim.recording import Recording
+
+# Okabe and Ito's palette: told apart by those who see fewer colours too.
+COMPONENTS = (("x", "#d55e00"), ("y", "#009e73"), ("z", "#0072b2"))
+MAGNITUDE = "#222222"
+AREA = "#aa3377"
+DOTS_PER_INCH = 150
+MM2_PER_M2 = 1e6
+
+
+def plot_forces(recording: Recording, title: str, path: Path) -> None:
+    """Write a PNG: the force on the blade above, the area that it has cut below."""
+    # Late, and without pyplot: importing it costs more than many a run.
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    time = recording.column("time_s")
+    force = recording.vector("force")
+
+    figure = Figure(figsize=(8.0, 5.4), layout="constrained")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+    figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+
+    above.plot(time, np.linalg.norm(force, axis=1), color=MAGNITUDE, lw=1.6, label="magnitude")
+    for i, (axis, colour) in enumerate(COMPONENTS):
+        above.plot(time, force[:, i], color=colour, lw=1.0, label=f"${axis}$")
+    above.set_ylabel("force on the blade [N]")
+    above.legend(ncols=4, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), fontsize=9)
+
+    area = recording.column("cut_area_m2") * MM2_PER_M2
+    below.fill_between(time, area, color=AREA, alpha=0.15, lw=0.0)
+    below.plot(time, area, color=AREA, lw=1.6)
+    below.set_ylabel("cut area [mm²]")
+    below.set_ylim(bottom=0.0)
+    below.set_xlabel("time [s]")
+
+    for axes in (above, below):
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.grid(color="0.9", lw=0.6)
+        axes.set_axisbelow(True)
+        axes.margins(x=0.0)
+    figure.align_ylabels()
+    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)

@@ -1,0 +1,40 @@
+"""From a scene to a simulation: body, stroke through it, and an arm that reaches."""
+
+from bridge.frames import TissueFrame
+from bridge.link import InProcessLink, TissueLink
+from scalpel_sim.arm import Arm
+from scalpel_sim.body import make_tissue
+from scalpel_sim.hand import Hand
+from scalpel_sim.placement import place
+from scalpel_sim.planning import check_meets, plan
+from scalpel_sim.scenes import Scene, read_stroke
+from scalpel_sim.simulation import Simulation
+from tissue.types import TetrahedralMesh
+
+
+def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
+    """Return the simulation of a scene, at its start.
+
+    The stroke is planned on the body as it lies there, sagged and stretched: what the link says of
+    it is all that is used, so that a body elsewhere gives the same run as one that is here.
+
+    Args:
+        scene: What to cut, and how.
+        link: A body that is elsewhere already; None makes the scene's own in this process.
+
+    Raises:
+        ValueError: the scene does not fit together; each part says how.
+        LinkError: the body is elsewhere, and cannot be reached.
+    """
+    if link is None:
+        link = InProcessLink(make_tissue(scene), scene.name)
+    body = link.snapshot()
+    mesh = TetrahedralMesh(body.positions, body.tetrahedra)
+    stroke = read_stroke(scene) or plan(
+        scene.stroke, mesh, speed=scene.speed, material=link.describe().material
+    )
+    check_meets(stroke, mesh)
+    placement = place(scene.arm, stroke)
+    frame = TissueFrame(origin=placement.tissue_origin)
+    arm = Arm(placement)
+    return Simulation(arm, Hand(arm), stroke, link, frame)

@@ -1,0 +1,109 @@
+"""One run, from a simulation at its start to a folder of files, whatever may end it."""
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+from bridge.link import LinkError
+from scalpel_sim import outputs as files
+from scalpel_sim.errors import Interrupted, RunError
+from scalpel_sim.outputs import Outputs
+from scalpel_sim.pictures import into_replay
+from scalpel_sim.replay import ReplayWriter
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.stop_signals import StopSignals
+from scalpel_sim.summary import COMPLETE, Summary, summarise
+
+log = logging.getLogger(__name__)
+
+REST_AFTER_STROKE = 0.3
+"""How long a run goes on after the stroke's end [s]: the tissue swings out, and the cut gapes."""
+
+
+def perform(
+    simulation: Simulation,
+    outputs: Outputs,
+    *,
+    settings: dict[str, Any],
+    seed: int = 0,
+    seconds: float | None = None,
+    every_frame: Callable[[Simulation], None] | None = None,
+) -> Summary:
+    """Do the run, and write its files.
+
+    A run that ends before its time, by the user, the system or an error, leaves the files of the
+    part that it did, and says in the summary's `status` what ended it.
+
+    Args:
+        simulation: At its start.
+        outputs: Where the files go.
+        settings: What to keep in the summary beside the figures.
+        seed: The same.
+        seconds: How long [s]; None for the stroke and `REST_AFTER_STROKE`.
+        every_frame: Called after each frame.
+
+    Raises:
+        Interrupted: the user or the system ended the run.
+        RunError: the run failed, or a file could not be written. The other files are.
+    """
+    seconds = run_time(simulation, seconds)
+    link = simulation.link
+    body = link.describe()
+    outputs.write_mesh(files.INITIAL, link.snapshot())
+    title = f"{body.scene}: {settings['stroke']} stroke"
+    replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
+    simulation.pictures.append(into_replay(replay))
+
+    status, failure = COMPLETE, None
+    with StopSignals() as stop:
+
+        def after_frame(now: Simulation) -> bool:
+            outputs.write_forces(now.recording)
+            if every_frame is not None:
+                every_frame(now)
+            return stop.reason is not None
+
+        try:
+            simulation.run(seconds, after_frame)
+        except Exception as error:
+            status, failure = f"failed: {error}", error
+    status = stop.reason or status
+
+    outputs.write_forces(simulation.recording, all_rows=True)
+    pieces = None
+    try:
+        outputs.write_mesh(files.FINAL, link.snapshot())
+        pieces = link.pieces()
+    except LinkError as error:
+        log.warning("%s is not written: %s", files.FINAL, error)
+    result = simulation.bridge.result
+    summary = summarise(
+        simulation.recording,
+        scene=body.scene,
+        status=status,
+        seed=seed,
+        dt=simulation.dt,
+        wall_seconds=simulation.wall_seconds,
+        tetrahedra_initial=body.n_tetrahedra,
+        tetrahedra_final=body.n_tetrahedra if result is None else result.n_tetrahedra,
+        pieces=pieces,
+        counters=simulation.bridge.counters._asdict(),
+        settings=settings,
+    )
+    outputs.write_summary(summary)
+    outputs.write_plot(simulation.recording, title)
+    outputs.write_replay(replay)
+    outputs.close()
+
+    if failure is not None:
+        raise RunError(f"the run failed after {simulation.time:.3f} s: {failure}") from failure
+    if stop.reason is not None:
+        raise Interrupted(
+            f"{stop.reason} after {simulation.time:.3f} s; {outputs.folder} holds what it did"
+        )
+    return summary
+
+
+def run_time(simulation: Simulation, seconds: float | None) -> float:
+    """Return how long to simulate [s]: what was asked for, else the stroke and a rest."""
+    return simulation.stroke.duration + REST_AFTER_STROKE if seconds is None else seconds

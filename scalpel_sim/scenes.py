@@ -1,0 +1,187 @@
+"""What lies on the table: a body, what it is made of, how it is held, and the stroke through it."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridge.link import TissueLink
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.planning import STROKES
+from scalpel_sim.stroke import Stroke, from_csv
+from tissue.material import Material
+from tissue.mesh_io import read_mesh
+from tissue.shapes import grid, organ
+from tissue.types import TetrahedralMesh
+
+ARMS = ("auto", "touch", "premium")
+
+PHANTOM = Material(young_modulus=10e3, density=1000.0, toughness=20.0)
+"""A soft gel phantom. toughness / young_modulus = 2 mm: the length by which the blade drags the
+tissue along before the tissue parts. It must be small against the body, or the blade draws the
+body after itself instead of cutting it."""
+
+PARENCHYMA = Material(young_modulus=15e3, density=1060.0, toughness=30.0)
+"""Firm organ tissue: stiffness of a liver at small strain, toughness well below the 150 J/m2 of
+liver with its vessels, so that toughness / young_modulus is 2 mm here too."""
+
+STANDARD_GRAVITY = 9.81
+"""[m/s2], along -z."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A body and what is to be done to it. Lengths in metres, tissue frame."""
+
+    name: str
+    about: str
+    """One line for a person."""
+    mesh: Callable[[], TetrahedralMesh]
+    material: Material = PHANTOM
+    fixed: str = "left,right"
+    """Which nodes do not move: names of sides, a box, or `none`; see `tissue.boundary`."""
+    stretch: float = 0.0
+    """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
+    Living tissue is under tension: a slit opens."""
+    gravity: float = STANDARD_GRAVITY
+    """[m/s2], along -z."""
+    stroke: str = "straight"
+    """A name known to `scalpel_sim.stroke`, or a CSV file."""
+    speed: float = 0.06
+    """Of the blade's tip [m/s]."""
+    arm: str = "auto"
+    """`touch`, `premium`, or `auto`: the first of them that reaches."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that mean nothing.
+
+        Raises:
+            UsageError: stretch, gravity or speed is out of range.
+        """
+        if not -0.5 <= self.stretch <= 1.0:
+            raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")
+        if not 0.0 <= self.gravity <= 100.0:
+            raise UsageError(f"gravity is {self.gravity} m/s2; it must lie between 0 and 100")
+        if not 0.0 < self.speed <= 1.0:
+            raise UsageError(f"speed is {self.speed} m/s; it must be above 0 and at most 1")
+
+    def settings(self) -> dict[str, Any]:
+        """Return the numbers and names of the scene, for a report."""
+        found = {field.name: getattr(self, field.name) for field in fields(self)}
+        del found["name"], found["mesh"]
+        return found | {"material": asdict(self.material)}
+
+
+SCENES = {
+    scene.name: scene
+    for scene in (
+        Scene(
+            "organ",
+            "an organ of some 5,000 tetrahedra, 90 x 60 x 30 mm",
+            organ,
+            material=PARENCHYMA,
+            stretch=0.05,
+        ),
+        Scene(
+            "slab",
+            "the paper's Figure 10: 4 x 6 x 4 cells, 576 tetrahedra",
+            lambda: grid((4, 6, 4), (0.04, 0.06, 0.04)),
+            stretch=0.05,
+        ),
+        Scene(
+            "grid2",
+            "the paper's Figure 12 a: 2 x 2 x 2 cells, 48 tetrahedra",
+            lambda: grid((2, 2, 2), (0.04, 0.04, 0.04)),
+            stretch=0.05,
+        ),
+        Scene(
+            "grid7",
+            "the paper's Figure 12 b: 7 x 7 x 7 cells, 2,058 tetrahedra",
+            lambda: grid((7, 7, 7), (0.04, 0.04, 0.04)),
+            stretch=0.05,
+        ),
+    )
+}
+"""The scenes that come with the project, by name."""
+
+DEFAULT_SCENE = "organ"
+
+
+def scene_called(name: str) -> Scene:
+    """Return the scene of that name.
+
+    Raises:
+        UsageError: there is none; the message says which there are.
+    """
+    if name not in SCENES:
+        raise unknown("scene", name, SCENES)
+    return SCENES[name]
+
+
+def mesh_scene(path: Path, scale: float = 1.0) -> Scene:
+    """Return a scene around a mesh from a file, named after it. The file is read once, here.
+
+    Raises:
+        MeshError: the file holds no mesh that could be cut.
+        UsageError: the scale is no positive number.
+    """
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise UsageError(
+            f"--scale is {scale}; it must be positive: the metres in one unit of {path}"
+        )
+    mesh = read_mesh(path, scale)
+    return Scene(path.stem, f"the mesh {path.name}", lambda: mesh)
+
+
+def scene_of(link: TissueLink) -> Scene:
+    """Return a scene around a body that is there already.
+
+    Raises:
+        LinkError: the body is elsewhere, and cannot be reached.
+    """
+    body = link.describe()
+    known = SCENES.get(body.scene)
+    if known is not None:
+        return replace(known, material=body.material)
+    rest = link.snapshot()
+    mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra)
+    return Scene(body.scene, f"the body '{body.scene}'", lambda: mesh, material=body.material)
+
+
+def check_motion(scene: Scene) -> None:
+    """Refuse a stroke or an arm that there is not.
+
+    Raises:
+        UsageError: neither a known name nor a CSV file; an arm that is not known.
+    """
+    read_stroke(scene)
+    if scene.arm not in ARMS:
+        raise unknown("arm", scene.arm, ARMS)
+
+
+def read_stroke(scene: Scene) -> Stroke | None:
+    """Return the stroke of a CSV file, or None for one that is to be planned.
+
+    Raises:
+        UsageError: neither a known name nor a CSV file.
+    """
+    if scene.stroke.lower().endswith(".csv"):
+        return from_csv(scene.stroke)
+    if scene.stroke not in STROKES:
+        raise unknown("stroke", scene.stroke, [*STROKES, "a file ending in .csv"])
+    return None
+
+
+def changed(scene: Scene, **changes: Any) -> Scene:
+    """Return the scene with those fields and material properties replaced that are not None.
+
+    A stretch that came with the scene is dropped where other sides are held; one that was asked
+    for stays, and is refused later where nothing can be pulled.
+    """
+    given = {name: value for name, value in changes.items() if value is not None}
+    if given.get("fixed", scene.fixed) != scene.fixed:
+        given.setdefault("stretch", 0.0)
+    material = {name: given.pop(name) for name in list(given) if hasattr(scene.material, name)}
+    return replace(scene, material=replace(scene.material, **material), **given)

@@ -1,0 +1,136 @@
+"""The frame loop: arm, blade, bridge, and back, a thousand times a simulated second."""
+
+import gc
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
+
+from bridge.bridge import Bridge
+from bridge.frames import TissueFrame
+from bridge.link import TissueLink
+from scalpel_sim.arm import Arm
+from scalpel_sim.hand import Hand
+from scalpel_sim.recording import Recording
+from scalpel_sim.stroke import Stroke
+from tissue.types import StepResult, Wrench
+
+EveryFrame = Callable[["Simulation"], bool | None]
+"""Called after each frame; a run ends early where it returns True."""
+
+Picture = Callable[["Simulation"], None]
+"""Called after each frame too, and takes what it wants to show: a replay, a live viewer."""
+
+
+class Simulation:
+    """An arm that leads a blade along a stroke, and the tissue that the blade meets.
+
+    Args:
+        arm: At the start of the stroke. `arm.model` and `arm.data` are MuJoCo's own.
+        hand: What holds the arm.
+        stroke: Where the hand leads the blade, tissue frame.
+        link: The tissue.
+        frame: Where the tissue lies in the world.
+    """
+
+    def __init__(
+        self, arm: Arm, hand: Hand, stroke: Stroke, link: TissueLink, frame: TissueFrame
+    ) -> None:
+        self.arm = arm
+        self.hand = hand
+        self.stroke = stroke
+        self.link = link
+        self.frame = frame
+        self.bridge = Bridge(link, frame, arm.limits)
+        self.wrench = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
+        """What the blade felt in the last frame, world frame."""
+        self.recording = Recording()
+        """What happened in each frame so far."""
+        self.pictures: list[Picture] = []
+        """Called after each frame, outside its clock; most frames they let pass."""
+        self.wall_seconds = 0.0
+        """Wall time spent in frames and pictures so far."""
+        self.dt: float = arm.model.opt.timestep
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]: that of the frames so far."""
+        return len(self.recording) * self.dt
+
+    @property
+    def result(self) -> StepResult:
+        """What the tissue did in the last frame, tissue frame."""
+        result = self.bridge.result
+        if result is None:
+            raise RuntimeError("no frame has been done yet: call step() or run() first")
+        return result
+
+    def step(self) -> Wrench:
+        """Do one frame and return what the blade felt in it.
+
+        Raises:
+            ArmError: MuJoCo's state is no longer finite.
+            CouplingError: the tissue answered with what no arm may feel.
+            LinkError: the tissue is elsewhere, and did not answer.
+        """
+        start = time.perf_counter()
+        self.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
+        self.arm.step1()
+        segment = self.arm.blade.segment()
+        self.wrench = self.bridge.step(segment, self.dt)
+        self.arm.blade.apply(self.wrench)
+        self.arm.step2()
+        self.arm.check()
+        framed = time.perf_counter()
+        for picture in self.pictures:
+            picture(self)
+        drawn = time.perf_counter()
+
+        result = self.result
+        self.recording.append(
+            (
+                self.time,
+                *segment.tip,
+                *self.wrench.force,
+                *self.wrench.torque,
+                result.cut_area,
+                result.n_tetrahedra,
+                result.anchored_length,
+                result.work_of_blade,
+                result.profile.collision,
+                result.profile.topology,
+                result.profile.relaxation,
+                drawn - framed,
+                framed - start,
+            )
+        )
+        self.wall_seconds += time.perf_counter() - start
+        return self.wrench
+
+    def run(self, seconds: float, every_frame: EveryFrame | None = None) -> None:
+        """Do frames until `seconds` of simulated time have passed, or `every_frame` says so."""
+        n_frames = round(seconds / self.dt)
+        with no_garbage_collection():
+            while len(self.recording) < n_frames:
+                self.step()
+                if every_frame is not None and every_frame(self):
+                    return
+
+
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Keep Python's cycle collector out of the frames, where it would cost milliseconds at random.
+
+    A frame makes no cycles: what it allocates is freed by counting references.
+    """
+    was_enabled = gc.isenabled()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        if was_enabled:
+            gc.enable()

@@ -1,0 +1,56 @@
+"""Every kernel, run once before the clock starts."""
+
+import logging
+from pathlib import Path
+
+import numpy as np
+
+from tissue.boundary import fixed_nodes
+from tissue.jit import _cache_directory
+from tissue.shapes import grid
+from tissue.tissue import Tissue
+from tissue.types import BladeSegment, BladeSweep
+
+log = logging.getLogger(__name__)
+
+SIDE = 0.02
+"""Of the block that is cut [m]."""
+N_STEPS = 20
+DT = 1e-3
+
+
+def kernels_are_compiled() -> bool:
+    """Return whether binaries of these very sources lie in the cache."""
+    return any(Path(_cache_directory()).rglob("*.nbi"))
+
+
+def warm_up() -> None:
+    """Load the kernels, or compile them where this is the first run of these sources.
+
+    A small block is settled, cut half through and looked at: the run that follows does nothing
+    that this did not do.
+    """
+    if not kernels_are_compiled():
+        log.warning("compiling kernels, first run only (about a minute)")
+    mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
+    tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"))
+    tissue.settle()
+    before = _edge(-0.1)
+    for fraction in np.linspace(-0.1, 0.6, N_STEPS):
+        after = _edge(fraction)
+        tissue.step(BladeSweep(before, after), DT)
+        before = after
+    tissue.step(None, DT)
+    tissue.surface()
+    tissue.snapshot()
+    tissue.pieces()
+
+
+def _edge(fraction: float) -> BladeSegment:
+    """Return an upright edge in the block's middle, `fraction` of the way from front to back."""
+    x, y = SIDE / 2.0, fraction * SIDE
+    return BladeSegment(
+        tip=np.array([x, y, -SIDE]),
+        heel=np.array([x, y, 2.0 * SIDE]),
+        forward=np.array([0.0, 1.0, 0.0]),
+    )
