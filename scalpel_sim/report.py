@@ -16,7 +16,7 @@ MJ_PER_J = 1e3
 
 
 class PaperRow(NamedTuple):
-    """A row of Table 1 of Bielser, Maiwald and Gross (1999), measured on an SGI Indigo 2."""
+    """A row of Table 1 of Bielser, Maiwald and Gross (1998), measured on an SGI Indigo 2."""
 
     tetrahedra_initial: int
     tetrahedra_final: int
@@ -40,7 +40,7 @@ def print_table(summary: Summary, console: Console) -> None:
     if paper is not None:
         table.show_header = True
         table.columns[1].header = "this run"
-        table.add_column("paper (1999)", justify="right", style="dim")
+        table.add_column("paper (1998)", justify="right", style="dim")
 
     def row(label: str, ours: str, theirs: str = "") -> None:
         table.add_row(label, ours, *([theirs] if paper else []))
