@@ -68,7 +68,7 @@ class BroadPhase:
     def __init__(
         self, bounds: FloatArray, sound_speed: float, fixtures: Iterable[Fixture] = ()
     ) -> None:
-        self._bounds = bounds
+        self._bounds = bounds.copy()
         self._sound_speed = sound_speed
         self._bounds_speed = 0.0
         self._blade = _Box()
@@ -105,7 +105,7 @@ class BroadPhase:
     def tissue_moved(self, bounds: FloatArray, dt: float) -> None:
         """Take note of where the tissue is after a step of `dt` [s]."""
         self._bounds_speed = float(np.abs(bounds - self._bounds).max()) / dt
-        self._bounds = bounds
+        self._bounds = bounds.copy()
 
 
 def swept_box(sweep: BladeSweep) -> SweptBox:

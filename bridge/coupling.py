@@ -20,6 +20,10 @@ ABSURD_FRAMES_IN_A_ROW = 10
 a run may be rolled. A single one may be a node that the blade flicks and that comes to rest."""
 
 
+ROUNDING = 1e-15
+"""By which fraction to stay below a limit, so that rounding never carries a force above it."""
+
+
 class CouplingError(RuntimeError):
     """The tissue does not answer with a wrench that an arm may feel. The arm must let go of it."""
 
@@ -137,4 +141,4 @@ class Coupling:
 
 def _factor(limit: float, size: float) -> float:
     """Return by what to multiply something of this size to keep it within its limit."""
-    return limit / size if size > limit else 1.0
+    return limit / size * (1.0 - ROUNDING) if size > limit else 1.0

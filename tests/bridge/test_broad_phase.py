@@ -1,0 +1,140 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.broad_phase import BroadPhase, swept_box
+from bridge.fixtures import FixtureBox, FixtureMesh
+from tissue.types import BladeSegment, BladeSweep
+
+UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+SOUND_SPEED = 3.0
+DT = 1e-3
+FORWARD_LIKE = (0.3, 0.5, 0.7)
+
+coordinates = st.floats(-2.0, 2.0)
+vectors = st.tuples(coordinates, coordinates, coordinates).map(np.array)
+edges = vectors.filter(lambda v: np.linalg.norm(np.cross(v, FORWARD_LIKE)) > 1e-3)
+fractions = st.floats(0.0, 1.0)
+
+
+def segment(tip, edge):
+    tip, edge = np.array(tip, float), np.array(edge, float)
+    forward = np.cross(edge, FORWARD_LIKE)
+    return BladeSegment(tip, tip + edge, forward / np.linalg.norm(forward))
+
+
+def resting(tip, edge=(0.0, 0.0, 1.0)):
+    here = segment(tip, edge)
+    return BladeSweep(here, here)
+
+
+@given(edges, edges, vectors, fractions, fractions, st.tuples(fractions, fractions, fractions))
+def test_an_edge_that_passes_through_the_tissue_is_never_hidden(
+    edge_t0, edge_t1, motion, along, when, inside
+):
+    # Both ends move on straight lines; put the blade where the point at `along` the edge is at
+    # `inside` the unit box at the time `when`.
+    there = when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
+    tip_t0 = np.array(inside) - there
+    sweep = BladeSweep(segment(tip_t0, edge_t0), segment(tip_t0 + motion, edge_t1))
+    assert BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
+
+
+@given(vectors, edges, edges, vectors, fractions, fractions)
+def test_the_swept_box_holds_the_edge_during_the_whole_step(
+    tip, edge_t0, edge_t1, motion, along, when
+):
+    sweep = BladeSweep(segment(tip, edge_t0), segment(tip + motion, edge_t1))
+    point = tip + when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
+    box = swept_box(sweep)
+    assert np.all(np.abs(box.axes.T @ (point - box.centre)) <= 0.5 * box.size)
+
+
+@given(edges)
+def test_the_axes_of_the_swept_box_are_a_rotation(edge):
+    axes = swept_box(resting((0.0, 0.0, 0.0), edge)).axes
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+
+
+def test_a_blade_above_the_tissue_does_not_touch_it():
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(resting((0.5, 0.5, 1.01)), DT).tissue
+
+
+def test_a_blade_beside_a_slanted_tissue_box_is_told_apart_by_its_own_axes():
+    # The axis-aligned box of this diagonal edge would hold the corner (1, 1, 1); its own does not.
+    diagonal = resting((1.5, 0.9, 0.5), (-0.6, 0.6, 0.0))
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(diagonal, DT).tissue
+
+
+def test_a_fast_blade_does_not_tunnel_through_a_thin_sheet():
+    sheet = np.array([[-1.0, 0.0, -1.0], [1.0, 1e-4, 1.0]])
+    before, after = segment((0, -0.5, 0), (0, 0, 0.1)), segment((0, 0.5, 0), (0, 0, 0.1))
+    phase = BroadPhase(sheet, 0.0)
+    assert phase.contacts(BladeSweep(before, after), DT).tissue
+    assert not phase.contacts(BladeSweep(before, before), DT).tissue
+    assert not phase.contacts(BladeSweep(after, after), DT).tissue
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(2.9e-3, True), (3.1e-3, False)])
+def test_the_box_grows_by_what_sound_travels_in_a_step(gap, touches):
+    phase = BroadPhase(UNIT_BOX, SOUND_SPEED)
+    assert phase.contacts(resting((0.5, 0.5, 1.0 + gap)), DT).tissue == touches
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(0.0499, True), (0.0501, False)])
+def test_the_box_of_a_falling_body_grows_by_what_it_fell_in_the_last_step(gap, touches):
+    phase = BroadPhase(UNIT_BOX + np.array([0.0, 0.0, 0.05]), 0.0)
+    phase.tissue_moved(UNIT_BOX, DT)
+    assert phase.contacts(resting((0.5, 0.5, -1.0 - gap)), DT).tissue == touches
+
+
+def test_the_box_follows_the_tissue():
+    phase = BroadPhase(UNIT_BOX, 0.0)
+    phase.tissue_moved(UNIT_BOX + 5.0, 1.0)
+    assert not phase.contacts(resting((0.5, 0.5, 0.5), (0, 0, 0.1)), DT).tissue
+    assert phase.contacts(resting((5.5, 5.5, 5.5), (0, 0, 0.1)), DT).tissue
+
+
+TABLE = FixtureBox("table", np.array([9.0, 9.0, 0.1]), np.array([0.0, 0.0, -0.5]))
+CLAMP = FixtureMesh(
+    "clamp",
+    np.array([[3.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, 0.0, 1.0]]),
+    np.array([[0, 1, 2]]),
+)
+
+
+@pytest.mark.parametrize(
+    ("tip", "named"),
+    [
+        ((0.5, 0.5, 3.0), ()),
+        ((0.5, 0.5, -0.5), ("table",)),
+        ((3.0, 0.2, 0.2), ("clamp",)),
+        ((3.0, 0.2, -0.5), ("table", "clamp")),
+    ],
+)
+def test_the_fixtures_that_the_blade_meets_are_named(tip, named):
+    phase = BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, CLAMP])
+    assert phase.contacts(resting(tip), DT).fixtures == named
+
+
+def test_a_fixture_of_many_triangles_does_not_hide_the_tissue():
+    grid = np.random.default_rng(0).random((3000, 3))
+    mesh = FixtureMesh("gauze", grid, np.arange(3000).reshape(1000, 3))
+    contacts = BroadPhase(UNIT_BOX, 0.0, [mesh]).contacts(resting((0.5, 0.5, 0.0)), DT)
+    assert contacts == (True, ("gauze",))
+
+
+def test_a_turned_box_is_met_where_it_is():
+    s = np.sqrt(0.5)
+    turn = np.array([[s, -s, 0.0], [s, s, 0.0], [0.0, 0.0, 1.0]])
+    bar = FixtureBox("bar", np.array([2.0, 0.02, 2.0]), np.array([5.0, 5.0, 0.0]), turn)
+    phase = BroadPhase(UNIT_BOX, 0.0, [bar])
+    assert phase.contacts(resting((5.5, 5.5, 0.0)), DT).fixtures == ("bar",)
+    assert phase.contacts(resting((5.5, 4.5, 0.0)), DT).fixtures == ()
+
+
+def test_two_fixtures_of_one_name_are_refused():
+    with pytest.raises(ValueError, match="two fixtures have the name 'table'"):
+        BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, TABLE])
