@@ -1,0 +1,168 @@
+"""The arrays of a tetrahedral body, how they grow, and how to walk from tetrahedron to tetrahedron.
+
+Face `f` of a tetrahedron lies opposite its local node `f`. `links[t, f]` names what is behind it:
+4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went.
+Nodes and tetrahedra keep their numbers while they live; both are only ever appended.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.geometry import barycentric_in, smallest_weight
+from tissue.jit import kernel
+from tissue.predicates import Lattice, lattice_around
+from tissue.types import BoolArray, FloatArray, IntArray, TetrahedralMesh
+from tissue.vec3 import Vec3
+
+OUTER = -1
+"""Link of a face on the skin."""
+CUT = -2
+"""Link of a face that a blade made."""
+
+INSIDE_TOLERANCE = 1e-9
+"""A barycentric weight this far below 0 still counts as inside: rounding, not distance."""
+
+LONGEST_WALK = 128
+"""Tetrahedra that `walk` passes through at most. A step of the edge passes through two or three."""
+
+NODES, TETRAHEDRA = 0, 1
+"""Places in `Body.counts`."""
+
+
+class Body(NamedTuple):
+    """Every node and tetrahedron. Rows beyond `counts` are room to grow."""
+
+    rest: FloatArray
+    """Rest positions [m], shape (capacity, 3)."""
+    lattice_rest: IntArray
+    """Rest positions on the lattice, shape (capacity, 3)."""
+    positions: FloatArray
+    """[m], shape (capacity, 3)."""
+    velocities: FloatArray
+    """[m/s], shape (capacity, 3)."""
+    masses: FloatArray
+    """Lumped [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
+    fixed: BoolArray
+    """Nodes that do not move, shape (capacity,)."""
+    node_tetrahedron: IntArray
+    """One tetrahedron around each node; the others follow through links. Shape (capacity,)."""
+    tetrahedra: IntArray
+    """Node indices, shape (capacity, 4)."""
+    links: IntArray
+    """What is behind each face, shape (capacity, 4)."""
+    counts: IntArray
+    """Number of nodes and of tetrahedra, shape (2,)."""
+    lattice: Lattice
+
+
+def build_links(tetrahedra: IntArray) -> IntArray:
+    """Return what is behind each face of each tetrahedron, shape (n_tets, 4).
+
+    Raises:
+        ValueError: a face belongs to more than two tetrahedra.
+    """
+    n = len(tetrahedra)
+    faces = np.empty((4 * n, 3), dtype=np.int64)
+    for f in range(4):
+        faces[f::4] = tetrahedra[:, [k for k in range(4) if k != f]]
+    faces.sort(axis=1)
+    order = np.lexsort(faces.T)
+    same = (faces[order[1:]] == faces[order[:-1]]).all(axis=1)
+    if (same[1:] & same[:-1]).any():
+        at = int(order[np.flatnonzero(same[1:] & same[:-1])[0]]) // 4
+        raise ValueError(f"a face of tetrahedron {at} belongs to three or more tetrahedra")
+    links = np.full(4 * n, OUTER, dtype=np.int64)
+    first, second = order[:-1][same], order[1:][same]
+    links[first], links[second] = second, first
+    return links.reshape(n, 4)
+
+
+def build_body(
+    mesh: TetrahedralMesh, positions: FloatArray | None, fixed: BoolArray | None
+) -> Body:
+    """Return the body of a mesh at rest, its nodes at `positions` [m] (default: at rest)."""
+    rest = np.ascontiguousarray(mesh.positions, dtype=np.float64)
+    tetrahedra = np.ascontiguousarray(mesh.tetrahedra, dtype=np.int64)
+    n = len(rest)
+    lattice = lattice_around(rest)
+    node_tetrahedron = np.zeros(n, dtype=np.int64)
+    node_tetrahedron[tetrahedra[::-1]] = np.arange(len(tetrahedra))[::-1, None]
+    return Body(
+        rest=rest.copy(),
+        lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
+        positions=rest.copy() if positions is None else np.array(positions, dtype=np.float64),
+        velocities=np.zeros_like(rest),
+        masses=np.zeros(n),
+        fixed=np.zeros(n, dtype=np.bool_) if fixed is None else np.array(fixed, dtype=np.bool_),
+        node_tetrahedron=node_tetrahedron,
+        tetrahedra=tetrahedra.copy(),
+        links=build_links(tetrahedra),
+        counts=np.array([n, len(tetrahedra)], dtype=np.int64),
+        lattice=lattice,
+    )
+
+
+def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
+    """Return a copy of `array` with `capacity` rows, the new ones filled with `fill`."""
+    larger = np.full((capacity, *array.shape[1:]), fill, dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
+
+
+def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
+    """Return the body with room for that many nodes and tetrahedra."""
+    of_nodes = ("rest", "lattice_rest", "positions", "velocities", "masses", "fixed")
+    of_nodes += ("node_tetrahedron",)
+    larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
+    larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in ("tetrahedra", "links")}
+    return body._replace(**larger)
+
+
+@kernel
+def local_index(body: Body, t: int, node: int) -> int:
+    """Return which of the four nodes of tetrahedron `t` is `node`, or -1."""
+    for k in range(4):
+        if body.tetrahedra[t, k] == node:
+            return k
+    return -1
+
+
+class Walk(NamedTuple):
+    """Where a walk through the body at rest ended."""
+
+    tetrahedron: int
+    inside: bool
+    """Whether the point is in that tetrahedron."""
+    link: int
+    """Where it is not: OUTER or CUT, what stopped the walk; 0 if it was too long."""
+
+
+@kernel
+def walk(body: Body, p: Vec3, start: int) -> Walk:
+    """Walk from tetrahedron `start` towards the rest point `p` [m], through faces.
+
+    The paper's search for the new active point tetrahedron "in the direct neighbourhood of the
+    old one" (section 3), continued as far as it takes.
+    """
+    t = start
+    for _ in range(LONGEST_WALK):
+        w = barycentric_in(p, body.rest, body.tetrahedra, t)
+        if smallest_weight(w) >= -INSIDE_TOLERANCE:
+            return Walk(t, True, 0)
+        stopped_by = OUTER
+        way = -1
+        lowest = -INSIDE_TOLERANCE
+        for f in range(4):
+            weight = w[f]
+            if weight < -INSIDE_TOLERANCE:
+                if body.links[t, f] >= 0:
+                    if weight < lowest:
+                        lowest = weight
+                        way = f
+                elif body.links[t, f] == CUT:
+                    stopped_by = CUT
+        if way < 0:
+            return Walk(t, False, stopped_by)
+        t = body.links[t, way] // 4
+    return Walk(t, False, 0)

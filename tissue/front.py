@@ -1,0 +1,180 @@
+"""The crack front: the path of an end of the blade through the tissue, as edges of the mesh.
+
+Where the tip passes a face, a node is put there, and successive nodes are joined by edges. Without
+them the sheet inside a tetrahedron that the tip passed through need not be a union of mesh faces:
+it failed for 20 to 50 % of the orders of insertion, and with them for none (algorithms.md 3.1).
+"""
+
+from typing import NamedTuple
+
+from tissue.body import local_index
+from tissue.jit import kernel
+from tissue.predicates import Point, pierces, point
+from tissue.sheet import FULL, N_DIRTY, Cut
+from tissue.snapping import insert_in_face
+from tissue.star import star
+from tissue.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
+
+MOST_EVENTS = 32
+"""Faces that an end of the blade can pass in one step. It is moved by less than half an element."""
+
+PARAMETER_GAP = 1e-9
+"""Two events nearer than this share of the step are one."""
+
+OUTSIDE_TOLERANCE = 1e-6
+"""Weight by which a line through an edge or a corner may miss a face by rounding."""
+
+
+class Event(NamedTuple):
+    """The end of the blade passes a face."""
+
+    when: float
+    """Fraction of the step; 2 where there is none."""
+    a: int
+    b: int
+    c: int
+    weights: Vec3
+    outer: bool
+    """Whether the face is on the skin or on a cut."""
+    leaving: bool
+
+
+@kernel
+def extend_fronts(cut: Cut) -> None:
+    """Extend the crack front at the tip and at the heel by their way in this step."""
+    last = len(cut.path.seed) - 1
+    for end in range(2):
+        sample = 0 if end == 0 else last
+        if cut.path.member[sample]:
+            _extend_front(cut, end, sample)
+        else:
+            cut.sheet.front[end] = -1
+
+
+@kernel
+def _extend_front(cut: Cut, end: int, sample: int) -> None:
+    front = cut.sheet.front
+    when = 0.0
+    for _ in range(MOST_EVENTS):
+        event = _next_event(cut, sample, when)
+        if event.when > 1.0:
+            return
+        when = event.when + PARAMETER_GAP
+        node = insert_in_face(cut, event.a, event.b, event.c, event.weights)
+        if node < 0:
+            return
+        if front[end] >= 0 and not (event.outer and not event.leaving):
+            _join(cut, front[end], node)
+        front[end] = -1 if event.outer and event.leaving else node
+        if cut.change.counts[FULL] != 0:
+            return
+
+
+@kernel
+def _next_event(cut: Cut, sample: int, after: float) -> Event:
+    """The first face that the way of a sample pierces after that fraction of the step."""
+    path, work, change = cut.path, cut.work, cut.change
+    start = point(path.lattice_t0, sample)
+    stop = point(path.lattice_t1, sample)
+    best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), False, False)
+    for i in range(work.n_active[0]):
+        best = _earlier_event(cut, work.active[i], sample, start, stop, after, best)
+    for i in range(change.counts[N_DIRTY]):
+        best = _earlier_event(cut, change.dirty[i], sample, start, stop, after, best)
+    return best
+
+
+@kernel
+def _earlier_event(
+    cut: Cut, t: int, sample: int, start: Point, stop: Point, after: float, best: Event
+) -> Event:
+    body, path = cut.body, cut.path
+    for f in range(4):
+        link = body.links[t, f]
+        if link >= 0 and link // 4 < t:
+            continue  # asked from the other side, unless that one is not active: then it is far
+        a = body.tetrahedra[t, (f + 1) % 4]
+        b = body.tetrahedra[t, (f + 2) % 4]
+        c = body.tetrahedra[t, (f + 3) % 4]
+        pa = point(body.lattice_rest, a)
+        pb = point(body.lattice_rest, b)
+        pc = point(body.lattice_rest, c)
+        if not pierces(start, stop, pa, pb, pc):
+            continue
+        origin = vec3(path.t0, sample)
+        way = sub(vec3(path.t1, sample), origin)
+        when, w = _meet_plane(
+            origin, way, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
+        )
+        when = min(max(when, PARAMETER_GAP), 1.0)
+        if not after < when < best.when:
+            continue
+        normal = cross(
+            sub(vec3(body.rest, b), vec3(body.rest, a)), sub(vec3(body.rest, c), vec3(body.rest, a))
+        )
+        apex = sub(vec3(body.rest, body.tetrahedra[t, f]), vec3(body.rest, a))
+        leaving = dot(normal, way) * dot(normal, apex) < 0.0
+        best = Event(when, a, b, c, w, link < 0, leaving)
+    return best
+
+
+@kernel
+def _meet_plane(origin: Vec3, way: Vec3, a: Vec3, b: Vec3, c: Vec3) -> tuple[float, Vec3]:
+    """Where the line meets the plane of abc: parameter along `way`, and weights of a, b, c."""
+    normal = cross(sub(b, a), sub(c, a))
+    slope = dot(normal, way)
+    squared = dot(normal, normal)
+    if slope == 0.0 or squared == 0.0:
+        return -1.0, Vec3(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+    when = dot(normal, sub(a, origin)) / slope
+    p = Vec3(origin.x + when * way.x, origin.y + when * way.y, origin.z + when * way.z)
+    return when, Vec3(
+        dot(cross(sub(c, b), sub(p, b)), normal) / squared,
+        dot(cross(sub(a, c), sub(p, c)), normal) / squared,
+        dot(cross(sub(b, a), sub(p, a)), normal) / squared,
+    )
+
+
+@kernel
+def _join(cut: Cut, start: int, stop: int) -> None:
+    """Insert nodes along the segment between two nodes until edges of the mesh join them."""
+    body = cut.body
+    around = cut.work.around_too
+    a = start
+    for _ in range(MOST_EVENTS):
+        if a == stop:
+            return
+        n = star(body, cut.visits, a, body.node_tetrahedron[a], around)
+        goal = vec3(body.rest, stop)
+        origin = vec3(body.rest, a)
+        best = -1.0
+        best_when = 1.0
+        best_weights = Vec3(0.0, 0.0, 0.0)
+        b = c = d = 0
+        for i in range(n):
+            t = around[i]
+            if local_index(body, t, stop) >= 0:
+                return
+            k = local_index(body, t, a)
+            p = body.tetrahedra[t, (k + 1) % 4]
+            q = body.tetrahedra[t, (k + 2) % 4]
+            r = body.tetrahedra[t, (k + 3) % 4]
+            when, w = _meet_plane(
+                origin,
+                sub(goal, origin),
+                vec3(body.rest, p),
+                vec3(body.rest, q),
+                vec3(body.rest, r),
+            )
+            smallest = min(w.x, min(w.y, w.z))
+            if when > 0.0 and smallest > best:
+                best, best_when, best_weights = smallest, when, w
+                b, c, d = p, q, r
+        if best < -OUTSIDE_TOLERANCE or best_when >= 1.0:
+            return  # the segment leaves the body: the front goes on from `stop`
+        node = insert_in_face(cut, b, c, d, best_weights)
+        if node < 0:
+            return
+        if norm(sub(goal, vec3(body.rest, node))) >= norm(sub(goal, lerp(0.0, origin, goal))):
+            return  # snapping would lead away from the goal
+        a = node

@@ -1,0 +1,338 @@
+"""Open the sheet: cut the links across the faces that tile it, and give each lip its own nodes.
+
+A face is cut if its three nodes lie on the sheet and the tetrahedra on its two sides are on
+different sides of the sheet. A node whose tetrahedra then no longer hang together is doubled
+(algorithms.md 3.4, steps 5 to 7).
+"""
+
+from tissue.body import CUT, NODES, Body, local_index
+from tissue.geometry import tetrahedron_volume, triangle_area
+from tissue.jit import kernel
+from tissue.sheet import (
+    FULL,
+    N_DIRTY,
+    N_FACES,
+    N_FLAGGED,
+    Cut,
+    decide_side,
+    decided_side,
+    note_dirty,
+    on_sheet,
+    plane_near,
+    side_of,
+    touch,
+)
+from tissue.star import Visits, star
+from tissue.types import IntArray
+from tissue.vec3 import Vec3, dot, sub, vec3
+
+CRUMB_TETRAHEDRA = 16
+"""A closed piece of more tetrahedra than this is never taken for a crumb."""
+
+
+@kernel
+def open_sheet(cut: Cut) -> None:
+    """Cut the faces that now tile the sheet."""
+    _mark(cut)
+    _keep_crumbs(cut)
+    change = cut.change
+    for i in range(change.counts[N_FACES]):
+        _unglue_face(cut, i)
+    for i in range(change.counts[N_FLAGGED]):
+        _unglue_fans(cut, change.flagged[i])
+
+
+@kernel
+def _mark(cut: Cut) -> None:
+    """Cut every face between the two sides, in the tetrahedra that this step can have changed."""
+    body, work, change = cut.body, cut.work, cut.change
+    for i in range(work.n_active[0]):
+        _mark_around(cut, work.active[i])
+    for i in range(change.counts[N_FLAGGED]):
+        node = change.flagged[i]
+        n = star(body, cut.visits, node, body.node_tetrahedron[node], work.around)
+        for j in range(n):
+            _mark_around(cut, work.around[j])
+
+
+@kernel
+def _mark_around(cut: Cut, t: int) -> None:
+    body, sheet, change = cut.body, cut.sheet, cut.change
+    n_on = 0
+    for k in range(4):
+        if on_sheet(sheet, body.tetrahedra[t, k]):
+            n_on += 1
+    if n_on < 3:
+        return
+    for f in range(4):
+        link = body.links[t, f]
+        if link < 0 or (n_on == 3 and on_sheet(sheet, body.tetrahedra[t, f])):
+            continue
+        if n_on == 4 and not _face_is_on(cut, t, f):
+            continue
+        other = link // 4
+        side = tetrahedron_side(cut, t)
+        other_side = tetrahedron_side(cut, other)
+        if side * other_side >= 0:
+            continue
+        if _n_links(body, t) == 1 or _n_links(body, other) == 1:
+            continue  # the last link of a tetrahedron holds: it would be a crumb
+        if change.counts[N_FACES] == len(change.faces):
+            change.counts[FULL] = 1
+            return
+        decide_side(sheet, t, side)
+        decide_side(sheet, other, other_side)
+        row = change.counts[N_FACES]
+        change.counts[N_FACES] += 1
+        change.faces[row, 0] = t
+        change.faces[row, 1] = f
+        change.faces[row, 2] = other
+        change.faces[row, 3] = link % 4
+        body.links[t, f] = CUT
+        body.links[other, link % 4] = CUT
+
+
+@kernel
+def _face_is_on(cut: Cut, t: int, f: int) -> bool:
+    for k in range(4):
+        if k != f and not on_sheet(cut.sheet, cut.body.tetrahedra[t, k]):
+            return False
+    return True
+
+
+@kernel
+def _n_links(body: Body, t: int) -> int:
+    n = 0
+    for f in range(4):
+        if body.links[t, f] >= 0:
+            n += 1
+    return n
+
+
+@kernel
+def tetrahedron_side(cut: Cut, t: int) -> int:
+    """Side of the sheet that tetrahedron `t` is on: +1, -1, or 0 where it is on both.
+
+    What was decided stays. Else the side that its nodes off the sheet were seen on; else where they
+    lie; where all four are on the sheet, where the centroid lies.
+    """
+    decided = decided_side(cut.sheet, t)
+    if decided != 0:
+        return decided
+    body, sheet = cut.body, cut.sheet
+    seen = 0
+    n_off = 0
+    mixed = False
+    for k in range(4):
+        node = body.tetrahedra[t, k]
+        if on_sheet(sheet, node):
+            continue
+        n_off += 1
+        side = side_of(sheet, node)
+        if side != 0:
+            mixed = mixed or (seen != 0 and side != seen)
+            seen = side
+    if mixed:
+        return 0
+    if seen != 0:
+        return seen
+    centroid = Vec3(0.0, 0.0, 0.0)
+    for k in range(4):
+        p = vec3(body.rest, body.tetrahedra[t, k])
+        centroid = Vec3(
+            centroid.x + 0.25 * p.x, centroid.y + 0.25 * p.y, centroid.z + 0.25 * p.z
+        )
+    plane = plane_near(cut.path, centroid)
+    if n_off == 0:
+        return _geometric_side(centroid, plane.point, plane.normal)
+    geometric = 0
+    for k in range(4):
+        node = body.tetrahedra[t, k]
+        if not on_sheet(sheet, node):
+            side = _geometric_side(vec3(body.rest, node), plane.point, plane.normal)
+            if geometric != 0 and side != geometric:
+                return 0
+            geometric = side
+    return geometric
+
+
+@kernel
+def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
+    return 1 if dot(sub(p, on), normal) >= 0.0 else -1
+
+
+@kernel
+def _keep_crumbs(cut: Cut) -> None:
+    """Link small closed pieces that this step made back to the side of larger contact."""
+    change, body, work = cut.change, cut.body, cut.work
+    n_faces = change.counts[N_FACES]
+    for i in range(n_faces):
+        for j in range(0, 4, 2):
+            start = change.faces[i, j]
+            if change.faces[i, 1] < 0:
+                continue
+            n = _small_piece(cut, start)
+            if n == 0:
+                continue
+            volume = 0.0
+            for m in range(n):
+                volume += tetrahedron_volume(body.rest, body.tetrahedra, work.around[m])
+            if volume <= cut.quality.crumb:
+                _relink(cut, n)
+
+
+@kernel
+def _small_piece(cut: Cut, start: int) -> int:
+    """Collect the connected piece of `start` in `work.around`; 0 if it is not a small one."""
+    body, visits, piece = cut.body, cut.visits, cut.work.around
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    visits.tetrahedra[start] = epoch
+    piece[0] = start
+    n = 1
+    i = 0
+    while i < n:
+        for f in range(4):
+            link = body.links[piece[i], f]
+            if link >= 0 and visits.tetrahedra[link // 4] != epoch:
+                if n == CRUMB_TETRAHEDRA:
+                    return 0
+                visits.tetrahedra[link // 4] = epoch
+                piece[n] = link // 4
+                n += 1
+        i += 1
+    return n
+
+
+@kernel
+def _relink(cut: Cut, n: int) -> None:
+    """Undo the cut faces between the piece in `work.around` and the side it touches most.
+
+    The piece was just collected, so its tetrahedra bear the current visit.
+    """
+    change, body, sheet = cut.change, cut.body, cut.sheet
+    epoch = cut.visits.epoch[0]
+    area_plus = 0.0
+    area_minus = 0.0
+    for row in range(change.counts[N_FACES]):
+        outside = _outside_of_piece(cut, row, epoch)
+        if outside >= 0:
+            area = _face_area(body, change.faces[row, 0], change.faces[row, 1])
+            if decided_side(sheet, outside) > 0:
+                area_plus += area
+            else:
+                area_minus += area
+    if area_plus == 0.0 and area_minus == 0.0:
+        return
+    side = 1 if area_plus >= area_minus else -1
+    for row in range(change.counts[N_FACES]):
+        outside = _outside_of_piece(cut, row, epoch)
+        if outside >= 0 and decided_side(sheet, outside) == side:
+            t = change.faces[row, 0]
+            f = change.faces[row, 1]
+            other = change.faces[row, 2]
+            g = change.faces[row, 3]
+            body.links[t, f] = 4 * other + g
+            body.links[other, g] = 4 * t + f
+            change.faces[row, 1] = -1
+    for i in range(n):
+        decide_side(sheet, cut.work.around[i], side)
+
+
+@kernel
+def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
+    """The tetrahedron beyond cut face `row`, if just one of its two is in the piece; else -1."""
+    faces, seen = cut.change.faces, cut.visits.tetrahedra
+    if faces[row, 1] < 0:
+        return -1
+    first_in = seen[faces[row, 0]] == epoch
+    second_in = seen[faces[row, 2]] == epoch
+    if first_in == second_in:
+        return -1
+    return faces[row, 2] if first_in else faces[row, 0]
+
+
+@kernel
+def _face_area(body: Body, t: int, f: int) -> float:
+    return triangle_area(
+        vec3(body.rest, body.tetrahedra[t, (f + 1) % 4]),
+        vec3(body.rest, body.tetrahedra[t, (f + 2) % 4]),
+        vec3(body.rest, body.tetrahedra[t, (f + 3) % 4]),
+    )
+
+
+@kernel
+def _unglue_face(cut: Cut, row: int) -> None:
+    """Double the nodes of cut face `row` that no longer hold its two tetrahedra together."""
+    change, body = cut.change, cut.body
+    if change.faces[row, 1] < 0:
+        return
+    t = change.faces[row, 0]
+    other = change.faces[row, 2]
+    note_dirty(change, t)
+    note_dirty(change, other)
+    for k in range(4):
+        if k != change.faces[row, 1]:
+            _unglue(cut, body.tetrahedra[t, k], t, other)
+
+
+@kernel
+def _unglue_fans(cut: Cut, node: int) -> None:
+    """Double a node that was inserted into the rim of an old cut, if its tetrahedra came in fans."""
+    body, change, work, visits = cut.body, cut.change, cut.work, cut.visits
+    start = body.node_tetrahedron[node]
+    star(body, visits, node, start, work.around)
+    epoch = visits.epoch[0]
+    for i in range(change.counts[N_DIRTY]):
+        t = change.dirty[i]
+        if visits.tetrahedra[t] != epoch and local_index(body, t, node) >= 0:
+            _unglue(cut, node, start, t)
+            star(body, visits, node, start, work.around)
+            epoch = visits.epoch[0]
+
+
+@kernel
+def _unglue(cut: Cut, node: int, t: int, other: int) -> None:
+    """Give the tetrahedra around `node` that hang together with `other`, but not `t`, a copy of it."""
+    body, work, change = cut.body, cut.work, cut.change
+    if local_index(body, other, node) < 0:
+        return
+    if _hang_together(body, cut.visits, node, t, other, work.around):
+        return
+    n = star(body, cut.visits, node, other, work.around)
+    copy = _copy_node(cut, node)
+    for i in range(n):
+        body.tetrahedra[work.around[i], local_index(body, work.around[i], node)] = copy
+        note_dirty(change, work.around[i])
+    body.node_tetrahedron[copy] = other
+    body.node_tetrahedron[node] = t
+
+
+@kernel
+def _hang_together(
+    body: Body, visits: Visits, node: int, t: int, other: int, around: IntArray
+) -> bool:
+    n = star(body, visits, node, t, around)
+    for i in range(n):
+        if around[i] == other:
+            return True
+    return False
+
+
+@kernel
+def _copy_node(cut: Cut, node: int) -> int:
+    body, sheet = cut.body, cut.sheet
+    copy = body.counts[NODES]
+    body.counts[NODES] += 1
+    for x in range(3):
+        body.rest[copy, x] = body.rest[node, x]
+        body.positions[copy, x] = body.positions[node, x]
+        body.velocities[copy, x] = body.velocities[node, x]
+        body.lattice_rest[copy, x] = body.lattice_rest[node, x]
+    body.fixed[copy] = body.fixed[node]
+    body.masses[copy] = 0.0
+    touch(sheet, node)
+    sheet.node_stamp[copy] = sheet.node_stamp[node]
+    sheet.offset[copy] = sheet.offset[node]
+    sheet.side[copy] = sheet.side[node]
+    return copy

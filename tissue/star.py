@@ -1,0 +1,104 @@
+"""The tetrahedra around a node, found through links: each star hangs together through faces."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.body import NODES, Body, local_index
+from tissue.geometry import altitude
+from tissue.jit import kernel
+from tissue.types import IntArray
+from tissue.vec3 import vec3
+
+LARGEST_STAR = 4096
+"""Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at the worst."""
+
+
+class Visits(NamedTuple):
+    """Which tetrahedra and nodes a search has seen. A new epoch forgets all, without clearing."""
+
+    epoch: IntArray
+    """Number of the current search, shape (1,)."""
+    tetrahedra: IntArray
+    """Search that saw each tetrahedron last, shape (capacity,)."""
+    nodes: IntArray
+    """Search that saw each node last, shape (capacity,)."""
+
+
+def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
+    """Return visits for that many nodes and tetrahedra."""
+    return Visits(
+        np.zeros(1, np.int64), np.zeros(n_tetrahedra, np.int64), np.zeros(n_nodes, np.int64)
+    )
+
+
+@kernel
+def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> int:
+    """Write the tetrahedra around `node` that hang together with `start` to `out`; return how many.
+
+    They come in breadth-first order, `start` first.
+    """
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    visits.tetrahedra[start] = epoch
+    out[0] = start
+    n = 1
+    i = 0
+    while i < n:
+        t = out[i]
+        i += 1
+        for f in range(4):
+            if body.tetrahedra[t, f] == node:
+                continue
+            link = body.links[t, f]
+            if link < 0:
+                continue
+            other = link // 4
+            if visits.tetrahedra[other] != epoch and n < LARGEST_STAR:
+                visits.tetrahedra[other] = epoch
+                out[n] = other
+                n += 1
+    return n
+
+
+@kernel
+def edge_star(body: Body, visits: Visits, a: int, b: int, out: IntArray) -> int:
+    """Write the tetrahedra around edge ab to `out`; return how many.
+
+    They are the part of the star of `a` that holds `b`: around the rim of a cut an edge can have
+    two fans of tetrahedra, which rotating about the edge would not find.
+    """
+    n = star(body, visits, a, body.node_tetrahedron[a], out)
+    kept = 0
+    for i in range(n):
+        if local_index(body, out[i], b) >= 0:
+            out[kept] = out[i]
+            kept += 1
+    return kept
+
+
+@kernel
+def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
+    """Smallest altitude from `node` over the tetrahedra around it, at rest [m]."""
+    n = star(body, visits, node, body.node_tetrahedron[node], out)
+    size = np.inf
+    for i in range(n):
+        t = out[i]
+        k = local_index(body, t, node)
+        h = altitude(
+            vec3(body.rest, node),
+            vec3(body.rest, body.tetrahedra[t, (k + 1) % 4]),
+            vec3(body.rest, body.tetrahedra[t, (k + 2) % 4]),
+            vec3(body.rest, body.tetrahedra[t, (k + 3) % 4]),
+        )
+        size = min(size, h)
+    return size
+
+
+@kernel
+def mean_node_size(body: Body, visits: Visits, out: IntArray) -> float:
+    """Mean over all nodes of `node_size` [m]."""
+    total = 0.0
+    for node in range(body.counts[NODES]):
+        total += node_size(body, visits, node, out)
+    return total / body.counts[NODES]

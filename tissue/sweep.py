@@ -1,0 +1,166 @@
+"""Collision detection: the active tetrahedra, and the edges that the swept edge of the blade crosses.
+
+Paper, section 3. The list of active tetrahedra is found anew in each step from the tetrahedra that
+hold the anchors, through faces: the cost is that of the tetrahedra along the blade.
+"""
+
+from tissue.jit import kernel
+from tissue.predicates import orient3d, pierces, point
+from tissue.sheet import Cut, Path
+from tissue.vec3 import dot, sub, vec3
+
+
+@kernel
+def find_active_tetrahedra(cut: Cut) -> None:
+    """Find the tetrahedra whose box at rest meets the box of a swept piece of the edge."""
+    body, path, work, visits = cut.body, cut.path, cut.work, cut.visits
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    n = 0
+    for k in range(len(path.seed)):
+        t = path.seed[k]
+        if t >= 0 and visits.tetrahedra[t] != epoch and n < len(work.active):
+            visits.tetrahedra[t] = epoch
+            _note_segments(cut, t, n)
+            work.active[n] = t
+            n += 1
+    i = 0
+    while i < n:
+        t = work.active[i]
+        i += 1
+        for f in range(4):
+            link = body.links[t, f]
+            if link < 0:
+                continue
+            other = link // 4
+            if visits.tetrahedra[other] == epoch or n == len(work.active):
+                continue
+            visits.tetrahedra[other] = epoch
+            if _note_segments(cut, other, n):
+                work.active[n] = other
+                n += 1
+    work.n_active[0] = n
+
+
+@kernel
+def _note_segments(cut: Cut, t: int, n: int) -> bool:
+    """Note the range of segments whose boxes meet that of tetrahedron `t`; return if there is any."""
+    body, path, segments = cut.body, cut.path, cut.work.segments
+    grid = body.lattice_rest
+    a = body.tetrahedra[t, 0]
+    b = body.tetrahedra[t, 1]
+    c = body.tetrahedra[t, 2]
+    d = body.tetrahedra[t, 3]
+    low_x = min(min(grid[a, 0], grid[b, 0]), min(grid[c, 0], grid[d, 0]))
+    low_y = min(min(grid[a, 1], grid[b, 1]), min(grid[c, 1], grid[d, 1]))
+    low_z = min(min(grid[a, 2], grid[b, 2]), min(grid[c, 2], grid[d, 2]))
+    high_x = max(max(grid[a, 0], grid[b, 0]), max(grid[c, 0], grid[d, 0]))
+    high_y = max(max(grid[a, 1], grid[b, 1]), max(grid[c, 1], grid[d, 1]))
+    high_z = max(max(grid[a, 2], grid[b, 2]), max(grid[c, 2], grid[d, 2]))
+    first = -1
+    last = -2
+    boxes = path.boxes
+    for k in range(len(path.linked) - 1):
+        if not path.linked[k]:
+            continue
+        if boxes[k, 0] > high_x or boxes[k, 1] > high_y or boxes[k, 2] > high_z:
+            continue
+        if boxes[k, 3] < low_x or boxes[k, 4] < low_y or boxes[k, 5] < low_z:
+            continue
+        if first < 0:
+            first = k
+        last = k
+    segments[n, 0] = first
+    segments[n, 1] = last
+    return first >= 0
+
+
+@kernel
+def find_crossings(cut: Cut) -> None:
+    """Find the edges of active tetrahedra that the swept edge crosses, each asked once."""
+    body, work, visits = cut.body, cut.work, cut.visits
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    mask = len(work.hash_keys) - 1
+    work.n_crossings[0] = 0
+    for i in range(work.n_active[0]):
+        if work.segments[i, 0] < 0:
+            continue
+        t = work.active[i]
+        for p in range(3):
+            for q in range(p + 1, 4):
+                a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
+                b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
+                key = (a << 32) | b
+                # Fibonacci hashing: 2^64 / golden ratio, as a signed number.
+                slot = ((key * -7046029254386353131) >> 40) & mask
+                while work.hash_stamps[slot] == epoch and work.hash_keys[slot] != key:
+                    slot = (slot + 1) & mask
+                if work.hash_stamps[slot] != epoch:
+                    work.hash_stamps[slot] = epoch
+                    work.hash_keys[slot] = key
+                    # Another tetrahedron around the edge may see more segments, but those that
+                    # meet the edge itself are seen by all of them.
+                    _cross_edge(cut, a, b, work.segments[i, 0], work.segments[i, 1])
+
+
+@kernel
+def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
+    """Note where segments `first` to `last`, swept, cross edge ab."""
+    body, path, work = cut.body, cut.path, cut.work
+    grid = body.lattice_rest
+    low_x = min(grid[a, 0], grid[b, 0])
+    low_y = min(grid[a, 1], grid[b, 1])
+    low_z = min(grid[a, 2], grid[b, 2])
+    high_x = max(grid[a, 0], grid[b, 0])
+    high_y = max(grid[a, 1], grid[b, 1])
+    high_z = max(grid[a, 2], grid[b, 2])
+    boxes = path.boxes
+    for k in range(first, last + 1):
+        if not path.linked[k]:
+            continue
+        if boxes[k, 0] > high_x or boxes[k, 1] > high_y or boxes[k, 2] > high_z:
+            continue
+        if boxes[k, 3] < low_x or boxes[k, 4] < low_y or boxes[k, 5] < low_z:
+            continue
+        at = _crossed_at(path, cut, a, b, k)
+        n = work.n_crossings[0]
+        if at >= 0.0 and n < len(work.crossing):
+            work.crossing[n, 0] = a
+            work.crossing[n, 1] = b
+            work.crossing[n, 2] = k
+            work.crossing_at[n, 0] = at
+            work.n_crossings[0] = n + 1
+            return
+
+
+@kernel
+def _crossed_at(path: Path, cut: Cut, a: int, b: int, k: int) -> float:
+    """Where along ab the quad that segment `k` sweeps is pierced, as a fraction, or -1."""
+    pa = point(cut.body.lattice_rest, a)
+    pb = point(cut.body.lattice_rest, b)
+    tip_t0 = point(path.lattice_t0, k)
+    heel_t0 = point(path.lattice_t0, k + 1)
+    tip_t1 = point(path.lattice_t1, k)
+    heel_t1 = point(path.lattice_t1, k + 1)
+    if pierces(pa, pb, tip_t0, tip_t1, heel_t1):
+        va = orient3d(tip_t0, tip_t1, heel_t1, pa)
+        vb = orient3d(tip_t0, tip_t1, heel_t1, pb)
+    elif pierces(pa, pb, tip_t0, heel_t1, heel_t0):
+        va = orient3d(tip_t0, heel_t1, heel_t0, pa)
+        vb = orient3d(tip_t0, heel_t1, heel_t0, pb)
+    else:
+        return -1.0
+    return float(va) / (float(va) - float(vb))
+
+
+@kernel
+def path_moved(path: Path) -> bool:
+    """Whether any piece of the edge moved through the material in this step."""
+    for k in range(len(path.linked) - 1):
+        if path.linked[k]:
+            for j in range(k, k + 2):
+                d = sub(vec3(path.t1, j), vec3(path.t0, j))
+                if dot(d, d) > 0.0:
+                    return True
+    return False

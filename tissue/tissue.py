@@ -1,0 +1,489 @@
+"""A tetrahedral body that a blade can cut: `Tissue` owns every array, `step` lists the stages."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from tissue.anchors import (
+    AREA,
+    IMPULSE,
+    IMPULSE_TORQUE,
+    TISSUE_IMPULSE,
+    WORK_OF_BLADE,
+    WORK_OF_CUTTING,
+    Anchors,
+    Edge,
+    anchored_length,
+    clear_forces,
+    frequency_with_anchors,
+    is_engaged,
+    meet,
+    new_anchors,
+    relocate,
+    seize,
+)
+from tissue.body import NODES, TETRAHEDRA, build_body, grown_body
+from tissue.front import extend_fronts
+from tissue.material import Material
+from tissue.path import forget_path, trace_path
+from tissue.pieces import count_pieces
+from tissue.runge_kutta import SAFETY, Stages, largest_stable_step, new_stages, relax
+from tissue.separate import open_sheet
+from tissue.sheet import (
+    FULL,
+    SPARE_NODES,
+    Cut,
+    Quality,
+    begin_sheet,
+    clear_changes,
+    grown_sheet,
+    new_change,
+    new_path,
+    new_sheet,
+    new_work,
+    put_on_lattice,
+)
+from tissue.snapping import insert_crossings
+from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
+from tissue.star import LARGEST_STAR, mean_node_size, no_visits
+from tissue.surface import boundary_surface
+from tissue.sweep import find_active_tetrahedra, find_crossings, path_moved
+from tissue.touched import largest_frequency, touched_nodes
+from tissue.types import (
+    BladeSegment,
+    BladeSweep,
+    BoolArray,
+    FloatArray,
+    Profile,
+    Snapshot,
+    StepResult,
+    Surface,
+    TetrahedralMesh,
+    Wrench,
+)
+from tissue.vec3 import Vec3
+
+SAMPLES_PER_NODE_SIZE = 6.0
+"""Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
+enters and leaves the skin; more cost time in every Runge-Kutta stage."""
+MOST_SAMPLES = 512
+"""Samples at most, for a long blade in a fine mesh."""
+
+INCREMENT = 0.25
+"""Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
+steep curves leave tetrahedra that bridge the cut (algorithms.md 3.6)."""
+
+SHEET_MARGIN = 0.5
+"""How far outside the skin the sheet begins and ends, per mean node size."""
+
+ROOM_FOR_TETRAHEDRA = 1 << 12
+"""Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
+
+NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
+"""The edge of no blade."""
+
+SAME_LENGTH = 1e-6
+"""Relative change in length below which it is the same blade; rounding of its two ends is less."""
+
+SETTLED = 1e-3
+"""Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
+LONGEST_SETTLING = 20_000
+"""Runge-Kutta steps after which `settle` gives up waiting."""
+
+
+class TissueError(RuntimeError):
+    """The tissue cannot go on."""
+
+
+@dataclass(frozen=True)
+class CutQuality:
+    """How closely the cut follows the blade, against how small the elements get that it makes.
+
+    In units of the mesh's mean node size (the smallest altitude of the tetrahedra around a node).
+    Larger values give larger elements and time steps, and a rougher cut (algorithms.md 3.5).
+    """
+
+    snap: float = 0.3
+    """A crossing nearer to a node than this share of that node's size uses the node."""
+    floor: float = 0.3
+    """... or nearer than this share of the mean node size."""
+    guard: float = 0.15
+    """No altitude of a new tetrahedron is smaller than this share of the mean node size."""
+    crumb: float = 0.3
+    """A piece smaller than this share of the mean tetrahedron is not cut loose."""
+
+
+class Tissue:
+    """A soft body of tetrahedra: masses at nodes, springs along edges, and a blade that cuts it.
+
+    Args:
+        mesh: The body at rest. It must be valid: see `tissue.validation`.
+        material: What it is made of.
+        fixed: Nodes that do not move, shape (n_nodes,).
+        positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
+            nodes stay there: the paper's displacement boundary conditions.
+        gravity: [m/s2].
+        quality: How closely cuts follow the blade.
+    """
+
+    def __init__(
+        self,
+        mesh: TetrahedralMesh,
+        material: Material | None = None,
+        *,
+        fixed: BoolArray | None = None,
+        positions: FloatArray | None = None,
+        gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        quality: CutQuality | None = None,
+    ) -> None:
+        self.material = material or Material()
+        self._gravity = np.array(gravity, dtype=np.float64)
+        self._body = build_body(mesh, positions, fixed)
+        n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
+        self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
+        self._visits = no_visits(n_nodes, n_tetrahedra)
+        self._springs = no_springs(n_nodes, 20 * n_nodes + POOL_MARGIN)
+        self._sheet = new_sheet(n_nodes, n_tetrahedra)
+        self._stages = new_stages(n_nodes)
+        self._work = new_work(n_tetrahedra)
+        self._change = new_change()
+        self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
+        self._edge_length = 0.0
+        self._path = new_path(2)
+        self._incising = False
+
+        every_node = np.arange(n_nodes)
+        self._frequency_squared = 0.0
+        self._build_rows(every_node, n_nodes)
+        self.node_size = mean_node_size(self._body, self._visits, self._around)
+        quality = quality or CutQuality()
+        volume = self._body.masses.sum() / self.material.density
+        self._quality = Quality(
+            quality.snap,
+            quality.floor * self.node_size,
+            quality.guard * self.node_size,
+            quality.crumb * volume / n_tetrahedra,
+        )
+        self._grow()
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return int(self._body.counts[NODES])
+
+    @property
+    def n_tetrahedra(self) -> int:
+        """Number of tetrahedra."""
+        return int(self._body.counts[TETRAHEDRA])
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of the body [m], shape (2, 3)."""
+        positions = self._body.positions[: self.n_nodes]
+        return np.stack([positions.min(axis=0), positions.max(axis=0)])
+
+    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        """Let the body live through `dt` [s] while the blade does `sweep`.
+
+        Args:
+            sweep: Motion of the cutting edge, or None where no blade is near.
+            dt: [s]. It is divided as stability and the speed of the blade need.
+
+        Raises:
+            ValueError: the blade has no length, or a number is not finite.
+            TissueError: the motion of the tissue became unstable.
+        """
+        edge = NOWHERE if sweep is None else _checked_edge(sweep)
+        if not (math.isfinite(dt) and dt >= 0.0):
+            raise ValueError(f"dt is {dt} s; it must be finite and not negative")
+        anchors = self._anchors_of(sweep)
+        anchors.totals[:WORK_OF_BLADE] = 0.0
+        collision = topology = relaxation = 0.0
+        n_substeps = 0
+        n_increments = self._n_increments(sweep)
+        for i in range(n_increments):
+            begin, end = i / n_increments, (i + 1) / n_increments
+            started = perf_counter()
+            n_substeps += self._relax(anchors, edge, dt, begin, end)
+            if sweep is not None:
+                self._hold(anchors, edge, end)
+            relaxed = perf_counter()
+            detected = self._detect() if sweep is not None else 0
+            collided = perf_counter()
+            if detected:
+                self._cut(anchors)
+            relaxation += relaxed - started
+            collision += collided - relaxed
+            topology += perf_counter() - collided
+        return self._result(
+            anchors, edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation)
+        )
+
+    def settle(self) -> int:
+        """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
+
+        Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
+        has passed a peak.
+        """
+        anchors = self._anchors_of(None)
+        n_each = 4
+        step = self._stable_step(self._frequency_squared)
+        energy = 0.0
+        for done in range(0, LONGEST_SETTLING, n_each):
+            self._relax_by(anchors, NOWHERE, n_each * step, 0.0, 1.0, n_each)
+            n = self.n_nodes
+            velocities = self._body.velocities[:n]
+            before, energy = energy, float((self._body.masses[:n, None] * velocities**2).sum())
+            if energy < before:
+                velocities[:] = 0.0
+                energy = 0.0
+            if np.abs(self._stages.a4[:n]).max() < SETTLED * 9.81:
+                velocities[:] = 0.0
+                return done + n_each
+        return LONGEST_SETTLING
+
+    def snapshot(self) -> Snapshot:
+        """Return a copy of the whole state."""
+        n, body = self.n_nodes, self._body
+        return Snapshot(
+            body.positions[:n].copy(),
+            body.rest[:n].copy(),
+            body.velocities[:n].copy(),
+            body.masses[:n].copy(),
+            body.tetrahedra[: self.n_tetrahedra].copy(),
+            body.fixed[:n].copy(),
+        )
+
+    def surface(self) -> Surface:
+        """Return the boundary triangles, skin and cut faces apart."""
+        return boundary_surface(self._body)
+
+    def pieces(self) -> int:
+        """Return the number of connected pieces."""
+        piece, queue = np.empty((2, self.n_tetrahedra), dtype=np.int64)
+        return count_pieces(self._body, piece, queue)
+
+    # stages of a step
+
+    def _relax(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> int:
+        """Advance the motion over a part of the step; return the Runge-Kutta steps taken."""
+        frequency_squared = max(
+            self._frequency_squared,
+            frequency_with_anchors(
+                anchors, self._body, self._springs.frequency_squared, self._stages.external
+            ),
+        )
+        span = dt * (end - begin)
+        if span == 0.0:
+            return 0
+        n = max(1, math.ceil(span / self._stable_step(frequency_squared)))
+        self._relax_by(anchors, edge, dt, begin, end, n)
+        return n
+
+    def _relax_by(
+        self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float, n: int
+    ) -> None:
+        material = self.material
+        relax(
+            self._body,
+            self._springs,
+            anchors,
+            edge,
+            self._visits,
+            self._stages,
+            self._around,
+            self._gravity,
+            material.retardation_time,
+            material.viscous_damping,
+            material.toughness,
+            self.node_size,
+            dt,
+            begin,
+            end,
+            n,
+        )
+
+    def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
+        """Anchor what came into the tissue, and trace the path of the edge through the material."""
+        clear_forces(anchors, self._body, self._stages.external)
+        seize(anchors, self._body, self._visits, edge, when, self._around)
+        meet(anchors, self._body, edge, when)
+        if not is_engaged(anchors):
+            if self._incising:
+                begin_sheet(self._sheet)
+                forget_path(self._path)
+            self._incising = False
+            self._work.n_active[0] = 0
+            return
+        self._incising = True
+        margin = SHEET_MARGIN * self.node_size
+        trace_path(anchors, self._body, edge, when, margin, self._path)
+
+    def _detect(self) -> int:
+        """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
+        if not self._incising or not path_moved(self._path):
+            return 0
+        put_on_lattice(self._path, self._body.lattice)
+        cut = self._cut_arrays()
+        find_active_tetrahedra(cut)
+        find_crossings(cut)
+        return 1
+
+    def _cut(self, anchors: Anchors) -> None:
+        """Insert the sheet into the mesh, open it, and renew what depends on the mesh."""
+        while True:
+            cut = self._cut_arrays()
+            clear_changes(self._change)
+            insert_crossings(cut)
+            extend_fronts(cut)
+            open_sheet(cut)
+            n = touched_nodes(self._body, self._change, self._visits, self._nodes)
+            if n:
+                self._build_rows(self._nodes, n)
+                relocate(anchors, self._body, self._visits, self._around)
+            if not self._change.counts[FULL]:
+                break
+            self._grow()
+            cut = self._cut_arrays()
+            find_active_tetrahedra(cut)
+            find_crossings(cut)
+        self._grow()
+
+    def _n_increments(self, sweep: BladeSweep | None) -> int:
+        """Return in how many parts the step is taken, so that the edge moves little in each."""
+        if sweep is None:
+            return 1
+        t0, t1 = sweep
+        travel = max(np.linalg.norm(t1.tip - t0.tip), np.linalg.norm(t1.heel - t0.heel))
+        return max(1, math.ceil(travel / (INCREMENT * self.node_size)))
+
+    def _result(
+        self,
+        anchors: Anchors,
+        edge: Edge,
+        sweep: BladeSweep | None,
+        dt: float,
+        n_substeps: int,
+        profile: Profile,
+    ) -> StepResult:
+        bounds = self.bounds
+        if not np.isfinite(bounds).all():
+            raise TissueError(
+                f"the motion of the tissue became unstable: a node is at {bounds.tolist()} m. "
+                "Use a shorter time step, or a material that is softer or heavier"
+            )
+        totals = anchors.totals
+        point = np.zeros(3) if sweep is None else np.array(edge.tip_t1)
+        per_second = 1.0 / dt if dt > 0.0 else 0.0
+        force = totals[IMPULSE : IMPULSE + 3] * per_second
+        torque = totals[IMPULSE_TORQUE : IMPULSE_TORQUE + 3] * per_second - np.cross(point, force)
+        return StepResult(
+            wrench=Wrench(force, torque, point),
+            force_on_tissue=totals[TISSUE_IMPULSE : TISSUE_IMPULSE + 3] * per_second,
+            bounds=bounds,
+            n_tetrahedra=self.n_tetrahedra,
+            n_nodes=self.n_nodes,
+            n_active=int(self._work.n_active[0]),
+            active_point_tetrahedron=int(self._path.seed[0]) if sweep is not None else -1,
+            anchored_length=anchored_length(anchors),
+            cut_area=float(totals[AREA]),
+            work_of_blade=float(totals[WORK_OF_BLADE]),
+            work_of_cutting=float(totals[WORK_OF_CUTTING]),
+            n_substeps=n_substeps,
+            profile=profile,
+        )
+
+    # arrays
+
+    def _anchors_of(self, sweep: BladeSweep | None) -> Anchors:
+        """Return the samples of this blade; another blade, or none, lets go of the tissue."""
+        length = 0.0 if sweep is None else float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip))
+        if abs(length - self._edge_length) <= SAME_LENGTH * length:
+            return self._anchors
+        n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
+        n = min(max(n, 2), MOST_SAMPLES)
+        totals = self._anchors.totals
+        self._anchors = new_anchors(n, length, self.material.young_modulus)._replace(totals=totals)
+        self._edge_length = length
+        self._path = new_path(n)
+        if self._incising:
+            begin_sheet(self._sheet)
+            self._incising = False
+        return self._anchors
+
+    def _cut_arrays(self) -> Cut:
+        return Cut(
+            self._body,
+            self._visits,
+            self._sheet,
+            self._path,
+            self._change,
+            self._work,
+            self._quality,
+        )
+
+    def _build_rows(self, nodes: np.ndarray, n: int) -> None:
+        """Write masses and springs of the first `n` of `nodes`, and update the frequency bound."""
+        material = self.material
+        done = 0
+        while True:
+            done += build_rows(
+                self._body,
+                self._visits,
+                self._springs,
+                nodes[done:n],
+                n - done,
+                material.density,
+                material.young_modulus,
+                self._around,
+            )
+            if done == n:
+                break
+            pool = 2 * len(self._springs.neighbour)
+            self._springs = grown_springs(self._springs, len(self._springs.first), pool)
+        largest = largest_frequency(self._body, self._springs.frequency_squared, nodes, n)
+        self._frequency_squared = max(self._frequency_squared, largest)
+
+    def _grow(self) -> None:
+        """Make room for the next pass of a cut step: arrays double when they are nearly full."""
+        body = self._body
+        n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+        if self.n_nodes + 2 * SPARE_NODES > n_nodes:
+            n_nodes = 2 * n_nodes + 2 * SPARE_NODES
+        if self.n_tetrahedra + ROOM_FOR_TETRAHEDRA > n_tetrahedra:
+            n_tetrahedra = 2 * n_tetrahedra + ROOM_FOR_TETRAHEDRA
+        if (n_nodes, n_tetrahedra) == (len(body.rest), len(body.tetrahedra)):
+            return
+        self._body = grown_body(body, n_nodes, n_tetrahedra)
+        self._springs = grown_springs(self._springs, n_nodes, len(self._springs.neighbour))
+        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._visits = no_visits(n_nodes, n_tetrahedra)
+        self._work = self._work._replace(place=np.zeros(n_tetrahedra, dtype=np.int64))
+        self._work.hash_stamps[:] = 0
+        self._stages = new_stages(n_nodes)
+        self._nodes = np.zeros(n_nodes, dtype=np.int64)
+
+    def _stable_step(self, frequency_squared: float) -> float:
+        material = self.material
+        frequency = math.sqrt(frequency_squared)
+        limit = largest_stable_step(frequency, material.retardation_time, material.viscous_damping)
+        return SAFETY * limit
+
+
+def _checked_edge(sweep: BladeSweep) -> Edge:
+    """Return the edge over the step, or refuse it."""
+    points = []
+    for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
+        rows = np.array(segment, dtype=np.float64)
+        if rows.shape != (3, 3) or not np.isfinite(rows).all():
+            raise ValueError(f"the blade at the {when} of the step is {rows.tolist()}: not finite")
+        along = rows[1] - rows[0]
+        if not np.linalg.norm(along) > 0.0:
+            raise ValueError(f"the blade at the {when} of the step has no length: {rows.tolist()}")
+        if np.linalg.norm(np.cross(along, rows[2])) <= 1e-6 * np.linalg.norm(along):
+            raise ValueError(f"the blade at the {when} of the step cuts along its own edge")
+        points += [Vec3(*row) for row in rows.tolist()]
+    return Edge(*points)
