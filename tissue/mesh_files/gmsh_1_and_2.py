@@ -19,6 +19,10 @@ def read_gmsh_1(source: Source) -> TetrahedralMesh:
 
 def read_gmsh_2(source: Source, byte_order: str) -> TetrahedralMesh:
     """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
+    if b"$ParametricNodes" in source.data:
+        source.fail(
+            "expected $Nodes, found $ParametricNodes: save it without parametric coordinates"
+        )
     _enter(source, rb"\$Nodes", "$Nodes")
     if byte_order:
         tags, positions = _nodes_in_binary(source, byte_order)
