@@ -109,7 +109,10 @@ class Bridge:
         self._segment, self._result, self._touching = after, result, contacts.fixtures
         self._n_frames += 1
         self._n_rejected += not near
-        self._wrench_raw = self._frame.wrench_to_world(result.wrench)
+        # Without a blade the tissue's wrench is zero, and at no particular point; what a slew limit
+        # still lets go of acts at the tip all the same.
+        wrench = result.wrench if near else result.wrench._replace(point=after.tip)
+        self._wrench_raw = self._frame.wrench_to_world(wrench)
         return self._coupling.felt(self._wrench_raw, dt)
 
     @property

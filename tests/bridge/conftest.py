@@ -1,0 +1,69 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tissue.types import BladeSegment
+
+ROOT = Path(__file__).parents[2]
+SERVE_BLOCK = Path(__file__).with_name("serve_block.py")
+
+
+class ServerProcess:
+    """A tissue server in a second process."""
+
+    def __init__(self) -> None:
+        path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+        self.process = subprocess.Popen(
+            [sys.executable, str(SERVE_BLOCK)],
+            env=os.environ | {"PYTHONPATH": path},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        self.address = self.process.stdout.readline().strip()
+
+    def end(self, number: int) -> int:
+        """Send a signal and return the exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(10)
+        finally:
+            self.process.kill()
+            self.process.stdout.close()
+
+
+@pytest.fixture
+def start_server():
+    servers = []
+
+    def start():
+        servers.append(ServerProcess())
+        return servers[-1]
+
+    yield start
+    for server in servers:
+        server.end(15)
+
+
+@pytest.fixture(scope="module")
+def server():
+    running = ServerProcess()
+    yield running
+    assert running.process.poll() is None, "the server did not survive its clients"
+    running.end(15)
+
+
+@pytest.fixture
+def upright():
+    """A blade that stands upright, longer than the block is high, and faces along y."""
+
+    def at(x: float, y: float, bottom: float = -0.005) -> BladeSegment:
+        return BladeSegment(
+            np.array([x, y, bottom]), np.array([x, y, bottom + 0.03]), np.array([0.0, 1.0, 0.0])
+        )
+
+    return at
