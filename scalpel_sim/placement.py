@@ -1,0 +1,283 @@
+"""Where to put the arm and the tissue so that the arm reaches a whole stroke."""
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.arm import PRESETS, Arm
+from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.hand import Impedance
+from scalpel_sim.inverse_kinematics import Geometry, geometry, reach
+from scalpel_sim.stroke import Stroke
+from tissue.types import FloatArray
+
+AUTO = "auto"
+"""Takes the smallest arm that reaches, and renders the force if one does."""
+
+SAMPLES = 9
+"""Poses along the stroke that the search looks at. A planned stroke bends by less than its own
+sagitta between them; `DENSE_SAMPLES` confirm the place that was found."""
+
+DENSE_SAMPLES = 65
+
+YAWS = np.arange(24) * (2.0 * math.pi / 24)
+"""Directions from the base to the stroke that the search tries [rad]."""
+
+DISTANCES, HEIGHTS = np.linspace(0.25, 1.0, 11), np.linspace(-0.7, 0.7, 13)
+"""Of the middle of the stroke from the axis of the waist, and over the shoulder, that the search
+tries, as fractions of the length of the stretched arm."""
+
+MOUNT_ANGLES = (0.0, math.pi / 4.0, math.pi / 2.0)
+"""Angles between stylus and blade that the search tries [rad]: scalpel handles are straight or
+bent. No one angle suits both a blade that stands and one that lies."""
+
+NEEDED_MARGIN = 0.04
+"""How far from the ends of their ranges the joints must stay, as a fraction of half the range. The
+hand yields, and a joint that meets its stop would push back."""
+
+BASE_RADIUS = 0.08
+"""[m] about the axis of the waist, in which the body must not lie."""
+
+FOREARM_CLEARANCE = 0.01
+"""[m] between the axis of the forearm and the box around the body."""
+
+TABLE_CLEARANCE = 0.01
+"""[m] between the table and what is lowest, blade or body: the blade passes beneath the body."""
+
+AWKWARD = 2.0
+"""Taken off the margin of a place where the forearm passes through the body, or where the base
+stands on a column: any place without that is better."""
+
+SMALLER = np.arange(0.95, 0.04, -0.05)
+"""Scales at which an error message says that the stroke would be reached."""
+
+
+class PlacementError(UsageError):
+    """No arm that was asked for reaches the stroke."""
+
+
+class Placement(NamedTuple):
+    """Where arm and tissue stand. World frame; its axes are the tissue's, the table is z = 0."""
+
+    preset: str
+    """One of `arm.PRESETS`."""
+    blade_length: float
+    """From heel to tip [m]."""
+    mount_angle: float
+    """Between stylus and blade [rad]."""
+    base_position: FloatArray
+    """Of the middle of the base's underside [m], shape (3,)."""
+    base_yaw: float
+    """By which the base is turned about +z [rad]."""
+    tissue_origin: FloatArray
+    """Of the tissue frame, which is not turned [m], shape (3,)."""
+    qpos: FloatArray
+    """Angles of the joints at the start of the stroke [rad], shape (6,)."""
+    margin: float
+    """Smallest distance of a joint from an end of its range along the stroke, as a fraction of half
+    the range."""
+
+    def arm(self, impedance: Impedance = Impedance()) -> Arm:
+        """Return an arm that stands there, with its blade at the start of the stroke."""
+        arm = Arm(
+            self.preset,
+            blade_length=self.blade_length,
+            mount_angle=self.mount_angle,
+            base_position=self.base_position,
+            base_yaw=self.base_yaw,
+            impedance=impedance,
+        )
+        arm.reset(self.qpos)
+        return arm
+
+
+def place(
+    stroke: Stroke, bounds: FloatArray, preset: str = AUTO, *, force: float = 0.0
+) -> Placement:
+    """Return the place from which an arm reaches the stroke with the most room in its joints.
+
+    Args:
+        stroke: In the tissue frame.
+        bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3). The base
+            stands beside it, and it lies above the table.
+        preset: One of `arm.PRESETS`, or `auto`: the smallest that reaches, and renders the force.
+        force: Expected on the blade [N], toughness times the length of edge in the tissue. It only
+            matters to `auto`; where no arm reaches and renders it, the largest that reaches is
+            taken, and feels what it can.
+
+    Raises:
+        UsageError: no arm has this name.
+        PlacementError: none reaches; the message says at which scale it would.
+    """
+    if preset != AUTO and preset not in PRESETS:
+        raise unknown("arm", preset, [*PRESETS, AUTO])
+    found = None
+    for name in PRESETS if preset == AUTO else (preset,):
+        placement = _place(stroke, bounds, name)
+        if placement.margin >= NEEDED_MARGIN:
+            found = placement
+            if PRESETS[name].force >= force:
+                break
+    if found is None:  # `name` is the largest arm that was asked for
+        raise PlacementError(_advice(stroke, bounds, name))
+    return found
+
+
+class _Path(NamedTuple):
+    """Poses of the blade's body along a stroke, tissue frame."""
+
+    positions: FloatArray
+    """[m], shape (n, 3)."""
+    axes: FloatArray
+    """As columns, shape (n, 3, 3)."""
+    lowest: float
+    """Of the blade and of the body along the stroke [m]."""
+    bounds: FloatArray
+    """Of the body [m], shape (2, 3)."""
+
+
+class _Places(NamedTuple):
+    """Candidates, relative to the middle of the stroke; arrays of one shape."""
+
+    yaws: FloatArray
+    distances: FloatArray
+    heights: FloatArray
+    """Of the middle of the stroke over the base's underside [m]."""
+
+
+def _place(stroke: Stroke, bounds: FloatArray, preset: str) -> Placement:
+    """Return the best place for one arm, whether or not it reaches."""
+    measures, heel = _measured(preset)
+    path = _path(stroke, bounds, heel, SAMPLES)
+    length = measures.upper + measures.forearm + measures.neck
+    places = _Places(
+        *(
+            grid.ravel()
+            for grid in np.meshgrid(
+                YAWS, DISTANCES * length, HEIGHTS * length + measures.shoulder, indexing="ij"
+            )
+        )
+    )
+    scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
+    mount, best = np.unravel_index(int(np.argmax(scores)), scores.shape)
+    place = _Places(*(values[best : best + 1] for values in places))
+    mount_angle = MOUNT_ANGLES[mount]
+
+    dense = _path(stroke, bounds, heel, DENSE_SAMPLES)
+    reached = reach(measures, *_in_base(dense, place), mount_angle)
+    base = _base(dense, place)[0]
+    table = min(base[2], dense.lowest - TABLE_CLEARANCE)
+    return Placement(
+        preset,
+        stroke.blade_length,
+        mount_angle,
+        base - [0.0, 0.0, table],
+        float(place.yaws[0]),
+        np.array([0.0, 0.0, -table]),
+        reached.angles[0, 0],
+        float(reached.margin.min()),
+    )
+
+
+@cache
+def _measured(preset: str) -> tuple[Geometry, float]:
+    """Return an arm's geometry, and how far its edge lies from its blade's axis [m]."""
+    model = Arm(preset).model
+    return geometry(model), float(model.site("heel").pos[2])
+
+
+def _path(stroke: Stroke, bounds: FloatArray, edge_height: float, samples: int) -> _Path:
+    """Return where the blade's body is along the stroke; its edge is `edge_height` off its axis."""
+    poses = stroke.poses(samples)
+    heels = np.array([pose.heel for pose in poses])
+    tips = np.array([pose.tip for pose in poses])
+    edges = (tips - heels) / stroke.blade_length
+    backs = -np.array([pose.forward for pose in poses])
+    axes = np.stack([np.cross(edges, backs), edges, backs], axis=2)
+    lowest = min(float(heels[:, 2].min()), float(tips[:, 2].min()), float(bounds[0][2]))
+    return _Path(heels - edge_height * backs, axes, lowest, bounds)
+
+
+def _scores(measures: Geometry, path: _Path, places: _Places, mount_angle: float) -> FloatArray:
+    """Return how good each place is: the margin along the path, less what is awkward there."""
+    positions, axes = _in_base(path, places)
+    reached = reach(measures, positions, axes, mount_angle)
+    base = _base(path, places)
+    stands_beside = _distance_to_box(base[:, :2], path.bounds[:, :2]) >= BASE_RADIUS
+    on_column = base[:, 2] > path.lowest - TABLE_CLEARANCE
+    forearm = _forearm(measures, reached.angles)
+    in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), forearm) + base[:, None, None]
+    through = _distance_to_box(in_tissue, path.bounds) < FOREARM_CLEARANCE
+    score = reached.margin.min(axis=1) - AWKWARD * on_column - AWKWARD * through.any(axis=(1, 2))
+    return np.where(stands_beside, score, -np.inf)
+
+
+def _base(path: _Path, places: _Places) -> FloatArray:
+    """Return where the base stands, tissue frame [m], shape (n_places, 3)."""
+    outward = _turns(places.yaws)[:, :, 1]
+    middle = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2.0
+    return (
+        middle
+        - places.distances[:, None] * outward
+        - np.multiply.outer(places.heights, [0.0, 0.0, 1.0])
+    )
+
+
+def _in_base(path: _Path, places: _Places) -> tuple[FloatArray, FloatArray]:
+    """Return the path as each base sees it, shapes (n_places, n, 3) and (n_places, n, 3, 3)."""
+    back = np.swapaxes(_turns(places.yaws), 1, 2)
+    offset = path.positions[None] - _base(path, places)[:, None]
+    return np.einsum("pij,pnj->pni", back, offset), back[:, None] @ path.axes[None]
+
+
+def _turns(yaws: FloatArray) -> FloatArray:
+    """Return rotations about z, shape (n, 3, 3)."""
+    c, s, zero = np.cos(yaws), np.sin(yaws), np.zeros_like(yaws)
+    return np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=1).reshape(-1, 3, 3)
+
+
+def _forearm(measures: Geometry, angles: FloatArray) -> FloatArray:
+    """Return points along the forearm in the frame of the base, shape (..., 5, 3)."""
+    waist, shoulder = angles[..., 0, None], angles[..., 1, None]
+    level = shoulder + angles[..., 2, None] - measures.bend
+    along = np.linspace(0.0, measures.forearm, 5)
+    out = measures.upper * np.cos(shoulder) + along * np.cos(level)
+    up = measures.shoulder + measures.upper * np.sin(shoulder) + along * np.sin(level)
+    return np.stack([-np.sin(waist) * out, np.cos(waist) * out, up], axis=-1)
+
+
+def _distance_to_box(points: FloatArray, box: FloatArray) -> FloatArray:
+    """Return how far points are from a box, 0 inside."""
+    return np.linalg.norm(np.maximum(np.maximum(box[0] - points, points - box[1]), 0.0), axis=-1)
+
+
+def _advice(stroke: Stroke, bounds: FloatArray, preset: str) -> str:
+    """Return the message that no arm reaches, by how much, and what to do."""
+    middle = (bounds[0] + bounds[1]) / 2.0
+    poses = stroke.poses(SAMPLES)
+    middles = np.array([(pose.tip + pose.heel) / 2.0 for pose in poses])
+    extent = 1e3 * np.ptp(middles, axis=0)
+    message = (
+        f"the {preset} arm does not reach the whole stroke '{stroke.name}', which leads a blade of "
+        f"{1e3 * stroke.blade_length:.0f} mm over {extent[0]:.0f} x {extent[1]:.0f} x "
+        f"{extent[2]:.0f} mm (x, y, z); "
+    )
+    larger = list(PRESETS)[list(PRESETS).index(preset) + 1 :]
+    remedy = f" or take --arm {larger[0]}" if larger else ""
+    for scale in SMALLER:
+        smaller = Stroke(
+            stroke.times,
+            [
+                pose._replace(
+                    tip=middle + scale * (pose.tip - middle),
+                    heel=middle + scale * (pose.heel - middle),
+                )
+                for pose in map(stroke.pose, stroke.times)
+            ],
+            stroke.name,
+        )
+        if _place(smaller, middle + scale * (bounds - middle), preset).margin >= NEEDED_MARGIN:
+            return f"{message}at {scale:.2f} times the size it would: make --scale smaller{remedy}"
+    return f"{message}is --scale right? Make it smaller{remedy}"
