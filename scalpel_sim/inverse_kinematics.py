@@ -8,17 +8,20 @@ import numpy as np
 from tissue.types import FloatArray
 
 
-class Geometry(NamedTuple):
-    """Lengths and ranges of an arm whose gimbal's three axes meet in one point.
+# From the side, in the vertical plane that turns with the waist:
+#
+#               elbow
+#              _/\_
+#    upper   _/    \_   forearm
+#          _/        \_
+#  shoulder            gimbal: yaw about the forearm, pitch, and roll about the stylus,
+#     |                |       all through one point
+#     |                |  neck
+#    base              |  blade, turned by the mount angle about its x
 
-    # drawing, from the side, in the vertical plane that turns with the waist:
-    #
-    #            ___ elbow
-    #      upper/   \  forearm
-    #  shoulder      \__ gimbal, about its centre: yaw (forearm's axis), pitch, roll (stylus's axis)
-    #     |             |  neck
-    #    base           |> blade, turned by the mount angle
-    """
+
+class Geometry(NamedTuple):
+    """Lengths and ranges of an arm whose gimbal's three axes meet in one point."""
 
     shoulder: float
     """Height of the shoulder over the base's underside [m]."""

@@ -50,8 +50,9 @@ AWKWARD = 2.0
 """Taken off the margin of a place where the forearm passes through the body, or where the base
 stands on a column: any place without that is better."""
 
-SMALLER = np.arange(0.95, 0.04, -0.05)
-"""Scales at which an error message says that the stroke would be reached."""
+SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
+"""Where an error message looks for the scale at which the arm would reach: from this up to 1, to
+6 %. A mesh in millimetres that is read as metres is a thousand times too large."""
 
 
 class PlacementError(UsageError):
@@ -149,26 +150,12 @@ class _Places(NamedTuple):
 
 def _place(stroke: Stroke, bounds: FloatArray, preset: str) -> Placement:
     """Return the best place for one arm, whether or not it reaches."""
-    measures, heel = _measured(preset)
-    path = _path(stroke, bounds, heel, SAMPLES)
-    length = measures.upper + measures.forearm + measures.neck
-    places = _Places(
-        *(
-            grid.ravel()
-            for grid in np.meshgrid(
-                YAWS, DISTANCES * length, HEIGHTS * length + measures.shoulder, indexing="ij"
-            )
-        )
-    )
-    scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
-    mount, best = np.unravel_index(int(np.argmax(scores)), scores.shape)
-    place = _Places(*(values[best : best + 1] for values in places))
-    mount_angle = MOUNT_ANGLES[mount]
-
-    dense = _path(stroke, bounds, heel, DENSE_SAMPLES)
-    reached = reach(measures, *_in_base(dense, place), mount_angle)
-    base = _base(dense, place)[0]
-    table = min(base[2], dense.lowest - TABLE_CLEARANCE)
+    measures, edge_height = _measured(preset)
+    place, mount_angle, _ = _search(measures, _path(stroke, bounds, edge_height, SAMPLES))
+    path = _path(stroke, bounds, edge_height, DENSE_SAMPLES)
+    reached = reach(measures, *_in_base(path, place), mount_angle)
+    base = _base(path, place)[0]
+    table = min(base[2], path.lowest - TABLE_CLEARANCE)
     return Placement(
         preset,
         stroke.blade_length,
@@ -179,6 +166,20 @@ def _place(stroke: Stroke, bounds: FloatArray, preset: str) -> Placement:
         reached.angles[0, 0],
         float(reached.margin.min()),
     )
+
+
+def _search(measures: Geometry, path: _Path) -> tuple[_Places, float, float]:
+    """Return the best of all places, the mount angle there, and the margin along the path."""
+    length = measures.upper + measures.forearm + measures.neck
+    grid = np.meshgrid(
+        YAWS, DISTANCES * length, HEIGHTS * length + measures.shoulder, indexing="ij"
+    )
+    places = _Places(*(values.ravel() for values in grid))
+    scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
+    mount, best = np.unravel_index(int(np.argmax(scores)), scores.shape)
+    place = _Places(*(values[best : best + 1] for values in places))
+    reached = reach(measures, *_in_base(path, place), MOUNT_ANGLES[mount])
+    return place, MOUNT_ANGLES[mount], float(reached.margin.min())
 
 
 @cache
@@ -254,30 +255,40 @@ def _distance_to_box(points: FloatArray, box: FloatArray) -> FloatArray:
 
 
 def _advice(stroke: Stroke, bounds: FloatArray, preset: str) -> str:
-    """Return the message that no arm reaches, by how much, and what to do."""
-    middle = (bounds[0] + bounds[1]) / 2.0
-    poses = stroke.poses(SAMPLES)
-    middles = np.array([(pose.tip + pose.heel) / 2.0 for pose in poses])
-    extent = 1e3 * np.ptp(middles, axis=0)
+    """Return the message that an arm does not reach, by how much, and what to do."""
+    measures, edge_height = _measured(preset)
+    path = _path(stroke, bounds, edge_height, SAMPLES)
+    way = 1e3 * np.ptp(path.positions, axis=0)
     message = (
-        f"the {preset} arm does not reach the whole stroke '{stroke.name}', which leads a blade of "
-        f"{1e3 * stroke.blade_length:.0f} mm over {extent[0]:.0f} x {extent[1]:.0f} x "
-        f"{extent[2]:.0f} mm (x, y, z); "
+        f"the {preset} arm does not reach the whole stroke '{stroke.name}': a blade of "
+        f"{1e3 * stroke.blade_length:.0f} mm over {way[0]:.0f} x {way[1]:.0f} x {way[2]:.0f} mm "
+        "(x, y, z)"
     )
     larger = list(PRESETS)[list(PRESETS).index(preset) + 1 :]
-    remedy = f" or take --arm {larger[0]}" if larger else ""
-    for scale in SMALLER:
-        smaller = Stroke(
-            stroke.times,
-            [
-                pose._replace(
-                    tip=middle + scale * (pose.tip - middle),
-                    heel=middle + scale * (pose.heel - middle),
-                )
-                for pose in map(stroke.pose, stroke.times)
-            ],
-            stroke.name,
-        )
-        if _place(smaller, middle + scale * (bounds - middle), preset).margin >= NEEDED_MARGIN:
-            return f"{message}at {scale:.2f} times the size it would: make --scale smaller{remedy}"
-    return f"{message}is --scale right? Make it smaller{remedy}"
+    other = f", or take --arm {larger[0]}" if larger else ""
+    low, high = math.log(SMALLEST_SCALE), 0.0
+    if not _reaches(measures, _scaled(path, SMALLEST_SCALE)):
+        return f"{message}. Move the stroke, or make --scale smaller{other}"
+    for _ in range(SCALE_HALVINGS):
+        middle = (low + high) / 2.0
+        if _reaches(measures, _scaled(path, math.exp(middle))):
+            low = middle
+        else:
+            high = middle
+    return f"{message}. It would at {math.exp(low):.2g} times the size: make --scale smaller{other}"
+
+
+def _reaches(measures: Geometry, path: _Path) -> bool:
+    """Whether there is a place from which the arm reaches the path."""
+    return _search(measures, path)[2] >= NEEDED_MARGIN
+
+
+def _scaled(path: _Path, scale: float) -> _Path:
+    """Return the path and the body, shrunk towards the middle of the body."""
+    middle = (path.bounds[0] + path.bounds[1]) / 2.0
+    return _Path(
+        middle + scale * (path.positions - middle),
+        path.axes,
+        float(middle[2] + scale * (path.lowest - middle[2])),
+        middle + scale * (path.bounds - middle),
+    )

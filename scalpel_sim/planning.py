@@ -81,6 +81,10 @@ RAMP = 0.1
 SAMPLE = 5e-3
 """Time between the poses of a planned stroke [s]. 20 of them make a ramp."""
 
+MOST_SAMPLES = 2000
+"""Between the ramps: what a stroke of 10 s takes. On a longer one they lie farther apart, so that a
+mesh in millimetres that is read as metres is soon refused for its size."""
+
 log = logging.getLogger("scalpel_sim")
 
 
@@ -239,7 +243,12 @@ def _timed(sheet: Sheet, start: float, end: float, speed: float) -> tuple[FloatA
     ways = np.concatenate([[0.0], np.cumsum(pieces)])
     speed = min(speed, ways[-1] / RAMP)
     duration = ways[-1] / speed + RAMP
-    times = np.linspace(0.0, duration, math.ceil(duration / SAMPLE) + 1)
+    ramp = np.linspace(0.0, RAMP, math.ceil(RAMP / SAMPLE) + 1)
+    n_even = min(math.ceil((duration - 2.0 * RAMP) / SAMPLE), MOST_SAMPLES)
+    even = np.linspace(RAMP, duration - RAMP, n_even + 1)
+    # Rounded to a nanosecond, so that the ends of the parts are one and the same.
+    times = np.unique(np.concatenate([ramp, even, duration - ramp]).round(9))
+    duration = float(times[-1])
     done = np.where(
         times <= duration / 2.0,
         _ramped(times, speed),

@@ -8,15 +8,15 @@ import numpy as np
 from tissue.types import BladeSegment, BoolArray, FloatArray, IntArray
 
 
-class Sheet(NamedTuple):
-    """A surface ruled by the edge of a blade that moves through it.
+# Seen along the blade; `down` points away from the reader, or towards:
+#
+#   normal ^          ___-----___           a half cosine of height `sagitta` over `chord`,
+#          |     __---           ---__      and its tangents beyond
+#          +----+----------o----------+----> motion
 
-    # drawing, seen along the blade (`down` points away from the reader):
-    #
-    #      normal ^        ___-----___            bulge: a half cosine of height `sagitta` over
-    #             |   __---           ---__       `chord`, and its tangents beyond
-    #             |--+---------------------+--> motion
-    """
+
+class Sheet(NamedTuple):
+    """A surface ruled by the edge of a blade that moves through it."""
 
     origin: FloatArray
     """Middle of the section with the body [m], shape (3,)."""
