@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tissue import liver_lobe
 from tissue.types import IntArray, TetrahedralMesh
 
 MAX_TETRAHEDRA = 50_000_000
@@ -41,6 +42,14 @@ def grid(
     lowest_corners = np.indices((n_x, n_y, n_z)).reshape(3, -1).T @ strides
     tetrahedra = lowest_corners[:, None, None] + _kuhn_corners() @ strides
     return TetrahedralMesh(positions, tetrahedra.reshape(-1, 4))
+
+
+def organ() -> TetrahedralMesh:
+    """Return a lobe of a liver, its lowest corner at the origin: 90 x 61 x 34 mm, 5,136 tetrahedra.
+
+    The mesh comes with the package; `tissue.liver_lobe` makes it.
+    """
+    return liver_lobe.load()
 
 
 def _kuhn_corners() -> IntArray:
