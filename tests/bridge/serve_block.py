@@ -1,12 +1,15 @@
 """Serves a small block to cut, in a process of its own. Patience is short, for hostile clients."""
 
-import sys
+import numpy as np
 
 import bridge.server
+from bridge.bridge import Bridge
+from bridge.link import InProcessLink
 from bridge.server import serve
 from tissue.material import Material
 from tissue.shapes import grid
 from tissue.tissue import Tissue
+from tissue.types import BladeSegment
 
 SIDE = 0.02
 
@@ -18,9 +21,20 @@ def block() -> Tissue:
     return Tissue(mesh, Material(toughness=5.0), fixed=fixed)
 
 
+def compile_kernels() -> None:
+    """Cut a block once, so that no client waits for the compiler."""
+    tissue = block()
+    bridge = Bridge(InProcessLink(tissue))
+    for y in np.linspace(-0.001, 0.01, 100):
+        tip, heel = np.array([0.009, y, -0.005]), np.array([0.009, y, 0.025])
+        bridge.step(BladeSegment(tip, heel, np.array([0.0, 1.0, 0.0])), 1e-3)
+    tissue.surface()
+    tissue.pieces()
+
+
 if __name__ == "__main__":
+    compile_kernels()
     bridge.server.HANDSHAKE_SECONDS = 0.5
     bridge.server.FRAME_SECONDS = 0.5
     bridge.server.SEND_SECONDS = 0.5
-    port = int(sys.argv[1]) if len(sys.argv) > 1 else 0
-    serve(block, scene="block", port=port, on_listening=lambda address: print(address, flush=True))
+    serve(block, scene="block", port=0, on_listening=lambda address: print(address, flush=True))
