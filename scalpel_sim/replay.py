@@ -27,8 +27,8 @@ BYTES_PER_TRIANGLE = 55
 in base64. Only the number of frames that are kept hangs on it."""
 
 CAPTION = (
-    "Dark red-brown: the skin of the tissue. Bright red: what the blade has laid open. "
-    "Yellow: the force that the blade feels. Drag to turn, scroll to zoom, right-drag to pan."
+    "Skin: red-brown, with vessels. Bright red: what the blade has laid open. Arrow: the force "
+    "that the blade feels. Drag to turn, scroll to zoom."
 )
 
 

@@ -36,7 +36,7 @@ class Look(NamedTuple):
     """What a surface looks like: a three.js material, and the pictures on it."""
 
     kind: str
-    """Class of three.js, for instance `MeshStandardMaterial`."""
+    """Class of three.js, for instance `MeshPhongMaterial`."""
     properties: Mapping[str, Any]
     """As three.js names them; colours as 0xRRGGBB in sRGB."""
     maps: Mapping[str, bytes] = {}

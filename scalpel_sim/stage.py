@@ -18,16 +18,16 @@ TISSUE = "/tissue"
 TILES_PER_BODY = 2.2
 """Repeats of the texture along the diagonal of the body, whatever its size."""
 
-CAMERA_DISTANCE = 2.1
-"""From the middle of the body, in diagonals of the body: it fills about half the height of the page
-and leaves room for the stylus."""
+CAMERA_DISTANCE = 2.4
+"""From the middle of the body, in diagonals of the body: it fills a third of the page's height, which leaves
+room for the stylus."""
 
 CAMERA_ELEVATION = float(np.radians(34.0))
 CAMERA_AZIMUTH = float(np.radians(52.0))
 """From the direction in which the arm stands, so that the arm comes in from the side and neither
 hides the cut nor is hidden by the body."""
 
-TABLE_RADIUS = 6.0
+TABLE_RADIUS = 4.5
 """Half width of a plane, in diagonals of the body. MuJoCo's planes are infinite whatever their size
 says; this one fades out around the body."""
 
@@ -37,8 +37,25 @@ ARROW_LENGTH = 0.15
 TARGET_OPACITY = 0.15
 """Of the marker of the hand's target: a hint of where the hand wants to be."""
 
-_WET = {"clearcoat": 0.6, "clearcoatRoughness": 0.3, "vertexColors": True, "color": 0xFFFFFF}
-_STEEL = Look("MeshStandardMaterial", {"color": 0xDCE1E6, "metalness": 1.0, "roughness": 0.22})
+MIX, ADD = 1, 2
+"""How a reflection joins the colour below it, as three.js numbers it: metal mixes, varnish adds."""
+
+_WET = {
+    "color": 0xFFFFFF,
+    "vertexColors": True,
+    "specular": 0x6E625F,
+    "shininess": 55,
+    "reflectivity": 0.06,
+    "combine": ADD,
+}
+_STEEL = {
+    "color": 0x98A1A8,
+    "specular": 0xFFFFFF,
+    "shininess": 120,
+    "reflectivity": 0.7,
+    "combine": MIX,
+}
+_PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 
 
 class Stage:
@@ -123,52 +140,28 @@ class Stage:
 
 def _set_tissue_looks(scene: Scene3D, diagonal: float) -> None:
     """Define skin and cut faces. The relief is measured in metres, so it grows with the body."""
-    skin, cut = textures.skin(), textures.cut_face()
     relief = {"bumpScale": 0.004 * diagonal}
-    scene.set_look(
-        "skin",
-        Look(
-            "MeshPhysicalMaterial",
-            {**_WET, **relief, "roughness": 0.5},
-            {"map": skin, "bumpMap": skin},
-        ),
-    )
-    scene.set_look(
-        "cut",
-        Look(
-            "MeshPhysicalMaterial",
-            {**_WET, **relief, "roughness": 0.38},
-            {"map": cut, "bumpMap": cut},
-        ),
-    )
+    for name, picture in (("skin", textures.skin()), ("cut", textures.cut_face())):
+        maps = {"map": picture, "bumpMap": picture}
+        scene.set_look(name, Look("MeshPhongMaterial", {**_WET, **relief}, maps))
 
 
 def _look_of(shape: Shape) -> Look:
     """Return what a shape of the model is made of: steel, table cloth, or paint."""
     if shape.is_blade:
-        return _STEEL
+        return Look("MeshPhongMaterial", _STEEL)
     red, green, blue, opacity = (float(channel) for channel in shape.colour)
     colour = int(np.dot(np.round(255.0 * np.clip([red, green, blue], 0.0, 1.0)), [65536, 256, 1]))
     if shape.kind == int(mujoco.mjtGeom.mjGEOM_PLANE):
         return Look(
-            "MeshStandardMaterial",
-            {"color": colour, "roughness": 0.95, "transparent": True},
+            "MeshLambertMaterial",
+            {"color": colour, "transparent": True},
             {"alphaMap": textures.fading_disc()},
         )
     if shape.is_target:
         opacity *= TARGET_OPACITY
-    return Look(
-        "MeshPhysicalMaterial",
-        {
-            "color": colour,
-            "roughness": 0.42,
-            "metalness": 0.15,
-            "clearcoat": 0.35,
-            "clearcoatRoughness": 0.25,
-            "opacity": opacity,
-            "transparent": opacity < 1.0,
-        },
-    )
+    see_through = {"opacity": opacity, "transparent": opacity < 1.0}
+    return Look("MeshPhongMaterial", {**_PAINT, **see_through, "color": colour})
 
 
 def _plane_around(mesh: TriangleMesh, centre: FloatArray, radius: float) -> TriangleMesh:

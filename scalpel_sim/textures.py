@@ -36,18 +36,18 @@ def skin() -> bytes:
         0.7 * _ridges(seed=4, wavelength=70.0, width=0.06),
     )
     fading = np.clip(0.55 + 0.5 * _standardized(_noise(seed=5, wavelength=200.0, spread=0.5)), 0, 1)
-    height = 0.60 + 0.11 * mottling + 0.05 * grain - 0.42 * vessels * fading
+    height = 0.54 + 0.11 * mottling + 0.05 * grain - 0.42 * vessels * fading
     return _encode_png(height, SKIN_RAMP)
 
 
 @functools.cache
 def cut_face() -> bytes:
     """Return freshly cut tissue as a PNG: striated along u, brighter and redder than skin."""
-    fibres = _standardized(_noise(seed=11, wavelength=14.0, spread=0.7, stretch=7.0))
+    fibres = _standardized(_noise(seed=11, wavelength=11.0, spread=0.7, stretch=6.0))
     bundles = _standardized(_noise(seed=12, wavelength=70.0, spread=0.6, stretch=3.5))
     grain = _standardized(_noise(seed=13, wavelength=5.0, spread=0.4))
     lobules = _ridges(seed=14, wavelength=110.0, width=0.05)
-    height = 0.52 + 0.13 * fibres + 0.09 * bundles + 0.03 * grain - 0.16 * lobules
+    height = 0.50 + 0.09 * fibres + 0.06 * bundles + 0.03 * grain - 0.12 * lobules
     return _encode_png(height, CUT_RAMP)
 
 

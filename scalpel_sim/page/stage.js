@@ -3,15 +3,15 @@
 
 const { THREE } = MeshCat;
 
-// A window must not be dazzling and a slit must not be black: an overcast room, with a bright lamp.
-const LAMP = { colour: 0xfff4e6, intensity: 2.1 };
-const RIM = { colour: 0xbfd4ff, intensity: 0.7 };
-const ROOM_INTENSITY = 0.75;
-const EXPOSURE = 0.95;
+// Wet tissue must shine without losing its colour, and a slit must not be black.
+const LAMP = { colour: 0xfff1e0, intensity: 0.88 };
+const RIM = { colour: 0xbfd4ff, intensity: 0.35 };
+const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
+const EXPOSURE = 1.0;
 
-const SHADOW_MAP_PIXELS = 2048;
+const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: its filter is what makes shadows soft
 const WIRE_COLOUR = 0x1b0f0e;
-const ARROW_COLOUR = 0xffc533;
+const ARROW_COLOUR = 0xffb000;
 const FORCE_WORTH_AN_ARROW = 0.02; // [N]; below it the arrow would be a speck
 
 // A decoded packet keeps its geometries, so that a replay uploads each of them once.
@@ -48,20 +48,25 @@ class Picture {
         viewer.renderer.outputEncoding = THREE.sRGBEncoding;
         viewer.renderer.toneMapping = THREE.ACESFilmicToneMapping;
         viewer.renderer.toneMappingExposure = EXPOSURE;
-        viewer.scene.environment = room(viewer.renderer);
+        this.room = room();
+        this.sky = new THREE.HemisphereLight(SKY.above, SKY.below, SKY.intensity);
         this.lamp = new THREE.DirectionalLight(LAMP.colour, LAMP.intensity);
         this.lamp.castShadow = true;
         this.lamp.shadow.mapSize.set(SHADOW_MAP_PIXELS, SHADOW_MAP_PIXELS);
         this.lamp.shadow.radius = 5;
         this.rim = new THREE.DirectionalLight(RIM.colour, RIM.intensity);
         this.arrow = forceArrow();
-        viewer.scene.add(this.lamp, this.lamp.target, this.rim, this.rim.target, this.arrow);
+        viewer.scene.add(this.sky, this.lamp, this.lamp.target, this.rim, this.rim.target, this.arrow);
+        viewer.gui.domElement.id = "scene-tree";
         new ResizeObserver(() => viewer.set_3d_pane_size()).observe(viewer.dom_element);
     }
 
     setLook({ name, kind, properties, maps }) {
         const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
-        material.color.convertSRGBToLinear();
+        for (const colour of [material.color, material.specular]) {
+            if (colour) colour.convertSRGBToLinear();
+        }
+        if ("reflectivity" in properties) material.envMap = this.room;
         for (const [property, url] of Object.entries(maps)) {
             const texture = new THREE.TextureLoader().load(url, () => this.viewer.set_dirty());
             texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
@@ -69,8 +74,6 @@ class Picture {
             if (property === "map") texture.encoding = THREE.sRGBEncoding;
             material[property] = texture;
         }
-        if ("envMapIntensity" in material) material.envMapIntensity = ROOM_INTENSITY;
-        if (material.metalness === 1) material.envMapIntensity = 1.6;
         this.looks.set(name, material);
     }
 
@@ -143,7 +146,7 @@ class Picture {
         const up = new THREE.Vector3(0, 0, 1);
         const away = (a, b, c) => target.clone()
             .addScaledVector(view, a * extent).addScaledVector(left, b * extent).addScaledVector(up, c * extent);
-        this.lamp.position.copy(away(0.7, 1.3, 3.2));
+        this.lamp.position.copy(away(0.9, 0.9, 3.6));
         this.rim.position.copy(away(-2.5, -1.5, 1.8));
         this.lamp.target.position.copy(target);
         this.rim.target.position.copy(target);
@@ -182,16 +185,19 @@ function geometryOf({ attributes, index }) {
 
 // An arrow along z from the origin: `point(length, size)` sets its length and that of the scene.
 function forceArrow() {
-    const material = new THREE.MeshStandardMaterial({
-        color: ARROW_COLOUR, roughness: 0.5, emissive: ARROW_COLOUR, emissiveIntensity: 0.25,
+    const material = new THREE.MeshLambertMaterial({
+        color: ARROW_COLOUR, emissive: ARROW_COLOUR,
+        depthTest: false, transparent: true, // seen through the tissue that the tip is in
     });
-    material.color.convertSRGBToLinear();
+    material.color.convertSRGBToLinear().multiplyScalar(0.45);
+    material.emissive.convertSRGBToLinear().multiplyScalar(0.6);
     const shaft = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 20).rotateX(Math.PI / 2), material);
     const head = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 28).rotateX(Math.PI / 2), material);
     const arrow = new THREE.Group();
     arrow.name = "force";
     arrow.add(shaft, head);
     arrow.visible = false;
+    shaft.renderOrder = head.renderOrder = 1;
     arrow.point = (length, size) => {
         const tip = Math.min(0.45 * size, 0.6 * length);
         shaft.scale.set(0.055 * size, 0.055 * size, length - tip);
@@ -202,24 +208,38 @@ function forceArrow() {
     return arrow;
 }
 
-// What shines on steel and wet tissue: a grey room with bright panels on its ceiling and one wall.
-function room(renderer) {
-    const scene = new THREE.Scene();
-    const box = (colour, size, place, side) => {
-        const mesh = new THREE.Mesh(
-            new THREE.BoxGeometry(...size), new THREE.MeshBasicMaterial({ color: colour, side: side || THREE.FrontSide }));
-        mesh.position.set(...place);
-        scene.add(mesh);
-        return mesh;
+// What steel and wet tissue mirror: a grey room with lamps under its ceiling. Painted, not rendered,
+// because a filtered environment takes seconds where there is no graphics card.
+function room() {
+    const size = 64;
+    const paint = (draw) => {
+        const canvas = document.createElement("canvas");
+        canvas.width = canvas.height = size;
+        draw(canvas.getContext("2d"));
+        return canvas;
     };
-    box(0x5b6468, [20, 12, 20], [0, 0, 0], THREE.BackSide);
-    box(0x2a3034, [20, 0.5, 20], [0, -5.8, 0]);
-    for (const [x, z] of [[-4, -3], [4, -3], [0, 5]]) {
-        box(0xffffff, [3.2, 0.3, 3.2], [x, 5.6, z]).material.color.multiplyScalar(7);
-    }
-    box(0xffffff, [0.3, 4, 7], [9.6, 1, 0]).material.color.multiplyScalar(3);
-    const generator = new THREE.PMREMGenerator(renderer);
-    const texture = generator.fromScene(scene, 0.03).texture;
-    generator.dispose();
+    const wall = paint((context) => {
+        const shade = context.createLinearGradient(0, 0, 0, size);
+        shade.addColorStop(0.0, "#dfe6e9");
+        shade.addColorStop(0.35, "#8b979c");
+        shade.addColorStop(0.55, "#4c5659");
+        shade.addColorStop(1.0, "#262c2f");
+        context.fillStyle = shade;
+        context.fillRect(0, 0, size, size);
+    });
+    const ceiling = paint((context) => {
+        context.fillStyle = "#7d888d";
+        context.fillRect(0, 0, size, size);
+        context.filter = "blur(3px)";
+        context.fillStyle = "#ffffff";
+        for (const [x, y] of [[10, 12], [38, 8], [24, 38]]) context.fillRect(x, y, 16, 16);
+    });
+    const floor = paint((context) => {
+        context.fillStyle = "#23292c";
+        context.fillRect(0, 0, size, size);
+    });
+    const texture = new THREE.CubeTexture([wall, wall, ceiling, floor, wall, wall]);
+    texture.encoding = THREE.sRGBEncoding;
+    texture.needsUpdate = true;
     return texture;
 }

@@ -1,0 +1,101 @@
+"""A headless Chromium for tests that look at pages."""
+
+import io
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+
+DETERMINISTIC = (
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+)
+"""Draw in software, the same everywhere, and talk to nobody."""
+
+WINDOW = {"width": 480, "height": 360}
+
+UNTIL_DRAWN = """() => new Promise((done) =>
+    requestAnimationFrame(() => requestAnimationFrame(done)))"""
+"""Resolves when what was changed so far is on the screen."""
+
+TIMEOUT = 60_000
+"""How long a page may take [ms]: drawing in software on a busy machine is slow."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium, without a window. Skips where there is none."""
+    executable = next(filter(None, map(shutil.which, NAMES)), None)
+    if executable is None:
+        pytest.skip("no Chromium on this machine: apt-get install chromium")
+    playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=executable, args=list(DETERMINISTIC))
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture
+def tab(browser: Any) -> Iterator[Any]:
+    """An empty tab in which no script may fail."""
+    page = new_tab(browser)
+    yield page
+    page.close()
+    assert page.failures == []
+
+
+def new_tab(browser: Any) -> Any:
+    """Open a tab that collects, as `failures`, the errors of its scripts."""
+    page = browser.new_page(viewport=WINDOW)
+    page.set_default_timeout(TIMEOUT)
+    page.failures = []
+    page.on("pageerror", lambda error: page.failures.append(str(error)))
+    return page
+
+
+def pixels(tab: Any) -> np.ndarray:
+    """Return what a tab shows: red, green and blue from 0 to 255, shape (height, width, 3)."""
+    from PIL import Image
+
+    tab.evaluate(UNTIL_DRAWN)
+    return np.asarray(Image.open(io.BytesIO(tab.screenshot())).convert("RGB"), dtype=int)
+
+
+def pixels_of(tab: Any, path: str) -> np.ndarray:
+    """Return the pixels that an object of the scene accounts for, shape (n, 3).
+
+    They are those that change when the object is hidden.
+    """
+    with_it = pixels(tab)
+    set_visible(tab, path, False)
+    without_it = pixels(tab)
+    set_visible(tab, path, True)
+    return with_it[np.abs(with_it - without_it).max(axis=2) > 12]
+
+
+def set_visible(tab: Any, path: str, is_visible: bool) -> None:
+    """Show or hide an object of meshcat's scene tree."""
+    tab.evaluate(
+        """([path, visible]) => {
+            viewer.set_property(path.split("/"), "visible", visible);
+            viewer.set_dirty();
+        }""",
+        [path, is_visible],
+    )
+
+
+def local_file(path: Path) -> str:
+    """Return the address under which a browser finds a file of this machine."""
+    return path.resolve().as_uri()
