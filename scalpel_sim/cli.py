@@ -3,6 +3,7 @@
 import logging
 import math
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +15,9 @@ from cyclopts import App, CycloptsError, Parameter
 
 from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, UsageError, exit_code
+from scalpel_sim.plotter import Plotter
+from scalpel_sim.stop_signals import StopSignals
+from scalpel_sim.version import version
 
 if TYPE_CHECKING:  # imported where they are used: `--help` should not wait for a compiler
     from bridge.link import TissueLink
@@ -26,19 +30,17 @@ log = logging.getLogger("scalpel_sim")
 PROGRAM = "scalpel-sim"
 LONGEST_RUN = 3600.0
 """[s] of simulated time: more is a slip of the keyboard."""
+SHORTEST_PAUSE = 5e-3
+"""[s]. Shorter ones cost more in waking up than they are worth."""
+LOOK_AGAIN = 0.2
+"""How often a finished `view` looks whether it is still wanted [s]."""
 FRAMES_PER_PROGRESS = 20
 """So often is the progress bar told [frames]."""
 
 
-def _version() -> str:
-    from importlib.metadata import version
-
-    return version(PROGRAM)
-
-
 app = App(
     name=PROGRAM,
-    version=_version,
+    version=version,
     help="A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it.\n\n"
     "Exit codes: 0 done, 1 the run failed or was interrupted, 2 wrong use or bad input.",
 )
@@ -116,8 +118,50 @@ def run(
     talk: Talk = Talk(),
 ) -> None:
     """Let the arm cut, print a table, write files to a folder."""
-    with _talking(talk), _ready(scene, body, motion) as ready:
-        _report(_perform(ready, motion, talk), ready.folder, talk)
+    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion) as ready:
+        _report(_perform(ready, motion, talk, plotter), ready.folder, talk)
+
+
+@app.command
+def view(
+    scene: SceneName = None,
+    /,
+    *,
+    wireframe: Annotated[bool, Parameter(negative="")] = False,
+    port: int | None = None,
+    body: Body = Body(),
+    motion: Motion = Motion(),
+    talk: Talk = Talk(),
+) -> None:
+    """Do the same at the speed of life, and show it live in a browser.
+
+    On a terminal it waits for Enter, so that one can open the page first. Afterwards the page stays
+    until Ctrl-C.
+
+    Args:
+        wireframe: Show the edges of the mesh.
+        port: Where the page is served, on this machine only; a free port if not given.
+    """
+    from scalpel_sim.pictures import into_viewer, show
+    from scalpel_sim.viewer import Viewer
+
+    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion) as ready:
+        simulation = ready.simulation
+        with Viewer(
+            simulation.arm.model,
+            title=ready.settings["about"],
+            frame=simulation.frame,
+            wireframe=wireframe,
+            port=port,
+        ) as viewer:
+            show(viewer, simulation)
+            simulation.pictures.append(into_viewer(viewer))
+            _invite(viewer.url)
+            summary = _perform(ready, motion, talk, plotter, at_most_real_time=True)
+            show(viewer, simulation)
+            _report(summary, ready.folder, talk)
+            _say(f"{viewer.url} stays until Ctrl-C")
+            _wait_while(lambda: viewer.is_running)
 
 
 @app.command
@@ -292,21 +336,53 @@ def _scene(name: str | None, body: Body) -> "Scene":
     )
 
 
-def _perform(ready: Ready, motion: Motion, talk: Talk) -> "Summary":
+def _perform(
+    ready: Ready, motion: Motion, talk: Talk, plotter: Plotter, *, at_most_real_time: bool = False
+) -> "Summary":
     """Do the run, with a progress bar on a terminal."""
     from scalpel_sim.outputs import Outputs
     from scalpel_sim.run import perform, run_time
 
     seconds = run_time(ready.simulation, motion.seconds)
     with _progress(seconds, talk) as advance:
+        after_frame = _paced(advance) if at_most_real_time else advance
         return perform(
             ready.simulation,
-            Outputs(ready.folder),
+            Outputs(ready.folder, plotter),
             settings=ready.settings,
             seed=motion.seed,
             seconds=seconds,
-            every_frame=advance,
+            every_frame=after_frame,
         )
+
+
+def _paced(after_frame: Callable[["Simulation"], None]) -> Callable[["Simulation"], None]:
+    """Return the same, with a pause where simulated time would overtake the clock on the wall."""
+    start = time.monotonic()
+
+    def pause(simulation: "Simulation") -> None:
+        after_frame(simulation)
+        ahead = simulation.time - (time.monotonic() - start)
+        if ahead > SHORTEST_PAUSE:
+            time.sleep(ahead)
+
+    return pause
+
+
+def _invite(url: str) -> None:
+    """Say where the page is, and give a person at a terminal the time to open it."""
+    if sys.stdin is not None and sys.stdin.isatty():
+        _say(f"open {url}, then press Enter to begin")
+        sys.stdin.readline()
+    else:
+        _say(f"live at {url}")
+
+
+def _wait_while(condition: Callable[[], bool]) -> None:
+    """Return when the condition fails, or on Ctrl-C."""
+    with StopSignals() as stop:
+        while condition() and stop.reason is None:
+            time.sleep(LOOK_AGAIN)
 
 
 @contextmanager
@@ -377,6 +453,11 @@ class _OneLine(logging.Formatter):
         return prefix + " ".join(record.getMessage().split())
 
 
+def _say(message: str) -> None:
+    """Print one line on standard error, where it cannot get between the figures."""
+    print(message, file=sys.stderr, flush=True)
+
+
 def _say_error(message: str) -> None:
     """Print one line on standard error."""
-    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    _say(f"error: {' '.join(message.split())}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.plot import plot_forces
+from scalpel_sim.plotter import Plotter
 from scalpel_sim.recording import COLUMNS, Recording
 from scalpel_sim.replay import ReplayWriter
 from scalpel_sim.summary import Summary
@@ -31,12 +31,19 @@ FRAMES_PER_FLUSH = 100
 class Outputs:
     """A folder with the files of one run. Those of an earlier run are removed, nothing else is.
 
+    Every `write_` raises RunError where the system refuses.
+
+    Args:
+        folder: Made where there is none.
+        plotter: Draws `force.png`. Whoever made it closes it.
+
     Raises:
         UsageError, RunError: as `check_folder`.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, plotter: Plotter) -> None:
         self.folder = folder
+        self._plotter = plotter
         check_folder(folder)
         for name in NAMES:
             _explained(folder / name, lambda path: path.unlink(missing_ok=True))
@@ -65,9 +72,9 @@ class Outputs:
         self._append(text)
         self._n_written = len(recording)
 
-    def write_plot(self, recording: Recording, title: str) -> None:
-        """Draw `force.png`."""
-        _explained(self.path(PLOT), lambda path: plot_forces(recording, title, path))
+    def write_plot(self, title: str) -> None:
+        """Draw `force.png` from `forces.csv`."""
+        self._plotter.draw(self.path(FORCES), title, self.path(PLOT))
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""
@@ -79,7 +86,7 @@ class Outputs:
         _explained(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
 
     def close(self) -> None:
-        """Close what is open. May be called twice."""
+        """Close `forces.csv`. May be called twice."""
         self._forces.close()
 
     def _append(self, text: str) -> None:

@@ -1,8 +1,13 @@
-"""Force and cut area over time, as one picture."""
+"""Force and cut area over time, as one picture.
+
+Without pyplot: no display is looked for, and nothing is kept between two pictures.
+"""
 
 from pathlib import Path
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from scalpel_sim.recording import Recording
 
@@ -16,10 +21,6 @@ MM2_PER_M2 = 1e6
 
 def plot_forces(recording: Recording, title: str, path: Path) -> None:
     """Write a PNG: the force on the blade above, the area that it has cut below."""
-    # Late, and without pyplot: importing it costs more than many a run.
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     time = recording.column("time_s")
     force = recording.vector("force")
 

@@ -2,9 +2,7 @@
 
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink, TissueLink
-from scalpel_sim.arm import Arm
 from scalpel_sim.body import make_tissue
-from scalpel_sim.hand import Hand
 from scalpel_sim.placement import place
 from scalpel_sim.planning import check_meets, plan
 from scalpel_sim.scenes import Scene, read_stroke
@@ -34,7 +32,6 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
         scene.stroke, mesh, speed=scene.speed, material=link.describe().material
     )
     check_meets(stroke, mesh)
-    placement = place(scene.arm, stroke)
+    placement = place(stroke, link.describe().bounds, scene.arm)
     frame = TissueFrame(origin=placement.tissue_origin)
-    arm = Arm(placement)
-    return Simulation(arm, Hand(arm), stroke, link, frame)
+    return Simulation(placement.arm(), stroke, link, frame)

@@ -1,6 +1,7 @@
 """What happened in each frame, as one table of numbers."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -64,3 +65,24 @@ class Recording:
         """Return the three columns of `tip`, `force` or `torque`, shape (n_frames, 3). A view."""
         first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
         return self.rows[:, first : first + 3]
+
+
+def read_forces(path: Path) -> Recording:
+    """Return the recording that a run wrote as `forces.csv`.
+
+    Raises:
+        ValueError: the file is no such table.
+        OSError: it cannot be read.
+    """
+    with path.open(encoding="ascii") as file:
+        header = file.readline().strip()
+        if header != ",".join(COLUMNS):
+            raise ValueError(
+                f"{path}: the first line is '{header[:200]}'; wanted the columns of a run"
+            )
+        lines = file.readlines()
+    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(COLUMNS)))
+    recording = Recording(len(rows))
+    for row in rows:
+        recording.append(row)
+    return recording

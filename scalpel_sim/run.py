@@ -8,7 +8,7 @@ from bridge.link import LinkError
 from scalpel_sim import outputs as files
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.outputs import Outputs
-from scalpel_sim.pictures import into_replay
+from scalpel_sim.pictures import add_to, into_replay
 from scalpel_sim.replay import ReplayWriter
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
@@ -69,13 +69,13 @@ def perform(
             status, failure = f"failed: {error}", error
     status = stop.reason or status
 
-    outputs.write_forces(simulation.recording, all_rows=True)
+    unwritten = _Attempts()
+    with unwritten:
+        outputs.write_forces(simulation.recording, all_rows=True)
     pieces = None
-    try:
-        outputs.write_mesh(files.FINAL, link.snapshot())
+    with unwritten:
         pieces = link.pieces()
-    except LinkError as error:
-        log.warning("%s is not written: %s", files.FINAL, error)
+        outputs.write_mesh(files.FINAL, link.snapshot())
     result = simulation.bridge.result
     summary = summarise(
         simulation.recording,
@@ -90,18 +90,41 @@ def perform(
         counters=simulation.bridge.counters._asdict(),
         settings=settings,
     )
-    outputs.write_summary(summary)
-    outputs.write_plot(simulation.recording, title)
-    outputs.write_replay(replay)
+    with unwritten:
+        outputs.write_summary(summary)
+    with unwritten:
+        outputs.write_plot(title)
+    with unwritten:
+        add_to(replay, simulation)
+    with unwritten:
+        outputs.write_replay(replay)
     outputs.close()
 
+    kept = f"{outputs.folder} holds what was done"
     if failure is not None:
-        raise RunError(f"the run failed after {simulation.time:.3f} s: {failure}") from failure
+        raise RunError(f"after {simulation.time:.3f} s {failure}; {kept}") from failure
     if stop.reason is not None:
-        raise Interrupted(
-            f"{stop.reason} after {simulation.time:.3f} s; {outputs.folder} holds what it did"
-        )
+        raise Interrupted(f"{stop.reason} after {simulation.time:.3f} s; {kept}")
+    if unwritten.errors:
+        raise unwritten.errors[0]
     return summary
+
+
+class _Attempts:
+    """Lets the files after one that fails be written too. Enter it once for each."""
+
+    def __init__(self) -> None:
+        self.errors: list[Exception] = []
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> bool:
+        if not isinstance(error, (RunError, LinkError)):
+            return False
+        self.errors.append(error)
+        log.warning("%s", error)
+        return True
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:

@@ -11,7 +11,6 @@ from bridge.bridge import Bridge
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink
 from scalpel_sim.arm import Arm
-from scalpel_sim.hand import Hand
 from scalpel_sim.recording import Recording
 from scalpel_sim.stroke import Stroke
 from tissue.types import StepResult, Wrench
@@ -28,17 +27,13 @@ class Simulation:
 
     Args:
         arm: At the start of the stroke. `arm.model` and `arm.data` are MuJoCo's own.
-        hand: What holds the arm.
         stroke: Where the hand leads the blade, tissue frame.
         link: The tissue.
         frame: Where the tissue lies in the world.
     """
 
-    def __init__(
-        self, arm: Arm, hand: Hand, stroke: Stroke, link: TissueLink, frame: TissueFrame
-    ) -> None:
+    def __init__(self, arm: Arm, stroke: Stroke, link: TissueLink, frame: TissueFrame) -> None:
         self.arm = arm
-        self.hand = hand
         self.stroke = stroke
         self.link = link
         self.frame = frame
@@ -75,7 +70,7 @@ class Simulation:
             LinkError: the tissue is elsewhere, and did not answer.
         """
         start = time.perf_counter()
-        self.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
+        self.arm.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
         self.arm.step1()
         segment = self.arm.blade.segment()
         self.wrench = self.bridge.step(segment, self.dt)

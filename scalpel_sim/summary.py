@@ -1,12 +1,12 @@
 """A run in twenty numbers: what `summary.json` holds and the table prints."""
 
-import importlib.metadata
 import platform
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from scalpel_sim.recording import Recording
+from scalpel_sim.version import version
 
 COMPLETE = "complete"
 """The status of a run that reached its end; any other status says what ended it."""
@@ -107,5 +107,5 @@ def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:
 
 def versions() -> dict[str, str]:
     """Return what the figures depend on besides the settings."""
-    found = {name.replace("-", "_"): importlib.metadata.version(name) for name in PACKAGES}
+    found = {name.replace("-", "_"): version(name) for name in PACKAGES}
     return found | {"python": platform.python_version(), "platform": platform.platform()}

@@ -1,0 +1,74 @@
+"""Draws plots in a process of its own, which loads matplotlib while the run goes on."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import IO, cast
+
+from scalpel_sim.errors import RunError
+
+SLOWEST = 60.0
+"""How long a plot may take [s]: a second, or ten when matplotlib first looks for fonts."""
+
+
+class Plotter:
+    """A process that draws on request. It ends when it is closed, or when this process ends.
+
+    Loading matplotlib takes as long as a short run does; here it costs the run nothing.
+    """
+
+    def __init__(self) -> None:
+        # A session of its own: the Ctrl-C that ends a run must not end the drawing of it.
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", "from scalpel_sim.plotter import main; main()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+        )
+
+    def draw(self, forces: Path, title: str, picture: Path) -> None:
+        """Draw what is in a `forces.csv`, and end the process.
+
+        Raises:
+            RunError: the plot could not be drawn or written.
+        """
+        request = json.dumps({"forces": str(forces), "title": title, "picture": str(picture)})
+        try:
+            _, complaint = self._process.communicate(request, timeout=SLOWEST)
+        except subprocess.TimeoutExpired:
+            self.close()
+            raise RunError(f"{picture}: drawing it took more than {SLOWEST:g} s") from None
+        if self._process.returncode != 0:
+            reason = complaint.strip().rpartition("\n")[2] or f"exit {self._process.returncode}"
+            raise RunError(f"{picture}: could not be drawn ({reason})")
+
+    def __enter__(self) -> "Plotter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the process, if it still lives."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stderr):
+            cast(IO[str], pipe).close()
+
+
+def main() -> None:
+    """Load what is needed, and draw what the standard input then asks for."""
+    from scalpel_sim.plot import plot_forces
+    from scalpel_sim.recording import read_forces
+
+    text = sys.stdin.read()
+    if text:
+        request = json.loads(text)
+        plot_forces(
+            read_forces(Path(request["forces"])), request["title"], Path(request["picture"])
+        )

@@ -1,0 +1,176 @@
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.outputs import FORCES, FRAMES_PER_FLUSH, INITIAL, PLOT, SUMMARY, Outputs
+from scalpel_sim.plotter import Plotter
+from scalpel_sim.recording import COLUMNS, Recording
+from scalpel_sim.summary import Summary, summarise
+from tissue.shapes import grid
+from tissue.types import Snapshot
+
+DT = 1e-3
+
+
+@pytest.fixture(scope="module")
+def plotter():
+    with Plotter() as plotter:
+        yield plotter
+
+
+def recorded(n_frames: int) -> Recording:
+    """A recording in which everything is random, but for times that sum to less than the wall's."""
+    rng = np.random.default_rng(0)
+    recording = Recording(1)
+    for i in range(n_frames):
+        recording.append((i * DT, *rng.normal(size=13), *rng.uniform(0.0, 1e-5, 5)))
+    return recording
+
+
+def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
+    return summarise(
+        recording,
+        scene="block",
+        status="complete",
+        seed=7,
+        dt=DT,
+        wall_seconds=wall_seconds,
+        tetrahedra_initial=6,
+        tetrahedra_final=8,
+        pieces=2,
+        counters={},
+        settings={"stroke": "straight"},
+    )
+
+
+def test_a_recording_keeps_every_frame_when_it_grows():
+    rows = np.arange(3000.0 * len(COLUMNS)).reshape(3000, -1)
+    recording = Recording(1)
+    for row in rows:
+        recording.append(row)
+    assert np.array_equal(recording.rows, rows)
+
+
+def test_a_vector_is_its_three_columns():
+    recording = recorded(5)
+    columns = [recording.column(f"torque_{axis}_nm") for axis in "xyz"]
+    assert np.array_equal(recording.vector("torque"), np.transpose(columns))
+
+
+def test_forces_csv_reads_back_to_the_same_bits(tmp_path, plotter):
+    recording = recorded(250)
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_forces(recording, all_rows=True)
+    with (tmp_path / FORCES).open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == list(COLUMNS)
+    assert np.array_equal(np.array(rows, float), recording.rows)
+
+
+def test_forces_csv_is_on_disk_while_the_run_goes_on(tmp_path, plotter):
+    outputs, recording = Outputs(tmp_path, plotter), Recording()
+    for i in range(FRAMES_PER_FLUSH + 5):
+        recording.append([float(i)] * len(COLUMNS))
+        outputs.write_forces(recording)
+    assert len((tmp_path / FORCES).read_text().splitlines()) == 1 + FRAMES_PER_FLUSH
+
+
+def test_a_new_run_removes_the_files_of_the_last_one_and_no_others(tmp_path, plotter):
+    for name in (SUMMARY, PLOT, "notes.txt"):
+        (tmp_path / name).write_text("old")
+    Outputs(tmp_path, plotter)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [FORCES, "notes.txt"]
+
+
+def test_a_path_that_is_a_file_is_wrong_use(tmp_path, plotter):
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for path in (file, file / "below"):
+        with pytest.raises(UsageError, match="is a file"):
+            Outputs(path, plotter)
+    assert file.read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_made_is_a_failed_run(plotter):
+    with pytest.raises(RunError, match=r"^/proc/nothing: cannot be written \("):
+        Outputs(Path("/proc/nothing"), plotter)
+
+
+def test_the_mesh_of_an_output_folder_reads_back(tmp_path, plotter):
+    meshio = pytest.importorskip("meshio")
+    mesh = grid((1, 1, 1), (0.01, 0.01, 0.01))
+    n = len(mesh.positions)
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_mesh(
+        INITIAL,
+        Snapshot(
+            mesh.positions + 0.001,
+            mesh.positions,
+            np.zeros((n, 3)),
+            np.ones(n),
+            mesh.tetrahedra,
+            np.zeros(n, bool),
+        ),
+    )
+    found = meshio.read(tmp_path / INITIAL)
+    assert np.array_equal(found.points, mesh.positions + 0.001)
+    assert np.array_equal(found.point_data["rest_position"], mesh.positions)
+    assert found.point_data["mass"].dtype == np.float64
+
+
+def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):
+    image = pytest.importorskip("PIL.Image")
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_forces(recorded(50), all_rows=True)
+    outputs.write_plot("block: straight stroke")
+    with image.open(tmp_path / PLOT) as picture:
+        pixels = np.asarray(picture.convert("RGB"))
+    assert pixels.shape[0] > 500 and pixels.shape[1] > 800
+    assert (pixels == (0x22, 0x22, 0x22)).all(axis=2).sum() > 500  # the magnitude's line
+
+
+def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_summary(summary_of(recorded(10)))
+    found = json.loads((tmp_path / SUMMARY).read_text())
+    promised = (
+        "scene seed simulated_seconds wall_seconds real_time_factor frame_rate_median "
+        "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces cut_area_m2 force_peak_n "
+        "force_mean_n work_of_blade_j share versions"
+    )
+    assert set(promised.split()) <= set(found)
+    assert {"RX", "RD", "GC", "CD"} <= set(found["share"])
+    assert {"scalpel_sim", "python", "numpy", "numba", "mujoco", "platform"} <= set(
+        found["versions"]
+    )
+
+
+def test_the_shares_sum_to_one():
+    assert sum(summary_of(recorded(100)).share.values()) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_figures_follow_from_the_frames():
+    recording = Recording()
+    for i in range(100):
+        row = dict.fromkeys(COLUMNS, 0.0)
+        row |= {"force_z_n": -2.0 if i < 50 else 0.0, "frame_s": 1e-2 if i == 99 else 1e-4}
+        recording.append([row[name] for name in COLUMNS])
+    summary = summary_of(recording, wall_seconds=0.05)
+    assert summary.simulated_seconds == pytest.approx(0.1)
+    assert summary.real_time_factor == pytest.approx(2.0)
+    assert summary.force_peak_n == 2.0
+    assert summary.force_mean_n == 2.0  # over the frames in which there was a force
+    assert summary.frame_rate_median == pytest.approx(1e4)
+    assert summary.frame_rate_p99 == pytest.approx(
+        1.0 / np.percentile(recording.column("frame_s"), 99)
+    )
+
+
+def test_a_run_that_ended_before_its_first_frame_has_a_summary_too():
+    summary = summary_of(Recording(), wall_seconds=0.0)
+    assert summary.simulated_seconds == summary.force_peak_n == summary.frame_rate_median == 0.0
+    assert json.loads(json.dumps(summary._asdict(), allow_nan=False))["frames"] == 0
