@@ -102,8 +102,8 @@ def _checked_box(bounds: npt.ArrayLike, spacing: float) -> tuple[FloatArray, Int
 
 def _lattice(lowest: FloatArray, cells: IntArray, spacing: float) -> _Lattice:
     """Return the lattice of `cells` from the corner `lowest` [m] on."""
-    corners = np.indices(cells + 1).reshape(3, -1).T
-    centres = np.indices(cells).reshape(3, -1).T
+    corners = np.indices(tuple(cells + 1)).reshape(3, -1).T
+    centres = np.indices(tuple(cells)).reshape(3, -1).T
     points = lowest + spacing * np.concatenate([corners, centres + 0.5])
     is_outermost = np.concatenate(
         [((corners == 0) | (corners == cells)).any(axis=1), np.zeros(len(centres), dtype=bool)]
@@ -218,10 +218,10 @@ def _stencil(pattern: tuple[int, ...]) -> list[tuple[_Vertex, ...]]:
     if len(inside) == 1:
         return [(*kept, *((inside[0], n) for n in outside))]
     if len(outside) == 1 and len(inside) == 2:
-        return _pyramid((on[0], on[0]), _face(*inside, outside[0]))
+        return _pyramid((on[0], on[0]), _face(inside[0], inside[1], outside[0]))
     if len(outside) == 1:
-        # Corner n is cut off. Its long edge goes to p; the diagonals of both faces there meet in the
-        # cut of pn, so that a tetrahedron and a pyramid remain.
+        # Corner n is cut off. Its long edge goes to p; the diagonals of both faces at pn meet in
+        # the cut of pn, so that a tetrahedron and a pyramid remain.
         (n,) = outside
         p = n ^ 1
         q, r = (i for i in inside if i != p)

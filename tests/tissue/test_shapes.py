@@ -1,13 +1,11 @@
 import numpy as np
 import pytest
 
+from tests.tissue.geometry_of_meshes import dihedral_angles
+from tissue import liver_lobe
 from tissue.faces import boundary_faces, sorted_faces
-from tissue.shapes import grid
-
-
-def signed_volumes(mesh):
-    a, b, c, d = (mesh.positions[mesh.tetrahedra[:, k]] for k in range(4))
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+from tissue.shapes import grid, organ
+from tissue.validation import checked, signed_volumes
 
 
 def test_the_default_grid_is_the_block_of_figure_10():
@@ -20,7 +18,7 @@ def test_the_default_grid_is_the_block_of_figure_10():
 
 @pytest.mark.parametrize("cells", [(1, 1, 1), (1, 2, 5), (4, 6, 4)])
 def test_the_six_tetrahedra_of_a_cell_are_equal_in_volume_and_turn_left(cells):
-    volumes = signed_volumes(grid(cells, (0.1, 0.2, 0.3)))
+    volumes = signed_volumes(*grid(cells, (0.1, 0.2, 0.3)))
     assert volumes == pytest.approx(0.1 * 0.2 * 0.3 / (6 * np.prod(cells)), rel=1e-12)
 
 
@@ -43,7 +41,7 @@ def test_the_boundary_faces_of_a_grid_turn_left_seen_from_outside():
     mesh = grid((2, 3, 1))
     a, b, c = (mesh.positions[boundary_faces(mesh.tetrahedra)[:, k]] for k in range(3))
     enclosed = np.einsum("ij,ij->i", np.cross(a, b), c).sum() / 6.0
-    assert enclosed == pytest.approx(signed_volumes(mesh).sum(), rel=1e-12)
+    assert enclosed == pytest.approx(signed_volumes(*mesh).sum(), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -61,3 +59,32 @@ def test_the_boundary_faces_of_a_grid_turn_left_seen_from_outside():
 def test_a_grid_that_cannot_be_is_refused_by_name(arguments, message):
     with pytest.raises(ValueError, match=message):
         grid(**arguments)
+
+
+def test_the_organ_that_is_shipped_is_the_one_that_the_code_makes():
+    shipped, made = organ(), liver_lobe.make()
+    assert np.array_equal(shipped.tetrahedra, made.tetrahedra)
+    assert np.allclose(shipped.positions, made.positions, rtol=0.0, atol=1e-12)
+
+
+def test_the_organ_is_of_the_size_of_a_liver_lobe_and_stands_at_the_origin():
+    mesh = organ()
+    assert 4500 <= len(mesh.tetrahedra) <= 5500
+    assert mesh.positions.min(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert mesh.positions.max(axis=0) == pytest.approx([0.090, 0.060, 0.033], abs=1.5e-3)
+
+
+def test_the_organ_is_one_sound_piece_with_good_angles():
+    mesh = organ()
+    assert checked(mesh).warnings == ()
+    angles = dihedral_angles(mesh)
+    assert angles.min() >= 10.0
+    assert angles.max() <= 165.0
+
+
+def test_the_surface_of_the_organ_is_a_closed_sphere():
+    triangles = boundary_faces(organ().tetrahedra)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    distinct, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 2).all()
+    assert len(np.unique(triangles)) - len(distinct) + len(triangles) == 2
