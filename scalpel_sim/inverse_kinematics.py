@@ -7,7 +7,6 @@ import numpy as np
 
 from tissue.types import FloatArray
 
-
 # From the side, in the vertical plane that turns with the waist:
 #
 #               elbow

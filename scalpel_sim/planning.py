@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from scalpel_sim.errors import unknown
-from scalpel_sim.sheet import Sheet, edges_of, is_above, section
+from scalpel_sim.planned_sheet import Sheet, edges_of, is_above, section
 from scalpel_sim.stroke import Stroke, StrokeError
 from tissue.faces import boundary_faces
 from tissue.material import Material

@@ -7,7 +7,6 @@ import numpy as np
 
 from tissue.types import BladeSegment, BoolArray, FloatArray, IntArray
 
-
 # Seen along the blade; `down` points away from the reader, or towards:
 #
 #   normal ^          ___-----___           a half cosine of height `sagitta` over `chord`,
