@@ -38,7 +38,7 @@ class Shape(NamedTuple):
     colour: FloatArray
     """Red, green, blue and opacity between 0 and 1, shape (4,)."""
     is_blade: bool
-    """Whether it is the blade: a box on a body that carries the sites `heel` and `tip`."""
+    """Whether it is the blade: a box that holds the sites `heel` and `tip` of its body."""
     is_target: bool
     """Whether it only marks where somebody's hand is (a mocap body)."""
 
@@ -224,17 +224,26 @@ def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
     return _faceted(positions, _grid(rows, columns))
 
 
+BLADE_MARGIN = 0.1
+"""How far heel and tip may lie outside the box that stands for the blade, as a fraction of the box's
+length. Boxes that they do not fit are other parts of the same body."""
+
+
 def _edge_in_geom(model: mujoco.MjModel, geom: int) -> tuple[FloatArray, FloatArray] | None:
-    """Return heel and tip in the geom's frame, if the geom's body carries sites of these names."""
+    """Return heel and tip in a box's frame, if the box is the sheet that carries them."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, model.geom_quat[geom])
     ends = []
     for name in ("heel", "tip"):
         site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
         if site < 0 or model.site_bodyid[site] != model.geom_bodyid[geom]:
             return None
-        rotation = np.empty(9)
-        mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-        ends.append((model.site_pos[site] - model.geom_pos[geom]) @ rotation.reshape(3, 3))
-    return ends[0], ends[1]
+        ends.append((model.site_pos[site] - model.geom_pos[geom]) @ matrix.reshape(3, 3))
+    heel, tip = ends
+    size = model.geom_size[geom]
+    fits = (np.abs([heel, tip]) <= size + BLADE_MARGIN * size.max()).all()
+    is_in_sheet = np.abs(tip - heel).argmax() != size.argmin() and not np.array_equal(heel, tip)
+    return (heel, tip) if fits and is_in_sheet else None
 
 
 #      spine_start ____________ spine_end
@@ -254,13 +263,13 @@ def _blade(size: FloatArray, heel: FloatArray, tip: FloatArray) -> TriangleMesh:
         heel: End of the edge nearest the handle [m], in the box's frame.
         tip: Sharp end [m], in the box's frame.
     """
-    sheet = int(np.argmin(size))
     along = tip - heel
-    across = np.cross(np.eye(3)[sheet], along)
-    across /= max(float(np.linalg.norm(across)), np.finfo(float).tiny)
+    across = np.cross(np.eye(3)[np.argmin(size)], along)
+    across /= np.linalg.norm(across)
     towards_spine = -across if np.dot(across, heel + tip) > 0.0 else across
     width = 2.0 * float(np.abs(towards_spine) @ size)
-    half = size[sheet] * np.eye(3)[sheet]
+    half = np.cross(along, towards_spine)
+    half *= size.min() / np.linalg.norm(half)
     spine_start = heel + width * towards_spine
     spine_end = spine_start + SPINE_LENGTH * along
     corners = np.array(
