@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.body import OUTER, TETRAHEDRA, Body, walk
 from tissue.geometry import (
     Weights,
@@ -54,7 +55,7 @@ class Edge(NamedTuple):
     forward_t1: Vec3
 
 
-class Anchors(NamedTuple):
+class Anchors(Arrays):
     """The samples of the edge, from the tip to the heel."""
 
     state: IntArray

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.geometry import barycentric_in, smallest_weight
 from tissue.jit import kernel
 from tissue.predicates import Lattice, lattice_around
@@ -30,7 +31,7 @@ NODES, TETRAHEDRA = 0, 1
 """Places in `Body.counts`."""
 
 
-class Body(NamedTuple):
+class Body(Arrays):
     """Every node and tetrahedron. Rows beyond `counts` are room to grow."""
 
     rest: FloatArray
@@ -116,7 +117,7 @@ def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     of_nodes += ("node_tetrahedron",)
     larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
     larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in ("tetrahedra", "links")}
-    return body._replace(**larger)
+    return body.replaced(**larger)
 
 
 @kernel

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3
@@ -31,28 +32,30 @@ class Point(NamedTuple):
     z: int
 
 
-class Lattice(NamedTuple):
+class Lattice(Arrays):
     """Where the lattice lies."""
 
     origin: FloatArray
     """Centre of the body at rest [m], shape (3,)."""
-    spacing: FloatArray
-    """Distance of lattice points [m], shape (1,)."""
+    spacing: float
+    """Distance of lattice points [m]."""
 
 
 def lattice_around(positions: FloatArray) -> Lattice:
     """Return the lattice of a body with these rest positions [m], shape (n_nodes, 3)."""
     low, high = positions.min(axis=0), positions.max(axis=0)
-    return Lattice(0.5 * (low + high), np.array([float((high - low).max()) / LATTICE_POINTS]))
+    return Lattice(
+        origin=0.5 * (low + high), spacing=float((high - low).max()) / LATTICE_POINTS
+    )
 
 
 @kernel
 def nearest(lattice: Lattice, p: Vec3) -> Point:
     """Return the lattice point nearest to `p` [m]."""
     return Point(
-        _round((p.x - lattice.origin[0]) / lattice.spacing[0]),
-        _round((p.y - lattice.origin[1]) / lattice.spacing[0]),
-        _round((p.z - lattice.origin[2]) / lattice.spacing[0]),
+        _round((p.x - lattice.origin[0]) / lattice.spacing),
+        _round((p.y - lattice.origin[1]) / lattice.spacing),
+        _round((p.z - lattice.origin[2]) / lattice.spacing),
     )
 
 

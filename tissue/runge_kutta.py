@@ -14,11 +14,10 @@ Nystroem's form (Collatz, chapter 2, the paper's reference [4]; algorithms.md 1.
 Elastic forces are evaluated three times a step, damping four times.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from tissue.anchors import Anchors, Edge, clear_forces, pull, slip
+from tissue.arrays import Arrays
 from tissue.body import NODES, Body
 from tissue.jit import kernel
 from tissue.springs import Springs, accelerations
@@ -47,7 +46,7 @@ SAFETY = 0.8
 0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
 
 
-class Stages(NamedTuple):
+class Stages(Arrays):
     """Scratch of one step, each of shape (capacity, 3)."""
 
     positions: FloatArray
@@ -63,7 +62,7 @@ class Stages(NamedTuple):
 
 def new_stages(n_nodes: int) -> Stages:
     """Return scratch for that many nodes."""
-    return Stages(*(np.zeros((n_nodes, 3)) for _ in Stages._fields))
+    return Stages(**{name: np.zeros((n_nodes, 3)) for name in Stages.__annotations__})
 
 
 def largest_stable_step(frequency: float, retardation_time: float, viscous_damping: float) -> float:

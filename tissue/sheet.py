@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.body import Body, grown
 from tissue.geometry import normalised
 from tissue.jit import kernel
@@ -33,7 +34,7 @@ HASH_SLOTS = 1 << 15
 """Slots of the table of edges seen; twice what one pass can meet."""
 
 
-class Quality(NamedTuple):
+class Quality(Arrays):
     """When a node that is there is used in place of a new one (algorithms.md 3.5).
 
     It trades the path of the cut against the smallest element, hence against the time step. Without
@@ -50,7 +51,7 @@ class Quality(NamedTuple):
     """A closed piece smaller than this [m3], made in one step, stays with its larger neighbour."""
 
 
-class Sheet(NamedTuple):
+class Sheet(Arrays):
     """What is known of the current incision. Entries count only where stamped with its number."""
 
     number: IntArray
@@ -69,7 +70,7 @@ class Sheet(NamedTuple):
     """Last node of the crack front at the tip and at the heel, or -1; shape (2,)."""
 
 
-class Path(NamedTuple):
+class Path(Arrays):
     """The way of the edge's samples through the material in one step. n samples."""
 
     t0: FloatArray
@@ -92,7 +93,7 @@ class Path(NamedTuple):
     """Lowest and highest lattice point of the quad from each sample to the next, shape (n, 6)."""
 
 
-class Change(NamedTuple):
+class Change(Arrays):
     """What one pass of a cut step did."""
 
     flagged: IntArray
@@ -109,7 +110,7 @@ N_FLAGGED, N_DIRTY, N_FACES, N_SPLITS, FULL = 0, 1, 2, 3, 4
 """Places in `Change.counts`."""
 
 
-class Work(NamedTuple):
+class Work(Arrays):
     """Scratch of a cut step."""
 
     active: IntArray
@@ -144,7 +145,7 @@ class Work(NamedTuple):
     """Search that wrote each slot, shape (HASH_SLOTS,)."""
 
 
-class Cut(NamedTuple):
+class Cut(Arrays):
     """All that a cut step reads and writes."""
 
     body: Body
@@ -171,7 +172,7 @@ def new_sheet(n_nodes: int, n_tetrahedra: int) -> Sheet:
 
 def grown_sheet(sheet: Sheet, n_nodes: int, n_tetrahedra: int) -> Sheet:
     """Return the sheet with room for that many nodes and tetrahedra."""
-    return sheet._replace(
+    return sheet.replaced(
         node_stamp=grown(sheet.node_stamp, n_nodes),
         offset=grown(sheet.offset, n_nodes, -1.0),
         side=grown(sheet.side, n_nodes),
@@ -199,10 +200,10 @@ def new_path(n: int) -> Path:
 def new_change() -> Change:
     """Return an empty list of changes."""
     return Change(
-        np.zeros(CHANGES, np.int64),
-        np.zeros(CHANGES, np.int64),
-        np.zeros((CHANGES, 4), np.int64),
-        np.zeros(5, np.int64),
+        flagged=np.zeros(CHANGES, np.int64),
+        dirty=np.zeros(CHANGES, np.int64),
+        faces=np.zeros((CHANGES, 4), np.int64),
+        counts=np.zeros(5, np.int64),
     )
 
 

@@ -9,10 +9,9 @@ Pull of a spring on its ends: k (l - l0).
 """
 
 import math
-from typing import NamedTuple
-
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.body import NODES, TETRAHEDRA, Body, grown
 from tissue.geometry import tetrahedron_volume
 from tissue.jit import kernel
@@ -27,7 +26,7 @@ POOL_MARGIN = 1024
 """Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
 
 
-class Springs(NamedTuple):
+class Springs(Arrays):
     """The rows, and what follows from them for each node."""
 
     first: IntArray
@@ -51,7 +50,9 @@ class Springs(NamedTuple):
 def no_springs(n_nodes: int, pool: int) -> Springs:
     """Return empty rows for that many nodes."""
     return Springs(
-        *np.zeros((3, n_nodes), dtype=np.int64),
+        first=np.zeros(n_nodes, dtype=np.int64),
+        room=np.zeros(n_nodes, dtype=np.int64),
+        count=np.zeros(n_nodes, dtype=np.int64),
         neighbour=np.zeros(pool, dtype=np.int64),
         stiffness=np.zeros(pool),
         rest_pull=np.zeros(pool),
@@ -66,7 +67,7 @@ def grown_springs(springs: Springs, n_nodes: int, pool: int) -> Springs:
     larger = {name: grown(getattr(springs, name), n_nodes) for name in of_nodes}
     of_pool = ("neighbour", "stiffness", "rest_pull")
     larger |= {name: grown(getattr(springs, name), pool) for name in of_pool}
-    return springs._replace(**larger)
+    return springs.replaced(**larger)
 
 
 @kernel

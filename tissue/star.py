@@ -1,9 +1,8 @@
 """The tetrahedra around a node, found through links: each star hangs together through faces."""
 
-from typing import NamedTuple
-
 import numpy as np
 
+from tissue.arrays import Arrays
 from tissue.body import NODES, Body, local_index
 from tissue.geometry import altitude
 from tissue.jit import kernel
@@ -14,7 +13,7 @@ LARGEST_STAR = 4096
 """Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at the worst."""
 
 
-class Visits(NamedTuple):
+class Visits(Arrays):
     """Which tetrahedra and nodes a search has seen. A new epoch forgets all, without clearing."""
 
     epoch: IntArray
@@ -28,7 +27,9 @@ class Visits(NamedTuple):
 def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
     """Return visits for that many nodes and tetrahedra."""
     return Visits(
-        np.zeros(1, np.int64), np.zeros(n_tetrahedra, np.int64), np.zeros(n_nodes, np.int64)
+        epoch=np.zeros(1, np.int64),
+        tetrahedra=np.zeros(n_tetrahedra, np.int64),
+        nodes=np.zeros(n_nodes, np.int64),
     )
 
 

@@ -162,10 +162,10 @@ class Tissue:
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._quality = Quality(
-            quality.snap,
-            quality.floor * self.node_size,
-            quality.guard * self.node_size,
-            quality.crumb * volume / n_tetrahedra,
+            snap=quality.snap,
+            floor=quality.floor * self.node_size,
+            guard=quality.guard * self.node_size,
+            crumb=float(quality.crumb * volume / n_tetrahedra),
         )
         self._grow()
 
@@ -406,7 +406,7 @@ class Tissue:
         n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
         n = min(max(n, 2), MOST_SAMPLES)
         totals = self._anchors.totals
-        self._anchors = new_anchors(n, length, self.material.young_modulus)._replace(totals=totals)
+        self._anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
         self._edge_length = length
         self._path = new_path(n)
         if self._incising:
@@ -416,13 +416,13 @@ class Tissue:
 
     def _cut_arrays(self) -> Cut:
         return Cut(
-            self._body,
-            self._visits,
-            self._sheet,
-            self._path,
-            self._change,
-            self._work,
-            self._quality,
+            body=self._body,
+            visits=self._visits,
+            sheet=self._sheet,
+            path=self._path,
+            change=self._change,
+            work=self._work,
+            quality=self._quality,
         )
 
     def _build_rows(self, nodes: np.ndarray, n: int) -> None:
@@ -461,7 +461,7 @@ class Tissue:
         self._springs = grown_springs(self._springs, n_nodes, len(self._springs.neighbour))
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._visits = no_visits(n_nodes, n_tetrahedra)
-        self._work = self._work._replace(place=np.zeros(n_tetrahedra, dtype=np.int64))
+        self._work = self._work.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._work.hash_stamps[:] = 0
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
