@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from tissue.boundary import fixed_nodes
-from tissue.jit import _cache_directory
+from tissue.jit import cache_directory
 from tissue.shapes import grid
 from tissue.tissue import Tissue
 from tissue.types import BladeSegment, BladeSweep
@@ -21,7 +21,7 @@ DT = 1e-3
 
 def kernels_are_compiled() -> bool:
     """Return whether binaries of these very sources lie in the cache."""
-    return any(Path(_cache_directory()).rglob("*.nbi"))
+    return any(Path(cache_directory()).rglob("*.nbi"))
 
 
 def warm_up() -> None:
