@@ -124,7 +124,7 @@ def test_arrays_of_the_wrong_shape_or_type_are_refused():
 
 @pytest.mark.parametrize(
     ("scale", "message"),
-    [(1e6, "1.732e\\+06|2e\\+04 m, over 1000 m: millimetres"), (1e-4, "under 1e-05 m")],
+    [(1e6, "over 1000 m: millimetres"), (1e-4, "under 1e-05 m")],
 )
 def test_an_extent_that_makes_no_sense_in_metres_is_refused(scale, message):
     positions, tetrahedra = block()
