@@ -62,12 +62,16 @@ class TissueFrame:
         )
 
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
-        """Return a wrench of the tissue frame in the world; its point is the same point."""
-        return Wrench(
-            self.vectors_to_world(wrench.force),
-            self.vectors_to_world(wrench.torque),
-            self.points_to_world(wrench.point),
-        )
+        """Return a wrench of the tissue frame in the world; its point is the same point.
+
+        What is infinite may become NaN. The coupling refuses both, so it is no news for a terminal.
+        """
+        with np.errstate(invalid="ignore"):
+            return Wrench(
+                self.vectors_to_world(wrench.force),
+                self.vectors_to_world(wrench.torque),
+                self.points_to_world(wrench.point),
+            )
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture that stands in the world in the tissue frame."""

@@ -255,9 +255,14 @@ class TissueServer:
 
     def _send(self, peer: _Peer, message: bytes) -> None:
         try:
-            peer.socket.settimeout(SEND_SECONDS)
-            peer.socket.sendall(message)
-            peer.socket.setblocking(False)
+            try:
+                sent = peer.socket.send(message)
+            except BlockingIOError:
+                sent = 0
+            if sent < len(message):
+                peer.socket.settimeout(SEND_SECONDS)
+                peer.socket.sendall(memoryview(message)[sent:])
+                peer.socket.setblocking(False)
         except OSError as error:
             self._drop(peer, f"it does not take its reply: {error}")
 

@@ -34,8 +34,9 @@ CONNECT_SECONDS = 5.0
 ANSWER_SECONDS = 60.0
 """How long to wait for an answer [s]. A step takes a millisecond, but the first steps of a freshly
 installed server compile."""
-READ_BYTES = 1 << 18
-"""How much to take from a socket at once [byte]."""
+READ_BYTES = 1 << 16
+"""How much to take from a socket at once [byte]. From 128 KiB on, every read would map fresh memory
+from the system, which takes longer than the rest of a round trip."""
 
 
 class TcpLink:
@@ -108,7 +109,6 @@ class TcpLink:
         sequence = self._sequence
         self._sequence = (sequence + 1) % (1 << 32)
         try:
-            self._socket.settimeout(self._timeout)
             self._socket.sendall(pack_frame(kind, sequence, payload))
             frame = self._answer_to(sequence, self._socket)
             if frame.kind == Kind.ERROR:
@@ -136,10 +136,8 @@ class TcpLink:
                 return frame
             if frame is not None:
                 continue
-            left = deadline - time.monotonic()
-            if left <= 0.0:
+            if time.monotonic() > deadline:  # each read has its own limit; this is for a trickle
                 raise TimeoutError
-            connection.settimeout(left)
             data = connection.recv(READ_BYTES)
             if not data:
                 raise ConnectionResetError("the other side has gone")
@@ -173,4 +171,5 @@ def _connect(address: str, timeout: float) -> socket.socket:
     except OSError as cause:
         raise LinkError(f"{address} cannot be reached: {cause.strerror or cause}") from cause
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.settimeout(timeout)
     return connection

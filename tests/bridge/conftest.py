@@ -3,10 +3,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 from tissue.types import BladeSegment
+
+# A busy machine is no fault of the code under test.
+hypothesis.settings.register_profile("no deadline", deadline=None)
+hypothesis.settings.load_profile("no deadline")
 
 ROOT = Path(__file__).parents[2]
 SERVE_BLOCK = Path(__file__).with_name("serve_block.py")

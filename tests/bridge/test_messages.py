@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from bridge import messages
 from bridge.link import TissueDescription
 from bridge.wire import MessageError
+from tests.bridge.bits import bits
 from tissue.material import Material
 from tissue.types import (
     BladeSegment,
@@ -59,15 +60,6 @@ def results(draw):
         n_substeps=draw(counts),
         profile=Profile(*draw(st.tuples(any_float, any_float, any_float))),
     )
-
-
-def bits(value):
-    """Return what a value is, down to the sign of a zero and the payload of a NaN."""
-    if isinstance(value, tuple):
-        return tuple(bits(part) for part in value)
-    if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, value.tobytes()
-    return struct.pack("<d", value) if isinstance(value, float) else value
 
 
 TETRAHEDRON = Snapshot(

@@ -1,13 +1,11 @@
 """The link between two processes. The server is a real one, in a process of its own."""
 
 import contextlib
-import importlib.util
 import signal
 import socket
 import struct
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,21 +18,12 @@ from bridge.messages import pack_error, pack_step, unpack_error
 from bridge.server import MOST_CONNECTIONS, TissueServer
 from bridge.tcp import TcpLink, parse_address
 from bridge.wire import LARGEST_REPLY, LARGEST_REQUEST, FrameReader, Kind, pack_frame
+from tests.bridge.bits import bits
+from tests.bridge.serve_block import block as make_block
 from tissue.types import BladeSegment, BladeSweep
 
 DT = 1e-3
 HELLO = pack_frame(Kind.HELLO, 0)
-
-
-def _block_maker():
-    path = Path(__file__).with_name("serve_block.py")
-    spec = importlib.util.spec_from_file_location("serve_block", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.block
-
-
-make_block = _block_maker()
 
 
 def connected(address):
@@ -98,15 +87,6 @@ def cut(link, upright):
         bridge.step(upright(0.009, -0.002 + 0.05 * DT * i), DT)
         results.append(bridge.result._replace(profile=None))
     return results
-
-
-def bits(value):
-    """Return what a value is, down to the last bit."""
-    if isinstance(value, tuple):
-        return tuple(bits(part) for part in value)
-    if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, value.tobytes()
-    return struct.pack("<d", value) if isinstance(value, float) else value
 
 
 def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
