@@ -225,7 +225,7 @@ def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
 
 
 BLADE_MARGIN = 0.1
-"""How far heel and tip may lie outside the box that stands for the blade, as a fraction of the box's
+"""How far heel and tip may lie outside the box that stands for the blade, as a fraction of its
 length. Boxes that they do not fit are other parts of the same body."""
 
 

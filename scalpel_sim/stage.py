@@ -19,13 +19,16 @@ TILES_PER_BODY = 2.2
 """Repeats of the texture along the diagonal of the body, whatever its size."""
 
 CAMERA_DISTANCE = 2.4
-"""From the middle of the body, in diagonals of the body: it fills a third of the page's height, which leaves
-room for the stylus."""
+"""From the middle of the body, in diagonals of the body: it fills a third of the page's height, which
+leaves room for the stylus."""
 
-CAMERA_ELEVATION = float(np.radians(34.0))
-CAMERA_AZIMUTH = float(np.radians(52.0))
-"""From the direction in which the arm stands, so that the arm comes in from the side and neither
-hides the cut nor is hidden by the body."""
+CAMERA_ELEVATION = float(np.radians(38.0))
+CAMERA_AZIMUTHS = np.radians([52.0, 128.0, 232.0, 308.0])
+"""From the tissue's x axis, across which strokes cut: so one looks into the cut as it opens, and
+still sees the flat of the blade."""
+ARM_AZIMUTH = float(np.radians(80.0))
+"""Where the arm should come in, seen from above, to the left or right of who looks: from the side,
+where it neither hides the cut nor is hidden by the body."""
 
 TABLE_RADIUS = 4.5
 """Half width of a plane, in diagonals of the body. MuJoCo's planes are infinite whatever their size
@@ -131,16 +134,19 @@ class Stage:
 
     def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
         """Return where the camera stands: beside the line from the body to the arm, and above."""
-        towards_arm = body_poses[self._bodies, :2].mean(axis=0) - centre[:2]
-        azimuth = float(np.arctan2(towards_arm[1], towards_arm[0])) + CAMERA_AZIMUTH
-        level, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
-        direction = np.array([level * np.cos(azimuth), level * np.sin(azimuth), up])
+        axis, arm = self._frame.rotation[:, 0], body_poses[self._bodies, :2].mean(axis=0)
+        azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
+        level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+        towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
+        misses = np.abs(np.arccos(np.clip(level @ towards_arm, -1.0, 1.0)) - ARM_AZIMUTH)
+        flat, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
+        direction = np.array([*(flat * level[misses.argmin()]), up])
         return centre + CAMERA_DISTANCE * self._diagonal * direction
 
 
 def _set_tissue_looks(scene: Scene3D, diagonal: float) -> None:
     """Define skin and cut faces. The relief is measured in metres, so it grows with the body."""
-    relief = {"bumpScale": 0.004 * diagonal}
+    relief = {"bumpScale": 0.0025 * diagonal}
     for name, picture in (("skin", textures.skin()), ("cut", textures.cut_face())):
         maps = {"map": picture, "bumpMap": picture}
         scene.set_look(name, Look("MeshPhongMaterial", {**_WET, **relief}, maps))
