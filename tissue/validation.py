@@ -77,6 +77,30 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     return result
 
 
+def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
+    """Refuse a mesh that is broken, or that `checked` would have to repair.
+
+    For those who are given a mesh together with something that is counted by its nodes, and
+    therefore must not change it.
+
+    Raises:
+        MeshError: See `checked`.
+    """
+    try:
+        result = _checked(mesh)
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+    n_nodes = len(result.mesh.positions)
+    is_same = n_nodes == len(mesh.positions) and np.array_equal(
+        result.mesh.tetrahedra, mesh.tetrahedra
+    )
+    if not is_same:
+        raise MeshError(
+            f"{name}: it would have to be repaired ({'; '.join(result.warnings)}): pass it through "
+            "tissue.validation.checked first"
+        )
+
+
 def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     """See `checked`: one question after the other, each relying on those before."""
     warnings: list[str] = []

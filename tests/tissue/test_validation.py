@@ -6,7 +6,7 @@ import pytest
 from tissue.shapes import grid
 from tissue.types import TetrahedralMesh
 from tissue.union_find import components
-from tissue.validation import MeshError, checked, quality, signed_volumes
+from tissue.validation import MeshError, checked, expect_sound, quality, signed_volumes
 
 CORNERS = 0.01 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
@@ -194,3 +194,16 @@ def test_components_are_numbered_by_their_lowest_vertices():
     n, labels = components(6, np.array([[5, 1], [0, 2], [2, 4]]))
     assert n == 3
     assert labels.tolist() == [0, 1, 0, 2, 0, 1]
+
+
+def test_a_mesh_that_would_have_to_be_repaired_is_refused_where_it_must_not_change():
+    positions, tetrahedra = block()
+    expect_sound(TetrahedralMesh(positions, tetrahedra))
+    expect_sound(TetrahedralMesh(1000.0 * positions, tetrahedra))  # doubtful, but not wrong
+    for broken in (
+        TetrahedralMesh(np.concatenate([positions, CORNERS]), tetrahedra),
+        TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]),
+        TetrahedralMesh(positions, tetrahedra[[0, 0]]),
+    ):
+        with pytest.raises(MeshError):
+            expect_sound(broken)
