@@ -19,8 +19,8 @@ TILES_PER_BODY = 2.2
 """Repeats of the texture along the diagonal of the body, whatever its size."""
 
 CAMERA_DISTANCE = 2.4
-"""From the middle of the body, in diagonals of the body: it fills a third of the page's height, which
-leaves room for the stylus."""
+"""From the middle of the body, in diagonals of the body: it fills a third of the page's height,
+which leaves room for the stylus."""
 
 CAMERA_ELEVATION = float(np.radians(38.0))
 CAMERA_AZIMUTHS = np.radians([52.0, 128.0, 232.0, 308.0])

@@ -17,7 +17,7 @@ from bridge.frames import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.model_shapes import shapes_of
 from scalpel_sim.scene3d import Readings
-from scalpel_sim.viewer_server import UPDATES_PER_SECOND, Greeting, Picture, Setting
+from scalpel_sim.viewer_messages import UPDATES_PER_SECOND, Greeting, Picture, Setting
 from tissue.types import FloatArray, Surface
 
 START_TIMEOUT = 30.0
@@ -167,7 +167,7 @@ def _start_process() -> subprocess.Popen[bytes]:
     pages get the last picture. It ends when the pipe does, however the run came to its end.
     """
     return subprocess.Popen(
-        [sys.executable, "-c", "from scalpel_sim.viewer_server import main; main()"],
+        [sys.executable, "-c", "from scalpel_sim.viewer_messages import main; main()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,

@@ -11,18 +11,15 @@ import logging
 import pickle
 import sys
 import threading
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 import tornado.web
 import tornado.websocket
 
-from bridge.frames import TissueFrame
-from scalpel_sim.model_shapes import Shape
 from scalpel_sim.page import live_page
-from scalpel_sim.scene3d import Readings
 from scalpel_sim.stage import Stage
-from tissue.types import FloatArray, Surface
+from scalpel_sim.viewer_messages import UPDATES_PER_SECOND, Greeting, Picture, Setting
 
 LOOPBACK = "127.0.0.1"
 """The only address that is listened at: nobody else on the network is to see or slow the run."""
@@ -34,39 +31,10 @@ FIRST_PORT = 7000
 """Where meshcat begins to look for a free port, too."""
 LAST_PORT = 7099
 
-UPDATES_PER_SECOND = 25.0
-"""Pictures a second of wall time."""
-
 FAREWELL = 1.0
 """How long the last picture may take to reach the pages [s] before the process ends."""
 
 CAPTION = "Live. Drag to turn, scroll to zoom, right-drag to move."
-
-
-class Setting(NamedTuple):
-    """What is said once, before the first picture."""
-
-    title: str
-    shapes: list[Shape]
-    frame: TissueFrame
-    wireframe: bool
-    port: int | None
-    """Where to listen; None: at the first free port."""
-
-
-class Picture(NamedTuple):
-    """One instant of the run."""
-
-    surface: Surface
-    body_poses: FloatArray
-    readings: Readings | None
-
-
-class Greeting(msgspec.Struct):
-    """Where the page is, or why there is none."""
-
-    url: str = ""
-    error: str = ""
 
 
 class Inbox:
