@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT
-from scalpel_sim.errors import EXIT_OK, EXIT_RUN_FAILED, EXIT_WRONG_USE, UsageError, exit_code
+from scalpel_sim.errors import (
+    EXIT_OK,
+    EXIT_RUN_FAILED,
+    EXIT_WRONG_USE,
+    UsageError,
+    exit_code,
+    one_line,
+)
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.version import version
@@ -224,7 +231,7 @@ def command_line(arguments: Sequence[str]) -> int:
     except Exception as error:
         if verbose:
             traceback.print_exc()
-        _say_error(str(error) or type(error).__name__)
+        _say_error(one_line(error))
         return exit_code(error)
     return EXIT_OK
 

@@ -20,6 +20,18 @@ class Interrupted(RunError):
     """The user, or the system, ended the run before its time. Exit code 1."""
 
 
+EXPECTED = (ValueError, RuntimeError, OSError)
+"""What the parts raise on purpose. Anything else is a fault of the program itself."""
+
+
+def one_line(error: Exception) -> str:
+    """Return what to tell the user of an error."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    if isinstance(error, EXPECTED):
+        return text
+    return f"{type(error).__name__}: {text}. This is a fault of the program; -v shows where"
+
+
 def exit_code(error: BaseException) -> int:
     """Return the exit code for an error that reached the command line.
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from bridge.link import LinkError
 from scalpel_sim import outputs as files
-from scalpel_sim.errors import Interrupted, RunError
+from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.outputs import Outputs
 from scalpel_sim.pictures import add_to, into_replay
 from scalpel_sim.replay import ReplayWriter
@@ -66,7 +66,7 @@ def perform(
         try:
             simulation.run(seconds, after_frame)
         except Exception as error:
-            status, failure = f"failed: {error}", error
+            status, failure = f"failed: {one_line(error)}", error
     status = stop.reason or status
 
     unwritten = _Attempts()
@@ -102,7 +102,7 @@ def perform(
 
     kept = f"{outputs.folder} holds what was done"
     if failure is not None:
-        raise RunError(f"after {simulation.time:.3f} s {failure}; {kept}") from failure
+        raise RunError(f"after {simulation.time:.3f} s: {one_line(failure)}; {kept}") from failure
     if stop.reason is not None:
         raise Interrupted(f"{stop.reason} after {simulation.time:.3f} s; {kept}")
     if unwritten.errors:

@@ -1,7 +1,6 @@
 """Every kernel, run once before the clock starts."""
 
 import logging
-from pathlib import Path
 
 import numpy as np
 
@@ -21,7 +20,7 @@ DT = 1e-3
 
 def kernels_are_compiled() -> bool:
     """Return whether binaries of these very sources lie in the cache."""
-    return any(Path(cache_directory()).rglob("*.nbi"))
+    return any(cache_directory().rglob("*.nbi"))
 
 
 def warm_up() -> None:
@@ -31,7 +30,7 @@ def warm_up() -> None:
     that this did not do.
     """
     if not kernels_are_compiled():
-        log.warning("compiling kernels, first run only (about a minute)")
+        log.warning("compiling kernels, first run only (half a minute)")
     mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
     tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"))
     tissue.settle()

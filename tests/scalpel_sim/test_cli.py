@@ -1,0 +1,242 @@
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scalpel_sim.cli import command_line
+from scalpel_sim.outputs import NAMES
+from scalpel_sim.recording import read_forces
+
+HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
+FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
+
+WRONG_USE = {
+    "an unknown command": (["rnu"], "Did you mean .run."),
+    "an unknown option": (["run", "slab", "--tougness", "3"], "Did you mean --toughness"),
+    "a number that is none": (["run", "slab", "--young", "soft"], "soft"),
+    "too many words": (["run", "slab", "grid2"], "grid2"),
+    "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
+    "a scene and a mesh": (["run", "slab", "--mesh", "{mesh}"], "choose one"),
+    "a scale without a mesh": (["run", "slab", "--scale", "2"], "--mesh"),
+    "a mesh that is not there": (["run", "--mesh", "nothing.msh"], "nothing.msh"),
+    "a mesh that is a folder": (["run", "--mesh", "{folder}"], "{folder}"),
+    "a mesh of the wrong kind": (["run", "--mesh", "{text}"], "text.stl"),
+    "a broken mesh": (["run", "--mesh", "{broken}"], "broken.msh"),
+    "a mesh of no size": (["run", "--mesh", "{mesh}", "--scale", "0"], "--scale"),
+    "an unknown stroke": (["run", "slab", "--stroke", "strait"], "Did you mean 'straight'"),
+    "a stroke file that is not there": (["run", "slab", "--stroke", "no.csv"], "no.csv"),
+    "a stroke file with a broken line": (["run", "slab", "--stroke", "{bad_stroke}"], "line 3"),
+    "a stroke outside the body": (["run", "grid2", "--stroke", "{far}"], "mm away from the body"),
+    "an unknown side": (["run", "slab", "--fix", "lefft,right"], "left"),
+    "a box that holds no node": (["run", "slab", "--fix", "1,1,1:2,2,2"], "no node"),
+    "a stretch of sides that are free": (
+        ["run", "slab", "--fix", "bottom", "--stretch", "0.1"],
+        "--fix left,right",
+    ),
+    "an unknown arm": (["run", "slab", "--arm", "tuch"], "Did you mean 'touch'"),
+    "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
+    "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
+    "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
+    "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
+    "no speed": (["run", "slab", "--speed", "0"], "speed"),
+    "an output folder that is a file": (["run", "slab", "--out", "{text}"], "is a file"),
+    "an address that is none": (["run", "--connect", "here"], "here"),
+    "a material for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--young", "1e4"],
+        "scalpel-sim serve",
+    ),
+    "a host that others can reach": (["serve", "grid2", "--host", "0.0.0.0"], "0.0.0.0"),
+    "a port that does not exist": (["view", "grid2", "--port", "99999"], "99999"),
+}
+
+TETRAHEDRON = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+4
+1 0 0 0
+2 0.01 0 0
+3 0 0.01 0
+4 0 0 0.01
+$EndNodes
+$Elements
+1
+1 4 0 {nodes}
+$EndElements
+"""
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """Run in a folder of its own, with one file of each kind."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mesh.msh").write_text(TETRAHEDRON.format(nodes="1 2 3 4"))
+    (tmp_path / "broken.msh").write_text(TETRAHEDRON.format(nodes="1 2 3 9"))
+    (tmp_path / "text.stl").write_text("solid nothing")
+    (tmp_path / "far.csv").write_text(FAR_AWAY)
+    (tmp_path / "bad.csv").write_text(HEADER + "0,0,0,0,0,0,1\n1,0,0,x,0,0,1\n")
+    return {
+        "mesh": "mesh.msh",
+        "broken": "broken.msh",
+        "text": "text.stl",
+        "folder": str(tmp_path),
+        "far": "far.csv",
+        "bad_stroke": "bad.csv",
+    }
+
+
+def only_line(text: str) -> str:
+    (line,) = text.splitlines()
+    return line
+
+
+@pytest.mark.parametrize("case", WRONG_USE)
+def test_wrong_use_gets_one_line_and_exit_code_2(case, files, capsys):
+    words, expected = WRONG_USE[case]
+    code = command_line([word.format(**files) for word in words])
+    out, err = capsys.readouterr()
+    line = only_line("\n".join(x for x in err.splitlines() if not x.startswith("warning: comp")))
+    assert (code, out) == (2, "")
+    assert re.match(f"error: .*{expected.format(**files)}", line)
+    assert "Traceback" not in err
+
+
+def test_an_unreachable_server_is_a_failed_run(files, capsys):
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{nobody.getsockname()[1]}"
+    assert command_line(["run", "--connect", address]) == 1
+    assert address in only_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("command", ["serve", "view"])
+def test_a_port_in_use_is_a_failed_run(command, files, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert command_line([command, "grid2", "--port", port]) == 1
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert re.match(f"error: .*{port}.*in use", line)
+
+
+def test_a_folder_that_cannot_be_written_is_a_failed_run_before_it_begins(files, capsys):
+    assert command_line(["run", "slab", "--out", "/proc/nothing"]) == 1
+    assert "cannot be written" in only_line(capsys.readouterr().err)
+
+
+def test_verbose_shows_where_an_error_came_from(files, capsys):
+    assert command_line(["run", "slap", "-v"]) == 2
+    err = capsys.readouterr().err
+    assert "Traceback" in err and err.splitlines()[-1].startswith("error: no scene")
+
+
+def test_a_run_prints_the_table_of_the_paper_and_writes_every_file(files, capsys):
+    assert command_line(["run", "slab", "--seconds", "0.05"]) == 0
+    out, err = capsys.readouterr()
+    for words in ("real-time factor", "tetrahedra after", "2,446", "1.14", "RX", "92.2 %"):
+        assert words in out
+    assert sorted(os.listdir("out/slab")) == sorted(NAMES)
+    assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
+
+
+def test_json_prints_the_summary_and_nothing_else(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.02", "--seed", "5", "--json", "--out", "here"]
+    assert command_line(words) == 0
+    printed = json.loads(capsys.readouterr().out)
+    with open("here/summary.json") as file:
+        assert json.load(file) == printed
+    assert (printed["scene"], printed["seed"], printed["frames"]) == ("grid2", 5, 20)
+    assert printed["simulated_seconds"] == pytest.approx(0.02)
+
+
+def test_quiet_says_nothing(files, capsys):
+    assert command_line(["run", "grid2", "--seconds", "0.01", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--young", "2e4", "--toughness", "7"]
+    assert command_line(words) == 0
+    material = json.loads(capsys.readouterr().out)["settings"]["material"]
+    assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_and_version_are_no_errors(words, capsys):
+    assert command_line(words) == 0
+    assert capsys.readouterr().err == ""
+
+
+def start(*words: str) -> subprocess.Popen[str]:
+    """Start the program in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "scalpel_sim", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+    )
+
+
+def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
+    """Wait until a run has written its first rows."""
+    while not (forces.exists() and forces.stat().st_size > 20_000):
+        assert program.poll() is None, program.communicate()
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
+    folder = tmp_path / "run"
+    program = start("run", "grid2", "--seconds", "1000", "--out", str(folder))
+    forces = folder / "forces.csv"
+    wait_for_rows(program, forces)
+    program.send_signal(number)
+    _, err = program.communicate(timeout=60)
+    assert program.returncode == 1
+    assert re.match(
+        f"error: interrupted by {number.name} after .* holds what", err.splitlines()[-1]
+    )
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == f"interrupted by {number.name}"
+    assert summary["frames"] == len(read_forces(forces)) >= 100
+    assert sorted(path.name for path in folder.iterdir()) == sorted(NAMES)
+
+
+def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
+    program = start("run", "grid2", "--seconds", "1000", "--out", str(tmp_path))
+    forces = tmp_path / "forces.csv"
+    wait_for_rows(program, forces)
+    program.kill()
+    program.communicate(timeout=60)
+    assert np.isfinite(read_forces(forces).rows).all()
+    assert (tmp_path / "initial.vtu").stat().st_size > 0
+
+
+def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    assert command_line(["run", "grid2", "--seconds", "0.9", "-q", "--out", str(here)]) == 0
+    server = start("serve", "grid2", "--port", "0")
+    try:
+        address = re.search(r"127\.0\.0\.1:\d+", server.stdout.readline()).group()
+        words = ["run", "--connect", address, "--seconds", "0.9", "-q", "--out", str(there)]
+        assert command_line(words) == 0
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=60)
+    assert server.returncode == 0
+    ours, theirs = (read_forces(folder / "forces.csv").rows for folder in (here, there))
+    timed = 5  # columns of wall times at the end
+    assert ours[:, 10].max() > 0.0  # something was cut
+    assert np.array_equal(ours[:, :-timed], theirs[:, :-timed])
+    assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
+    assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
