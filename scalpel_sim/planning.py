@@ -60,7 +60,15 @@ GAP, GAP_SHARE = 5e-3, 0.1
 
 OVERSHOOT, OVERSHOOT_SHARE = 15e-3, 0.4
 """How far beyond the body the blade goes on: [m], or a share of the section's length where that is
-more. The last of the tissue is dragged along before it parts."""
+more, and in either case what the body gives way by. The last of the tissue is dragged along before
+it parts."""
+
+FARTHEST_GIVE = 0.5
+"""By how much of half its width a body gives way at most: then it is drawn out between its held
+sides like a string, which bending and shear do not know of."""
+
+SLIP_SHARE = 0.3
+"""Part of what the body gives way by that may be along the edge: the sine of `RAKE`, and some."""
 
 STOP_SHARE = 0.55
 """Fraction of the section's length at which the stroke `stop` ends."""
@@ -106,7 +114,8 @@ def plan(
         name: One of `STROKES`.
         mesh: The body as it lies before the stroke, tissue frame [m].
         speed: Of the blade between its ramps [m/s].
-        material: What the body is made of; the depth of a press follows from it.
+        material: What the body is made of: how far it gives way before the blade, and how deep a
+            press may go.
         depth: How far a press goes in [m]. None: half of what would cut.
 
     Raises:
@@ -123,7 +132,9 @@ def plan(
     first, last = float(travels.min()), float(travels.max())
     length = last - first
     start = first - max(GAP + GAP_SHARE * length, 0.5 * speed * RAMP)
-    end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length)
+    thickness = float(np.ptp(depths))
+    give = _give(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
+    end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + give
     if name == "stop":
         end = first + STOP_SHARE * length
     if name == "press":
@@ -132,7 +143,7 @@ def plan(
             depth = min(harmless, DEEPEST_PRESS * length)
         _check_positive("depth", depth, "m")
         end = first + depth
-    margin = BLADE_MARGIN + BLADE_MARGIN_SHARE * float(np.ptp(depths))
+    margin = BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * give
     times, travels = _timed(sheet, start, end, speed)
     segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
     if name == "press":
@@ -230,6 +241,25 @@ def _divides(sheet: Sheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) 
     margin = HELD * np.ptp(x)
     left, right = above[x <= x.min() + margin], above[x >= x.max() - margin]
     return parts == pieces + 1 and not left.any() and bool(right.all())
+
+
+def _give(width: float, length: float, thickness: float, material: Material) -> float:
+    """Return how far the middle of the body gives way before the blade [m], roughly.
+
+    Each half is a beam that is built in at its held side, and bends and shears under its half of
+    the cutting force, toughness x thickness: a long soft body is dragged along by more than its
+    section measures.
+
+    Args:
+        width: Of the body between its held sides [m].
+        length: Of the section along the motion [m].
+        thickness: Of the section along the blade [m].
+        material: Gives stiffness and toughness.
+    """
+    half, force = width / 2.0, material.toughness * thickness / 2.0
+    bending = half**3 / (3.0 * material.young_modulus * thickness * length**3 / 12.0)
+    shear = half / (material.young_modulus / 3.0 * thickness * length)  # G = E/3: incompressible
+    return min(force * (bending + shear), FARTHEST_GIVE * half)
 
 
 def _timed(sheet: Sheet, start: float, end: float, speed: float) -> tuple[FloatArray, FloatArray]:

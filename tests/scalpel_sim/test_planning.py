@@ -178,6 +178,17 @@ def test_press_goes_half_as_deep_as_toughness_over_stiffness():
     assert np.array_equal(resting.tip, deeper.pose(deeper.duration).tip)
 
 
+@pytest.mark.parametrize(
+    ("half_width", "give"),
+    # Cantilevers of 20 x 20 mm, E = 10 kPa, with half of 20 J/m2 x 20 mm: F L^3 / 3EI + F L / GA.
+    [(0.02, 0.2 * (0.02**3 / (3e4 * 0.02**4 / 12) + 0.02 / (1e4 / 3 * 0.02**2))), (0.15, 0.075)],
+)
+def test_the_blade_goes_on_by_what_a_long_soft_body_gives_way(half_width, give):
+    mesh = grid((8, 2, 2), (2 * half_width, 0.02, 0.02))
+    stroke = plan("straight", mesh, material=Material(young_modulus=10e3, toughness=20.0))
+    assert stroke.pose(stroke.duration).tip[1] == pytest.approx(0.02 + 0.015 + give)
+
+
 def fork():
     """Two prongs along x, joined at the right end: at the middle a plane would cut three parts."""
     mesh = grid((20, 3, 1), (0.10, 0.03, 0.01))
