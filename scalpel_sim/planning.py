@@ -70,8 +70,9 @@ sides like a string, which bending and shear do not know of."""
 SLIP_SHARE = 0.3
 """Part of what the body gives way by that may be along the edge: the sine of `RAKE`, and some."""
 
-STOP_SHARE = 0.55
-"""Fraction of the section's length at which the stroke `stop` ends."""
+STOP_SHARE, STOP_LATEST = 0.55, 0.9
+"""Fraction of the section's length at which the stroke `stop` ends, and at which it ends at the
+latest where the body gives way first."""
 
 PRESS_TOUGHNESS_SHARE = 0.5
 """A press goes as deep as half of what would cut: depth x Young's modulus is a force per length of
@@ -136,7 +137,7 @@ def plan(
     give = _give(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
     end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + give
     if name == "stop":
-        end = first + STOP_SHARE * length
+        end = first + min(STOP_SHARE * length + give, STOP_LATEST * length)
     if name == "press":
         if depth is None:
             harmless = PRESS_TOUGHNESS_SHARE * material.toughness / material.young_modulus

@@ -163,9 +163,10 @@ def test_a_sheet_through_a_narrow_body_leans_less_and_spares_the_held_sides():
     assert 5.0 < np.degrees(np.arccos(abs(normal[0]) / np.linalg.norm(normal))) < 12.0
 
 
-def test_stop_ends_inside_at_55_percent():
-    stroke = plan("stop", BODIES["slab"]())
-    assert stroke.pose(stroke.duration).tip[1] == pytest.approx(0.55 * 0.06)
+@pytest.mark.parametrize(("toughness", "share"), [(0.0, 0.55), (1e3, 0.9)])
+def test_stop_ends_at_55_percent_or_later_where_the_body_gives_way_but_inside(toughness, share):
+    stroke = plan("stop", BODIES["across"](), material=Material(toughness=toughness))
+    assert stroke.pose(stroke.duration).tip[1] == pytest.approx(share * 0.03)
 
 
 def test_press_goes_half_as_deep_as_toughness_over_stiffness():
