@@ -51,6 +51,9 @@ _WET = {
     "reflectivity": 0.06,
     "combine": ADD,
 }
+LIGHT_IN_A_CUT = 0x5A1216
+"""What light between the lips of a cut gives back. Without it a narrow cut looks black."""
+
 _STEEL = {
     "color": 0x98A1A8,
     "specular": 0xFFFFFF,
@@ -147,9 +150,13 @@ class Stage:
 def _set_tissue_looks(scene: Scene3D, diagonal: float) -> None:
     """Define skin and cut faces. The relief is measured in metres, so it grows with the body."""
     relief = {"bumpScale": 0.0025 * diagonal}
-    for name, picture in (("skin", textures.skin()), ("cut", textures.cut_face())):
+    for name, picture, glow in (
+        ("skin", textures.skin(), 0x000000),
+        ("cut", textures.cut_face(), LIGHT_IN_A_CUT),
+    ):
+        properties = {**_WET, **relief, "emissive": glow}
         maps = {"map": picture, "bumpMap": picture}
-        scene.set_look(name, Look("MeshPhongMaterial", {**_WET, **relief}, maps))
+        scene.set_look(name, Look("MeshPhongMaterial", properties, maps))
 
 
 def _look_of(shape: Shape) -> Look:

@@ -63,7 +63,7 @@ class Picture {
 
     setLook({ name, kind, properties, maps }) {
         const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
-        for (const colour of [material.color, material.specular]) {
+        for (const colour of [material.color, material.specular, material.emissive]) {
             if (colour) colour.convertSRGBToLinear();
         }
         if ("reflectivity" in properties) material.envMap = this.room;

@@ -7,13 +7,10 @@ from scalpel_sim import replay as replay_module
 from scalpel_sim.model_shapes import body_poses
 from scalpel_sim.replay import BYTES_PER_TRIANGLE, ReplayWriter
 from tests.browser import WINDOW, local_file, new_tab, pixels, pixels_of
-from tests.scalpel_sim.cut_block import cut_block
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+from tests.scalpel_sim.real_cut import cut_tissue
 
 N_PIXELS = WINDOW["width"] * WINDOW["height"]
-
-GAPES = 0.02
-"""How far the block of the tests gapes at the end [m]."""
 
 
 def times_in(path) -> list[float]:
@@ -23,15 +20,16 @@ def times_in(path) -> list[float]:
 def write_cut(path, *, n_frames=3, wireframe=False, title="a block"):
     model, data = little_arm()
     replay = ReplayWriter(model, title=title, frame=FRAME, wireframe=wireframe)
-    for i, gap in enumerate(np.linspace(0.0, GAPES, n_frames)):
-        replay.add(0.1 * i, cut_block(gap), body_poses(data), readings(0.1 * i))
+    for i in range(n_frames):
+        surface = cut_tissue()[min(i, 2)]
+        replay.add(0.1 * i, surface, body_poses(data), readings(0.1 * i))
     replay.write(path)
 
 
 def test_a_run_of_a_second_is_kept_as_twenty_five_frames_and_its_last(tmp_path):
     model, data = little_arm()
     replay = ReplayWriter(model)
-    whole, poses = cut_block(0.0), body_poses(data)
+    whole, poses = cut_tissue()[0], body_poses(data)
     for frame in range(1000):
         replay.add(frame / 1000, whole, poses)
     replay.write(tmp_path / "replay.html")
@@ -43,7 +41,7 @@ def test_a_run_of_a_second_is_kept_as_twenty_five_frames_and_its_last(tmp_path):
 
 def test_a_heavy_body_gets_fewer_frames_evenly_spread(tmp_path, monkeypatch):
     model, data = little_arm()
-    whole, poses = cut_block(0.0), body_poses(data)
+    whole, poses = cut_tissue()[0], body_poses(data)
     limit = 10 * len(whole.triangles) * BYTES_PER_TRIANGLE
     monkeypatch.setattr(replay_module, "FILE_LIMIT", limit)
     replay = ReplayWriter(model)
@@ -60,7 +58,7 @@ def test_a_file_is_no_larger_than_was_reckoned(tmp_path):
     write_cut(tmp_path / "few.html", n_frames=2)
     write_cut(tmp_path / "more.html", n_frames=12)
     added = (tmp_path / "more.html").stat().st_size - (tmp_path / "few.html").stat().st_size
-    assert added / 10 < len(cut_block(GAPES).triangles) * BYTES_PER_TRIANGLE
+    assert added / 10 < len(cut_tissue()[2].triangles) * BYTES_PER_TRIANGLE
 
 
 def test_a_replay_without_frames_is_refused(tmp_path):

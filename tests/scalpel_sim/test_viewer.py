@@ -7,7 +7,6 @@ import time
 import urllib.error
 import urllib.request
 
-import numpy as np
 import pytest
 from tornado.websocket import websocket_connect
 
@@ -15,8 +14,8 @@ from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.model_shapes import body_poses
 from scalpel_sim.viewer import Viewer
 from tests.browser import WINDOW, new_tab, pixels_of
-from tests.scalpel_sim.cut_block import cut_block
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+from tests.scalpel_sim.real_cut import cut_tissue
 
 NO_WAIT = 0.25
 """What `show` may take on a busy machine [s]. Usually 20 microseconds; if it waited for
@@ -36,7 +35,7 @@ class Run:
     """A run that shows a block being parted, as fast as it can, until it is told to stop."""
 
     def __init__(self, viewer: Viewer) -> None:
-        self.surfaces = [cut_block(gap) for gap in np.linspace(0.0, 0.02, 20)]
+        self.surfaces = cut_tissue()
         self.poses = body_poses(little_arm()[1])
         self.viewer = viewer
         self.longest = 0.0
@@ -179,7 +178,7 @@ def in_a_thread(coroutine) -> None:
 @pytest.mark.browser
 def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
     run = Run(viewer)
-    run.go_on(20)  # ends with the block cut open
+    run.go_on(21)  # ends with the block cut in two
     tab, other = new_tab(browser), new_tab(browser)
     for page in (tab, other):
         page.goto(viewer.url)
