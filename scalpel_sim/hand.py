@@ -61,7 +61,14 @@ def add_hand(
         impedance: How firm the hand is.
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
+
+    Raises:
+        ValueError: the model has no such site.
     """
+    for name in (heel, tip):
+        if spec.site(name) is None:
+            there = ", ".join(f"'{site.name}'" for site in spec.sites) or "none"
+            raise ValueError(f"the model has no site '{name}'. It has: {there}")
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
     edge = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     spec.site(tip).parent.add_site(

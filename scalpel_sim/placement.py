@@ -40,14 +40,14 @@ hand yields, and a joint that meets its stop would push back."""
 BASE_RADIUS = 0.08
 """[m] about the axis of the waist, in which the body must not lie."""
 
-FOREARM_CLEARANCE = 0.01
-"""[m] between the axis of the forearm and the box around the body."""
+LINK_CLEARANCE = 0.01
+"""[m] between the axes of upper arm and forearm and the box around the body."""
 
 TABLE_CLEARANCE = 0.01
 """[m] between the table and what is lowest, blade or body: the blade passes beneath the body."""
 
 AWKWARD = 2.0
-"""Taken off the margin of a place where the forearm passes through the body, or where the base
+"""Taken off the margin of a place where a link passes through the body, or where the base
 stands on a column: any place without that is better."""
 
 SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
@@ -208,9 +208,9 @@ def _scores(measures: Geometry, path: _Path, places: _Places, mount_angle: float
     base = _base(path, places)
     stands_beside = _distance_to_box(base[:, :2], path.bounds[:, :2]) >= BASE_RADIUS
     on_column = base[:, 2] > path.lowest - TABLE_CLEARANCE
-    forearm = _forearm(measures, reached.angles)
-    in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), forearm) + base[:, None, None]
-    through = _distance_to_box(in_tissue, path.bounds) < FOREARM_CLEARANCE
+    links = _links(measures, reached.angles)
+    in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), links) + base[:, None, None]
+    through = _distance_to_box(in_tissue, path.bounds) < LINK_CLEARANCE
     score = reached.margin.min(axis=1) - AWKWARD * on_column - AWKWARD * through.any(axis=(1, 2))
     return np.where(stands_beside, score, -np.inf)
 
@@ -239,13 +239,14 @@ def _turns(yaws: FloatArray) -> FloatArray:
     return np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=1).reshape(-1, 3, 3)
 
 
-def _forearm(measures: Geometry, angles: FloatArray) -> FloatArray:
-    """Return points along the forearm in the frame of the base, shape (..., 5, 3)."""
+def _links(measures: Geometry, angles: FloatArray) -> FloatArray:
+    """Return points along upper arm and forearm in the frame of the base, shape (..., 8, 3)."""
     waist, shoulder = angles[..., 0, None], angles[..., 1, None]
     level = shoulder + angles[..., 2, None] - measures.bend
-    along = np.linspace(0.0, measures.forearm, 5)
-    out = measures.upper * np.cos(shoulder) + along * np.cos(level)
-    up = measures.shoulder + measures.upper * np.sin(shoulder) + along * np.sin(level)
+    upper = measures.upper * np.array([0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0, 1.0])
+    forearm = measures.forearm * np.array([0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0])
+    out = upper * np.cos(shoulder) + forearm * np.cos(level)
+    up = measures.shoulder + upper * np.sin(shoulder) + forearm * np.sin(level)
     return np.stack([-np.sin(waist) * out, np.cos(waist) * out, up], axis=-1)
 
 

@@ -1,8 +1,10 @@
+import mujoco
 import numpy as np
 import pytest
 
 from scalpel_sim.arm import PRESETS, Arm
-from scalpel_sim.hand import Impedance
+from scalpel_sim.blade import Blade
+from scalpel_sim.hand import Hand, Impedance, add_hand
 from tissue.types import BladeSegment, Wrench
 
 NOTHING = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
@@ -110,3 +112,34 @@ def test_a_pose_that_is_not_finite_is_refused_and_leaves_the_hand_where_it_was()
 def test_an_impedance_is_positive(value):
     with pytest.raises(ValueError, match="turning_stiffness is"):
         Impedance(turning_stiffness=value)
+
+
+# A free blade in space: whoever has an arm of their own can have the hand too.
+FREE_BLADE = """
+<mujoco>
+  <worldbody>
+    <body name="knife" gravcomp="1">
+      <freejoint/> <geom type="box" size=".005 .02 .003" pos="0 .02 0" mass=".05"/>
+      <site name="heel"/> <site name="tip" pos="0 .04 0"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+
+def test_the_hand_holds_the_blade_of_any_model():
+    spec = mujoco.MjSpec.from_string(FREE_BLADE)
+    add_hand(spec)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hand, blade = Hand(model, data), Blade(model, data)
+    goal = moved(blade.segment(), [0.002, -0.001, 0.003])
+    hand.hold(goal)
+    mujoco.mj_step(model, data, 1000)
+    mujoco.mj_kinematics(model, data)
+    assert np.allclose(blade.segment().tip, goal.tip, atol=1e-9)
+
+
+def test_a_hand_on_a_blade_that_is_not_there_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"no site 'point'\. It has: 'heel', 'tip'"):
+        add_hand(mujoco.MjSpec.from_string(FREE_BLADE), tip="point")

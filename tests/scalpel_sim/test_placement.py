@@ -66,7 +66,7 @@ def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(me
 
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize("name", STROKES)
-def test_base_and_forearm_stay_out_of_the_body(preset, name):
+def test_base_and_links_stay_out_of_the_body(preset, name):
     stroke = plan(name, SLAB)
     placement = place(stroke, bounds(SLAB), preset)
     box = bounds(SLAB) + placement.tissue_origin
@@ -75,7 +75,7 @@ def test_base_and_forearm_stay_out_of_the_body(preset, name):
         arm.hand.follow(in_world(stroke.pose(1e-3 * k), placement))
         arm.step1()
         if k % 50 == 0:
-            for body in ("base", "torso", "forearm", "gimbal"):
+            for body in ("base", "torso", "forearm", "wrist", "gimbal"):
                 position = arm.data.body(body).xpos
                 assert ((position < box[0]) | (position > box[1])).any()
         arm.step2()
