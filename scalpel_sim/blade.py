@@ -6,17 +6,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from bridge.coupling import ABSURD_FORCE, ABSURD_TORQUE
 from tissue.types import BladeSegment, FloatArray, Wrench
 
 SHORTEST_EDGE = 1e-4
 """[m]. A shorter cutting edge is a mistake in the model: its direction would be noise."""
-
-ABSURD_FORCE = 1e3
-"""[N]. Far above what any hand-held or desktop arm feels (the PHANTOMs end at 8.5 N). MuJoCo takes
-1e3 N without a word and answers 1e9 N with a silent reset, so more than this is refused here."""
-
-ABSURD_TORQUE = 1e2
-"""[N m], about the body's centre of mass: `ABSURD_FORCE` on a lever of 10 cm."""
 
 
 class BladeError(ValueError):
@@ -102,6 +96,7 @@ class Blade:
             BladeError: the wrench is not finite, or larger than `ABSURD_FORCE` or `ABSURD_TORQUE`.
                 What the blade felt before stays, and MuJoCo sees nothing of it.
         """
+        # The last guard: MuJoCo takes 1e3 N without a word, and resets itself at 1e9 N or NaN.
         # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
         fx, fy, fz = wrench.force.tolist()
         tx, ty, tz = wrench.torque.tolist()

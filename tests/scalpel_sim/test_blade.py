@@ -2,7 +2,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from scalpel_sim.blade import ABSURD_FORCE, Blade, BladeError
+from bridge.coupling import ABSURD_FORCE
+from scalpel_sim.blade import Blade, BladeError
 from tissue.types import Wrench
 
 # Two hinges, a bent blade whose centre of mass is off the edge.
