@@ -10,7 +10,7 @@ const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
 const EXPOSURE = 1.0;
 
 const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: its filter is what makes shadows soft
-const WIRE_COLOUR = 0x1b0f0e;
+const WIRE_COLOUR = 0xffe4d8;
 const ARROW_COLOUR = 0xffb000;
 const FORCE_WORTH_AN_ARROW = 0.02; // [N]; below it the arrow would be a speck
 
@@ -105,7 +105,7 @@ class Picture {
         let wires = this.wires.get(mesh.uuid);
         if (!wires) {
             const material = new THREE.MeshBasicMaterial({
-                color: WIRE_COLOUR, wireframe: true, transparent: true, opacity: 0.55,
+                color: WIRE_COLOUR, wireframe: true, transparent: true, opacity: 0.7,
                 polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1,
             });
             wires = new THREE.Mesh(mesh.geometry, material);
