@@ -1,0 +1,181 @@
+import gc
+
+import numpy as np
+import pytest
+
+from bridge.link import InProcessLink, LinkError
+from scalpel_sim.body import make_tissue, pulled_apart
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.outputs import NAMES, Outputs
+from scalpel_sim.plotter import Plotter
+from scalpel_sim.prepare import prepare
+from scalpel_sim.recording import COLUMNS, read_forces
+from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
+from scalpel_sim.scenes import DEFAULT_SCENE, SCENES, changed, scene_called, scene_of
+from scalpel_sim.simulation import Simulation
+from tissue.shapes import grid
+
+GRID2 = SCENES["grid2"]
+UNTIMED = COLUMNS.index("cd_s")
+"""Columns from here on are wall times."""
+
+
+def test_two_runs_of_a_scene_give_the_same_bits():
+    first, second = (prepare(GRID2) for _ in range(2))
+    for simulation in (first, second):
+        simulation.run(0.8)
+    assert first.result.cut_area > 0.0
+    assert np.array_equal(first.recording.rows[:, :UNTIMED], second.recording.rows[:, :UNTIMED])
+
+
+def test_a_run_in_two_parts_is_the_run_in_one():
+    whole, parts = (prepare(GRID2) for _ in range(2))
+    whole.run(0.5)
+    parts.run(0.2)
+    parts.run(0.5)
+    assert np.array_equal(whole.recording.rows[:, :UNTIMED], parts.recording.rows[:, :UNTIMED])
+
+
+def test_a_run_ends_when_it_is_told_to():
+    simulation = prepare(GRID2)
+    simulation.run(1.0, lambda now: len(now.recording) == 7)
+    assert len(simulation.recording) == 7
+    assert simulation.time == pytest.approx(7 * simulation.dt)
+
+
+def test_the_blade_starts_on_the_stroke_and_stays_near_it():
+    simulation = prepare(GRID2)
+    simulation.run(simulation.stroke.duration)
+    tips = simulation.frame.points_to_tissue(simulation.recording.vector("tip"))
+    wanted = [simulation.stroke.pose(t).tip for t in simulation.recording.column("time_s")]
+    distances = np.linalg.norm(tips - wanted, axis=1)
+    assert distances[0] < 1e-5
+    assert distances.max() < 2e-3
+
+
+def test_the_garbage_collector_rests_during_a_run_and_works_after_it():
+    simulation = prepare(GRID2)
+    seen = []
+    simulation.run(0.005, lambda now: seen.append(gc.isenabled()))
+    assert seen == [False] * 5
+    assert gc.isenabled() and gc.get_freeze_count() == 0
+
+
+def test_the_stages_of_a_frame_take_no_longer_than_the_frame():
+    simulation = prepare(GRID2)
+    simulation.pictures.append(lambda now: sum(range(10_000)))
+    simulation.run(0.5)
+    rows = simulation.recording
+    stages = rows.column("cd_s") + rows.column("gc_s") + rows.column("rx_s")
+    assert (stages <= rows.column("frame_s")).all()
+    assert (rows.column("rd_s") > 0.0).all()
+    in_all = rows.column("frame_s").sum() + rows.column("rd_s").sum()
+    assert in_all == pytest.approx(simulation.wall_seconds, rel=0.1)
+
+
+def test_there_is_no_result_before_the_first_frame():
+    with pytest.raises(RuntimeError, match="no frame"):
+        _ = prepare(GRID2).result
+
+
+def test_the_scenes_are_those_of_the_paper_and_an_organ():
+    counts = {name: len(scene.mesh().tetrahedra) for name, scene in SCENES.items()}
+    assert (counts["slab"], counts["grid2"], counts["grid7"]) == (576, 48, 2058)
+    assert 4500 <= counts["organ"] <= 5500
+    assert DEFAULT_SCENE == "organ"
+    with pytest.raises(UsageError, match=r"Did you mean 'grid7'. Known: organ, slab, grid2"):
+        scene_called("grid77")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_parts_before_it_is_dragged_far(name):
+    """The blade drags tissue along by toughness / stiffness: little against the body."""
+    scene = SCENES[name]
+    drag = scene.material.toughness / scene.material.young_modulus
+    assert drag <= 0.1 * np.ptp(scene.mesh().positions, axis=0).min()
+
+
+def test_a_stretch_moves_held_sides_apart_and_nothing_else():
+    corners = grid((1, 1, 1), (0.1, 0.2, 0.3)).positions
+    pulled = pulled_apart(corners, "left,right", 0.5)
+    assert np.ptp(pulled, axis=0) == pytest.approx([0.15, 0.2, 0.3])
+    assert pulled.mean(axis=0) == pytest.approx(corners.mean(axis=0))
+    assert pulled_apart(corners, "bottom", 0.0) is corners
+    with pytest.raises(UsageError, match="no such pair"):
+        pulled_apart(corners, "left,bottom", 0.1)
+
+
+def test_other_sides_held_drop_the_stretch_that_came_with_the_scene():
+    assert changed(GRID2, fixed="bottom").stretch == 0.0
+    assert changed(GRID2, fixed="bottom", stretch=0.1).stretch == 0.1
+    assert changed(GRID2, toughness=3.0).stretch == GRID2.stretch
+
+
+def test_a_body_is_at_rest_when_the_run_begins():
+    tissue = make_tissue(GRID2)
+    before = tissue.snapshot().positions
+    for _ in range(100):
+        tissue.step(None, 1e-3)
+    assert np.abs(tissue.snapshot().positions - before).max() < 1e-5
+
+
+def test_a_scene_around_a_body_elsewhere_is_the_scene():
+    soft = changed(GRID2, young_modulus=5e3)
+    found = scene_of(InProcessLink(make_tissue(soft), "grid2"))
+    assert (found.name, found.stroke, found.material) == ("grid2", "straight", soft.material)
+
+
+def test_a_run_lasts_for_the_stroke_and_a_rest_unless_it_is_told():
+    simulation = prepare(GRID2)
+    assert run_time(simulation, None) == simulation.stroke.duration + REST_AFTER_STROKE
+    assert run_time(simulation, 0.1) == 0.1
+
+
+class BreakingLink(InProcessLink):
+    """A link that is lost after some steps, as when a server dies."""
+
+    n_steps_left = 150
+
+    def _use(self) -> None:
+        if self.n_steps_left == 0:
+            raise LinkError("the server is gone")
+
+    def step(self, sweep, dt):
+        self._use()
+        self.n_steps_left -= 1
+        return super().step(sweep, dt)
+
+    def snapshot(self):
+        self._use()
+        return super().snapshot()
+
+    def surface(self):
+        self._use()
+        return super().surface()
+
+    def pieces(self):
+        self._use()
+        return super().pieces()
+
+
+def perform_in(folder, simulation: Simulation):
+    with Plotter() as plotter:
+        return perform(
+            simulation, Outputs(folder, plotter), settings={"stroke": "straight"}, seconds=0.3
+        )
+
+
+def test_a_run_that_loses_its_tissue_keeps_all_that_can_be_kept(tmp_path):
+    simulation = prepare(GRID2, BreakingLink(make_tissue(GRID2), "grid2"))
+    with pytest.raises(RunError, match=r"after 0\.150 s: the server is gone; .* holds"):
+        perform_in(tmp_path, simulation)
+    assert len(read_forces(tmp_path / "forces.csv")) == 150
+    assert {path.name for path in tmp_path.iterdir()} == set(NAMES) - {"final.vtu"}
+
+
+def test_a_run_whose_fault_is_ours_keeps_its_files_too(tmp_path):
+    simulation = prepare(GRID2)
+    simulation.pictures.append(lambda now: 1 / (now.time < 0.1))
+    with pytest.raises(RunError, match=r"ZeroDivisionError.*fault of the program"):
+        perform_in(tmp_path, simulation)
+    assert {path.name for path in tmp_path.iterdir()} == set(NAMES)

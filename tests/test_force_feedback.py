@@ -1,0 +1,202 @@
+"""What goes round: the blade pulls on the tissue, and the arm feels it, newton for newton."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+import pytest
+
+from scalpel_sim.body import make_tissue
+from scalpel_sim.prepare import prepare
+from scalpel_sim.scenes import SCENES, Scene, changed
+from scalpel_sim.simulation import Simulation
+from tissue.types import BladeSegment, BladeSweep, FloatArray, StepResult
+
+ACTION_IS_REACTION = 1e-9
+"""[N]."""
+
+
+PRESS = changed(SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0)
+"""Neither pulled nor sagging: the face that the blade leans on is flat, at y = 0."""
+
+
+class Run(NamedTuple):
+    """A finished simulation and what the tissue said in each of its frames."""
+
+    simulation: Simulation
+    results: list[StepResult]
+    joint_force_errors: FloatArray
+    """Per frame [N m]: MuJoCo's generalised force of the wrench, less J^T w."""
+
+    def every(self, name: str) -> FloatArray:
+        return np.array([getattr(result, name) for result in self.results])
+
+    def forces(self) -> FloatArray:
+        return np.array([result.wrench.force for result in self.results])
+
+    def torques(self) -> FloatArray:
+        return np.array([result.wrench.torque for result in self.results])
+
+
+def run(scene: Scene, seconds_after: float = 0.2, *, frictionless: bool = False) -> Run:
+    """Do a scene's whole stroke."""
+    simulation = prepare(scene)
+    model, data = simulation.arm.model, simulation.arm.data
+    if frictionless:
+        model.dof_frictionloss[:] = 0.0
+        model.tendon_frictionloss[:] = 0.0
+    results: list[StepResult] = []
+    errors: list[float] = []
+
+    def note(simulation: Simulation) -> None:
+        results.append(simulation.result)
+        errors.append(joint_force_error(simulation))
+
+    simulation.run(simulation.stroke.duration + seconds_after, note)
+    assert np.isfinite(data.qpos).all()
+    return Run(simulation, results, np.array(errors))
+
+
+def joint_force_error(simulation: Simulation) -> float:
+    """Return the largest difference between what the joints get of the wrench and J^T w."""
+    model, data, wrench = simulation.arm.model, simulation.arm.data, simulation.wrench
+    translation, rotation = np.zeros((2, 3, model.nv))
+    body = simulation.arm.blade.body_id
+    mujoco.mj_jac(model, data, translation, rotation, wrench.point, body)
+    # All forces of the frame, less those that come from elsewhere.
+    got = data.qfrc_smooth - data.qfrc_passive - data.qfrc_actuator + data.qfrc_bias
+    return float(np.abs(got - translation.T @ wrench.force - rotation.T @ wrench.torque).max())
+
+
+@pytest.fixture(scope="module")
+def cut() -> Run:
+    """A straight cut clean through the small block of the paper's Figure 12 a."""
+    return run(SCENES["grid2"])
+
+
+@pytest.fixture(scope="module")
+def gentle_cut() -> Run:
+    """The same where little is stored in the tissue: it parts before it has given way by 1 mm."""
+    return run(changed(SCENES["grid2"], toughness=5.0, stretch=0.0))
+
+
+@pytest.fixture(scope="module")
+def press() -> Run:
+    """The blade leans on the block without cutting it; the arm's joints have no friction."""
+    return run(PRESS, frictionless=True)
+
+
+def test_action_equals_reaction_in_every_frame_of_a_cut(cut):
+    both = cut.forces() + cut.every("force_on_tissue")
+    assert np.abs(cut.forces()).max() > 0.1
+    assert np.abs(both).max() <= ACTION_IS_REACTION
+
+
+def test_what_the_joints_get_is_the_jacobian_transposed_times_the_wrench(cut):
+    assert np.abs(cut.joint_force_errors).max() < 1e-12
+
+
+def test_the_wrench_acts_at_the_tip_and_is_what_the_tissue_said(cut):
+    simulation = cut.simulation
+    assert np.array_equal(simulation.recording.vector("force"), cut.forces())
+    held = cut.every("anchored_length") > 0.0
+    said = np.array([result.wrench.point for result in cut.results])
+    tips = simulation.frame.points_to_tissue(simulation.recording.vector("tip"))
+    assert np.abs(said - tips)[held].max() < 1e-12
+
+
+def test_nothing_is_felt_out_of_contact(cut):
+    held = cut.every("anchored_length") > 0.0
+    free = ~(held | np.roll(held, 1))  # neither at the start of the frame nor at its end
+    assert free[:100].all() and free[-100:].all() and held.any()
+    assert not cut.forces()[free].any()
+    assert not cut.torques()[free].any()
+
+
+def test_cutting_costs_toughness_times_area(gentle_cut):
+    toughness = gentle_cut.simulation.link.describe().material.toughness
+    last = gentle_cut.results[-1]
+    assert last.cut_area == pytest.approx(0.04 * 0.04, rel=0.05)
+    assert last.work_of_blade == pytest.approx(toughness * last.cut_area, rel=0.05)
+
+
+@pytest.mark.parametrize("case", ["cut", "gentle_cut"])
+def test_a_steady_cut_pulls_with_toughness_times_the_length_in_the_tissue(case, request):
+    found = request.getfixturevalue(case)
+    toughness = found.simulation.link.describe().material.toughness
+    lengths, area = found.every("anchored_length"), found.every("cut_area")
+    steady = (area > 0.3 * area[-1]) & (area < 0.7 * area[-1])
+    force = np.linalg.norm(found.forces()[steady], axis=1)
+    assert np.mean(force) == pytest.approx(toughness * np.mean(lengths[steady]), rel=0.05)
+
+
+def test_a_press_cuts_nothing_and_does_no_lasting_work(press):
+    assert press.results[-1].cut_area == 0.0
+    assert press.results[-1].n_tetrahedra == press.results[0].n_tetrahedra
+
+
+def test_a_pressing_arm_rests_where_hand_and_tissue_are_in_balance(press):
+    hand, wrench = press.simulation.arm.hand, press.simulation.wrench
+    size = float(np.linalg.norm(wrench.force))
+    assert size > 0.1
+    assert np.linalg.norm(hand.force + wrench.force) < 0.01 * size
+
+
+def test_the_hand_gives_way_by_force_over_its_stiffness(press):
+    arm, wrench = press.simulation.arm, press.simulation.wrench
+    stiffness = arm.model.actuator("hand_x").gainprm[0]
+    assert arm.hand.deflection * stiffness == pytest.approx(wrench.force, rel=0.02, abs=2e-3)
+
+
+def test_what_a_press_feels_is_the_stiffness_of_the_tissue_times_the_indentation(press):
+    """A blade without an arm, led to the same depth, feels the same; to half of it, half."""
+    stroke = press.simulation.stroke
+    tip = press.simulation.recording.vector("tip")[-1]
+    indentation = float(press.simulation.frame.points_to_tissue(tip)[1])
+    assert 0.0 < indentation < stroke.pose(stroke.duration).tip[1]  # the hand gives way too
+    felt = -press.simulation.wrench.force[1]
+    assert felt == pytest.approx(force_alone(stroke.pose(0.0), indentation), rel=0.03)
+    assert felt == pytest.approx(2.0 * force_alone(stroke.pose(0.0), indentation / 2.0), rel=0.1)
+
+
+def force_alone(start: BladeSegment, indentation: float) -> float:
+    """Return the force [N] on a blade that is led to an indentation at 20 mm/s, and rests there."""
+    tissue, dt, speed, n_resting = make_tissue(PRESS), 1e-3, 0.02, 500
+    way = indentation - start.tip[1]
+    before = start
+    for done in np.append(np.linspace(0.0, way, round(way / speed / dt)), np.full(n_resting, way)):
+        shift = np.array([0.0, done, 0.0])
+        after = start._replace(tip=start.tip + shift, heel=start.heel + shift)
+        result = tissue.step(BladeSweep(before, after), dt)
+        before = after
+    return -float(result.wrench.force[1])
+
+
+def test_the_arm_never_feels_more_than_its_device_can_exert():
+    scene = changed(SCENES["grid2"], toughness=200.0, young_modulus=100e3, arm="touch")
+    found = run(scene, 0.0)
+    felt = np.linalg.norm(found.simulation.recording.vector("force"), axis=1)
+    said = np.linalg.norm(found.forces(), axis=1)
+    assert said.max() > 3.5
+    assert felt.max() <= 3.3 * (1.0 + 1e-12)
+    assert found.simulation.bridge.counters.force_limited == (said > 3.3).sum()
+
+
+def test_the_arm_feels_the_tissue_through_its_joints():
+    """Without the tissue's force the blade would be elsewhere."""
+    free, led = (prepare(SCENES["grid2"]) for _ in range(2))
+    free.arm.blade.apply = lambda wrench: None  # type: ignore[method-assign]
+    seconds = 0.5 * led.stroke.duration
+    free.run(seconds)
+    led.run(seconds)
+    pushed_back = free.recording.vector("tip")[-1] - led.recording.vector("tip")[-1]
+    assert pushed_back[1] > 1e-5
+
+
+@pytest.mark.parametrize(
+    ("stroke", "pieces"),
+    [("straight", 2), ("slanted", 2), ("curved", 2), ("stop", 1), ("press", 1)],
+)
+def test_a_stroke_clean_through_leaves_two_pieces_and_any_other_one(stroke, pieces):
+    found = run(changed(SCENES["grid2"], stroke=stroke))
+    assert found.simulation.link.pieces() == pieces

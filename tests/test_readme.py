@@ -1,0 +1,60 @@
+"""What the README promises: its code runs, its commands and its files are there."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from scalpel_sim.cli import command_line
+from scalpel_sim.outputs import NAMES
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = dict(enumerate(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)))
+
+
+def printed(code: str, capsys) -> str:
+    exec(compile(code, "README.md", "exec"), {})
+    return capsys.readouterr().out
+
+
+def test_five_lines_of_python_run_a_scene(capsys):
+    assert len(BLOCKS[0].strip().splitlines()) <= 6
+    assert re.search(r"\] \d+$", printed(BLOCKS[0], capsys).strip())
+
+
+def test_a_tissue_attached_to_ones_own_arm_is_cut_and_felt(capsys):
+    """The section is complete: pasted into a file, it cuts a block in two."""
+    peak, area, pieces = re.search(
+        r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", printed(BLOCKS[1], capsys)
+    ).groups()
+    assert float(peak) == pytest.approx(20.0 * 0.02, rel=0.3)  # toughness times thickness
+    assert float(area) == pytest.approx(40 * 20, rel=0.1)
+    assert int(pieces) == 2
+
+
+def test_every_file_that_a_run_writes_is_explained():
+    assert [name for name in NAMES if f"`{name}`" not in README] == []
+
+
+def test_the_options_of_the_readme_are_those_of_the_program(capsys):
+    named = set(re.findall(r"`(--[a-z]+)", README))
+    known = ""
+    for command in ("run", "view", "serve"):
+        assert command_line([command, "--help"]) == 0
+        known += capsys.readouterr().out
+    assert named and {option for option in named if option not in known} == set()
+
+
+def test_what_the_readme_shows_and_links_to_is_there():
+    linked = re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
+    assert linked and [path for path in linked if not (ROOT / path).exists()] == []
+
+
+def test_the_two_commands_of_the_readme_are_the_ones_that_the_package_offers():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert "\npip install uv && uv run scalpel-sim run\n" in README
+    assert "\npip install uv && uv run --extra test pytest\n" in README
+    assert "scalpel-sim" in project["scripts"]
+    assert any(name.startswith("pytest") for name in project["optional-dependencies"]["test"])
