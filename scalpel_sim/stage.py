@@ -137,7 +137,8 @@ class Stage:
 
     def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
         """Return where the camera stands: beside the line from the body to the arm, and above."""
-        axis, arm = self._frame.rotation[:, 0], body_poses[self._bodies, :2].mean(axis=0)
+        axis, moving = self._frame.rotation[:, 0], [body for body in self._bodies if body > 0]
+        arm = body_poses[moving, :2].mean(axis=0) if moving else centre[:2]
         azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
         level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
         towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)

@@ -11,6 +11,10 @@ function showReadings(readings) {
     element("tetrahedra").textContent = readings.tetrahedra.toLocaleString("en");
 }
 
+window.addEventListener("error", (event) => {
+    element("status").textContent = `this browser cannot draw the picture: ${event.message}`;
+});
+
 const picture = new Picture(element("meshcat-pane"), showReadings);
 window.viewer = picture.viewer; // as on meshcat's own page
 
