@@ -41,8 +41,8 @@ SHORTEST_PAUSE = 5e-3
 """[s]. Shorter ones cost more in waking up than they are worth."""
 LOOK_AGAIN = 0.2
 """How often a finished `view` looks whether it is still wanted [s]."""
-FRAMES_PER_PROGRESS = 20
-"""So often is the progress bar told [frames]."""
+SECONDS_PER_PROGRESS = 0.1
+"""So often is the progress bar drawn [s]."""
 
 
 app = App(
@@ -156,7 +156,7 @@ def view(
         simulation = ready.simulation
         with Viewer(
             simulation.arm.model,
-            title=ready.settings["about"],
+            title=simulation.title,
             frame=simulation.frame,
             wireframe=wireframe,
             port=port,
@@ -408,13 +408,19 @@ def _progress(seconds: float, talk: Talk) -> Iterator[Callable[["Simulation"], N
         TextColumn("{task.fields[force]:.2f} N"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    # Drawn between two frames: a thread that draws would make frames wait.
+    with Progress(
+        *columns, console=Console(stderr=True), transient=True, auto_refresh=False
+    ) as bar:
         task = bar.add_task("cutting", total=seconds, force=0.0)
+        due = time.monotonic()
 
         def advance(simulation: "Simulation") -> None:
-            if len(simulation.recording) % FRAMES_PER_PROGRESS == 0:
+            nonlocal due
+            if time.monotonic() >= due:
+                due = time.monotonic() + SECONDS_PER_PROGRESS
                 force = math.hypot(*simulation.wrench.force.tolist())
-                bar.update(task, completed=simulation.time, force=force)
+                bar.update(task, completed=simulation.time, force=force, refresh=True)
 
         yield advance
 

@@ -34,7 +34,11 @@ TABLE_1 = {
 def print_table(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
     paper = TABLE_1.get(summary.scene)
-    table = Table(title=f"scalpel-sim run {summary.scene}", title_justify="left", show_header=False)
+    table = Table(
+        title=f"{summary.scene}: {summary.settings['stroke']} stroke",
+        title_justify="left",
+        show_header=False,
+    )
     table.add_column(style="bold")
     table.add_column(justify="right")
     if paper is not None:

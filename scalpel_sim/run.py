@@ -50,8 +50,7 @@ def perform(
     link = simulation.link
     body = link.describe()
     outputs.write_mesh(files.INITIAL, link.snapshot())
-    title = f"{body.scene}: {settings['stroke']} stroke"
-    replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
+    replay = ReplayWriter(simulation.arm.model, title=simulation.title, frame=simulation.frame)
     simulation.pictures.append(into_replay(replay))
 
     status, failure = COMPLETE, None
@@ -93,7 +92,7 @@ def perform(
     with unwritten:
         outputs.write_summary(summary)
     with unwritten:
-        outputs.write_plot(title)
+        outputs.write_plot(simulation.title)
     with unwritten:
         add_to(replay, simulation)
     with unwritten:

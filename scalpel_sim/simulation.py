@@ -49,6 +49,11 @@ class Simulation:
         self.dt: float = arm.model.opt.timestep
 
     @property
+    def title(self) -> str:
+        """What is cut, and how, for a heading."""
+        return f"{self.link.describe().scene}: {self.stroke.name} stroke"
+
+    @property
     def time(self) -> float:
         """Simulated time [s]: that of the frames so far."""
         return len(self.recording) * self.dt
