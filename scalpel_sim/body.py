@@ -1,5 +1,7 @@
 """A scene's body: held, pulled, and settled."""
 
+import logging
+
 import numpy as np
 
 from scalpel_sim.errors import UsageError
@@ -7,6 +9,11 @@ from scalpel_sim.scenes import Scene, check_motion
 from tissue.boundary import fixed_nodes
 from tissue.tissue import Tissue
 from tissue.types import FloatArray
+
+log = logging.getLogger("scalpel_sim")
+
+LONG_DRAG = 0.1
+"""How far a blade may drag the tissue without a word, as a fraction of the body's middle extent."""
 
 OPPOSITE_SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
 """Pairs of sides that can be pulled apart, one pair an axis."""
@@ -44,6 +51,16 @@ def check(scene: Scene) -> None:
     mesh = scene.mesh()
     fixed_nodes(mesh, scene.fixed)
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)
+    drag = scene.material.toughness / scene.material.young_modulus
+    extent = float(np.median(np.ptp(mesh.positions, axis=0)))
+    if drag > LONG_DRAG * extent:
+        log.warning(
+            "the blade will drag the tissue along by some %.2g mm (toughness / Young's modulus) "
+            "before it parts, and the body measures %.3g mm: the cut may stay unfinished. A larger "
+            "--young or a smaller --toughness cuts cleanly",
+            1e3 * drag,
+            1e3 * extent,
+        )
 
 
 def pulled_apart(positions: FloatArray, fixed: str, stretch: float) -> FloatArray:

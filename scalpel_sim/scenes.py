@@ -42,7 +42,7 @@ class Scene:
     material: Material = PHANTOM
     fixed: str = "left,right"
     """Which nodes do not move: names of sides, a box, or `none`; see `tissue.boundary`."""
-    stretch: float = 0.0
+    stretch: float = 0.05
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""
     gravity: float = STANDARD_GRAVITY
@@ -82,25 +82,21 @@ SCENES = {
             "an organ of some 5,000 tetrahedra, 90 x 60 x 30 mm",
             organ,
             material=PARENCHYMA,
-            stretch=0.05,
         ),
         Scene(
             "slab",
             "the paper's Figure 10: 4 x 6 x 4 cells, 576 tetrahedra",
             lambda: grid((4, 6, 4), (0.04, 0.06, 0.04)),
-            stretch=0.05,
         ),
         Scene(
             "grid2",
             "the paper's Figure 12 a: 2 x 2 x 2 cells, 48 tetrahedra",
             lambda: grid((2, 2, 2), (0.04, 0.04, 0.04)),
-            stretch=0.05,
         ),
         Scene(
             "grid7",
             "the paper's Figure 12 b: 7 x 7 x 7 cells, 2,058 tetrahedra",
             lambda: grid((7, 7, 7), (0.04, 0.04, 0.04)),
-            stretch=0.05,
         ),
     )
 }

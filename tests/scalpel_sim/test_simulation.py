@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridge.link import InProcessLink, LinkError
-from scalpel_sim.body import make_tissue, pulled_apart
+from scalpel_sim.body import check, make_tissue, pulled_apart
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.outputs import NAMES, Outputs
 from scalpel_sim.plotter import Plotter
@@ -85,6 +85,13 @@ def test_the_scenes_are_those_of_the_paper_and_an_organ():
     assert DEFAULT_SCENE == "organ"
     with pytest.raises(UsageError, match=r"Did you mean 'grid7'. Known: organ, slab, grid2"):
         scene_called("grid77")
+
+
+def test_a_body_that_would_be_dragged_instead_of_cut_gets_a_warning(caplog):
+    check(changed(GRID2, toughness=30.0))
+    assert not caplog.records
+    check(changed(GRID2, toughness=60.0))
+    assert "drag the tissue along by some 6 mm" in caplog.text
 
 
 @pytest.mark.parametrize("name", SCENES)
