@@ -125,7 +125,7 @@ def run(
     talk: Talk = Talk(),
 ) -> None:
     """Let the arm cut, print a table, write files to a folder."""
-    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion) as ready:
+    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion, talk) as ready:
         _report(_perform(ready, motion, talk, plotter), ready.folder, talk)
 
 
@@ -152,7 +152,7 @@ def view(
     from scalpel_sim.pictures import into_viewer, show
     from scalpel_sim.viewer import Viewer
 
-    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion) as ready:
+    with _talking(talk), Plotter() as plotter, _ready(scene, body, motion, talk) as ready:
         simulation = ready.simulation
         with Viewer(
             simulation.arm.model,
@@ -191,12 +191,11 @@ def serve(
     """
     from bridge.server import serve as serve_tissue
     from scalpel_sim.body import check, make_tissue
-    from scalpel_sim.warm_up import warm_up
 
     with _talking(talk):
         served = _scene(scene, body)
         check(served)
-        warm_up()
+        _warm_up(talk)
         serve_tissue(
             lambda: make_tissue(served),
             scene=served.name,
@@ -246,7 +245,7 @@ class Ready(NamedTuple):
 
 
 @contextmanager
-def _ready(name: str | None, body: Body, motion: Motion) -> Iterator[Ready]:
+def _ready(name: str | None, body: Body, motion: Motion, talk: Talk) -> Iterator[Ready]:
     """Yield the run that the command line asks for, and let go of the tissue afterwards."""
     from scalpel_sim.prepare import prepare
 
@@ -255,7 +254,7 @@ def _ready(name: str | None, body: Body, motion: Motion) -> Iterator[Ready]:
             f"--seconds is {motion.seconds}; it must be above 0 and at most {LONGEST_RUN:g}"
         )
     tissue = _tissue_here if motion.connect is None else _tissue_elsewhere
-    link, scene, settings = tissue(name, body, motion)
+    link, scene, settings = tissue(name, body, motion, talk)
     try:
         yield Ready(prepare(scene, link), _folder(motion, scene), settings)
     finally:
@@ -263,25 +262,24 @@ def _ready(name: str | None, body: Body, motion: Motion) -> Iterator[Ready]:
 
 
 def _tissue_here(
-    name: str | None, body: Body, motion: Motion
+    name: str | None, body: Body, motion: Motion, talk: Talk
 ) -> tuple["TissueLink", "Scene", dict[str, Any]]:
     """Make the tissue in this process, after all checks that need none."""
     from bridge.link import InProcessLink
     from scalpel_sim.body import check, make_tissue
     from scalpel_sim.outputs import check_folder
     from scalpel_sim.scenes import changed
-    from scalpel_sim.warm_up import warm_up
 
     scene = changed(_scene(name, body), **_given(motion))
     check(scene)
     check_folder(_folder(motion, scene))
-    warm_up()
+    _warm_up(talk)
     log.info("settling %s", scene.about)
     return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings()
 
 
 def _tissue_elsewhere(
-    name: str | None, body: Body, motion: Motion
+    name: str | None, body: Body, motion: Motion, talk: Talk
 ) -> tuple["TissueLink", "Scene", dict[str, Any]]:
     """Reach the tissue in another process, and take the scene from what it says of itself."""
     from bridge.tcp import TcpLink
@@ -308,6 +306,15 @@ def _tissue_elsewhere(
     elsewhere = {"fixed", "stretch", "gravity"}  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
+
+
+def _warm_up(talk: Talk) -> None:
+    """Load the kernels; where they must be compiled first, say why nothing seems to happen."""
+    from scalpel_sim.warm_up import kernels_are_compiled, warm_up
+
+    if not talk.quiet and not kernels_are_compiled():
+        _say("compiling kernels, first run only (about half a minute)")
+    warm_up()
 
 
 def _given(motion: Motion) -> dict[str, Any]:

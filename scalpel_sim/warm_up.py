@@ -1,7 +1,5 @@
 """Every kernel, run once before the clock starts."""
 
-import logging
-
 import numpy as np
 
 from tissue.boundary import fixed_nodes
@@ -9,8 +7,6 @@ from tissue.jit import cache_directory
 from tissue.shapes import grid
 from tissue.tissue import Tissue
 from tissue.types import BladeSegment, BladeSweep
-
-log = logging.getLogger(__name__)
 
 SIDE = 0.02
 """Of the block that is cut [m]."""
@@ -29,8 +25,6 @@ def warm_up() -> None:
     A small block is settled, cut half through and looked at: the run that follows does nothing
     that this did not do.
     """
-    if not kernels_are_compiled():
-        log.warning("compiling kernels, first run only (half a minute)")
     mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
     tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"))
     tissue.settle()

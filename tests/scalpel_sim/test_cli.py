@@ -103,7 +103,7 @@ def test_wrong_use_gets_one_line_and_exit_code_2(case, files, capsys):
     words, expected = WRONG_USE[case]
     code = command_line([word.format(**files) for word in words])
     out, err = capsys.readouterr()
-    line = only_line("\n".join(x for x in err.splitlines() if not x.startswith("warning: comp")))
+    line = only_line("\n".join(x for x in err.splitlines() if not x.startswith("compiling")))
     assert (code, out) == (2, "")
     assert re.match(f"error: .*{expected.format(**files)}", line)
     assert "Traceback" not in err
