@@ -16,6 +16,8 @@ COMPONENTS = (("x", "#d55e00"), ("y", "#009e73"), ("z", "#0072b2"))
 MAGNITUDE = "#222222"
 AREA = "#aa3377"
 DOTS_PER_INCH = 150
+MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.085, "top": 0.89, "hspace": 0.07}
+"""Fixed: to let matplotlib find them by itself would draw everything twice."""
 MM2_PER_M2 = 1e6
 
 
@@ -24,9 +26,9 @@ def plot_forces(recording: Recording, title: str, path: Path) -> None:
     time = recording.column("time_s")
     force = recording.vector("force")
 
-    figure = Figure(figsize=(8.0, 5.4), layout="constrained")
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
-    figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+    figure = Figure(figsize=(8.0, 5.4))
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0), gridspec_kw=MARGINS)
+    figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
 
     above.plot(time, np.linalg.norm(force, axis=1), color=MAGNITUDE, lw=1.6, label="magnitude")
     for i, (axis, colour) in enumerate(COMPONENTS):

@@ -92,11 +92,11 @@ def perform(
     with unwritten:
         outputs.write_summary(summary)
     with unwritten:
-        outputs.write_plot(simulation.title)
-    with unwritten:
         add_to(replay, simulation)
     with unwritten:
         outputs.write_replay(replay)
+    with unwritten:  # last: the plotter may still be loading
+        outputs.write_plot(simulation.title)
     outputs.close()
 
     kept = f"{outputs.folder} holds what was done"

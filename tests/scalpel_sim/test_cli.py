@@ -1,11 +1,13 @@
 import json
 import os
+import pty
 import re
 import signal
 import socket
 import subprocess
 import sys
 import time
+import urllib.request
 from pathlib import Path
 
 import numpy as np
@@ -176,10 +178,11 @@ def test_help_and_version_are_no_errors(words, capsys):
     assert capsys.readouterr().err == ""
 
 
-def start(*words: str) -> subprocess.Popen[str]:
+def start(*words: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
     """Start the program in a process of its own."""
     return subprocess.Popen(
         [sys.executable, "-m", "scalpel_sim", *words],
+        stdin=stdin,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -240,3 +243,38 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
     assert np.array_equal(ours[:, :-timed], theirs[:, :-timed])
     assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
     assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
+
+
+def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
+    program = start("view", "grid2", "--seconds", "0.3", "--out", str(tmp_path))
+    said = ""
+    while "stays until Ctrl-C" not in said:
+        line = program.stderr.readline()
+        assert line, f"it ended: {said}"
+        said += line
+    url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", said).group(1)
+    with urllib.request.urlopen(url, timeout=10) as page:
+        assert "grid2: straight stroke" in page.read().decode()
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(NAMES)
+    program.send_signal(signal.SIGINT)
+    out, _ = program.communicate(timeout=30)
+    assert program.returncode == 0
+    assert "tetrahedra after" in out
+
+
+def test_view_waits_for_enter_where_a_person_looks_on(tmp_path):
+    ours, theirs = pty.openpty()
+    program = start("view", "grid2", "--seconds", "0.1", "--out", str(tmp_path), stdin=theirs)
+    try:
+        while "press Enter" not in (line := program.stderr.readline()):
+            assert line, "it ended"
+        assert not (tmp_path / "forces.csv").exists()
+        os.write(ours, b"\n")
+        while "stays until Ctrl-C" not in (line := program.stderr.readline()):
+            assert line, "it ended"
+        assert len(read_forces(tmp_path / "forces.csv")) == 100
+    finally:
+        program.terminate()
+        program.communicate(timeout=30)
+        os.close(ours)
+        os.close(theirs)
