@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.arrays import Arrays
-from tissue.body import OUTER, TETRAHEDRA, Body, walk
+from tissue.body import INSIDE_TOLERANCE, OUTER, TETRAHEDRA, Body, walk
 from tissue.geometry import (
+    Matrix3,
     Weights,
     apply,
     barycentric_in,
@@ -39,6 +40,12 @@ gone out through the skin ahead, in this step."""
 FLATTEST = 0.05
 """Determinant of the deformation gradient below which a tetrahedron is too squashed to say which
 way is forward in the material; the current direction is taken instead."""
+
+MOST_STRAIN = 2.0
+"""Factor by which a length in the body at rest may differ from the length now. Tissue about to part
+is stretched far more over an element; without the bound the path of the cut would leap there."""
+
+IDENTITY = Matrix3(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0))
 
 SEARCH = 512
 """Tetrahedra that the search beyond a cut face looks at, at most."""
@@ -227,15 +234,23 @@ def to_material(body: Body, t: int, direction: Vec3) -> Vec3:
     rest = edge_matrix(body.rest, body.tetrahedra, t)
     if determinant(now) < FLATTEST * determinant(rest):
         return direction
-    return apply(rest, solve(now, direction))
+    mapped = apply(rest, solve(now, direction))
+    length = norm(mapped)
+    if length == 0.0:
+        return direction
+    wanted = norm(direction)
+    return scale(min(max(length, wanted / MOST_STRAIN), wanted * MOST_STRAIN) / length, mapped)
 
 
 class Place(NamedTuple):
     """Where a material point is."""
 
     tetrahedron: int
-    state: int
-    """ANCHORED, or LEFT where it lies beyond the skin."""
+    """Which holds it, or the one nearest by."""
+    inside: bool
+    """Whether it holds the point."""
+    beyond_skin: bool
+    """Where it does not: whether the skin is between them, rather than a cut."""
 
 
 @kernel
@@ -246,10 +261,8 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
     the other lip hangs together with this one around the rim of the cut.
     """
     at = walk(body, p, start)
-    if at.inside:
-        return Place(at.tetrahedron, ANCHORED)
-    if at.link == OUTER:
-        return Place(at.tetrahedron, LEFT)
+    if at.inside or at.link == OUTER:
+        return Place(at.tetrahedron, at.inside, not at.inside)
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
     queue[0] = at.tetrahedron
@@ -271,7 +284,13 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
                 visits.tetrahedra[link // 4] = epoch
                 queue[n] = link // 4
                 n += 1
-    return Place(closest, ANCHORED)
+    if closest_weight >= -INSIDE_TOLERANCE:
+        return Place(closest, True, False)
+    w = barycentric_in(p, body.rest, body.tetrahedra, closest)
+    for f in range(4):
+        if w[f] == closest_weight:
+            return Place(closest, False, body.links[closest, f] == OUTER)
+    return Place(closest, False, False)
 
 
 @kernel
@@ -370,7 +389,7 @@ def _slip_by(
     t = anchors.tetrahedron[k]
     p = add(vec3(anchors.rest, k), to_material(body, t, step))
     place = find(body, visits, p, t, queue)
-    if place.state == LEFT:
+    if place.beyond_skin:
         anchors.state[k] = LEFT
         store(anchors.rest, k, p)
         anchors.tetrahedron[k] = place.tetrahedron
@@ -388,6 +407,7 @@ def seize(
     tissue if the point that far behind it is.
     """
     n = len(anchors.state)
+    rotation = mean_rotation(anchors, body)
     for sweep in range(2):
         for i in range(n):
             k = i if sweep == 0 else n - 1 - i
@@ -396,9 +416,10 @@ def seize(
                 continue
             if anchors.state[beside] != ANCHORED:
                 continue
-            p = beside_anchor(anchors, body, edge, when, k, beside)
+            offset = offset_from(edge, rotation, when, n, k, beside)
+            p = add(vec3(anchors.rest, beside), offset)
             place = find(body, visits, p, anchors.tetrahedron[beside], queue)
-            if place.state != ANCHORED:
+            if not place.inside:
                 continue
             put(anchors, body, k, place.tetrahedron, p)
             d = sub(
@@ -407,16 +428,67 @@ def seize(
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
 
 
+POLAR_ITERATIONS = 8
+"""Steps of the iteration for the rotation in a deformation; it doubles the digits in each."""
+
+
 @kernel
-def beside_anchor(
-    anchors: Anchors, body: Body, edge: Edge, when: float, k: int, beside: int
+def mean_rotation(anchors: Anchors, body: Body) -> Matrix3:
+    """The rotation of the tissue along the edge, from the body at rest to the body as it is.
+
+    It is that of the mean deformation gradient of the tetrahedra that the edge holds. A single one
+    is dented and sheared by the blade, and says little of how the blade lies to the body.
+    """
+    c0 = Vec3(0.0, 0.0, 0.0)
+    c1 = Vec3(0.0, 0.0, 0.0)
+    c2 = Vec3(0.0, 0.0, 0.0)
+    for k in range(len(anchors.state)):
+        if anchors.state[k] != FREE:
+            t = anchors.tetrahedron[k]
+            now = edge_matrix(body.positions, body.tetrahedra, t)
+            rest = edge_matrix(body.rest, body.tetrahedra, t)
+            c0 = add(c0, apply(now, solve(rest, Vec3(1.0, 0.0, 0.0))))
+            c1 = add(c1, apply(now, solve(rest, Vec3(0.0, 1.0, 0.0))))
+            c2 = add(c2, apply(now, solve(rest, Vec3(0.0, 0.0, 1.0))))
+    return rotation_of(Matrix3(c0, c1, c2))
+
+
+@kernel
+def rotation_of(m: Matrix3) -> Matrix3:
+    """The rotation nearest to `m`, up to scale; the identity where `m` is not near any.
+
+    Higham's iteration for the polar decomposition: R <- (R + R^-T) / 2.
+    """
+    size = norm(m.c0) + norm(m.c1) + norm(m.c2)
+    if size == 0.0:
+        return IDENTITY
+    r = Matrix3(scale(3.0 / size, m.c0), scale(3.0 / size, m.c1), scale(3.0 / size, m.c2))
+    for _ in range(POLAR_ITERATIONS):
+        d = determinant(r)
+        if d < FLATTEST:
+            return IDENTITY
+        half = 0.5 / d  # the columns of R^-T are cross products of those of R, over det R
+        r = Matrix3(
+            add(scale(0.5, r.c0), scale(half, cross(r.c1, r.c2))),
+            add(scale(0.5, r.c1), scale(half, cross(r.c2, r.c0))),
+            add(scale(0.5, r.c2), scale(half, cross(r.c0, r.c1))),
+        )
+    return r
+
+
+@kernel
+def turned_back(rotation: Matrix3, v: Vec3) -> Vec3:
+    """Return R^T v."""
+    return Vec3(dot(rotation.c0, v), dot(rotation.c1, v), dot(rotation.c2, v))
+
+
+@kernel
+def offset_from(
+    edge: Edge, rotation: Matrix3, when: float, n: int, k: int, beside: int
 ) -> Vec3:
-    """Rest point [m] that lies from anchor `beside` as sample `k` lies from sample `beside`."""
-    n = len(anchors.state)
+    """The way from sample `beside` to sample `k` of `n` [m], in the body at rest."""
     offset = sub(sample_point(edge, k, n, when), sample_point(edge, beside, n, when))
-    return add(
-        vec3(anchors.rest, beside), to_material(body, anchors.tetrahedron[beside], offset)
-    )
+    return turned_back(rotation, offset)
 
 
 @kernel

@@ -22,8 +22,7 @@ from tissue.sheet import (
     side_of,
     touch,
 )
-from tissue.star import Visits, star
-from tissue.types import IntArray
+from tissue.star import star
 from tissue.vec3 import Vec3, dot, sub, vec3
 
 CRUMB_TETRAHEDRA = 16
@@ -263,60 +262,44 @@ def _face_area(body: Body, t: int, f: int) -> float:
 
 @kernel
 def _unglue_face(cut: Cut, row: int) -> None:
-    """Double the nodes of cut face `row` that no longer hold its two tetrahedra together."""
+    """Double the nodes of cut face `row` whose tetrahedra it held together.
+
+    Every part of a star that fell apart lies at a face cut in this pass, on one side or the other.
+    """
     change, body = cut.change, cut.body
     if change.faces[row, 1] < 0:
         return
-    t = change.faces[row, 0]
-    other = change.faces[row, 2]
-    note_dirty(change, t)
-    note_dirty(change, other)
-    for k in range(4):
-        if k != change.faces[row, 1]:
-            _unglue(cut, body.tetrahedra[t, k], t, other)
+    for side in range(0, 4, 2):
+        t = change.faces[row, side]
+        note_dirty(change, t)
+        for k in range(4):
+            if k != change.faces[row, side + 1]:
+                _unglue(cut, body.tetrahedra[t, k], t)
 
 
 @kernel
 def _unglue_fans(cut: Cut, node: int) -> None:
     """Double a node that was inserted into the rim of an old cut, if its tetrahedra came in fans."""
-    body, change, work, visits = cut.body, cut.change, cut.work, cut.visits
-    start = body.node_tetrahedron[node]
-    star(body, visits, node, start, work.around)
-    epoch = visits.epoch[0]
+    body, change = cut.body, cut.change
     for i in range(change.counts[N_DIRTY]):
         t = change.dirty[i]
-        if visits.tetrahedra[t] != epoch and local_index(body, t, node) >= 0:
-            _unglue(cut, node, start, t)
-            star(body, visits, node, start, work.around)
-            epoch = visits.epoch[0]
+        if local_index(body, t, node) >= 0:
+            _unglue(cut, node, t)
 
 
 @kernel
-def _unglue(cut: Cut, node: int, t: int, other: int) -> None:
-    """Give the tetrahedra around `node` that hang together with `other`, but not `t`, a copy of it."""
-    body, work, change = cut.body, cut.work, cut.change
-    if local_index(body, other, node) < 0:
+def _unglue(cut: Cut, node: int, t: int) -> None:
+    """Give the tetrahedra that hang together with `t` around `node` a copy of it, if they are apart."""
+    body, work, change, visits = cut.body, cut.work, cut.change, cut.visits
+    star(body, visits, node, body.node_tetrahedron[node], work.around)
+    if visits.tetrahedra[t] == visits.epoch[0]:
         return
-    if _hang_together(body, cut.visits, node, t, other, work.around):
-        return
-    n = star(body, cut.visits, node, other, work.around)
+    n = star(body, visits, node, t, work.around)
     copy = _copy_node(cut, node)
     for i in range(n):
         body.tetrahedra[work.around[i], local_index(body, work.around[i], node)] = copy
         note_dirty(change, work.around[i])
-    body.node_tetrahedron[copy] = other
-    body.node_tetrahedron[node] = t
-
-
-@kernel
-def _hang_together(
-    body: Body, visits: Visits, node: int, t: int, other: int, around: IntArray
-) -> bool:
-    n = star(body, visits, node, t, around)
-    for i in range(n):
-        if around[i] == other:
-            return True
-    return False
+    body.node_tetrahedron[copy] = t
 
 
 @kernel

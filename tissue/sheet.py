@@ -85,8 +85,8 @@ class Path(Arrays):
     """Tetrahedron at or beside the sample, shape (n,)."""
     member: BoolArray
     """Whether the sample is part of the chain at the end, shape (n,)."""
-    was_member: BoolArray
-    """Whether it was at the start, shape (n,)."""
+    known: BoolArray
+    """Whether it ever was in this incision, so that its `t1` tells where it was; shape (n,)."""
     linked: BoolArray
     """Whether sample and next sample span a piece of the sheet, shape (n,)."""
     boxes: IntArray
@@ -191,7 +191,7 @@ def new_path(n: int) -> Path:
         forward=np.zeros((n, 3)),
         seed=np.full(n, -1, np.int64),
         member=np.zeros(n, np.bool_),
-        was_member=np.zeros(n, np.bool_),
+        known=np.zeros(n, np.bool_),
         linked=np.zeros(n, np.bool_),
         boxes=np.zeros((n, 6), np.int64),
     )
