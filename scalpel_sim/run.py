@@ -19,6 +19,9 @@ log = logging.getLogger(__name__)
 REST_AFTER_STROKE = 0.3
 """How long a run goes on after the stroke's end [s]: the tissue swings out, and the cut gapes."""
 
+MANY_SUBSTEPS = 200
+"""Runge-Kutta steps in a frame above which a person should be told. The scenes take 1 to 20."""
+
 
 def perform(
     simulation: Simulation,
@@ -57,6 +60,8 @@ def perform(
     with StopSignals() as stop:
 
         def after_frame(now: Simulation) -> bool:
+            if len(now.recording) == 1:
+                _warn_if_slow(now)
             outputs.write_forces(now.recording)
             if every_frame is not None:
                 every_frame(now)
@@ -107,6 +112,17 @@ def perform(
     if unwritten.errors:
         raise unwritten.errors[0]
     return summary
+
+
+def _warn_if_slow(simulation: Simulation) -> None:
+    """Say so where a frame takes so many Runge-Kutta steps that one would think it hangs."""
+    n_substeps = simulation.result.n_substeps
+    if n_substeps > MANY_SUBSTEPS:
+        log.warning(
+            "a frame takes %s Runge-Kutta steps, because the tissue's elements are small, stiff or "
+            "light: the run will take long. Check --scale, or lower --young, or raise --density",
+            f"{n_substeps:,}",
+        )
 
 
 class _Attempts:

@@ -1,4 +1,5 @@
 import gc
+import re
 
 import numpy as np
 import pytest
@@ -165,10 +166,10 @@ class BreakingLink(InProcessLink):
         return super().pieces()
 
 
-def perform_in(folder, simulation: Simulation):
+def perform_in(folder, simulation: Simulation, seconds: float = 0.3):
     with Plotter() as plotter:
         return perform(
-            simulation, Outputs(folder, plotter), settings={"stroke": "straight"}, seconds=0.3
+            simulation, Outputs(folder, plotter), settings={"stroke": "straight"}, seconds=seconds
         )
 
 
@@ -186,3 +187,8 @@ def test_a_run_whose_fault_is_ours_keeps_its_files_too(tmp_path):
     with pytest.raises(RunError, match=r"ZeroDivisionError.*fault of the program"):
         perform_in(tmp_path, simulation)
     assert {path.name for path in tmp_path.iterdir()} == set(NAMES)
+
+
+def test_a_body_that_makes_a_run_crawl_is_named(tmp_path, caplog):
+    perform_in(tmp_path, prepare(changed(GRID2, young_modulus=1e10, toughness=2e7)), seconds=0.002)
+    assert re.search(r"a frame takes [\d,]+ Runge-Kutta steps.*--young", caplog.text)
