@@ -15,7 +15,7 @@ from tissue.anchors import (
     offset_from,
     turned_back,
 )
-from tissue.body import Body
+from tissue.body import OUTER, Body, walk
 from tissue.geometry import Matrix3
 from tissue.jit import kernel
 from tissue.sheet import Path
@@ -25,6 +25,12 @@ from tissue.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 OUTREACH = 3
 """Samples that the chain reaches out beyond the last one in the tissue: half a mean node size. With
 one, a corner of the skin between two samples can stay uncut."""
+
+SMOOTHING = 6
+"""Passes of smoothing along the edge; they reach over half a mean node size to either side."""
+
+STEEPEST = 1.0
+"""How far the path may go sideways per way ahead. Steeper steps leave tetrahedra uncut."""
 
 
 @kernel
@@ -42,9 +48,11 @@ def trace_path(
         path: Its last end is the new start.
     """
     n = len(anchors.state)
-    _, forward, _ = edge_frame(edge, when)
+    _, forward, flat = edge_frame(edge, when)
     rotation = mean_rotation(anchors, body)
     ahead = turned_back(rotation, forward)
+    sideways = turned_back(rotation, flat)
+    store(path.sideways, 0, sideways)
     gone = True
     for k in range(n):
         store(path.t0, k, vec3(path.t1, k))
@@ -55,17 +63,20 @@ def trace_path(
             gone = gone and anchors.state[k] == LEFT
             path.seed[k] = anchors.tetrahedron[k]
             store(path.t1, k, vec3(anchors.rest, k))
+            if anchors.state[k] == LEFT:
+                _reach_out(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
     for k in range(n):
         if anchors.state[k] == FREE:
             _place_beside(anchors, edge, rotation, when, k, path)
-    if gone:
-        for k in range(n):
-            store(path.t1, k, axpy(margin, vec3(path.forward, k), vec3(path.t1, k)))
+    _smooth(path, sideways)
     for k in range(n):
         if path.member[k]:
-            if not path.known[k]:
-                _begin(path, k, margin)
-            _never_back(path, k)
+            if gone:
+                store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
+            if path.known[k]:
+                _never_back(path, k, sideways)
+            else:  # a new member begins outside the skin, behind where it is met now
+                store(path.t0, k, axpy(-margin, ahead, vec3(path.t1, k)))
     for k in range(n):
         path.known[k] = path.known[k] or path.member[k]
         path.linked[k] = k + 1 < n and path.member[k] and path.member[k + 1]
@@ -79,6 +90,14 @@ def forget_path(path: Path) -> None:
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False
+
+
+@kernel
+def _reach_out(body: Body, k: int, p: Vec3, path: Path) -> None:
+    """Let the sheet end at `p` [m] where a sample left the body, if that is outside."""
+    at = walk(body, p, path.seed[k])
+    if not at.inside and at.link == OUTER:
+        store(path.t1, k, p)
 
 
 @kernel
@@ -101,14 +120,41 @@ def _place_beside(
 
 
 @kernel
-def _begin(path: Path, k: int, margin: float) -> None:
-    """Give a new member of the chain a start outside the skin, behind where it is met now."""
-    store(path.t0, k, axpy(-margin, vec3(path.forward, k), vec3(path.t1, k)))
+def _smooth(path: Path, sideways: Vec3) -> None:
+    """Even out how far samples beside each other lie sideways, over about a node size.
+
+    Anchors in different tetrahedra are dragged sideways by different amounts. The mesh cannot hold
+    a fold of the sheet that is finer than its tetrahedra; it would tear along one.
+    """
+    n = len(path.member)
+    for sweep in range(SMOOTHING):
+        for parity in range(2):
+            for k in range(parity, n, 2):
+                if not path.member[k]:
+                    continue
+                here = vec3(path.t1, k)
+                n_beside = 0
+                distance = 0.0
+                for beside in range(k - 1, k + 2, 2):
+                    if 0 <= beside < n and path.member[beside]:
+                        n_beside += 1
+                        distance += dot(sub(vec3(path.t1, beside), here), sideways)
+                if n_beside == 2:
+                    store(path.t1, k, axpy(0.5 * distance / n_beside, sideways, here))
 
 
 @kernel
-def _never_back(path: Path, k: int) -> None:
-    """Let a sample that is not ahead of where it has been stay there: it is in its own cut."""
+def _never_back(path: Path, k: int, sideways: Vec3) -> None:
+    """Hold a sample that is not ahead of where it has been, and any motion more sideways than ahead.
+
+    The first is in its own cut; the second would fold the sheet.
+    """
     start = vec3(path.t0, k)
-    if dot(sub(vec3(path.t1, k), start), vec3(path.forward, k)) <= 0.0:
+    step = sub(vec3(path.t1, k), start)
+    ahead = dot(step, vec3(path.forward, k))
+    if ahead <= 0.0:
         store(path.t1, k, start)
+        return
+    drift = dot(step, sideways)
+    kept = min(max(drift, -STEEPEST * ahead), STEEPEST * ahead)
+    store(path.t1, k, axpy(kept - drift, sideways, vec3(path.t1, k)))

@@ -15,7 +15,7 @@ from tissue.jit import kernel
 from tissue.predicates import Lattice, nearest
 from tissue.star import LARGEST_STAR, Visits
 from tissue.types import BoolArray, FloatArray, IntArray
-from tissue.vec3 import Vec3, add, cross, dot, lerp, sub, vec3
+from tissue.vec3 import Vec3, add, cross, dot, scale, sub, vec3
 
 CHANGES = 1 << 15
 """Changes that one pass of a cut step can note; see PASS_NODES."""
@@ -81,6 +81,8 @@ class Path(Arrays):
     lattice_t1: IntArray
     forward: FloatArray
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
+    sideways: FloatArray
+    """Unit normal of the blade's flat, in the body at rest: the side +1; shape (1, 3)."""
     seed: IntArray
     """Tetrahedron at or beside the sample, shape (n,)."""
     member: BoolArray
@@ -189,6 +191,7 @@ def new_path(n: int) -> Path:
         lattice_t0=np.zeros((n, 3), np.int64),
         lattice_t1=np.zeros((n, 3), np.int64),
         forward=np.zeros((n, 3)),
+        sideways=np.zeros((1, 3)),
         seed=np.full(n, -1, np.int64),
         member=np.zeros(n, np.bool_),
         known=np.zeros(n, np.bool_),
@@ -297,6 +300,10 @@ def decide_side(sheet: Sheet, t: int, side: int) -> None:
     sheet.tetrahedron_side[t] = side
 
 
+SAME_WAY = 0.7
+"""Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
+
+
 class Plane(NamedTuple):
     """The sheet near a point: a point on it and its unit normal, towards side +1."""
 
@@ -313,10 +320,12 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
     u = 0.0
     if squared > 0.0:
         u = min(1.0, max(0.0, dot(sub(p, tip), along) / squared))
-    forward = lerp(u, vec3(path.forward, k), vec3(path.forward, k + 1))
-    return Plane(
-        add(tip, Vec3(u * along.x, u * along.y, u * along.z)), normalised(cross(forward, along))
-    )
+    normal = normalised(cross(vec3(path.forward, k), along))
+    # Where anchors are in disorder the normal of the path means nothing; that of the blade does.
+    sideways = vec3(path.sideways, 0)
+    if dot(normal, sideways) < SAME_WAY:
+        normal = sideways
+    return Plane(add(tip, scale(u, along)), normal)
 
 
 @kernel
