@@ -83,9 +83,9 @@ class Anchors(Arrays):
 
 IMPULSE, IMPULSE_TORQUE, TISSUE_IMPULSE = 0, 3, 6
 """Of the tissue on the blade [N s] and [N m s] about the origin, and on the tissue; three each."""
-WORK_OF_BLADE, WORK_OF_CUTTING, AREA, RELEASED = 9, 10, 11, 12
-"""[J], [J], [m2], and the energy of anchors that let go [J]."""
-N_TOTALS = 13
+WORK_OF_BLADE, WORK_OF_CUTTING, RELEASED = 9, 10, 11
+"""[J], [J], and the energy of anchors that let go, less that of new ones [J]."""
+N_TOTALS = 12
 
 
 def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
@@ -378,7 +378,6 @@ def slip(
             sample_point(edge, k, n, when), anchor_position(anchors, body, body.positions, k)
         )
         anchors.totals[WORK_OF_CUTTING] += energy - 0.5 * anchors.stiffness[k] * dot(left, left)
-        anchors.totals[AREA] += surplus * across * anchors.length[k]
 
 
 @kernel

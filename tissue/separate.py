@@ -36,7 +36,9 @@ def open_sheet(cut: Cut) -> None:
     _keep_crumbs(cut)
     change = cut.change
     for i in range(change.counts[N_FACES]):
-        _unglue_face(cut, i)
+        if change.faces[i, 1] >= 0:
+            change.area[0] += _face_area(cut.body, change.faces[i, 0], change.faces[i, 1])
+            _unglue_face(cut, i)
     for i in range(change.counts[N_FLAGGED]):
         _unglue_fans(cut, change.flagged[i])
 
@@ -267,8 +269,6 @@ def _unglue_face(cut: Cut, row: int) -> None:
     Every part of a star that fell apart lies at a face cut in this pass, on one side or the other.
     """
     change, body = cut.change, cut.body
-    if change.faces[row, 1] < 0:
-        return
     for side in range(0, 4, 2):
         t = change.faces[row, side]
         note_dirty(change, t)

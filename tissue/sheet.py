@@ -106,6 +106,8 @@ class Change(Arrays):
     """Faces cut: tetrahedron, face, tetrahedron, face; shape (CHANGES, 4)."""
     counts: IntArray
     """How many of each, of splits, and whether there was too little room; shape (5,)."""
+    area: FloatArray
+    """Area of the faces cut, at rest, since the body was made [m2]; shape (1,)."""
 
 
 N_FLAGGED, N_DIRTY, N_FACES, N_SPLITS, FULL = 0, 1, 2, 3, 4
@@ -207,6 +209,7 @@ def new_change() -> Change:
         dirty=np.zeros(CHANGES, np.int64),
         faces=np.zeros((CHANGES, 4), np.int64),
         counts=np.zeros(5, np.int64),
+        area=np.zeros(1),
     )
 
 

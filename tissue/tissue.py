@@ -8,7 +8,6 @@ from time import perf_counter
 import numpy as np
 
 from tissue.anchors import (
-    AREA,
     IMPULSE,
     IMPULSE_TORQUE,
     TISSUE_IMPULSE,
@@ -112,7 +111,7 @@ class CutQuality:
     """... or nearer than this share of the mean node size."""
     guard: float = 0.15
     """No altitude of a new tetrahedron is smaller than this share of the mean node size."""
-    crumb: float = 0.3
+    crumb: float = 1.0
     """A piece smaller than this share of the mean tetrahedron is not cut loose."""
 
 
@@ -389,7 +388,7 @@ class Tissue:
             n_active=int(self._work.n_active[0]),
             active_point_tetrahedron=int(self._path.seed[0]) if sweep is not None else -1,
             anchored_length=anchored_length(anchors),
-            cut_area=float(totals[AREA]),
+            cut_area=float(self._change.area[0]),
             work_of_blade=float(totals[WORK_OF_BLADE]),
             work_of_cutting=float(totals[WORK_OF_CUTTING]),
             n_substeps=n_substeps,

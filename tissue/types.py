@@ -72,11 +72,11 @@ class StepResult(NamedTuple):
     anchored_length: float
     """Length of the cutting edge that is in the tissue [m]."""
     cut_area: float
-    """Area that the edge has cut since the start, on one side [m2]."""
+    """Area of the faces cut since the start, at rest, one side of each [m2]."""
     work_of_blade: float
     """Work that the blade has done on the tissue since the start [J]."""
     work_of_cutting: float
-    """Toughness times area, since the start [J]."""
+    """Work that slipping through the material took, since the start [J]: toughness times area."""
     n_substeps: int
     """Runge-Kutta steps taken in this step."""
     profile: Profile
