@@ -13,7 +13,9 @@ from bridge.link import TissueLink
 from scalpel_sim.arm import Arm
 from scalpel_sim.recording import Recording
 from scalpel_sim.stroke import Stroke
-from tissue.types import StepResult, Wrench
+from tissue.types import BladeSegment, StepResult, Wrench
+
+NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
 
 EveryFrame = Callable[["Simulation"], bool | None]
 """Called after each frame; a run ends early where it returns True."""
@@ -38,7 +40,7 @@ class Simulation:
         self.link = link
         self.frame = frame
         self.bridge = Bridge(link, frame, arm.limits)
-        self.wrench = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
+        self.wrench = NO_WRENCH
         """What the blade felt in the last frame, world frame."""
         self.recording = Recording()
         """What happened in each frame so far."""
@@ -78,7 +80,7 @@ class Simulation:
         self.arm.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
         self.arm.step1()
         segment = self.arm.blade.segment()
-        self.wrench = self.bridge.step(segment, self.dt)
+        self.wrench = self._answer(segment)
         self.arm.blade.apply(self.wrench)
         self.arm.step2()
         self.arm.check()
@@ -107,6 +109,14 @@ class Simulation:
         )
         self.wall_seconds += time.perf_counter() - start
         return self.wrench
+
+    def _answer(self, segment: BladeSegment) -> Wrench:
+        """Return what the tissue answers; where it does not, let go of the arm."""
+        try:
+            return self.bridge.step(segment, self.dt)
+        except Exception:
+            self.arm.blade.apply(NO_WRENCH)
+            raise
 
     def run(self, seconds: float, every_frame: EveryFrame | None = None) -> None:
         """Do frames until `seconds` of simulated time have passed, or `every_frame` says so."""

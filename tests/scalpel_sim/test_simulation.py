@@ -166,6 +166,16 @@ class BreakingLink(InProcessLink):
         return super().pieces()
 
 
+def test_an_arm_that_loses_its_tissue_in_the_middle_of_a_cut_is_let_go():
+    link = BreakingLink(make_tissue(GRID2), "grid2")
+    link.n_steps_left = 600
+    simulation = prepare(GRID2, link)
+    with pytest.raises(LinkError):
+        simulation.run(1.0)
+    assert np.linalg.norm(simulation.wrench.force) > 0.1
+    assert not simulation.arm.data.xfrc_applied.any()
+
+
 def perform_in(folder, simulation: Simulation, seconds: float = 0.3):
     with Plotter() as plotter:
         return perform(
