@@ -123,6 +123,10 @@ class Work(Arrays):
     """First and last segment of the edge that each may meet, shape (CHANGES, 2)."""
     n_active: IntArray
     """Shape (1,)."""
+    previous: IntArray
+    """Tetrahedra that were active or changed in the step before, shape (2 * CHANGES,)."""
+    n_previous: IntArray
+    """Shape (1,)."""
     around: IntArray
     """A star, shape (LARGEST_STAR,)."""
     around_too: IntArray
@@ -219,6 +223,8 @@ def new_work(n_tetrahedra: int) -> Work:
         active=np.zeros(CHANGES, np.int64),
         segments=np.zeros((CHANGES, 2), np.int64),
         n_active=np.zeros(1, np.int64),
+        previous=np.zeros(2 * CHANGES, np.int64),
+        n_previous=np.zeros(1, np.int64),
         around=np.zeros(LARGEST_STAR, np.int64),
         around_too=np.zeros(LARGEST_STAR, np.int64),
         parents=np.zeros(LARGEST_STAR, np.int64),

@@ -88,6 +88,8 @@ def insert_crossings(cut: Cut) -> None:
 def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
     """Handle one crossing of edge ab, at fraction `t` from a, by that segment of the edge."""
     sheet, body = cut.sheet, cut.body
+    if on_sheet(sheet, a) and on_sheet(sheet, b):
+        return  # the edge lies in the sheet; on a lip it must stay like its twin on the other
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
     normal = plane_at(cut.path, segment, lerp(t, pa, pb)).normal
@@ -146,7 +148,8 @@ def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     near_b = norm(sub(p, pb)) / snap_b
     near_c = norm(sub(p, pc)) / snap_c
     nearest = min(near_a, min(near_b, near_c))
-    if nearest < 1.0:
+    lies_in_sheet = on_sheet(cut.sheet, a) and on_sheet(cut.sheet, b) and on_sheet(cut.sheet, c)
+    if nearest < 1.0 or lies_in_sheet:
         corner = a if near_a == nearest else (b if near_b == nearest else c)
         flag(cut, corner)
         return corner

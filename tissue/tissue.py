@@ -25,6 +25,7 @@ from tissue.anchors import (
     seize,
 )
 from tissue.body import NODES, TETRAHEDRA, build_body, grown_body
+from tissue.bridges import remember_active, resolve_bridges
 from tissue.front import extend_fronts
 from tissue.material import Material
 from tissue.path import forget_path, trace_path
@@ -311,11 +312,7 @@ class Tissue:
         seize(anchors, self._body, self._visits, edge, when, self._around)
         meet(anchors, self._body, edge, when)
         if not is_engaged(anchors):
-            if self._incising:
-                begin_sheet(self._sheet)
-                forget_path(self._path)
-            self._incising = False
-            self._work.n_active[0] = 0
+            self._end_incision(anchors)
             return
         self._incising = True
         margin = SHEET_MARGIN * self.node_size
@@ -338,7 +335,9 @@ class Tissue:
             clear_changes(self._change)
             insert_crossings(cut)
             extend_fronts(cut)
+            resolve_bridges(cut)
             open_sheet(cut)
+            remember_active(cut)
             n = touched_nodes(self._body, self._change, self._visits, self._nodes)
             if n:
                 self._build_rows(self._nodes, n)
@@ -350,6 +349,18 @@ class Tissue:
             find_active_tetrahedra(cut)
             find_crossings(cut)
         self._grow()
+
+    def _end_incision(self, anchors: Anchors) -> None:
+        """Resolve what the blade left behind, and let the next contact begin another sheet."""
+        if not self._incising:
+            return
+        self._work.n_active[0] = 0
+        self._work.n_crossings[0] = 0
+        self._cut(anchors)
+        begin_sheet(self._sheet)
+        forget_path(self._path)
+        self._work.n_previous[0] = 0
+        self._incising = False
 
     def _n_increments(self, sweep: BladeSweep | None) -> int:
         """Return in how many parts the step is taken, so that the edge moves little in each."""
@@ -404,13 +415,11 @@ class Tissue:
             return self._anchors
         n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
         n = min(max(n, 2), MOST_SAMPLES)
+        self._end_incision(self._anchors)
         totals = self._anchors.totals
         self._anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
         self._edge_length = length
         self._path = new_path(n)
-        if self._incising:
-            begin_sheet(self._sheet)
-            self._incising = False
         return self._anchors
 
     def _cut_arrays(self) -> Cut:

@@ -1,0 +1,125 @@
+"""Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the sheet.
+
+Every edge that the blade crosses gets a node on the sheet, so an edge between the two sides can only
+remain where the sheet turns within an element and a node was seen on the one side first, and on the
+other later. It is looked for when a tetrahedron leaves the list of active ones, and resolved.
+"""
+
+from tissue.jit import kernel
+from tissue.sheet import (
+    FULL,
+    N_DIRTY,
+    Cut,
+    Path,
+    Plane,
+    flag,
+    on_sheet,
+    plane_at,
+    see_side,
+    side_of,
+)
+from tissue.snapping import insert_crossing, snap_distance
+from tissue.vec3 import Vec3, add, dot, lerp, scale, sub, vec3
+
+
+@kernel
+def resolve_bridges(cut: Cut) -> None:
+    """Resolve the bridges among tetrahedra that were active or changed, and are active no more."""
+    work, visits = cut.work, cut.visits
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    for i in range(work.n_active[0]):
+        visits.tetrahedra[work.active[i]] = epoch
+    # `visits` is overwritten by the searches below, so the list is thinned out first.
+    n = 0
+    for i in range(work.n_previous[0]):
+        if visits.tetrahedra[work.previous[i]] != epoch:
+            work.previous[n] = work.previous[i]
+            n += 1
+    for i in range(n):
+        _resolve(cut, work.previous[i])
+        if cut.change.counts[FULL] != 0:
+            break
+    work.n_previous[0] = 0
+
+
+@kernel
+def remember_active(cut: Cut) -> None:
+    """Note the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
+    work, change = cut.work, cut.change
+    n = work.n_previous[0]
+    for i in range(work.n_active[0]):
+        if n < len(work.previous):
+            work.previous[n] = work.active[i]
+            n += 1
+    for i in range(change.counts[N_DIRTY]):
+        if n < len(work.previous):
+            work.previous[n] = change.dirty[i]
+            n += 1
+    work.n_previous[0] = n
+
+
+@kernel
+def _resolve(cut: Cut, t: int) -> None:
+    body, sheet = cut.body, cut.sheet
+    for p in range(3):
+        for q in range(p + 1, 4):
+            a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
+            b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
+            if on_sheet(sheet, a) or on_sheet(sheet, b):
+                continue
+            if side_of(sheet, a) * side_of(sheet, b) < 0:
+                _resolve_edge(cut, a, b)
+                return
+
+
+@kernel
+def _resolve_edge(cut: Cut, a: int, b: int) -> None:
+    """Cut an edge between the two sides, or correct a side that was seen from too far away."""
+    body, sheet = cut.body, cut.sheet
+    pa = vec3(body.rest, a)
+    pb = vec3(body.rest, b)
+    segment = _nearest_segment(cut.path, lerp(0.5, pa, pb))
+    if segment < 0:
+        return
+    height_a = _height(plane_at(cut.path, segment, pa), pa)
+    height_b = _height(plane_at(cut.path, segment, pb), pb)
+    if height_a * height_b < 0.0:
+        insert_crossing(cut, a, b, segment, height_a / (height_a - height_b))
+        return
+    side = 1 if height_a + height_b >= 0.0 else -1
+    wrong = a if side_of(sheet, a) != side else b
+    height = abs(height_a) if wrong == a else abs(height_b)
+    if height < snap_distance(cut, wrong):
+        flag(cut, wrong)
+    else:
+        see_side(sheet, wrong, side, True)
+
+
+@kernel
+def _height(plane: Plane, p: Vec3) -> float:
+    return dot(sub(p, plane.point), plane.normal)
+
+
+@kernel
+def _nearest_segment(path: Path, p: Vec3) -> int:
+    """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel, where no cut is."""
+    best = -1
+    best_squared = 1e300
+    beyond = False
+    last = len(path.linked) - 2
+    for k in range(last + 1):
+        if not path.linked[k]:
+            continue
+        start = vec3(path.t1, k)
+        along = sub(vec3(path.t1, k + 1), start)
+        squared = dot(along, along)
+        u = 0.0
+        if squared > 0.0:
+            u = min(1.0, max(0.0, dot(sub(p, start), along) / squared))
+        d = sub(p, add(start, scale(u, along)))
+        if dot(d, d) < best_squared:
+            best_squared = dot(d, d)
+            best = k
+            beyond = (k == 0 and u == 0.0) or (k == last and u == 1.0)
+    return -1 if beyond else best
