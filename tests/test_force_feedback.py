@@ -182,10 +182,10 @@ def test_the_arm_never_feels_more_than_its_device_can_exert():
     assert found.simulation.bridge.counters.force_limited == (said > 3.3).sum()
 
 
-def test_the_arm_feels_the_tissue_through_its_joints():
+def test_the_arm_feels_the_tissue_through_its_joints(monkeypatch):
     """Without the tissue's force the blade would be elsewhere."""
     free, led = (prepare(SCENES["grid2"]) for _ in range(2))
-    free.arm.blade.apply = lambda wrench: None  # type: ignore[method-assign]
+    monkeypatch.setattr(free.arm.blade, "apply", lambda wrench: None)
     seconds = 0.5 * led.stroke.duration
     free.run(seconds)
     led.run(seconds)

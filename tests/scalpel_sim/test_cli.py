@@ -157,6 +157,7 @@ def test_json_prints_the_summary_and_nothing_else(files, capsys):
     with open("here/summary.json") as file:
         assert json.load(file) == printed
     assert (printed["scene"], printed["seed"], printed["frames"]) == ("grid2", 5, 20)
+    assert printed["settings"]["arm"] == "touch"  # what auto resolved to
     assert printed["simulated_seconds"] == pytest.approx(0.02)
 
 

@@ -1,0 +1,69 @@
+"""What can be asked for on the command line."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+SceneName = Annotated[
+    str | None,
+    Parameter(help="organ (default), slab, grid2 or grid7."),
+]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Body:
+    """What is to be cut. What is not given is the scene's."""
+
+    mesh: Path | None = None
+    "Cut this tetrahedral mesh instead of a scene: Gmsh .msh, legacy .vtk, or .vtu."
+    scale: float | None = None
+    "Metres in one unit of the mesh file: 0.001 for millimetres."
+    fix: str | None = None
+    "What is held: sides (left, right, front, back, bottom, top), a box x0,y0,z0:x1,y1,z1, or none."
+    young: float | None = None
+    "Young's modulus [Pa]."
+    density: float | None = None
+    "Density [kg/m3]."
+    toughness: float | None = None
+    "Fracture toughness: what a square metre of cut costs [J/m2]."
+    stretch: float | None = None
+    "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
+    gravity: float | None = None
+    "Gravity, downwards [m/s2]."
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Motion:
+    """What is done to it, and by what. What is not given is the scene's."""
+
+    stroke: str | None = None
+    "straight, slanted, curved, stop, press, or a CSV file of times and blade poses."
+    speed: float | None = None
+    "How fast the blade is led [m/s]."
+    arm: str | None = None
+    "touch, premium, or auto: the first that reaches."
+    seconds: float | None = None
+    "How long to simulate [s]; else the stroke and 0.3 s more."
+    seed: int = 0
+    "Seed of whatever is random. Kept in summary.json."
+    connect: str | None = None
+    "The tissue is elsewhere: HOST:PORT of `scalpel-sim serve`."
+    out: Path | None = None
+    "Folder for the files; out/SCENE if not given."
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Talk:
+    """How much is said."""
+
+    json: Annotated[bool, Parameter(negative="")] = False
+    "Print the summary as JSON on standard output, and nothing else there."
+    quiet: Annotated[bool, Parameter(name=["--quiet", "-q"], negative="")] = False
+    "Say nothing but errors."
+    verbose: Annotated[bool, Parameter(name=["--verbose", "-v"], negative="")] = False
+    "Say what is being done; after an error, show where it came from."

@@ -1,0 +1,135 @@
+"""From the command line's options to a run that only has to be started."""
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from bridge.link import InProcessLink, TissueLink
+from bridge.tcp import TcpLink
+from scalpel_sim.body import check, make_tissue
+from scalpel_sim.console import say
+from scalpel_sim.errors import UsageError
+from scalpel_sim.options import Body, Motion, Talk
+from scalpel_sim.outputs import check_folder
+from scalpel_sim.prepare import prepare
+from scalpel_sim.scenes import (
+    DEFAULT_SCENE,
+    Scene,
+    changed,
+    check_motion,
+    mesh_scene,
+    scene_called,
+    scene_of,
+)
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.warm_up import kernels_are_compiled, warm_up
+
+log = logging.getLogger("scalpel_sim")
+
+LONGEST_RUN = 3600.0
+"""[s] of simulated time: more is a slip of the keyboard."""
+
+
+class Ready(NamedTuple):
+    """A run that only has to be started."""
+
+    simulation: Simulation
+    folder: Path
+    settings: dict[str, Any]
+    """What the command line and the scene resolved to."""
+
+
+@contextmanager
+def ready_run(name: str | None, body: Body, motion: Motion, talk: Talk) -> Iterator[Ready]:
+    """Yield the run that the command line asks for, and let go of the tissue afterwards."""
+    if motion.seconds is not None and not 0.0 < motion.seconds <= LONGEST_RUN:
+        raise UsageError(
+            f"--seconds is {motion.seconds}; it must be above 0 and at most {LONGEST_RUN:g}"
+        )
+    tissue = _tissue_here if motion.connect is None else _tissue_elsewhere
+    link, scene, settings = tissue(name, body, motion, talk)
+    try:
+        simulation = prepare(scene, link)
+        settings |= {"arm": simulation.arm.preset, "seconds": motion.seconds}
+        yield Ready(simulation, _folder(motion, scene), settings)
+    finally:
+        link.close()
+
+
+def _tissue_here(
+    name: str | None, body: Body, motion: Motion, talk: Talk
+) -> tuple[TissueLink, Scene, dict[str, Any]]:
+    """Make the tissue in this process, after all checks that need none."""
+    scene = changed(chosen_scene(name, body), **_given(motion))
+    check(scene)
+    check_folder(_folder(motion, scene))
+    load_kernels(talk)
+    log.info("settling %s", scene.about)
+    return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings()
+
+
+def _tissue_elsewhere(
+    name: str | None, body: Body, motion: Motion, talk: Talk
+) -> tuple[TissueLink, Scene, dict[str, Any]]:
+    """Reach the tissue in another process, and take the scene from what it says of itself."""
+    assert motion.connect is not None
+    for field in fields(body):
+        if getattr(body, field.name) is not None:
+            raise UsageError(
+                f"--{field.name} belongs to the tissue, and that is at {motion.connect}; "
+                "give it to `scalpel-sim serve`"
+            )
+    link = TcpLink(motion.connect)
+    try:
+        scene = changed(scene_of(link), **_given(motion))
+        if name not in (None, scene.name):
+            raise UsageError(f"{motion.connect} holds '{scene.name}', not '{name}'")
+        check_motion(scene)
+        check_folder(_folder(motion, scene))
+    except BaseException:
+        link.close()
+        raise
+    elsewhere = {"fixed", "stretch", "gravity"}  # the server knows, and does not say
+    settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
+    return link, scene, settings | {"connect": motion.connect}
+
+
+def load_kernels(talk: Talk) -> None:
+    """Load the kernels; where they must be compiled first, say why nothing seems to happen."""
+    if not talk.quiet and not kernels_are_compiled():
+        say("compiling kernels, first run only (about half a minute)")
+    warm_up()
+
+
+def _given(motion: Motion) -> dict[str, Any]:
+    """Return what of the motion is a field of the scene."""
+    return {"stroke": motion.stroke, "speed": motion.speed, "arm": motion.arm}
+
+
+def _folder(motion: Motion, scene: Scene) -> Path:
+    """Return where the files go."""
+    return motion.out or Path("out") / scene.name
+
+
+def chosen_scene(name: str | None, body: Body) -> Scene:
+    """Return the scene or the user's mesh, with what the user changed about it."""
+    if body.mesh is None:
+        if body.scale is not None:
+            raise UsageError("--scale is for a --mesh; the scenes come in metres")
+        scene = scene_called(name or DEFAULT_SCENE)
+    elif name is not None:
+        raise UsageError(f"both the scene '{name}' and --mesh {body.mesh} are given; choose one")
+    else:
+        scene = mesh_scene(body.mesh, 1.0 if body.scale is None else body.scale)
+    return changed(
+        scene,
+        fixed=body.fix,
+        young_modulus=body.young,
+        density=body.density,
+        toughness=body.toughness,
+        stretch=body.stretch,
+        gravity=body.gravity,
+    )
