@@ -1,0 +1,109 @@
+"""Slow twins of kernels, in plain Python and NumPy: the same answers the obvious way."""
+
+import itertools
+from fractions import Fraction
+
+import numpy as np
+
+from tissue.body import OUTER
+from tissue.types import FloatArray, IntArray
+
+
+def determinant(a, b, c, d) -> int:
+    """Six times the signed volume of four lattice points, in Python's whole numbers."""
+    u, v, w = ([int(q) - int(p) for p, q in zip(a, x, strict=True)] for x in (b, c, d))
+    return (
+        w[0] * (u[1] * v[2] - u[2] * v[1])
+        + w[1] * (u[2] * v[0] - u[0] * v[2])
+        + w[2] * (u[0] * v[1] - u[1] * v[0])
+    )
+
+
+def pierced_at(a, b, p, q, r) -> list[Fraction] | None:
+    """Weights of the point where the line ab meets the plane pqr; None if it is parallel to it."""
+    weights = [determinant(a, b, *edge) for edge in ((q, r), (r, p), (p, q))]
+    total = sum(weights)
+    return None if total == 0 else [Fraction(w, total) for w in weights]
+
+
+def links(tetrahedra: IntArray) -> IntArray:
+    """What is behind each face, by comparing every tetrahedron with every other."""
+    out = np.full(tetrahedra.shape, OUTER)
+    for t, u in itertools.permutations(range(len(tetrahedra)), 2):
+        for f, g in itertools.product(range(4), repeat=2):
+            if set(np.delete(tetrahedra[t], f)) == set(np.delete(tetrahedra[u], g)):
+                out[t, f] = 4 * u + g
+    return out
+
+
+def star(tetrahedra: IntArray, node: int) -> set[int]:
+    """The tetrahedra that name `node`."""
+    return set(np.flatnonzero((tetrahedra == node).any(axis=1)).tolist())
+
+
+def volume(corners: FloatArray) -> float:
+    """Signed volume of a tetrahedron with these corners [m3]."""
+    return float(np.linalg.det(corners[1:] - corners[0])) / 6.0
+
+
+def node_size(rest: FloatArray, tetrahedra: IntArray, node: int) -> float:
+    """Smallest altitude from `node`: three times volume over area of the face opposite."""
+    altitudes = []
+    for t in star(tetrahedra, node):
+        face = rest[[n for n in tetrahedra[t] if n != node]]
+        area = 0.5 * np.linalg.norm(np.cross(face[1] - face[0], face[2] - face[0]))
+        altitudes.append(3.0 * volume(rest[tetrahedra[t]]) / area)
+    return float(min(altitudes))
+
+
+def masses(rest: FloatArray, tetrahedra: IntArray, density: float) -> FloatArray:
+    """A quarter of each tetrahedron to each of its nodes [kg]."""
+    out = np.zeros(len(rest))
+    for nodes in tetrahedra:
+        out[nodes] += 0.25 * density * volume(rest[nodes])
+    return out
+
+
+def stiffnesses(
+    rest: FloatArray, tetrahedra: IntArray, young_modulus: float
+) -> dict[tuple[int, int], float]:
+    """The spring of each edge: k = E * (volume around it) / (rest length)^2 [N/m]."""
+    around: dict[tuple[int, int], float] = {}
+    for nodes in tetrahedra:
+        for a, b in itertools.combinations(sorted(nodes.tolist()), 2):
+            around[a, b] = around.get((a, b), 0.0) + volume(rest[nodes])
+    return {
+        (a, b): young_modulus * v / float(np.sum((rest[b] - rest[a]) ** 2))
+        for (a, b), v in around.items()
+    }
+
+
+def elastic_energy(
+    springs: dict[tuple[int, int], float], rest: FloatArray, positions: FloatArray
+) -> float:
+    """Sum of k (l - l0)^2 / 2 over the springs [J]."""
+    energy = 0.0
+    for (a, b), k in springs.items():
+        stretch = np.linalg.norm(positions[b] - positions[a]) - np.linalg.norm(rest[b] - rest[a])
+        energy += 0.5 * k * float(stretch) ** 2
+    return energy
+
+
+def forces(
+    springs: dict[tuple[int, int], float],
+    rest: FloatArray,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float = 0.0,
+) -> FloatArray:
+    """Pull of each spring, and of the damper beside it, on its two ends [N]."""
+    out = np.zeros_like(positions)
+    for (a, b), k in springs.items():
+        d = positions[b] - positions[a]
+        length = np.linalg.norm(d)
+        way = d / length
+        pull = k * (length - np.linalg.norm(rest[b] - rest[a]))
+        pull += retardation_time * k * float((velocities[b] - velocities[a]) @ way)
+        out[a] += pull * way
+        out[b] -= pull * way
+    return out

@@ -1,0 +1,156 @@
+"""Whether a cut body is a sound mesh, asked of its nodes and tetrahedra alone."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.types import FloatArray, IntArray, Snapshot
+
+OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+class Faces(NamedTuple):
+    """Every triangle of every tetrahedron."""
+
+    nodes: IntArray
+    """Counter-clockwise seen from outside its tetrahedron, shape (4 n_tets, 3)."""
+    same: IntArray
+    """Number of the set of nodes, equal for the two sides of one triangle, shape (4 n_tets,)."""
+    count: IntArray
+    """How many tetrahedra have that set, shape (n_sets,)."""
+
+    @property
+    def boundary(self) -> IntArray:
+        return self.nodes[self.count[self.same] == 1]
+
+
+def faces_of(tetrahedra: IntArray) -> Faces:
+    nodes = tetrahedra[:, OUTWARD].reshape(-1, 3)
+    _, same, count = np.unique(
+        np.sort(nodes, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return Faces(nodes, same.ravel(), count)
+
+
+def volumes(rest: FloatArray, tetrahedra: IntArray) -> FloatArray:
+    """Return signed volumes [m3]."""
+    a, b, c, d = (rest[tetrahedra[:, k]] for k in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+
+
+def triangle_areas(rest: FloatArray, triangles: IntArray) -> FloatArray:
+    """Return areas [m2]."""
+    a, b, c = (rest[triangles[:, k]] for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def is_closed(triangles: IntArray) -> bool:
+    """Whether as many triangles run along each edge one way as the other."""
+    edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    ways, way = np.where(edges[:, 0] < edges[:, 1], 1, -1), np.sort(edges, axis=1)
+    _, same = np.unique(way, axis=0, return_inverse=True)
+    return not np.bincount(same.ravel(), weights=ways).any()
+
+
+def n_pieces(tetrahedra: IntArray) -> int:
+    """Return into how many pieces the tetrahedra fall: they hang together through faces."""
+    faces = faces_of(tetrahedra)
+    return _n_groups(len(tetrahedra), _pairs(faces) // 4)
+
+
+def n_split_stars(tetrahedra: IntArray) -> int:
+    """Return how many nodes hold together tetrahedra that share no face there."""
+    faces = faces_of(tetrahedra)
+    corner = {(n, t): i for i, (t, n) in enumerate(_corners(tetrahedra))}
+    links = [
+        (corner[n, a], corner[n, b])
+        for a, b in (_pairs(faces) // 4).tolist()
+        for n in set(tetrahedra[a].tolist()) & set(tetrahedra[b].tolist())
+    ]
+    return _n_groups(len(corner), np.array(links).reshape(-1, 2)) - len(np.unique(tetrahedra))
+
+
+def lone_area(body: Snapshot) -> float:
+    """Area of the triangles that bound the body once nodes at one rest position are one [m2].
+
+    The lips of a cut close up then, and what is left is the skin. A crack, a hanging node, or a
+    face that was cut on one side only would add to it.
+    """
+    _, glued = np.unique(body.rest_positions, axis=0, return_inverse=True)
+    faces = faces_of(body.tetrahedra)
+    same = faces_of(glued.ravel()[body.tetrahedra])
+    lone = faces.nodes[same.count[same.same] == 1]
+    return float(triangle_areas(body.rest_positions, lone).sum())
+
+
+def faults(before: Snapshot, after: Snapshot, volume: float = 1e-9, mass: float = 1e-12) -> list[str]:
+    """Return what is wrong with the body after a cut; nothing if all is well.
+
+    Args:
+        before: The whole body.
+        after: The cut body.
+        volume: Largest relative change of volume.
+        mass: Largest relative change of mass.
+    """
+    found = []
+    rest, tetrahedra = after.rest_positions, after.tetrahedra
+    v = volumes(rest, tetrahedra)
+    if v.min() <= 0.0:
+        found.append(f"{(v <= 0.0).sum()} tetrahedra are not positive, the least {v.min():.2e} m3")
+    v_before = volumes(before.rest_positions, before.tetrahedra).sum()
+    if abs(v.sum() / v_before - 1.0) > volume:
+        found.append(f"volume changed by {v.sum() / v_before - 1.0:.2e}")
+    if abs(after.masses.sum() / before.masses.sum() - 1.0) > mass:
+        found.append(f"mass changed by {after.masses.sum() / before.masses.sum() - 1.0:.2e}")
+    if not all(np.isfinite(a).all() for a in (after.positions, after.velocities, after.masses)):
+        found.append("not finite")
+    if len(np.unique(tetrahedra)) != len(rest):
+        found.append(f"{len(rest) - len(np.unique(tetrahedra))} nodes are not used")
+    if (np.diff(np.sort(tetrahedra, axis=1)) == 0).any():
+        found.append("a tetrahedron names a node twice")
+    faces = faces_of(tetrahedra)
+    if (faces.count > 2).any():
+        found.append(f"{(faces.count > 2).sum()} triangles belong to three tetrahedra")
+    if not is_closed(faces.boundary):
+        found.append("the boundary is open")
+    if n_split_stars(tetrahedra):
+        found.append(f"{n_split_stars(tetrahedra)} nodes hold together what shares no face")
+    skin = lone_area(before)
+    if abs(lone_area(after) / skin - 1.0) > 1e-9:
+        found.append(f"cut faces without a twin: {lone_area(after) - skin:.2e} m2")
+    return found
+
+
+def cut_area(before: Snapshot, after: Snapshot) -> float:
+    """Area of the cut at rest, one side of it [m2]."""
+    return 0.5 * (_boundary_area(after) - _boundary_area(before))
+
+
+def _boundary_area(body: Snapshot) -> float:
+    boundary = faces_of(body.tetrahedra).boundary
+    return float(triangle_areas(body.rest_positions, boundary).sum())
+
+
+def _corners(tetrahedra: IntArray) -> list[tuple[int, int]]:
+    return [(t, n) for t, nodes in enumerate(tetrahedra.tolist()) for n in nodes]
+
+
+def _pairs(faces: Faces) -> IntArray:
+    """Return the faces that two tetrahedra share, as places in `faces.nodes`; shape (n, 2)."""
+    order = np.argsort(faces.same, kind="stable")
+    ends = np.cumsum(faces.count)[faces.count == 2]
+    return np.stack([order[ends - 2], order[ends - 1]], axis=1)
+
+
+def _n_groups(n: int, pairs: IntArray) -> int:
+    parent = list(range(n))
+
+    def root(i: int) -> int:
+        while parent[i] != i:
+            parent[i] = parent[parent[i]]
+            i = parent[i]
+        return i
+
+    for a, b in pairs.tolist():
+        parent[root(a)] = root(b)
+    return sum(parent[i] == i for i in range(n))
