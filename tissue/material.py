@@ -20,7 +20,7 @@ class Material:
     """Fracture toughness: the energy that a square metre of cut costs [J/m2]."""
     viscous_damping: float = 5.0
     """Drag on every node, as the rate at which its free motion dies away [1/s]."""
-    retardation_time: float = 2e-4
+    retardation_time: float = 5e-5
     """Penalty-based damping, along springs only: the Kelvin-Voigt ratio of viscosity to stiffness [s]."""
 
     def __post_init__(self) -> None:

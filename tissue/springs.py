@@ -225,50 +225,43 @@ def accelerations(
         x = positions[i, 0]
         y = positions[i, 1]
         z = positions[i, 2]
+        vx = velocities[i, 0]
+        vy = velocities[i, 1]
+        vz = velocities[i, 2]
+        ex = ey = ez = 0.0
         fx = fy = fz = 0.0
         first = springs.first[i]
+        for slot in range(first, first + springs.count[i]):
+            j = springs.neighbour[slot]
+            dx = positions[j, 0] - x
+            dy = positions[j, 1] - y
+            dz = positions[j, 2] - z
+            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
+            if with_elastic:
+                pull = springs.stiffness[slot] - springs.rest_pull[slot] * inverse
+                ex += pull * dx
+                ey += pull * dy
+                ez += pull * dz
+            approach = (
+                (velocities[j, 0] - vx) * dx
+                + (velocities[j, 1] - vy) * dy
+                + (velocities[j, 2] - vz) * dz
+            )
+            pull = springs.stiffness[slot] * approach * inverse * inverse
+            fx += pull * dx
+            fy += pull * dy
+            fz += pull * dz
         if with_elastic:
-            for slot in range(first, first + springs.count[i]):
-                j = springs.neighbour[slot]
-                dx = positions[j, 0] - x
-                dy = positions[j, 1] - y
-                dz = positions[j, 2] - z
-                pull = springs.stiffness[slot] - springs.rest_pull[slot] / math.sqrt(
-                    dx * dx + dy * dy + dz * dz
-                )
-                fx += pull * dx
-                fy += pull * dy
-                fz += pull * dz
-            elastic[i, 0] = fx
-            elastic[i, 1] = fy
-            elastic[i, 2] = fz
+            elastic[i, 0] = ex
+            elastic[i, 1] = ey
+            elastic[i, 2] = ez
         else:
-            fx = elastic[i, 0]
-            fy = elastic[i, 1]
-            fz = elastic[i, 2]
-        if retardation_time > 0.0:
-            vx = velocities[i, 0]
-            vy = velocities[i, 1]
-            vz = velocities[i, 2]
-            for slot in range(first, first + springs.count[i]):
-                j = springs.neighbour[slot]
-                dx = positions[j, 0] - x
-                dy = positions[j, 1] - y
-                dz = positions[j, 2] - z
-                approach = (
-                    (velocities[j, 0] - vx) * dx
-                    + (velocities[j, 1] - vy) * dy
-                    + (velocities[j, 2] - vz) * dz
-                )
-                pull = (
-                    retardation_time
-                    * springs.stiffness[slot]
-                    * approach
-                    / (dx * dx + dy * dy + dz * dz)
-                )
-                fx += pull * dx
-                fy += pull * dy
-                fz += pull * dz
+            ex = elastic[i, 0]
+            ey = elastic[i, 1]
+            ez = elastic[i, 2]
+        fx = ex + retardation_time * fx
+        fy = ey + retardation_time * fy
+        fz = ez + retardation_time * fz
         per_mass = 1.0 / body.masses[i]
         out[i, 0] = (fx + external[i, 0]) * per_mass + gravity[0] - viscous_damping * velocities[i, 0]
         out[i, 1] = (fy + external[i, 1]) * per_mass + gravity[1] - viscous_damping * velocities[i, 1]
