@@ -83,7 +83,9 @@ def lone_area(body: Snapshot) -> float:
     return float(triangle_areas(body.rest_positions, lone).sum())
 
 
-def faults(before: Snapshot, after: Snapshot, volume: float = 1e-9, mass: float = 1e-12) -> list[str]:
+def faults(
+    before: Snapshot, after: Snapshot, volume: float = 1e-9, mass: float = 1e-12
+) -> list[str]:
     """Return what is wrong with the body after a cut; nothing if all is well.
 
     Args:

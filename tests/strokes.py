@@ -49,7 +49,9 @@ def along_y(start: float, stop: float, speed: float = SPEED) -> FloatArray:
     return np.linspace(start, stop, n + 1)
 
 
-def upright(x: float, start: float, stop: float, low: float, high: float, speed: float = SPEED) -> Stroke:
+def upright(
+    x: float, start: float, stop: float, low: float, high: float, speed: float = SPEED
+) -> Stroke:
     """Return a stroke along y of an upright edge at `x`, from height `low` to `high` [m]."""
     way = 1.0 if stop > start else -1.0
     return [pose((x, y, low), (x, y, high), (0.0, way, 0.0)) for y in along_y(start, stop, speed)]

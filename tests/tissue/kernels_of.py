@@ -1,0 +1,156 @@
+"""The arrays that kernels work on, made from a mesh as `Tissue` makes them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.anchors import Anchors, new_anchors
+from tissue.body import NODES, Body, build_body, grown_body
+from tissue.cut import SPARE_NODES, Cut, Quality, new_change, new_work
+from tissue.path import new_path
+from tissue.runge_kutta import Stages, new_stages, runge_kutta_nystroem
+from tissue.sheet import new_sheet
+from tissue.springs import POOL_MARGIN, Springs, accelerations, build_rows, no_springs
+from tissue.star import LARGEST_STAR, no_visits
+from tissue.tissue import NOWHERE
+from tissue.types import BoolArray, FloatArray, TetrahedralMesh
+
+DENSITY, YOUNG_MODULUS = 1000.0, 10e3
+
+
+def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
+    """Return all that a cut step reads and writes, with room to grow, for a body that is whole."""
+    n_nodes, n_tetrahedra = len(mesh.positions) + SPARE_NODES + 512, 8 * len(mesh.tetrahedra) + 4096
+    return Cut(
+        body=grown_body(build_body(mesh, None, None), n_nodes, n_tetrahedra),
+        visits=no_visits(n_nodes, n_tetrahedra),
+        sheet=new_sheet(n_nodes, n_tetrahedra),
+        path=new_path(n_samples),
+        change=new_change(),
+        work=new_work(n_tetrahedra),
+        quality=Quality(snap=0.3, floor=0.0, guard=0.0, crumb=0.0),
+    )
+
+
+def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
+    """Write every mass of the body; return the rows of its springs."""
+    n = int(body.counts[NODES])
+    capacity = len(body.rest)
+    springs = no_springs(capacity, 40 * capacity + POOL_MARGIN)
+    written = build_rows(
+        body,
+        no_visits(capacity, len(body.tetrahedra)),
+        springs,
+        np.arange(n),
+        n,
+        DENSITY,
+        young_modulus,
+        np.zeros(LARGEST_STAR, dtype=np.int64),
+    )
+    assert written == n
+    return springs
+
+
+def row(springs: Springs, node: int) -> dict[int, tuple[float, float]]:
+    """Return the springs of a node: neighbour to stiffness and rest pull."""
+    first = int(springs.first[node])
+    slots = range(first, first + int(springs.count[node]))
+    return {
+        int(springs.neighbour[s]): (float(springs.stiffness[s]), float(springs.rest_pull[s]))
+        for s in slots
+    }
+
+
+def dense_modes(body: Body, springs: Springs) -> FloatArray:
+    """Return M^-1/2 K M^-1/2 of the nodes that can move, of a body at rest [1/s2]."""
+    n = int(body.counts[NODES])
+    stiffness = np.zeros((n, 3, n, 3))
+    for i in range(n):
+        for j, (k, _) in row(springs, i).items():
+            way = body.rest[j] - body.rest[i]
+            block = k * np.outer(way, way) / (way @ way)
+            stiffness[i, :, i] += block
+            stiffness[i, :, j] -= block
+    free = np.repeat(~body.fixed[:n], 3)
+    weights = 1.0 / np.sqrt(np.repeat(body.masses[:n], 3)[free])
+    return weights[:, None] * stiffness.reshape(3 * n, 3 * n)[np.ix_(free, free)] * weights
+
+
+class Network(NamedTuple):
+    """A body that moves by itself: no blade."""
+
+    body: Body
+    springs: Springs
+    anchors: Anchors
+    stages: Stages
+    retardation_time: float
+    viscous_damping: float
+
+    def forces(self) -> FloatArray:
+        """Return the forces on the nodes as they are and move now [N]."""
+        stages = self.stages
+        accelerations(
+            self.springs,
+            self.body,
+            self.body.positions,
+            self.body.velocities,
+            self.retardation_time,
+            self.viscous_damping,
+            np.zeros(3),
+            stages.external,
+            True,
+            stages.elastic,
+            stages.a1,
+        )
+        return stages.a1 * self.body.masses[:, None]
+
+    def advance(self, h: float, n: int = 1) -> None:
+        """Take `n` Runge-Kutta steps of `h` [s]."""
+        for _ in range(n):
+            runge_kutta_nystroem(
+                self.body,
+                self.springs,
+                self.anchors,
+                NOWHERE,
+                self.stages,
+                np.zeros(3),
+                self.retardation_time,
+                self.viscous_damping,
+                h,
+                0.0,
+                1.0,
+            )
+
+
+def network_of(
+    mesh: TetrahedralMesh,
+    fixed: BoolArray | None = None,
+    retardation_time: float = 0.0,
+    viscous_damping: float = 0.0,
+) -> Network:
+    """Return the springs and masses of a mesh."""
+    body = build_body(mesh, None, fixed)
+    springs = springs_of(body)
+    stages = new_stages(len(mesh.positions))
+    anchors = new_anchors(2, 1.0, YOUNG_MODULUS)
+    return Network(body, springs, anchors, stages, retardation_time, viscous_damping)
+
+
+def oscillator(
+    frequency: float, retardation_time: float = 0.0, viscous_damping: float = 0.0
+) -> Network:
+    """Return one mass of 1 kg on a spring along x, 1 m from the fixed node it hangs on.
+
+    As long as it moves along x the spring is linear: x'' = -w^2 (x - 1) - 2 zeta w x'.
+    """
+    mesh = TetrahedralMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    network = network_of(
+        mesh, np.array([True, False, True, True]), retardation_time, viscous_damping
+    )
+    springs = network.springs
+    springs.count[:] = 0
+    springs.count[1] = 1
+    springs.neighbour[springs.first[1]] = 0
+    springs.stiffness[springs.first[1]] = springs.rest_pull[springs.first[1]] = frequency**2
+    network.body.masses[:] = 1.0
+    return network
