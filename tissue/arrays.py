@@ -54,6 +54,8 @@ class Arrays:
     """
 
     _numba_type_: ClassVar[ArraysType | None] = None
+    address: int
+    """Where the table is in memory; the object keeps it and the arrays alive."""
 
     def __init__(self, **fields: Any) -> None:
         names = list(type(self).__annotations__)
@@ -78,10 +80,10 @@ class Arrays:
                 kinds.append((name, types.Array(dtype, value.ndim, "C")))
         self._table = np.array(words, dtype=np.int64)
         self.address = self._table.ctypes.data
-        """Where the table is in memory; the object keeps it and the arrays alive."""
-        if type(self)._numba_type_ is None:
+        known = type(self)._numba_type_
+        if known is None:
             type(self)._numba_type_ = ArraysType(type(self).__name__, tuple(kinds))
-        elif type(self)._numba_type_.fields != tuple(kinds):
+        elif known.fields != tuple(kinds):
             raise TypeError(f"{type(self).__name__} has fields of other types than before")
 
     def replaced(self, **fields: Any) -> Self:
@@ -115,13 +117,13 @@ def _unbox(_: ArraysType, value: Any, c: Any) -> NativeValue:
 class _Attributes(AttributeTemplate):
     key = ArraysType
 
-    def generic_resolve(self, struct: ArraysType, attribute: str) -> types.Type | None:
+    def resolve(self, struct: ArraysType, attribute: str) -> types.Type | None:
         return dict(struct.fields).get(attribute)
 
 
 @lower_getattr_generic(ArraysType)
 def _getattr(context: Any, builder: Any, struct: ArraysType, table: Any, attribute: str) -> Any:
-    field = dict(struct.fields)[attribute]
+    field: Any = dict(struct.fields)[attribute]
     place = struct.place(attribute)
 
     def word(i: int) -> Any:

@@ -92,10 +92,10 @@ def build_body(
     return Body(
         rest=rest.copy(),
         lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
-        positions=rest.copy() if positions is None else np.array(positions, dtype=np.float64),
+        positions=rest.copy() if positions is None else positions.copy(),
         velocities=np.zeros_like(rest),
         masses=np.zeros(n),
-        fixed=np.zeros(n, dtype=np.bool_) if fixed is None else np.array(fixed, dtype=np.bool_),
+        fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
         node_tetrahedron=node_tetrahedron,
         tetrahedra=tetrahedra.copy(),
         links=build_links(tetrahedra),
@@ -113,10 +113,10 @@ def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
 
 def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     """Return the body with room for that many nodes and tetrahedra."""
-    of_nodes = ("rest", "lattice_rest", "positions", "velocities", "masses", "fixed")
-    of_nodes += ("node_tetrahedron",)
+    of_tetrahedra = ("tetrahedra", "links")
+    of_nodes = set(Body.__annotations__) - {*of_tetrahedra, "counts", "lattice"}
     larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
-    larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in ("tetrahedra", "links")}
+    larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in of_tetrahedra}
     return body.replaced(**larger)
 
 

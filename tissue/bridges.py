@@ -1,23 +1,15 @@
 """Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the sheet.
 
-Every edge that the blade crosses gets a node on the sheet, so an edge between the two sides can only
-remain where the sheet turns within an element and a node was seen on the one side first, and on the
-other later. It is looked for when a tetrahedron leaves the list of active ones, and resolved.
+Every edge that the blade crosses gets a node on the sheet, so an edge between the two sides can
+only remain where the sheet turns within an element and a node was seen on the one side first, and
+on the other later. It is looked for when a tetrahedron leaves the list of active ones, and
+resolved.
 """
 
+from tissue.cut import FULL, N_DIRTY, Cut, flag
 from tissue.jit import kernel
-from tissue.sheet import (
-    FULL,
-    N_DIRTY,
-    Cut,
-    Path,
-    Plane,
-    flag,
-    on_sheet,
-    plane_at,
-    see_side,
-    side_of,
-)
+from tissue.path import Path, Plane, plane_at
+from tissue.sheet import on_sheet, see_side, side_of
 from tissue.snapping import insert_crossing, snap_distance
 from tissue.vec3 import Vec3, add, dot, lerp, scale, sub, vec3
 
@@ -103,7 +95,7 @@ def _height(plane: Plane, p: Vec3) -> float:
 
 @kernel
 def _nearest_segment(path: Path, p: Vec3) -> int:
-    """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel, where no cut is."""
+    """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel: no cut there."""
     best = -1
     best_squared = 1e300
     beyond = False

@@ -80,9 +80,7 @@ def barycentric(p: Vec3, a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Weights:
 
 
 @kernel
-def barycentric_in(
-    p: Vec3, positions: FloatArray, tetrahedra: IntArray, t: int
-) -> Weights:
+def barycentric_in(p: Vec3, positions: FloatArray, tetrahedra: IntArray, t: int) -> Weights:
     """Weights of `p` in tetrahedron `t`."""
     return barycentric(
         p,

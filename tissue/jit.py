@@ -18,6 +18,10 @@ _SOURCES = sorted(Path(__file__).parent.glob("*.py"))
 _DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
 
 
+FLAGS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+"""What every kernel is compiled with: see `kernel`."""
+
+
 def cache_directory() -> Path:
     """Return where compiled kernels are kept: $NUMBA_CACHE_DIR, else the user's cache folder."""
     root = os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("scalpel-sim")
@@ -36,8 +40,7 @@ def kernel(function: F) -> F:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_directory())  # read by Numba as it decorates, so restored after
     try:
-        flags = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
-        compiled = nb.njit(cache=True, **flags)(function)
+        compiled = cast(Any, nb.njit)(cache=True, **FLAGS)(function)
     finally:
         config.CACHE_DIR = before
     if not config.DISABLE_JIT:

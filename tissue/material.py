@@ -21,7 +21,7 @@ class Material:
     viscous_damping: float = 5.0
     """Drag on every node, as the rate at which its free motion dies away [1/s]."""
     retardation_time: float = 5e-5
-    """Penalty-based damping, along springs only: the Kelvin-Voigt ratio of viscosity to stiffness [s]."""
+    """Penalty-based damping, along springs only: viscosity per stiffness [s] (Kelvin-Voigt)."""
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -1,6 +1,6 @@
 """The two-level Runge-Kutta method: positions and velocities in one step of 4th order.
 
-Nystroem's form (Collatz, chapter 2, the paper's reference [4]; algorithms.md 1.3):
+Nystroem's form (Collatz, chapter 2: the paper's reference [4]):
 
     a1 = a(t,       x,   v           )
     X  = x + h/2 v + h^2/8 a1                  one position for stages 2 and 3
@@ -16,10 +16,11 @@ Elastic forces are evaluated three times a step, damping four times.
 
 import numpy as np
 
-from tissue.anchors import Anchors, Edge, clear_forces, pull, slip
+from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
 from tissue.jit import kernel
+from tissue.slipping import slip
 from tissue.springs import Springs, accelerations
 from tissue.star import Visits
 from tissue.types import FloatArray, IntArray
@@ -38,8 +39,8 @@ STABILITY_LIMIT = np.array(
         [5.0, 0.278],
     ]
 )
-"""Where the method is stable for x'' = -w^2 x - 2 zeta w x' (algorithms.md 1.5, measured there and
-in the tests). Between 0.05 and 0.5 the limit is higher; the table stays at its lowest."""
+"""Where the method is stable for x'' = -w^2 x - 2 zeta w x' (the tests measure it). Between 0.05
+and 0.5 the limit is higher; the table stays at its lowest."""
 
 SAFETY = 0.8
 """Share of the stable step that is used. Springs in strong compression are stiffer than at rest;
@@ -133,6 +134,7 @@ def relax(
             gravity,
             retardation_time,
             viscous_damping,
+            toughness,
             dt,
             at,
             share,
@@ -151,6 +153,7 @@ def runge_kutta_nystroem(
     gravity: FloatArray,
     retardation_time: float,
     viscous_damping: float,
+    toughness: float,
     dt: float,
     at: float,
     share: float,
@@ -169,14 +172,16 @@ def runge_kutta_nystroem(
     damping = (retardation_time, viscous_damping, gravity)
     forces = (stages.external, True, stages.elastic)
 
-    pull(anchors, body, edge, x, at, share / 6.0, dt, stages.external)
+    pull(anchors, body, edge, x, at, share / 6.0, dt, toughness, stages.external)
     accelerations(springs, body, x, v, *damping, *forces, a1)
     for i in range(n):
         for c in range(3):
             xs[i, c] = x[i, c] + 0.5 * h * v[i, c] + 0.125 * h * h * a1[i, c]
             vs[i, c] = v[i, c] + 0.5 * h * a1[i, c]
 
-    pull(anchors, body, edge, xs, at + 0.5 * share, share * 2.0 / 3.0, dt, stages.external)
+    pull(
+        anchors, body, edge, xs, at + 0.5 * share, share * 2.0 / 3.0, dt, toughness, stages.external
+    )
     accelerations(springs, body, xs, vs, *damping, *forces, a2)
     for i in range(n):
         for c in range(3):
@@ -188,7 +193,7 @@ def runge_kutta_nystroem(
             xs[i, c] = x[i, c] + h * v[i, c] + 0.5 * h * h * a3[i, c]
             vs[i, c] = v[i, c] + h * a3[i, c]
 
-    pull(anchors, body, edge, xs, at + share, share / 6.0, dt, stages.external)
+    pull(anchors, body, edge, xs, at + share, share / 6.0, dt, toughness, stages.external)
     accelerations(springs, body, xs, vs, *damping, *forces, a4)
     for i in range(n):
         for c in range(3):

@@ -1,27 +1,15 @@
 """Open the sheet: cut the links across the faces that tile it, and give each lip its own nodes.
 
 A face is cut if its three nodes lie on the sheet and the tetrahedra on its two sides are on
-different sides of the sheet. A node whose tetrahedra then no longer hang together is doubled
-(algorithms.md 3.4, steps 5 to 7).
+different sides of the sheet. A node whose tetrahedra then no longer hang together is doubled.
 """
 
 from tissue.body import CUT, NODES, Body, local_index
+from tissue.cut import FULL, N_DIRTY, N_FACES, N_FLAGGED, Cut, note_dirty
 from tissue.geometry import tetrahedron_volume, triangle_area
 from tissue.jit import kernel
-from tissue.sheet import (
-    FULL,
-    N_DIRTY,
-    N_FACES,
-    N_FLAGGED,
-    Cut,
-    decide_side,
-    decided_side,
-    note_dirty,
-    on_sheet,
-    plane_near,
-    side_of,
-    touch,
-)
+from tissue.path import plane_near
+from tissue.sheet import decide_side, decided_side, on_sheet, side_of, touch
 from tissue.star import star
 from tissue.vec3 import Vec3, dot, sub, vec3
 
@@ -140,9 +128,7 @@ def tetrahedron_side(cut: Cut, t: int) -> int:
     centroid = Vec3(0.0, 0.0, 0.0)
     for k in range(4):
         p = vec3(body.rest, body.tetrahedra[t, k])
-        centroid = Vec3(
-            centroid.x + 0.25 * p.x, centroid.y + 0.25 * p.y, centroid.z + 0.25 * p.z
-        )
+        centroid = Vec3(centroid.x + 0.25 * p.x, centroid.y + 0.25 * p.y, centroid.z + 0.25 * p.z)
     plane = plane_near(cut.path, centroid)
     if n_off == 0:
         return _geometric_side(centroid, plane.point, plane.normal)
@@ -279,7 +265,7 @@ def _unglue_face(cut: Cut, row: int) -> None:
 
 @kernel
 def _unglue_fans(cut: Cut, node: int) -> None:
-    """Double a node that was inserted into the rim of an old cut, if its tetrahedra came in fans."""
+    """Double a node put into the rim of an old cut, if the tetrahedra around it are apart."""
     body, change = cut.body, cut.change
     for i in range(change.counts[N_DIRTY]):
         t = change.dirty[i]
@@ -289,7 +275,7 @@ def _unglue_fans(cut: Cut, node: int) -> None:
 
 @kernel
 def _unglue(cut: Cut, node: int, t: int) -> None:
-    """Give the tetrahedra that hang together with `t` around `node` a copy of it, if they are apart."""
+    """Give the part of the star of `node` that holds `t` a copy of it, if it is apart."""
     body, work, change, visits = cut.body, cut.work, cut.change, cut.visits
     star(body, visits, node, body.node_tetrahedron[node], work.around)
     if visits.tetrahedra[t] == visits.epoch[0]:

@@ -1,21 +1,15 @@
 """Bring the sheet into the mesh: at each crossing use a node that is there, or insert one.
 
 The rule is one of distance, not of the fraction along the edge, so that the result does not depend
-on the order of crossings and no thin tetrahedron with four nodes on the sheet arises
-(algorithms.md 3.5).
+on the order of crossings and no thin tetrahedron with four nodes on the sheet arises.
 """
 
 import math
 
+from tissue.cut import FULL, Cut, flag
 from tissue.jit import kernel
-from tissue.sheet import (
-    FULL,
-    Cut,
-    flag,
-    on_sheet,
-    plane_at,
-    see_side,
-)
+from tissue.path import plane_at
+from tissue.sheet import on_sheet, see_side
 from tissue.star import node_size
 from tissue.stellar import (
     edge_split_is_good,

@@ -9,6 +9,7 @@ Pull of a spring on its ends: k (l - l0).
 """
 
 import math
+
 import numpy as np
 
 from tissue.arrays import Arrays
@@ -183,9 +184,7 @@ def _frequency_bound(body: Body, springs: Springs, node: int) -> float:
         xz += c * d.x * d.z
         yz += c * d.y * d.z
         trace += k
-    rows = max(
-        xx + abs(xy) + abs(xz), max(abs(xy) + yy + abs(yz), abs(xz) + abs(yz) + zz)
-    )
+    rows = max(xx + abs(xy) + abs(xz), max(abs(xy) + yy + abs(yz), abs(xz) + abs(yz) + zz))
     return (min(rows, trace) + trace) / body.masses[node]
 
 
@@ -263,9 +262,15 @@ def accelerations(
         fy = ey + retardation_time * fy
         fz = ez + retardation_time * fz
         per_mass = 1.0 / body.masses[i]
-        out[i, 0] = (fx + external[i, 0]) * per_mass + gravity[0] - viscous_damping * velocities[i, 0]
-        out[i, 1] = (fy + external[i, 1]) * per_mass + gravity[1] - viscous_damping * velocities[i, 1]
-        out[i, 2] = (fz + external[i, 2]) * per_mass + gravity[2] - viscous_damping * velocities[i, 2]
+        out[i, 0] = (
+            (fx + external[i, 0]) * per_mass + gravity[0] - viscous_damping * velocities[i, 0]
+        )
+        out[i, 1] = (
+            (fy + external[i, 1]) * per_mass + gravity[1] - viscous_damping * velocities[i, 1]
+        )
+        out[i, 2] = (
+            (fz + external[i, 2]) * per_mass + gravity[2] - viscous_damping * velocities[i, 2]
+        )
 
 
 @kernel

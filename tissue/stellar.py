@@ -1,26 +1,16 @@
 """Stellar subdivision: insert a node into an edge or a face, and split all tetrahedra around it.
 
 This is the paper's splitEdge and splitFace (section 4.3) without the case table: the whole star is
-split at once, so that no hanging node can arise; a node at positive weights turns a tetrahedron into
-children of positive volume (algorithms.md 3.1 and 3.3).
+split at once, so that no hanging node can arise. A node at positive weights turns a tetrahedron
+into children of positive volume.
 """
 
 from tissue.body import NODES, TETRAHEDRA, local_index
+from tissue.cut import FULL, N_FLAGGED, N_SPLITS, PASS_NODES, SPARE_NODES, Cut, note_dirty
 from tissue.geometry import smallest_altitude
 from tissue.jit import kernel
 from tissue.predicates import nearest
-from tissue.sheet import (
-    FULL,
-    N_FLAGGED,
-    N_SPLITS,
-    PASS_NODES,
-    SPARE_NODES,
-    Cut,
-    decide_side,
-    decided_side,
-    note_dirty,
-    touch,
-)
+from tissue.sheet import decide_side, decided_side, touch
 from tissue.star import edge_star
 from tissue.types import FloatArray
 from tissue.vec3 import Vec3, vec3
@@ -87,9 +77,7 @@ def _mix(values: FloatArray, a: int, b: int, c: int, w: Vec3, x: int) -> float:
 def _children_are_good(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> bool:
     body = cut.body
     rest = body.rest
-    p = Vec3(
-        _mix(rest, a, b, c, w, 0), _mix(rest, a, b, c, w, 1), _mix(rest, a, b, c, w, 2)
-    )
+    p = Vec3(_mix(rest, a, b, c, w, 0), _mix(rest, a, b, c, w, 1), _mix(rest, a, b, c, w, 2))
     for i in range(n):
         t = cut.work.parents[i]
         for e in range(n_ends):
@@ -204,6 +192,6 @@ def _link_child(cut: Cut, n: int, i: int, e: int, n_ends: int, a: int, b: int, c
 
 @kernel
 def _end_at(cut: Cut, i: int, e: int, n_ends: int, a: int, b: int, c: int) -> int:
-    """Local place of end `e` in parent `i`, asked of a sibling of child `e`, which still holds it."""
+    """Local place of end `e` in parent `i`: a sibling of child `e` still holds it."""
     sibling = cut.work.children[i, (e + 1) % n_ends]
     return local_index(cut.body, sibling, _pick(e, a, b, c))

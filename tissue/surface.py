@@ -11,8 +11,10 @@ OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 @kernel
-def boundary_triangles(body: Body, triangles: IntArray, is_cut: BoolArray, outward: IntArray) -> int:
-    """Write the triangles without a neighbour; return how many. Room for 4 a tetrahedron is enough."""
+def boundary_triangles(
+    body: Body, triangles: IntArray, is_cut: BoolArray, outward: IntArray
+) -> int:
+    """Write the triangles without a neighbour; return how many. Room: 4 a tetrahedron."""
     n = 0
     for t in range(body.counts[TETRAHEDRA]):
         for f in range(4):
@@ -35,6 +37,4 @@ def boundary_surface(body: Body) -> Surface:
     used[triangles] = True
     nodes = np.flatnonzero(used)
     vertex = np.cumsum(used) - 1
-    return Surface(
-        body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut[:n].copy()
-    )
+    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut[:n].copy())

@@ -1,12 +1,13 @@
-"""Collision detection: the active tetrahedra, and the edges that the swept edge of the blade crosses.
+"""Collision detection: the active tetrahedra, and the edges of theirs that the blade crosses.
 
 Paper, section 3. The list of active tetrahedra is found anew in each step from the tetrahedra that
 hold the anchors, through faces: the cost is that of the tetrahedra along the blade.
 """
 
+from tissue.cut import Cut
 from tissue.jit import kernel
+from tissue.path import Path
 from tissue.predicates import orient3d, pierces, point
-from tissue.sheet import Cut, Path
 from tissue.vec3 import dot, sub, vec3
 
 
@@ -44,7 +45,7 @@ def find_active_tetrahedra(cut: Cut) -> None:
 
 @kernel
 def _note_segments(cut: Cut, t: int, n: int) -> bool:
-    """Note the range of segments whose boxes meet that of tetrahedron `t`; return if there is any."""
+    """Note which segments' boxes meet that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.work.segments
     grid = body.lattice_rest
     a = body.tetrahedra[t, 0]

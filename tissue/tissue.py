@@ -19,41 +19,29 @@ from tissue.anchors import (
     clear_forces,
     frequency_with_anchors,
     is_engaged,
-    meet,
     new_anchors,
-    relocate,
-    seize,
 )
 from tissue.body import NODES, TETRAHEDRA, build_body, grown_body
+from tissue.border import checked_edge, checked_fixed, checked_gravity, checked_positions
 from tissue.bridges import remember_active, resolve_bridges
+from tissue.cut import FULL, SPARE_NODES, Cut, Quality, clear_changes, new_change, new_work
 from tissue.front import extend_fronts
+from tissue.holding import meet, seize
 from tissue.material import Material
-from tissue.path import forget_path, trace_path
+from tissue.path import new_path, put_on_lattice
 from tissue.pieces import count_pieces
-from tissue.runge_kutta import SAFETY, Stages, largest_stable_step, new_stages, relax
+from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.separate import open_sheet
-from tissue.sheet import (
-    FULL,
-    SPARE_NODES,
-    Cut,
-    Quality,
-    begin_sheet,
-    clear_changes,
-    grown_sheet,
-    new_change,
-    new_path,
-    new_sheet,
-    new_work,
-    put_on_lattice,
-)
+from tissue.sheet import begin_sheet, grown_sheet, new_sheet
+from tissue.slipping import relocate
 from tissue.snapping import insert_crossings
 from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, mean_node_size, no_visits
 from tissue.surface import boundary_surface
 from tissue.sweep import find_active_tetrahedra, find_crossings, path_moved
 from tissue.touched import largest_frequency, touched_nodes
+from tissue.trace import forget_path, trace_path
 from tissue.types import (
-    BladeSegment,
     BladeSweep,
     BoolArray,
     FloatArray,
@@ -64,6 +52,7 @@ from tissue.types import (
     TetrahedralMesh,
     Wrench,
 )
+from tissue.validation import expect_sound
 from tissue.vec3 import Vec3
 
 SAMPLES_PER_NODE_SIZE = 6.0
@@ -74,7 +63,7 @@ MOST_SAMPLES = 512
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
-steep curves leave tetrahedra that bridge the cut (algorithms.md 3.6)."""
+steep curves leave tetrahedra that bridge the cut."""
 
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
@@ -103,7 +92,7 @@ class CutQuality:
     """How closely the cut follows the blade, against how small the elements get that it makes.
 
     In units of the mesh's mean node size (the smallest altitude of the tetrahedra around a node).
-    Larger values give larger elements and time steps, and a rougher cut (algorithms.md 3.5).
+    Larger values give larger elements and time steps, and a rougher cut.
     """
 
     snap: float = 0.3
@@ -120,13 +109,17 @@ class Tissue:
     """A soft body of tetrahedra: masses at nodes, springs along edges, and a blade that cuts it.
 
     Args:
-        mesh: The body at rest. It must be valid: see `tissue.validation`.
+        mesh: The body at rest.
         material: What it is made of.
         fixed: Nodes that do not move, shape (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
         gravity: [m/s2].
         quality: How closely cuts follow the blade.
+
+    Raises:
+        MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
+        ValueError: another argument does not fit the mesh, or is not finite.
     """
 
     def __init__(
@@ -139,9 +132,14 @@ class Tissue:
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
         quality: CutQuality | None = None,
     ) -> None:
+        expect_sound(mesh)
         self.material = material or Material()
-        self._gravity = np.array(gravity, dtype=np.float64)
-        self._body = build_body(mesh, positions, fixed)
+        self._gravity = checked_gravity(gravity)
+        self._body = build_body(
+            mesh,
+            checked_positions(positions, mesh.positions),
+            checked_fixed(fixed, len(mesh.positions)),
+        )
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
@@ -196,7 +194,7 @@ class Tissue:
             ValueError: the blade has no length, or a number is not finite.
             TissueError: the motion of the tissue became unstable.
         """
-        edge = NOWHERE if sweep is None else _checked_edge(sweep)
+        edge = NOWHERE if sweep is None else checked_edge(sweep)
         if not (math.isfinite(dt) and dt >= 0.0):
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
         anchors = self._anchors_of(sweep)
@@ -479,19 +477,3 @@ class Tissue:
         frequency = math.sqrt(frequency_squared)
         limit = largest_stable_step(frequency, material.retardation_time, material.viscous_damping)
         return SAFETY * limit
-
-
-def _checked_edge(sweep: BladeSweep) -> Edge:
-    """Return the edge over the step, or refuse it."""
-    points = []
-    for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
-        rows = np.array(segment, dtype=np.float64)
-        if rows.shape != (3, 3) or not np.isfinite(rows).all():
-            raise ValueError(f"the blade at the {when} of the step is {rows.tolist()}: not finite")
-        along = rows[1] - rows[0]
-        if not np.linalg.norm(along) > 0.0:
-            raise ValueError(f"the blade at the {when} of the step has no length: {rows.tolist()}")
-        if np.linalg.norm(np.cross(along, rows[2])) <= 1e-6 * np.linalg.norm(along):
-            raise ValueError(f"the blade at the {when} of the step cuts along its own edge")
-        points += [Vec3(*row) for row in rows.tolist()]
-    return Edge(*points)

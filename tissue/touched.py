@@ -1,8 +1,8 @@
 """Which nodes a cut step touched, and the largest local frequency among them."""
 
-from tissue.jit import kernel
-from tissue.sheet import N_DIRTY, Change
 from tissue.body import Body
+from tissue.cut import N_DIRTY, Change
+from tissue.jit import kernel
 from tissue.star import Visits
 from tissue.types import FloatArray, IntArray
 
@@ -24,9 +24,7 @@ def touched_nodes(body: Body, change: Change, visits: Visits, out: IntArray) -> 
 
 
 @kernel
-def largest_frequency(
-    body: Body, frequency_squared: FloatArray, nodes: IntArray, n: int
-) -> float:
+def largest_frequency(body: Body, frequency_squared: FloatArray, nodes: IntArray, n: int) -> float:
     """Largest bound on w^2 [1/s2] among the first `n` of `nodes` that can move."""
     largest = 0.0
     for i in range(n):

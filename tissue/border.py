@@ -1,0 +1,87 @@
+"""What the engine is given is checked here, once, and refused by name."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.anchors import Edge
+from tissue.types import BladeSweep, BoolArray, FloatArray
+from tissue.vec3 import Vec3
+
+ALONG_EDGE = 1e-6
+"""Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
+
+
+def checked_gravity(gravity: Sequence[float]) -> FloatArray:
+    """Return gravity as an array.
+
+    Raises:
+        ValueError: it is not three finite numbers.
+    """
+    array = np.array(gravity, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"gravity is {gravity}; it is three finite numbers, in m/s2")
+    return array
+
+
+def checked_fixed(fixed: npt.ArrayLike | None, n_nodes: int) -> BoolArray:
+    """Return the mask of nodes that do not move; None holds nothing.
+
+    Raises:
+        ValueError: it is not one truth value a node.
+    """
+    if fixed is None:
+        return np.zeros(n_nodes, dtype=np.bool_)
+    array = np.array(fixed)
+    if array.shape != (n_nodes,) or array.dtype != np.bool_:
+        raise ValueError(
+            f"fixed has shape {array.shape} and type {array.dtype}; it is one truth value for each "
+            f"of the {n_nodes} nodes"
+        )
+    return array
+
+
+def checked_positions(positions: npt.ArrayLike | None, rest: FloatArray) -> FloatArray:
+    """Return where the nodes are at first [m]; None is at rest.
+
+    Raises:
+        ValueError: it is not three finite numbers a node.
+    """
+    if positions is None:
+        return rest.copy()
+    array = np.array(positions, dtype=np.float64)
+    if array.shape != rest.shape:
+        raise ValueError(f"positions have shape {array.shape}; the mesh's nodes have {rest.shape}")
+    if not np.isfinite(array).all():
+        first = np.flatnonzero(~np.isfinite(array).all(axis=1))[:5].tolist()
+        raise ValueError(f"positions of nodes {first} are not finite")
+    return array
+
+
+def checked_edge(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step.
+
+    Raises:
+        ValueError: a number is not finite, the blade has no length, or it would cut along itself.
+    """
+    points = []
+    for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
+        rows = np.array(segment, dtype=np.float64)
+        if rows.shape != (3, 3) or not np.isfinite(rows).all():
+            raise ValueError(
+                f"the blade at the {when} of the step is {rows.tolist()}; tip, heel and forward "
+                "are three finite numbers each"
+            )
+        along = rows[1] - rows[0]
+        length = np.linalg.norm(along)
+        if not length > 0.0:
+            raise ValueError(f"the blade at the {when} of the step has no length: {rows.tolist()}")
+        across = np.linalg.norm(np.cross(along, rows[2]))
+        if not across > ALONG_EDGE * length * np.linalg.norm(rows[2]):
+            raise ValueError(
+                f"the blade at the {when} of the step cuts along its own edge: forward is "
+                f"{rows[2].tolist()}, from tip to heel is {along.tolist()}"
+            )
+        points += [Vec3(*row) for row in rows.tolist()]
+    return Edge(*points)

@@ -1,0 +1,189 @@
+"""How anchors slip through the material, and how their tetrahedra are found (return mapping)."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.anchors import (
+    ANCHORED,
+    FREE,
+    LEFT,
+    RELEASED,
+    RETRACTED,
+    WORK_OF_CUTTING,
+    Anchors,
+    Edge,
+    anchor_position,
+    edge_frame,
+    sample_point,
+    surplus_of,
+)
+from tissue.body import INSIDE_TOLERANCE, OUTER, Body, walk
+from tissue.geometry import (
+    Weights,
+    barycentric_in,
+    interpolate,
+    smallest_weight,
+)
+from tissue.jit import kernel
+from tissue.rotation import to_material
+from tissue.star import Visits
+from tissue.types import IntArray
+from tissue.vec3 import Vec3, add, dot, norm, store, sub, vec3
+
+SEARCH = 512
+"""Tetrahedra that the search beyond a cut face looks at, at most."""
+
+
+class Place(NamedTuple):
+    """Where a material point is."""
+
+    tetrahedron: int
+    """Which holds it, or the one nearest by."""
+    inside: bool
+    """Whether it holds the point."""
+    beyond_skin: bool
+    """Where it does not: whether the skin is between them, rather than a cut."""
+
+
+@kernel
+def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Place:
+    """Find the tetrahedron that holds the rest point `p` [m], searching from `start`.
+
+    Walks through faces; where a cut face stops the walk, the tetrahedra around are searched, since
+    the other lip hangs together with this one around the rim of the cut.
+    """
+    at = walk(body, p, start)
+    if at.inside or at.link == OUTER:
+        return Place(at.tetrahedron, at.inside, not at.inside)
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    queue[0] = at.tetrahedron
+    visits.tetrahedra[at.tetrahedron] = epoch
+    n = 1
+    i = 0
+    closest = at.tetrahedron
+    closest_weight = -np.inf
+    while i < n:
+        t = queue[i]
+        i += 1
+        weight = smallest_weight(barycentric_in(p, body.rest, body.tetrahedra, t))
+        if weight > closest_weight:
+            closest_weight = weight
+            closest = t
+        for f in range(4):
+            link = body.links[t, f]
+            if link >= 0 and visits.tetrahedra[link // 4] != epoch and n < SEARCH:
+                visits.tetrahedra[link // 4] = epoch
+                queue[n] = link // 4
+                n += 1
+    if closest_weight >= -INSIDE_TOLERANCE:
+        return Place(closest, True, False)
+    w = barycentric_in(p, body.rest, body.tetrahedra, closest)
+    for f in range(4):
+        if w[f] == closest_weight:
+            return Place(closest, False, body.links[closest, f] == OUTER)
+    return Place(closest, False, False)
+
+
+@kernel
+def put(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
+    """Anchor sample `k` at rest point `p` [m] in tetrahedron `t`, or at a point of it nearby."""
+    w = barycentric_in(p, body.rest, body.tetrahedra, t)
+    total = max(w.a, 0.0) + max(w.b, 0.0) + max(w.c, 0.0) + max(w.d, 0.0)
+    w = Weights(
+        max(w.a, 0.0) / total, max(w.b, 0.0) / total, max(w.c, 0.0) / total, max(w.d, 0.0) / total
+    )
+    anchors.tetrahedron[k] = t
+    anchors.weights[k, 0] = w.a
+    anchors.weights[k, 1] = w.b
+    anchors.weights[k, 2] = w.c
+    anchors.weights[k, 3] = w.d
+    store(anchors.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    anchors.state[k] = ANCHORED
+
+
+@kernel
+def relocate(anchors: Anchors, body: Body, visits: Visits, queue: IntArray) -> None:
+    """Find the anchors' tetrahedra again after the mesh changed. Material points do not move."""
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED or anchors.state[k] == RETRACTED:
+            state = anchors.state[k]
+            p = vec3(anchors.rest, k)
+            put(
+                anchors,
+                body,
+                k,
+                find(body, visits, p, anchors.tetrahedron[k], queue).tetrahedron,
+                p,
+            )
+            anchors.state[k] = state
+
+
+@kernel
+def slip(
+    anchors: Anchors,
+    body: Body,
+    visits: Visits,
+    edge: Edge,
+    when: float,
+    toughness: float,
+    reach: float,
+    queue: IntArray,
+) -> None:
+    """Let every anchor slip whose pull exceeds toughness times length (return mapping).
+
+    Args:
+        anchors: The samples.
+        body: The tissue.
+        visits: For searches.
+        edge: The cutting edge over the step.
+        when: Instant, as a fraction of the step.
+        toughness: [J/m2].
+        reach: Distance at which a blade that backed off has let go of its anchor [m].
+        queue: Scratch, shape (SEARCH,) or longer.
+    """
+    n = len(anchors.state)
+    frame = edge_frame(edge, when)
+    forward = frame[1]
+    for k in range(n):
+        if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
+            continue
+        a = anchor_position(anchors, body, body.positions, k)
+        d = sub(sample_point(edge, k, n, when), a)
+        ahead = dot(d, forward)
+        if ahead < 0.0:
+            if anchors.state[k] == ANCHORED:
+                anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
+            anchors.state[k] = FREE if norm(d) > reach else RETRACTED
+            continue
+        if anchors.state[k] == RETRACTED:
+            anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
+            anchors.state[k] = ANCHORED
+        step = surplus_of(anchors, k, d, frame, toughness)
+        surplus = norm(step)
+        if surplus == 0.0:
+            continue
+        across = dot(step, forward) / surplus
+        _slip_by(anchors, body, visits, k, step, queue)
+        energy = 0.5 * anchors.stiffness[k] * dot(d, d)
+        if anchors.state[k] == LEFT:
+            anchors.totals[RELEASED] += energy
+            continue
+        anchors.totals[WORK_OF_CUTTING] += toughness * surplus * across * anchors.length[k]
+
+
+@kernel
+def _slip_by(
+    anchors: Anchors, body: Body, visits: Visits, k: int, step: Vec3, queue: IntArray
+) -> None:
+    """Move anchor `k` by `step` [m], a vector in the body as it is, through the material."""
+    t = anchors.tetrahedron[k]
+    p = add(vec3(anchors.rest, k), to_material(body, t, step))
+    place = find(body, visits, p, t, queue)
+    if place.beyond_skin:
+        anchors.state[k] = LEFT
+        store(anchors.rest, k, p)
+        anchors.tetrahedron[k] = place.tetrahedron
+        return
+    put(anchors, body, k, place.tetrahedron, p)
