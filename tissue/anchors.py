@@ -18,7 +18,7 @@ from tissue.geometry import (
     interpolate,
 )
 from tissue.jit import kernel
-from tissue.types import FloatArray, IntArray
+from tissue.types import BoolArray, FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
 ANCHOR_STIFFNESS = 4.0
@@ -52,6 +52,8 @@ class Anchors(Arrays):
     """The anchor's material point: its position in the body at rest [m], shape (n, 3)."""
     weights: FloatArray
     """Its barycentric weights, shape (n, 4)."""
+    slipped: BoolArray
+    """Whether it has cut since it came to hold the tissue, shape (n,)."""
     length: FloatArray
     """Length of edge that the sample stands for [m], shape (n,)."""
     stiffness: FloatArray
@@ -77,6 +79,7 @@ def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
         tetrahedron=np.zeros(n, dtype=np.int64),
         rest=np.zeros((n, 3)),
         weights=np.zeros((n, 4)),
+        slipped=np.zeros(n, dtype=np.bool_),
         length=length,
         stiffness=ANCHOR_STIFFNESS * young_modulus * length,
         totals=np.zeros(N_TOTALS),

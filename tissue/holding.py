@@ -50,6 +50,7 @@ def seize(
             if not place.inside:
                 continue
             put(anchors, body, k, place.tetrahedron, p)
+            anchors.slipped[k] = False
             d = sub(
                 sample_point(edge, k, n, when), anchor_position(anchors, body, body.positions, k)
             )
@@ -95,3 +96,4 @@ def meet(anchors: Anchors, body: Body, edge: Edge, when: float) -> None:
                 if smallest_weight(w) >= 0.0:
                     p = interpolate(w, body.rest, body.tetrahedra, t)
                     put(anchors, body, k, t, p)
+                    anchors.slipped[k] = False

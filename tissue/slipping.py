@@ -178,6 +178,7 @@ def _slip_by(
     anchors: Anchors, body: Body, visits: Visits, k: int, step: Vec3, queue: IntArray
 ) -> None:
     """Move anchor `k` by `step` [m], a vector in the body as it is, through the material."""
+    anchors.slipped[k] = True
     t = anchors.tetrahedron[k]
     p = add(vec3(anchors.rest, k), to_material(body, t, step))
     place = find(body, visits, p, t, queue)

@@ -54,7 +54,11 @@ def trace_path(
         if path.member[k]:
             gone = gone and anchors.state[k] == LEFT
             path.seed[k] = anchors.tetrahedron[k]
-            store(path.t1, k, vec3(anchors.rest, k))
+            # A blade that only presses has not cut yet: the path waits outside the skin.
+            if anchors.slipped[k]:
+                store(path.t1, k, vec3(anchors.rest, k))
+            elif not path.known[k]:
+                store(path.t1, k, axpy(-margin, ahead, vec3(anchors.rest, k)))
             if anchors.state[k] == LEFT:
                 _reach_out(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
     for k in range(n):
