@@ -347,7 +347,7 @@ def unpack_description(payload: bytes) -> TissueDescription:
     """
     try:
         found = _description_decoder.decode(payload)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(f"the tissue's description cannot be read: {error}") from error
     bounds = np.array(found.bounds)
     if not (np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all()):
@@ -369,5 +369,5 @@ def unpack_error(payload: bytes) -> str:
     """
     try:
         return msgspec.msgpack.decode(payload, type=str)
-    except msgspec.DecodeError as error:
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(f"an error that cannot be read: {error}") from error

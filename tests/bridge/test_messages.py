@@ -3,7 +3,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bridge import messages
@@ -207,6 +207,7 @@ def test_a_description_of_no_real_material_is_refused():
     st.sampled_from(["step", "result", "snapshot", "surface", "pieces", "description", "error"]),
     st.binary(max_size=400),
 )
+@example("error", b"\xa1\x80")  # a string that is no UTF-8
 def test_random_bytes_never_give_another_exception_than_ours(what, payload):
     with contextlib.suppress(MessageError):
         getattr(messages, f"unpack_{what}")(payload)
