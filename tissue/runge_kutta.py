@@ -79,7 +79,8 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     if ratio > table[-1, 0]:
         limit = table[-1, 1] * table[-1, 0] / ratio
     else:
-        limit = float(np.interp(ratio, table[:, 0], table[:, 1]))
+        # The limit falls nearly as 1 / ratio: a line between its entries would be above it.
+        limit = 1.0 / float(np.interp(ratio, table[:, 0], 1.0 / table[:, 1]))
     return limit / frequency
 
 
