@@ -116,6 +116,7 @@ class Network(NamedTuple):
                 np.zeros(3),
                 self.retardation_time,
                 self.viscous_damping,
+                0.0,
                 h,
                 0.0,
                 1.0,

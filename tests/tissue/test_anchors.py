@@ -59,8 +59,9 @@ class Held:
         self.forces = np.zeros_like(self.body.rest)
         meet(self.anchors, self.body, edge_at(0.009), 1.0)
 
-    def pull(self, edge, dt=1.0):
-        pull(self.anchors, self.body, edge, self.body.positions, 1.0, 1.0, dt, self.forces)
+    def pull(self, edge, toughness=TOUGH):
+        x = self.body.positions
+        pull(self.anchors, self.body, edge, x, 1.0, 1.0, 1.0, toughness, self.forces)
         return self.anchors.totals
 
     def slip(self, edge, reach=0.005):
@@ -91,7 +92,8 @@ def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     anchors = new_anchors(N, 0.016, STIFF)
     meet(anchors, held.body, edge_at(-0.001), 1.0)
     assert not is_engaged(anchors)
-    pull(anchors, held.body, edge_at(-0.001), held.body.positions, 1.0, 1.0, 1.0, held.forces)
+    x = held.body.positions
+    pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, TOUGH, held.forces)
     assert not anchors.totals.any()
     assert not held.forces.any()
 

@@ -1,0 +1,288 @@
+"""Whole cuts: a blade goes through a body by itself, and what is left must be sound."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests import bodies, soundness, strokes
+from tissue.mesh_io import read_mesh
+from tissue.shapes import grid, organ
+from tissue.tissue import Tissue
+from tissue.types import TetrahedralMesh
+from tissue.validation import checked
+
+CUBE = (0.04, 0.04, 0.04)
+
+MESHES = {
+    "grid 2x2x2": grid((2, 2, 2), CUBE),
+    "grid 4x6x4": grid(),
+    "jittered 3, 0": bodies.jittered(3, 0),
+    "jittered 3, 1": bodies.jittered(3, 1),
+    "jittered 4, 0": bodies.jittered(4, 0),
+    "jittered 4, 2": bodies.jittered(4, 2),
+}
+
+
+def at_rest(mesh: TetrahedralMesh, **options) -> Tissue:
+    """Return a body held at its left and right side, without weight."""
+    options = {"fixed": bodies.sides(mesh), "gravity": (0.0, 0.0, 0.0)} | options
+    return Tissue(mesh, **options)
+
+
+def expect_sound(before, tissue: Tissue, pieces: int) -> None:
+    """Fail unless the body is sound and in that many pieces, by the engine's count and by ours."""
+    after = tissue.snapshot()
+    assert soundness.faults(before, after) == []
+    assert soundness.n_pieces(after.tetrahedra) == pieces
+    assert tissue.pieces() == pieces
+
+
+@pytest.mark.parametrize("stroke", strokes.THROUGH)
+@pytest.mark.parametrize("mesh", MESHES)
+def test_a_stroke_through_leaves_two_sound_pieces(mesh, stroke):
+    tissue = at_rest(MESHES[mesh])
+    before = tissue.snapshot()
+    results = strokes.make(tissue, strokes.THROUGH[stroke](MESHES[mesh]))
+    expect_sound(before, tissue, pieces=2)
+    after = tissue.snapshot()
+    assert soundness.faults(before, after, volume=1e-12) == []
+    assert results[-1].cut_area == pytest.approx(soundness.cut_area(before, after), rel=1e-9)
+    assert results[-1].n_tetrahedra == len(after.tetrahedra)
+
+
+@pytest.mark.parametrize("stroke", strokes.THROUGH)
+def test_an_organ_falls_into_two_sound_pieces(stroke):
+    mesh = organ()
+    tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.08))
+    before = tissue.snapshot()
+    strokes.make(tissue, strokes.THROUGH[stroke](mesh))
+    expect_sound(before, tissue, pieces=2)
+
+
+FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
+FILES = {
+    "bullet_banana.vtk": 0.1,
+    "sofa_liver.msh": 0.05,
+    "sofa_truthcylinder1.msh": 0.01,
+    "sofaenv_tissue_volume.msh": 1.0,
+}
+EXTENT = 0.1
+"""Longest side to which the meshes of others are scaled [m]: an organ's."""
+
+
+@pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
+@pytest.mark.parametrize("stroke", strokes.THROUGH)
+@pytest.mark.parametrize("file", FILES)
+def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
+    raw = read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])
+    scale = EXTENT / np.ptp(raw.positions, axis=0).max()
+    mesh = checked(raw._replace(positions=raw.positions * scale)).mesh
+    tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.1))
+    before = tissue.snapshot()
+    whole = tissue.pieces()
+    strokes.make(tissue, strokes.THROUGH[stroke](mesh))
+    expect_sound(before, tissue, pieces=whole + 1)
+
+
+def test_the_paper_s_slab_grows_to_at_most_850_tetrahedra():
+    for stroke in (strokes.straight(grid()), strokes.slanted(grid(), 0.2, 0.2)):
+        tissue = at_rest(grid())
+        assert tissue.n_tetrahedra == 576
+        strokes.make(tissue, stroke)
+        assert tissue.n_tetrahedra <= 850
+
+
+def test_a_plane_between_those_of_the_mesh_makes_28_tetrahedra_of_the_6_of_each_cell():
+    """Two of the six are cut 2 to 2, into 6 each; four are cut 1 to 3, into 4 each."""
+    tissue = at_rest(grid())
+    strokes.make(tissue, strokes.straight(grid(), 0.41))
+    assert tissue.n_tetrahedra == 576 + 24 * (28 - 6)
+
+
+def test_a_cut_along_a_plane_of_the_mesh_adds_no_tetrahedra_and_has_its_area():
+    tissue = at_rest(grid())
+    results = strokes.make(tissue, strokes.straight(grid()))
+    assert tissue.n_tetrahedra == 576
+    assert results[-1].cut_area == pytest.approx(0.06 * 0.04, rel=1e-12)
+    assert tissue.pieces() == 2
+
+
+DEGENERATE = {
+    "through nodes, along a plane of the mesh": strokes.straight(grid((2, 2, 2), CUBE)),
+    "a rounding error beside the plane": strokes.straight(grid((2, 2, 2), CUBE), 0.5 + 1e-13),
+    "along the diagonals of the cells": [
+        strokes.pose((s, s, -0.01), (s, s, 0.05), (1.0, 1.0, 0.0))
+        for s in strokes.along_y(-0.01, 0.09)
+    ],
+    "across the diagonals": [
+        strokes.pose((s, 0.04 - s, -0.01), (s, 0.04 - s, 0.05), (1.0, -1.0, 0.0))
+        for s in strokes.along_y(-0.01, 0.09)
+    ],
+    "ends of the edge in the skin": strokes.upright(0.02, -0.01, 0.1, 0.0, 0.04),
+    "from edge to edge of the block": [
+        strokes.pose((-0.01, y, -0.01), (0.05, y, 0.05), (0.0, 1.0, 0.0))
+        for y in strokes.along_y(-0.01, 0.1)
+    ],
+}
+
+
+@pytest.mark.parametrize("name", DEGENERATE)
+def test_a_degenerate_stroke_cuts_like_any_other(name):
+    mesh = grid((2, 2, 2), CUBE)
+    tissue = at_rest(
+        mesh, fixed=bodies.sides(mesh, axis=2) if "edge to edge" in name else bodies.sides(mesh)
+    )
+    before = tissue.snapshot()
+    strokes.make(tissue, DEGENERATE[name])
+    expect_sound(before, tissue, pieces=2)
+
+
+def test_a_blade_that_does_not_move_cuts_nothing():
+    mesh = grid((2, 2, 2), CUBE)
+    tissue = at_rest(mesh)
+    still = [strokes.pose((0.018, 0.02, -0.01), (0.018, 0.02, 0.05), (0.0, 1.0, 0.0))] * 20
+    results = strokes.make(tissue, still)
+    assert results[-1].cut_area == 0.0
+    assert results[-1].work_of_cutting == pytest.approx(0.0, abs=1e-20)
+    assert tissue.n_tetrahedra == 48
+
+
+INCISIONS = {
+    "stops inside": strokes.upright(0.0217, -0.01, 0.03, -0.01, 0.05),
+    "the tip inside all the way": strokes.upright(0.0217, -0.01, 0.1, 0.0173, 0.05),
+    "the tip on a line of the grid": strokes.upright(0.02, -0.01, 0.1, 0.02, 0.05),
+    "the heel inside": strokes.upright(0.0217, -0.01, 0.1, -0.01, 0.0237),
+    "both ends inside": strokes.upright(0.0217, -0.01, 0.1, 0.0113, 0.0291),
+    "in half way and out again": strokes.upright(0.0217, -0.01, 0.03, -0.01, 0.05)
+    + strokes.upright(0.0217, 0.03, -0.02, -0.01, 0.05),
+    "pressed in from above": [
+        strokes.pose((0.0217, -0.01, z), (0.0217, 0.07, z), (0.0, 0.0, -1.0))
+        for z in 0.05 - strokes.along_y(0.0, 0.03)
+    ],
+}
+INCISIONS["in half way and out again"] = [
+    strokes.pose(p.tip, p.heel, (0.0, 1.0, 0.0)) for p in INCISIONS["in half way and out again"]
+]
+
+
+@pytest.mark.parametrize("mesh", ["grid 4x6x4", "jittered 4, 0"])
+@pytest.mark.parametrize("name", INCISIONS)
+def test_an_incision_leaves_one_sound_piece(name, mesh):
+    tissue = at_rest(MESHES[mesh])
+    before = tissue.snapshot()
+    results = strokes.make(tissue, INCISIONS[name])
+    assert results[-1].cut_area > 2e-4
+    expect_sound(before, tissue, pieces=1)
+
+
+@pytest.mark.parametrize("x", [0.02, 0.0217, 0.0243])
+def test_a_blade_drawn_back_along_its_cut_cuts_nothing_more(x):
+    there = strokes.upright(x, -0.01, 0.03, -0.01, 0.05)
+    back = [*reversed(there)]
+    tissue = at_rest(grid())
+    strokes.make(tissue, there)
+    n, area = tissue.n_tetrahedra, tissue.step(None, 0.0).cut_area
+    results = strokes.make(tissue, back)
+    assert results[-1].cut_area == area
+    assert tissue.n_tetrahedra == n
+
+
+def test_a_blade_drawn_back_in_its_cut_feels_nothing():
+    there = strokes.upright(0.02, -0.01, 0.03, -0.01, 0.05)
+    tissue = at_rest(grid())
+    strokes.make(tissue, there)
+    results = strokes.make(tissue, [*reversed(there)])
+    assert np.abs([r.wrench.force for r in results[20:]]).max() == 0.0
+
+
+def gap(tissue: Tissue) -> float:
+    """Return how far the lips of the cut are apart, at most [m]: copies of one node of rest."""
+    body = tissue.snapshot()
+    _, same = np.unique(body.rest_positions, axis=0, return_inverse=True)
+    order = np.argsort(same.ravel(), kind="stable")
+    x, same = body.positions[order], same.ravel()[order]
+    twins = same[1:] == same[:-1]
+    return float(np.linalg.norm(x[1:] - x[:-1], axis=1)[twins].max(initial=0.0))
+
+
+@pytest.mark.parametrize("mesh", ["grid 4x6x4", "jittered 4, 0"])
+def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
+    def slit(stretch):
+        x = MESHES[mesh].positions
+        tissue = at_rest(MESHES[mesh], positions=x * [stretch, 1.0, 1.0])
+        tissue.settle()
+        strokes.make(tissue, strokes.upright(0.0207 * stretch, -0.01, 0.03, -0.01, 0.05))
+        tissue.settle()
+        assert tissue.pieces() == 1
+        return gap(tissue)
+
+    gaps = [slit(stretch) for stretch in (1.0, 1.05, 1.15)]
+    assert gaps[0] < 1e-3
+    assert gaps[0] + 5e-4 < gaps[1] < gaps[2]
+    assert gaps[2] > 2e-3
+
+
+def test_the_second_of_two_parallel_cuts_makes_a_third_piece():
+    tissue = at_rest(grid())
+    before = tissue.snapshot()
+    strokes.make(tissue, strokes.straight(grid(), 0.3))
+    strokes.make(tissue, strokes.straight(grid(), 0.7))
+    expect_sound(before, tissue, pieces=3)
+
+
+def test_a_cut_in_a_stretched_and_turned_body_is_sound():
+    mesh = bodies.jittered(4, 0)
+    angle = 0.5
+    turn = np.array(
+        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+    )
+    placed = (mesh.positions * [1.1, 1.0, 1.0]) @ turn.T + [0.3, -0.1, 0.2]
+    tissue = at_rest(mesh, positions=placed)
+    before = tissue.snapshot()
+    there = mesh._replace(positions=mesh.positions * [1.1, 1.0, 1.0])
+    moved = [
+        strokes.pose(
+            turn @ p.tip + [0.3, -0.1, 0.2], turn @ p.heel + [0.3, -0.1, 0.2], turn @ p.forward
+        )
+        for p in strokes.straight(there)
+    ]
+    strokes.make(tissue, moved)
+    expect_sound(before, tissue, pieces=2)
+
+
+def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
+    def most_active(n):
+        """A blade 10 mm long, in a body of n x 6 x n cells of 10 mm."""
+        mesh = grid((n, 6, n), (0.01 * n, 0.06, 0.01 * n))
+        tissue = at_rest(mesh)
+        middle = 0.005 * n + 0.0013
+        stroke = strokes.upright(middle, -0.005, 0.03, middle - 0.005, middle + 0.005)
+        return max(r.n_active for r in strokes.make(tissue, stroke))
+
+    assert most_active(4) <= 60
+    assert most_active(12) <= 1.2 * most_active(4)
+
+
+def test_a_fine_mesh_grows_by_the_tetrahedra_along_the_cut():
+    """Ten thousand tetrahedra, arrays that grow many times, and a cut through the middle of them."""
+    mesh = grid((12, 12, 12), CUBE)
+    tissue = at_rest(mesh)
+    before = tissue.snapshot()
+    strokes.make(tissue, strokes.slanted(mesh))
+    expect_sound(before, tissue, pieces=2)
+    assert 1.05 < tissue.n_tetrahedra / len(mesh.tetrahedra) < 1.5
+
+
+def test_every_step_of_a_cut_leaves_the_mesh_sound():
+    mesh = bodies.jittered(3, 1)
+    tissue = at_rest(mesh)
+    before = tissue.snapshot()
+    area = 0.0
+    for sweep in strokes.sweeps(strokes.curved(mesh)):
+        now = tissue.step(sweep, strokes.DT).cut_area
+        if now > area:
+            assert soundness.faults(before, tissue.snapshot()) == []
+        area = now
+    assert area > 0.04 * 0.04
