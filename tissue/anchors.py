@@ -161,9 +161,10 @@ def pull(
     for k in range(n):
         if anchors.state[k] != ANCHORED:
             continue
-        d = sub(sample_point(edge, k, n, when), anchor_position(anchors, body, positions, k))
-        held = sub(d, surplus_of(anchors, k, d, frame, toughness))
-        force = scale(anchors.stiffness[k], held)
+        b = sample_point(edge, k, n, when)
+        d = sub(b, anchor_position(anchors, body, positions, k))
+        surplus = surplus_of(anchors, k, d, frame, toughness)
+        force = scale(anchors.stiffness[k], sub(d, surplus))
         for q in range(4):
             node = body.tetrahedra[anchors.tetrahedron[k], q]
             w = anchors.weights[k, q]
@@ -178,7 +179,9 @@ def pull(
         totals[IMPULSE + 2] -= seconds * force.z
         travel = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
         totals[WORK_OF_BLADE] += share * dot(force, travel)
-        torque = cross(sample_point(edge, k, n, when), force)
+        # The surplus is about to slip and holds nothing: without it the force points along the way
+        # from anchor to blade, so that the torques on the two cancel as well.
+        torque = cross(sub(b, surplus), force)
         totals[IMPULSE_TORQUE] -= seconds * torque.x
         totals[IMPULSE_TORQUE + 1] -= seconds * torque.y
         totals[IMPULSE_TORQUE + 2] -= seconds * torque.z
