@@ -170,7 +170,10 @@ def slip(
         if anchors.state[k] == LEFT:
             anchors.totals[RELEASED] += energy
             continue
-        anchors.totals[WORK_OF_CUTTING] += toughness * surplus * across * anchors.length[k]
+        # Where the tissue is very distorted an anchor slips less far than it was told to.
+        slipped = sub(anchor_position(anchors, body, body.positions, k), a)
+        way = dot(slipped, step) / surplus
+        anchors.totals[WORK_OF_CUTTING] += toughness * way * across * anchors.length[k]
 
 
 @kernel
