@@ -1,0 +1,239 @@
+"""What cutting, pulling and moving must keep: mass, momentum, energy; action equals reaction."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tests.tissue.kernels_of import row, springs_of
+from tissue.material import Material
+from tissue.shapes import grid
+from tissue.springs import elastic_energy
+from tissue.tissue import Tissue
+
+NO_GRAVITY = (0.0, 0.0, 0.0)
+SLAB = (0.04, 0.08, 0.02)
+
+
+def momentum(tissue):
+    """Return the linear and angular momentum about the origin [kg m/s, kg m2/s]."""
+    body = tissue.snapshot()
+    p = body.masses[:, None] * body.velocities
+    return p.sum(axis=0), np.cross(body.positions, p).sum(axis=0)
+
+
+def scale_of_momentum(tissue):
+    """Return the momentum that the body has at 1 m/s [kg m/s]."""
+    return float(tissue.snapshot().masses.sum())
+
+
+def drifting(mesh, undamped=True):
+    """Return a free body that flies and tumbles; drag, which slows it, is off."""
+    material = Material(viscous_damping=0.0, retardation_time=0.0 if undamped else 2e-4)
+    tissue = Tissue(mesh, material, gravity=NO_GRAVITY)
+    n = tissue.n_nodes
+    spin = np.cross([3.0, -2.0, 5.0], mesh.positions - mesh.positions.mean(axis=0))
+    wobble = 0.05 * np.random.default_rng(0).normal(size=(n, 3))
+    tissue._body.velocities[:n] = [0.3, 0.1, -0.2] + spin + wobble
+    return tissue
+
+
+@pytest.mark.parametrize("undamped", [True, False])
+def test_a_free_body_keeps_its_momentum_over_a_thousand_steps(undamped):
+    tissue = drifting(bodies.jittered(3, 0), undamped)
+    linear, angular = momentum(tissue)
+    for _ in range(1000):
+        tissue.step(None, strokes.DT)
+    linear_t1, angular_t1 = momentum(tissue)
+    np.testing.assert_allclose(linear_t1, linear, atol=1e-12 * np.linalg.norm(linear))
+    np.testing.assert_allclose(angular_t1, angular, atol=1e-3 * np.linalg.norm(angular))
+
+
+def test_a_free_undamped_body_keeps_its_energy():
+    tissue = drifting(bodies.jittered(3, 0))
+
+    def energy():
+        body = tissue.snapshot()
+        kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
+        return kinetic + elastic_energy(tissue._springs, tissue._body)
+
+    before = energy()
+    for _ in range(500):
+        tissue.step(None, strokes.DT)
+    assert 0.98 * before <= energy() <= 1.0001 * before
+
+
+def test_a_falling_body_falls_by_half_g_t_squared():
+    mesh = grid((1, 1, 1), (0.02, 0.02, 0.02))
+    tissue = Tissue(mesh, Material(viscous_damping=0.0))
+    for _ in range(100):
+        tissue.step(None, strokes.DT)
+    fallen = (mesh.positions - tissue.snapshot().positions).mean(axis=0)
+    np.testing.assert_allclose(fallen, [0.0, 0.0, 0.5 * 9.81 * 0.1**2], atol=1e-12)
+
+
+class Audit:
+    """A free body without drag, cut by a blade; what each frame did to it and to the blade."""
+
+    def __init__(self, mesh, stroke):
+        self.tissue = Tissue(mesh, Material(viscous_damping=0.0), gravity=NO_GRAVITY)
+        self.impulse, self.angular_impulse, self.gained, self.gained_angular = [], [], [], []
+        self.results = []
+        before = momentum(self.tissue)
+        for sweep in strokes.sweeps(stroke):
+            result = self.tissue.step(sweep, strokes.DT)
+            after = momentum(self.tissue)
+            force, torque, point = result.wrench
+            self.impulse.append(strokes.DT * force)
+            self.angular_impulse.append(strokes.DT * (torque + np.cross(point, force)))
+            self.gained.append(after[0] - before[0])
+            self.gained_angular.append(after[1] - before[1])
+            self.results.append(result)
+            before = after
+
+
+@pytest.fixture(scope="module")
+def audit():
+    """A free cube, first run into and then cut by a fast blade."""
+    mesh = bodies.jittered(4, 0)
+    # So fast that the body has no time to run away from the blade.
+    stroke = [
+        strokes.pose((0.0187, y, -0.03), (0.0227, y + 0.004, 0.07), (0.1, 1.0, 0.0))
+        for y in strokes.along_y(-0.02, 0.2, speed=3.0)
+    ]
+    return Audit(mesh, stroke)
+
+
+def test_the_free_body_of_these_tests_was_cut(audit):
+    assert audit.results[-1].cut_area > 4e-4
+    assert audit.tissue.n_tetrahedra > 425
+
+
+def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(audit):
+    """Frame by frame, through splits, un-gluing and growing arrays."""
+    scale = scale_of_momentum(audit.tissue)
+    assert np.abs(audit.impulse).max() > 1e-4 * scale
+    np.testing.assert_allclose(audit.gained, -np.array(audit.impulse), atol=1e-12 * scale)
+
+
+def test_the_angular_momentum_changes_by_the_torque_of_the_blade(audit):
+    """Runge-Kutta keeps angular momentum to the order of the method, not to the last digit."""
+    gained, given = np.array(audit.gained_angular), np.array(audit.angular_impulse)
+    assert np.abs(given).max() > 1e-7
+    np.testing.assert_allclose(gained, -given, atol=0.02 * np.abs(given).max())
+
+
+def test_force_on_the_tissue_plus_force_on_the_blade_is_zero_in_every_frame(audit):
+    total = [r.wrench.force + r.force_on_tissue for r in audit.results]
+    assert np.abs(total).max() < 1e-9
+
+
+def test_a_blade_out_of_contact_feels_exactly_nothing():
+    mesh = grid()
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh))
+    beside = strokes.upright(0.2, -0.01, 0.1, -0.01, 0.05)
+    for result in strokes.make(tissue, beside):
+        assert not np.any(result.wrench.force)
+        assert not np.any(result.wrench.torque)
+        assert not np.any(result.force_on_tissue)
+        assert result.anchored_length == 0.0
+        assert result.active_point_tetrahedron == -1
+
+
+def test_a_press_that_does_not_cut_springs_back():
+    """Half a millimetre is less than toughness over anchor stiffness: the tissue only dents."""
+    mesh = grid()
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
+    slowly = {"low": -0.01, "high": 0.05, "speed": 0.02}
+    press = strokes.make(tissue, strokes.upright(0.02, -0.0002, 0.0003, **slowly))
+    assert press[-1].wrench.force[1] < -0.05
+    assert press[-1].cut_area == press[-1].work_of_cutting == 0.0
+    release = strokes.make(tissue, strokes.upright(0.02, 0.0003, -0.0005, **slowly)[:1])
+    away = strokes.upright(0.02, -0.0101, -0.0102, **slowly)
+    release = strokes.make(tissue, away)
+    assert not np.any(release[-1].wrench.force)
+    tissue.settle()
+    np.testing.assert_allclose(tissue.snapshot().positions, mesh.positions, atol=1e-5)
+
+
+def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02):
+    """Cut a block held at both sides; return the frames in the middle of the cut."""
+    mesh = grid(cells, SLAB)
+    tissue = Tissue(
+        mesh, Material(toughness=toughness), fixed=bodies.sides(mesh), gravity=NO_GRAVITY
+    )
+    low = -0.005 if depth == SLAB[2] else SLAB[2] - depth
+    stroke = strokes.upright(0.0213, -0.004, 0.06, low, 0.025, speed * dt / strokes.DT)
+    results = strokes.make(tissue, stroke, dt)
+    middle = [r for r, pose in zip(results, stroke[1:], strict=True) if 0.035 < pose.tip[1] < 0.055]
+    return tissue, middle, results
+
+
+@pytest.mark.parametrize("cells", [(4, 8, 2), (6, 12, 3)], ids=["coarse", "fine"])
+@pytest.mark.parametrize("toughness", [5.0, 20.0, 60.0])
+@pytest.mark.parametrize("speed", [0.05, 0.1])
+def test_steady_cutting_force_is_toughness_times_anchored_length(cells, toughness, speed):
+    _, middle, _ = steady(cells, toughness, speed)
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    anchored = np.mean([r.anchored_length for r in middle])
+    assert anchored == pytest.approx(SLAB[2], rel=0.05)
+    assert force == pytest.approx(toughness * anchored, rel=0.05)
+
+
+@pytest.mark.parametrize("dt", [0.5e-3, 2e-3])
+def test_the_cutting_force_does_not_depend_on_the_time_step(dt):
+    _, middle, _ = steady((6, 12, 3), 20.0, 0.1, dt)
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    assert force == pytest.approx(20.0 * SLAB[2], rel=0.05)
+
+
+def test_an_incision_half_as_deep_costs_half_the_force():
+    _, middle, _ = steady((6, 12, 4), 20.0, 0.1, depth=0.01)
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    assert force == pytest.approx(20.0 * 0.01, rel=0.1)
+
+
+@pytest.mark.parametrize("toughness", [5.0, 20.0, 60.0])
+def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
+    """From rest: work of cutting and the energy stored are no more than the work of the blade."""
+    tissue, _, results = steady((6, 12, 3), toughness, 0.1)
+    body = tissue.snapshot()
+    stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
+    stored += elastic_energy(tissue._springs, tissue._body)
+    last = results[-1]
+    assert last.work_of_cutting > 0.0
+    assert last.work_of_cutting <= last.work_of_blade
+    assert last.work_of_cutting + stored <= 1.03 * last.work_of_blade
+
+
+@pytest.mark.parametrize("toughness", [5.0, 20.0])
+def test_the_work_of_cutting_is_toughness_times_the_area_cut(toughness):
+    mesh = grid((6, 12, 3), SLAB)
+    tissue = Tissue(
+        mesh, Material(toughness=toughness), fixed=bodies.sides(mesh), gravity=NO_GRAVITY
+    )
+    last = strokes.make(tissue, strokes.straight(mesh))[-1]
+    assert last.cut_area == pytest.approx(SLAB[1] * SLAB[2])
+    assert last.work_of_cutting == pytest.approx(toughness * last.cut_area, rel=0.05)
+
+
+def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
+    """To the last bit: a row follows from the tetrahedra around the node alone."""
+    mesh = bodies.jittered(4, 0)
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh))
+    strokes.make(tissue, strokes.slanted(mesh))
+    strokes.make(tissue, strokes.straight(mesh, 0.3))
+    body, n = tissue._body, tissue.n_nodes
+    kept = [row(tissue._springs, i) for i in range(n)]
+    masses = body.masses[:n].copy()
+    from_scratch = springs_of(body, tissue.material.young_modulus)
+    assert kept == [row(from_scratch, i) for i in range(n)]
+    np.testing.assert_array_equal(masses, body.masses[:n])
+
+
+def test_mass_does_not_drift_over_many_cuts():
+    mesh = grid()
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
+    before = tissue.snapshot().masses.sum()
+    for at in np.linspace(0.2, 0.8, 6):
+        strokes.make(tissue, strokes.straight(mesh, at))
+    assert tissue.snapshot().masses.sum() == pytest.approx(before, rel=1e-12)
