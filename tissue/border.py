@@ -67,12 +67,13 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     """
     points = []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
-        rows = np.array(segment, dtype=np.float64)
-        if rows.shape != (3, 3) or not np.isfinite(rows).all():
+        parts = [np.asarray(part, dtype=np.float64) for part in segment]
+        if any(part.shape != (3,) or not np.isfinite(part).all() for part in parts):
             raise ValueError(
-                f"the blade at the {when} of the step is {rows.tolist()}; tip, heel and forward "
-                "are three finite numbers each"
+                f"the blade at the {when} of the step is {[part.tolist() for part in parts]}; tip, "
+                "heel and forward are three finite numbers each"
             )
+        rows = np.array(parts)
         along = rows[1] - rows[0]
         length = np.linalg.norm(along)
         if not length > 0.0:
