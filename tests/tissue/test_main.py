@@ -1,0 +1,54 @@
+"""`python -m tissue`: the engine alone, from the command line."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tissue.__main__ import cut_through, main
+from tissue.shapes import grid
+
+
+def test_a_block_is_cut_into_two_and_every_stage_has_its_time(capsys):
+    assert main(["--cells", "3", "4", "3", "--steps", "200"]) == 0
+    out = capsys.readouterr().out
+    for stage in ("CD", "GC", "RX", "all"):
+        median, high = re.search(rf"^{stage}\b.*?([\d.]+) +([\d.]+)$", out, re.MULTILINE).groups()
+        assert 0.0 <= float(median) <= float(high)
+    assert re.search(r"pieces +2$", out, re.MULTILINE)
+    before, after = re.search(r"tetrahedra +(\d+) -> (\d+)", out).groups()
+    assert int(before) == 6 * 3 * 4 * 3 < int(after)
+
+
+def test_the_cut_area_is_that_of_the_leaning_blade_through_the_block():
+    cut = cut_through(grid(), 400)
+    assert cut.results[-1].cut_area == pytest.approx(0.06 * 0.04 * (1 + 0.25**2) ** 0.5, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        ["--cells", "0", "1", "1"],
+        ["--cells", "2", "2"],
+        ["--size", "-1", "1", "1"],
+        ["--size", "nan", "1", "1"],
+        ["--steps", "0"],
+        ["--steps", "many"],
+        ["--cells", "100000", "100000", "1000"],
+    ],
+)
+def test_a_wrong_option_is_one_clear_error(wrong, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        main(wrong)
+    assert stopped.value.code == 2
+    assert "error:" in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_the_engine_stands_alone():
+    """No arm, no window, no network: nothing of MuJoCo, FCL, sockets or meshcat is imported."""
+    program = (
+        "import sys, tissue.tissue, tissue.__main__\n"
+        "assert not {'mujoco', 'fcl', 'meshcat', 'bridge', 'scalpel_sim'} & set(sys.modules)"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

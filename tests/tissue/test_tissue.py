@@ -1,0 +1,205 @@
+"""The border of the engine: what it takes, what it refuses, what it hands out."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tissue.material import Material
+from tissue.shapes import grid
+from tissue.tissue import Tissue
+from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
+from tissue.validation import MeshError
+
+MESH = grid((2, 2, 2), (0.04, 0.04, 0.04))
+POSE = strokes.pose((0.02, 0.01, -0.01), (0.02, 0.01, 0.05), (0.0, 1.0, 0.0))
+
+
+@pytest.fixture
+def tissue():
+    return Tissue(MESH, fixed=bodies.sides(MESH), gravity=(0.0, 0.0, 0.0))
+
+
+def sweep_to(**changes):
+    return BladeSweep(POSE, POSE._replace(**changes))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("part", BladeSegment._fields)
+def test_a_blade_that_is_not_finite_is_refused(tissue, part, value):
+    with pytest.raises(ValueError, match="finite"):
+        tissue.step(sweep_to(**{part: np.array([0.0, value, 0.0])}), 1e-3)
+
+
+@pytest.mark.parametrize("wrong", [np.zeros(2), np.zeros((3, 1)), np.zeros(4)])
+def test_a_blade_of_another_shape_is_refused(tissue, wrong):
+    with pytest.raises(ValueError, match="blade"):
+        tissue.step(sweep_to(tip=wrong), 1e-3)
+
+
+def test_a_blade_without_length_is_refused(tissue):
+    with pytest.raises(ValueError, match="no length"):
+        tissue.step(sweep_to(heel=POSE.tip), 1e-3)
+
+
+@pytest.mark.parametrize("forward", [(0.0, 0.0, 1.0), (0.0, 0.0, 0.0)])
+def test_a_blade_that_faces_along_its_own_edge_is_refused(tissue, forward):
+    with pytest.raises(ValueError, match="edge"):
+        tissue.step(sweep_to(forward=np.array(forward)), 1e-3)
+
+
+@pytest.mark.parametrize("dt", [-1e-3, np.nan, np.inf])
+def test_a_time_step_that_is_negative_or_not_finite_is_refused(tissue, dt):
+    with pytest.raises(ValueError, match="dt"):
+        tissue.step(None, dt)
+
+
+def test_what_is_refused_changes_nothing(tissue):
+    before = tissue.snapshot()
+    with pytest.raises(ValueError, match="no length"):
+        tissue.step(sweep_to(heel=POSE.tip), 1e-3)
+    for a, b in zip(before, tissue.snapshot(), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+BROKEN = {
+    "inverted": MESH._replace(
+        tetrahedra=np.vstack([MESH.tetrahedra[0, [0, 2, 1, 3]], MESH.tetrahedra[1:]])
+    ),
+    "twice": MESH._replace(tetrahedra=np.vstack([MESH.tetrahedra, MESH.tetrahedra[:1]])),
+    "out of range": MESH._replace(tetrahedra=MESH.tetrahedra + 1),
+    "no tetrahedra": MESH._replace(tetrahedra=np.zeros((0, 4), dtype=np.int64)),
+    "NaN": MESH._replace(positions=np.where(MESH.positions == 0.02, np.nan, MESH.positions)),
+    "flat": MESH._replace(positions=MESH.positions * [1.0, 1.0, 0.0]),
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_a_broken_mesh_is_refused(fault):
+    with pytest.raises(MeshError):
+        Tissue(BROKEN[fault])
+
+
+def test_a_mesh_that_would_have_to_be_repaired_is_refused():
+    unused = MESH._replace(positions=np.vstack([MESH.positions, [1.0, 1.0, 1.0]]))
+    with pytest.raises(MeshError, match="checked"):
+        Tissue(unused)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"fixed": np.zeros(3, dtype=bool)},
+        {"positions": np.zeros((3, 3))},
+        {"positions": np.full_like(MESH.positions, np.nan)},
+        {"gravity": (0.0, 0.0)},
+        {"gravity": (0.0, 0.0, np.nan)},
+    ],
+    ids=["too few fixed", "too few positions", "NaN positions", "flat gravity", "NaN gravity"],
+)
+def test_arguments_that_do_not_fit_the_mesh_are_refused(options):
+    with pytest.raises(ValueError):
+        Tissue(MESH, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("young_modulus", 0.0), ("density", -1.0), ("toughness", np.nan), ("viscous_damping", -0.1)],
+)
+def test_a_material_with_a_quantity_of_the_wrong_sign_is_refused_by_name(name, value):
+    with pytest.raises(ValueError, match=name):
+        Material(**{name: value})
+
+
+def test_the_engine_keeps_its_own_copy_of_what_it_is_given(tissue):
+    mesh = TetrahedralMesh(MESH.positions.copy(), MESH.tetrahedra.copy())
+    positions, fixed = mesh.positions.copy(), bodies.sides(mesh)
+    tissue = Tissue(mesh, fixed=fixed, positions=positions)
+    for array in (*mesh, positions, fixed):
+        array[:] = 0
+    np.testing.assert_array_equal(tissue.snapshot().positions, MESH.positions)
+    assert tissue.snapshot().fixed.any()
+
+
+def test_a_snapshot_is_a_copy(tissue):
+    for array in (*tissue.snapshot(), *tissue.surface()):
+        array[...] = 0
+    np.testing.assert_array_equal(tissue.snapshot().positions, MESH.positions)
+    assert tissue.n_tetrahedra == 48
+    assert tissue.n_nodes == 27
+
+
+def test_bounds_are_the_lowest_and_highest_corner_now(tissue):
+    np.testing.assert_allclose(tissue.bounds, [[0.0] * 3, [0.04] * 3])
+    np.testing.assert_array_equal(tissue.step(None, 1e-3).bounds, tissue.bounds)
+
+
+def test_a_fixed_node_stays_where_it_was_put():
+    stretched = MESH.positions * [1.2, 1.0, 1.0]
+    tissue = Tissue(MESH, fixed=bodies.sides(MESH), positions=stretched)
+    for _ in range(50):
+        tissue.step(None, 1e-3)
+    fixed = bodies.sides(MESH)
+    np.testing.assert_array_equal(tissue.snapshot().positions[fixed], stretched[fixed])
+
+
+def test_a_body_held_below_settles_to_bear_its_weight():
+    """The springs of the held nodes carry the whole weight above them."""
+    low = MESH.positions[:, 2] == 0.0
+    tissue = Tissue(MESH, fixed=low)
+    assert tissue.settle() < 20_000
+    body = tissue.snapshot()
+    assert (body.velocities == 0.0).all()
+    assert -5e-3 < (body.positions - MESH.positions)[:, 2].min() < -1e-5
+    for _ in range(100):
+        tissue.step(None, 1e-3)
+    np.testing.assert_allclose(tissue.snapshot().positions, body.positions, atol=2e-6)
+
+
+def test_time_that_does_not_pass_moves_nothing(tissue):
+    before = tissue.snapshot().positions
+    result = tissue.step(BladeSweep(POSE, POSE), 0.0)
+    np.testing.assert_array_equal(tissue.snapshot().positions, before)
+    assert np.isfinite(result.wrench.force).all()
+
+
+def test_a_step_says_where_its_time_went(tissue):
+    results = strokes.make(tissue, strokes.slanted(MESH))
+    assert all(min(r.profile) >= 0.0 for r in results)
+    assert max(r.profile.topology for r in results) > 0.0
+    assert results[0].n_substeps >= 1
+    assert max(r.n_active for r in results) > 0
+
+
+def test_the_tetrahedron_of_the_tip_holds_the_tip():
+    mesh = grid((4, 6, 4), (0.04, 0.06, 0.04))
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
+    stroke = strokes.upright(0.0217, -0.005, 0.03, 0.0183, 0.05)
+    last = strokes.make(tissue, stroke)[-1]
+    body = tissue.snapshot()
+    corners = body.rest_positions[body.tetrahedra[last.active_point_tetrahedron]]
+    # In the body at rest the tip trails behind the blade, by as much as the tissue is dragged.
+    assert np.abs(corners[:, 0].mean() - 0.0217) < 0.01
+    assert np.abs(corners[:, 2].mean() - 0.0183) < 0.01
+    assert 0.01 < corners[:, 1].mean() < 0.035
+
+
+def test_another_blade_lets_go_of_what_the_first_one_held(tissue):
+    strokes.make(tissue, strokes.upright(0.0187, -0.01, 0.02, -0.01, 0.05))
+    held = tissue.step(sweep_of(0.02, 0.06), 1e-3)
+    other = tissue.step(sweep_of(0.02, 0.03), 1e-3)
+    assert np.isfinite(held.wrench.force).all()
+    assert np.isfinite(other.wrench.force).all()
+    assert other.anchored_length <= 0.03 + 1e-12
+
+
+def sweep_of(y, length):
+    pose = strokes.pose((0.0187, y, -0.01), (0.0187, y, -0.01 + length), (0.0, 1.0, 0.0))
+    return BladeSweep(pose, pose)
+
+
+def test_without_a_blade_the_body_hangs_and_swings(tissue):
+    hanging = Tissue(MESH, fixed=bodies.sides(MESH))
+    result = hanging.step(None, 1e-3)
+    assert result.anchored_length == 0.0
+    assert not np.any(result.wrench.force)
+    assert hanging.snapshot().velocities[:, 2].min() < 0.0
