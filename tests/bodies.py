@@ -29,7 +29,8 @@ def two_tetrahedra() -> TetrahedralMesh:
 def jittered(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
     """Return the Delaunay mesh of a box of n x n x n cells whose nodes are shifted at random.
 
-    Nodes on the sides stay on them, so that the body is the box. Meshes with slivers are passed over.
+    Nodes on the sides stay on them, so that the body is the box. Meshes with slivers are passed
+    over.
     """
     random = np.random.default_rng(seed)
     while True:

@@ -27,12 +27,12 @@ def pierced_at(a, b, p, q, r) -> list[Fraction] | None:
 
 
 def links(tetrahedra: IntArray) -> IntArray:
-    """What is behind each face, by comparing every tetrahedron with every other."""
+    """What is behind each face: the other tetrahedron with a face of the same three nodes."""
     out = np.full(tetrahedra.shape, OUTER)
-    for t, u in itertools.permutations(range(len(tetrahedra)), 2):
-        for f, g in itertools.product(range(4), repeat=2):
-            if set(np.delete(tetrahedra[t], f)) == set(np.delete(tetrahedra[u], g)):
-                out[t, f] = 4 * u + g
+    faces = [[frozenset(t) - {node} for node in t] for t in tetrahedra.tolist()]
+    for (t, of_t), (u, of_u) in itertools.permutations(enumerate(faces), 2):
+        for face in set(of_t) & set(of_u):
+            out[t, of_t.index(face)] = 4 * u + of_u.index(face)
     return out
 
 

@@ -33,7 +33,7 @@ def drifting(mesh, undamped=True):
     n = tissue.n_nodes
     spin = np.cross([3.0, -2.0, 5.0], mesh.positions - mesh.positions.mean(axis=0))
     wobble = 0.05 * np.random.default_rng(0).normal(size=(n, 3))
-    tissue._body.velocities[:n] = [0.3, 0.1, -0.2] + spin + wobble
+    tissue._body.velocities[:n] = np.array([0.3, 0.1, -0.2]) + spin + wobble
     return tissue
 
 

@@ -266,7 +266,7 @@ def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
 
 
 def test_a_fine_mesh_grows_by_the_tetrahedra_along_the_cut():
-    """Ten thousand tetrahedra, arrays that grow many times, and a cut through the middle of them."""
+    """Ten thousand tetrahedra, arrays that grow on the way, and a cut through the middle."""
     mesh = grid((12, 12, 12), CUBE)
     tissue = at_rest(mesh)
     before = tissue.snapshot()

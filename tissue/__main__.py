@@ -74,7 +74,7 @@ def report(cut: CutThrough) -> str:
     times = {
         name: np.array([getattr(r.profile, f) for r in results]) for name, (f, _) in STAGES.items()
     }
-    frame = sum(times.values())
+    frame = np.sum(list(times.values()), axis=0)
     lines = [f"{'per frame [us]':<40}{'median':>10}{'99 %':>10}"]
     for name, (_, what) in STAGES.items():
         lines.append(_row(f"{name}  {what}", times[name]))

@@ -21,7 +21,7 @@ from tissue.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 
 pytestmark = pytest.mark.kernel
 
-O, X, Y, Z = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
+ORIGIN, X, Y, Z = Vec3(0.0, 0.0, 0.0), Vec3(1.0, 0.0, 0.0), Vec3(0.0, 1.0, 0.0), Vec3(0.0, 0.0, 1.0)
 ONE = np.array([[0, 1, 2, 3]])
 
 
@@ -30,8 +30,8 @@ def random_corners(seed):
 
 
 def test_the_corner_of_a_cube_is_a_sixth_of_it():
-    assert signed_volume(O, X, Y, Z) == pytest.approx(1 / 6)
-    assert signed_volume(O, Y, X, Z) == pytest.approx(-1 / 6)
+    assert signed_volume(ORIGIN, X, Y, Z) == pytest.approx(1 / 6)
+    assert signed_volume(ORIGIN, Y, X, Z) == pytest.approx(-1 / 6)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -42,31 +42,31 @@ def test_volume_is_that_of_the_determinant(seed):
 
 
 def test_altitude_is_the_distance_from_the_plane():
-    assert altitude(Vec3(5.0, 7.0, -2.0), O, X, Y) == pytest.approx(2.0)
+    assert altitude(Vec3(5.0, 7.0, -2.0), ORIGIN, X, Y) == pytest.approx(2.0)
 
 
 def test_altitude_over_a_line_is_zero():
-    assert altitude(Z, O, X, Vec3(2.0, 0.0, 0.0)) == 0.0
+    assert altitude(Z, ORIGIN, X, Vec3(2.0, 0.0, 0.0)) == 0.0
 
 
 def test_the_smallest_altitude_is_the_least_of_four():
-    assert smallest_altitude(O, X, Y, Z) == pytest.approx(1 / np.sqrt(3))
+    assert smallest_altitude(ORIGIN, X, Y, Z) == pytest.approx(1 / np.sqrt(3))
 
 
 def test_area_of_half_a_square():
-    assert triangle_area(O, X, Y) == pytest.approx(0.5)
+    assert triangle_area(ORIGIN, X, Y) == pytest.approx(0.5)
 
 
 def test_weights_of_a_corner_are_one_and_zeros():
-    assert barycentric(Y, O, X, Y, Z) == pytest.approx((0.0, 0.0, 1.0, 0.0))
+    assert barycentric(Y, ORIGIN, X, Y, Z) == pytest.approx((0.0, 0.0, 1.0, 0.0))
 
 
 def test_a_weight_is_negative_beyond_the_opposite_face():
-    assert barycentric(Vec3(-0.1, 0.2, 0.2), O, X, Y, Z).b < 0.0
+    assert barycentric(Vec3(-0.1, 0.2, 0.2), ORIGIN, X, Y, Z).b < 0.0
 
 
 def test_weights_in_a_flat_tetrahedron_are_equal_shares():
-    assert barycentric(Z, O, X, Y, Vec3(1.0, 1.0, 0.0)) == (0.25,) * 4
+    assert barycentric(Z, ORIGIN, X, Y, Vec3(1.0, 1.0, 0.0)) == (0.25,) * 4
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -94,11 +94,11 @@ def test_the_determinant_of_the_edges_is_six_volumes(seed):
 
 def test_a_unit_vector_has_length_one_and_zero_stays_zero():
     assert norm(normalised(Vec3(3.0, 4.0, 12.0))) == pytest.approx(1.0)
-    assert normalised(O) == O
+    assert normalised(ORIGIN) == ORIGIN
 
 
 def test_vectors_turn_right_handed():
     assert cross(X, Y) == Z
     assert dot(X, Y) == 0.0
     assert norm(sub(X, Y)) == pytest.approx(np.sqrt(2.0))
-    assert lerp(0.25, O, Vec3(4.0, 0.0, -8.0)) == (1.0, 0.0, -2.0)
+    assert lerp(0.25, ORIGIN, Vec3(4.0, 0.0, -8.0)) == (1.0, 0.0, -2.0)

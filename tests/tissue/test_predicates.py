@@ -121,7 +121,7 @@ def test_a_flat_triangle_is_never_pierced():
 
 
 def test_nothing_slips_between_the_triangles_of_an_edge_that_advances():
-    """Wherever a line meets the plane an edge sweeps, exactly one triangle of its quads is pierced."""
+    """Wherever a line meets what an edge sweeps, exactly one triangle of its quads is pierced."""
     tips = [Point(0, 0, 0), Point(4, 1, 0), Point(6, 0, 0), Point(12, 0, 0)]
     heels = [Point(0, 8, 0), Point(2, 8, 0), Point(8, 8, 0), Point(12, 8, 0)]
     triangles = []

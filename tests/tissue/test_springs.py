@@ -120,7 +120,7 @@ def test_a_turned_and_shifted_body_feels_no_force(mesh):
     turn *= np.linalg.det(turn)
     network.body.positions[:] = mesh.positions @ turn.T + [1.0, -2.0, 0.5]
     spin = np.array([3.0, -1.0, 2.0])
-    network.body.velocities[:] = [0.1, 0.2, -0.3] + np.cross(spin, network.body.positions)
+    network.body.velocities[:] = np.array([0.1, 0.2, -0.3]) + np.cross(spin, network.body.positions)
     assert np.abs(network.forces()).max() < 1e-9 * YOUNG_MODULUS * np.ptp(mesh.positions) ** 2
 
 
