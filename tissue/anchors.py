@@ -163,6 +163,8 @@ def pull(
             continue
         b = sample_point(edge, k, n, when)
         d = sub(b, anchor_position(anchors, body, positions, k))
+        if dot(d, frame[1]) < 0.0:
+            continue  # backed off: an edge pushes, and does not pull
         surplus = surplus_of(anchors, k, d, frame, toughness)
         force = scale(anchors.stiffness[k], sub(d, surplus))
         for q in range(4):

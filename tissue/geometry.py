@@ -59,6 +59,17 @@ def altitude(apex: Vec3, a: Vec3, b: Vec3, c: Vec3) -> float:
 
 
 @kernel
+def node_altitude(positions: FloatArray, tetrahedra: IntArray, t: int, k: int) -> float:
+    """Altitude of tetrahedron `t` over its local node `k` [m]."""
+    return altitude(
+        vec3(positions, tetrahedra[t, k]),
+        vec3(positions, tetrahedra[t, (k + 1) % 4]),
+        vec3(positions, tetrahedra[t, (k + 2) % 4]),
+        vec3(positions, tetrahedra[t, (k + 3) % 4]),
+    )
+
+
+@kernel
 def smallest_altitude(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> float:
     """The smallest of the four altitudes of a tetrahedron [m]."""
     return min(

@@ -29,7 +29,7 @@ from tissue.jit import kernel
 from tissue.rotation import to_material
 from tissue.star import Visits
 from tissue.types import IntArray
-from tissue.vec3 import Vec3, add, dot, norm, store, sub, vec3
+from tissue.vec3 import Vec3, add, axpy, dot, norm, store, sub, vec3
 
 SEARCH = 512
 """Tetrahedra that the search beyond a cut face looks at, at most."""
@@ -140,7 +140,7 @@ def slip(
         edge: The cutting edge over the step.
         when: Instant, as a fraction of the step.
         toughness: [J/m2].
-        reach: Distance at which a blade that backed off has let go of its anchor [m].
+        reach: How far beside its anchor a blade that backed off still belongs to it [m].
         queue: Scratch, shape (SEARCH,) or longer.
     """
     n = len(anchors.state)
@@ -155,7 +155,8 @@ def slip(
         if ahead < 0.0:
             if anchors.state[k] == ANCHORED:
                 anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
-            anchors.state[k] = FREE if norm(d) > reach else RETRACTED
+            beside = norm(axpy(-ahead, forward, d))
+            anchors.state[k] = FREE if beside > reach else RETRACTED
             continue
         if anchors.state[k] == RETRACTED:
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)

@@ -4,10 +4,9 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body, local_index
-from tissue.geometry import altitude
+from tissue.geometry import node_altitude
 from tissue.jit import kernel
 from tissue.types import IntArray
-from tissue.vec3 import vec3
 
 LARGEST_STAR = 4096
 """Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at the worst."""
@@ -86,12 +85,7 @@ def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
     for i in range(n):
         t = out[i]
         k = local_index(body, t, node)
-        h = altitude(
-            vec3(body.rest, node),
-            vec3(body.rest, body.tetrahedra[t, (k + 1) % 4]),
-            vec3(body.rest, body.tetrahedra[t, (k + 2) % 4]),
-            vec3(body.rest, body.tetrahedra[t, (k + 3) % 4]),
-        )
+        h = node_altitude(body.rest, body.tetrahedra, t, k)
         size = min(size, h)
     return size
 

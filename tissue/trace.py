@@ -7,12 +7,12 @@ the body or at a real end of the blade; they lie from their anchored neighbour a
 
 from tissue.anchors import FREE, LEFT, Anchors, Edge, edge_frame
 from tissue.body import OUTER, Body, walk
-from tissue.geometry import Matrix3
+from tissue.geometry import Matrix3, barycentric_in, node_altitude
 from tissue.holding import offset_from
 from tissue.jit import kernel
 from tissue.path import Path
 from tissue.rotation import mean_rotation, turned_back
-from tissue.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
+from tissue.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 
 OUTREACH = 3
 """Samples that the chain reaches out beyond the last one in the tissue: half a mean node size. With
@@ -20,6 +20,10 @@ one, a corner of the skin between two samples can stay uncut."""
 
 SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
+
+MOST_OBLIQUE = 0.3
+"""Cosine between the way ahead and the outward normal of the skin, above which a sample that leaves
+there has cut through."""
 
 STEEPEST = 1.0
 """How far the path may go sideways per way ahead. Steeper steps leave tetrahedra uncut."""
@@ -46,6 +50,7 @@ def trace_path(
     sideways = turned_back(rotation, flat)
     store(path.sideways, 0, sideways)
     gone = True
+    begun = False
     for k in range(n):
         store(path.t0, k, vec3(path.t1, k))
         path.member[k] = anchors.state[k] != FREE
@@ -53,6 +58,7 @@ def trace_path(
         store(path.forward, k, ahead)
         if path.member[k]:
             gone = gone and anchors.state[k] == LEFT
+            begun = begun or anchors.slipped[k]
             path.seed[k] = anchors.tetrahedron[k]
             # A blade that only presses has not cut yet: the path waits outside the skin.
             if anchors.slipped[k]:
@@ -72,7 +78,8 @@ def trace_path(
             if path.known[k]:
                 _never_back(path, k, sideways)
             else:  # a new member begins outside the skin, behind where it is met now
-                store(path.t0, k, axpy(-margin, ahead, vec3(path.t1, k)))
+                behind = margin if begun else 0.0
+                store(path.t0, k, axpy(-behind, ahead, vec3(path.t1, k)))
     for k in range(n):
         path.known[k] = path.known[k] or path.member[k]
         path.linked[k] = k + 1 < n and path.member[k] and path.member[k + 1]
@@ -90,10 +97,26 @@ def forget_path(path: Path) -> None:
 
 @kernel
 def _reach_out(body: Body, k: int, p: Vec3, path: Path) -> None:
-    """Let the sheet end at `p` [m] where a sample left the body, if that is outside."""
+    """Let the sheet end at `p` [m], straight ahead, where a sample left the body through its back.
+
+    Not where it left sideways, through the top or the bottom: ahead of it there is uncut tissue.
+    """
     at = walk(body, p, path.seed[k])
-    if not at.inside and at.link == OUTER:
-        store(path.t1, k, p)
+    if at.inside or at.link != OUTER:
+        return
+    there = barycentric_in(p, body.rest, body.tetrahedra, at.tetrahedron)
+    left_at = vec3(path.t1, k)
+    here = barycentric_in(left_at, body.rest, body.tetrahedra, at.tetrahedron)
+    way = norm(sub(p, left_at))
+    for f in range(4):
+        if body.links[at.tetrahedron, f] == OUTER and there[f] < 0.0:
+            # A weight falls by one over the altitude: this is the way along the outward normal.
+            outwards = (here[f] - there[f]) * node_altitude(
+                body.rest, body.tetrahedra, at.tetrahedron, f
+            )
+            if outwards > MOST_OBLIQUE * way:
+                store(path.t1, k, p)
+                return
 
 
 @kernel
