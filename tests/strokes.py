@@ -15,7 +15,7 @@ SPEED = 0.25
 """Of the blade [m/s]."""
 
 DRAGGED = 0.03
-"""How far a blade goes on behind the body at least [m]: tissue held at the sides is dragged along."""
+"""How far a blade goes on behind the body at least [m], for it drags tissue along."""
 
 Y, Z = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 

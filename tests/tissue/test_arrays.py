@@ -63,7 +63,7 @@ def test_a_kernel_writes_into_the_arrays_themselves():
 
 
 def test_one_kernel_serves_arrays_of_any_size():
-    assert summed(example(3)) != summed(example(3).replaced(numbers=np.arange(30)))
+    assert summed(example(3)) != summed(example(3).replaced(numbers=np.arange(2)))
 
 
 def test_replaced_keeps_the_other_fields_and_leaves_the_first_alone():
