@@ -1,5 +1,6 @@
 """A tetrahedral body that a blade can cut: `Tissue` owns every array, `step` lists the stages."""
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -83,6 +84,13 @@ LONGEST_SETTLING = 20_000
 """Runge-Kutta steps after which `settle` gives up waiting."""
 
 
+TOUGHEST = 2.0
+"""Toughness over Young's modulus, in mean node sizes, up to which the cutting force is that of the
+toughness. At 2.6 it was measured 6 to 11 % low, at 1.8 less than 1 %."""
+
+log = logging.getLogger("tissue")
+
+
 class TissueError(RuntimeError):
     """The tissue cannot go on."""
 
@@ -157,6 +165,7 @@ class Tissue:
         self._frequency_squared = 0.0
         self._build_rows(every_node, n_nodes)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
+        self._warn_of_toughness()
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._quality = Quality(
@@ -359,6 +368,19 @@ class Tissue:
         forget_path(self._path)
         self._work.n_previous[0] = 0
         self._incising = False
+
+    def _warn_of_toughness(self) -> None:
+        """Say so where the blade strains tetrahedra more than springs can bear."""
+        length = self.material.toughness / self.material.young_modulus
+        if length > TOUGHEST * self.node_size:
+            log.warning(
+                "toughness / young_modulus is %.1f mm, %.1f times the mean node size of %.1f mm: "
+                "tetrahedra ahead of the blade are strained beyond what springs bear, and the "
+                "cutting force reads up to 15 %% low. Use a lower toughness, or a stiffer material",
+                length * 1e3,
+                length / self.node_size,
+                self.node_size * 1e3,
+            )
 
     def _n_increments(self, sweep: BladeSweep | None) -> int:
         """Return in how many parts the step is taken, so that the edge moves little in each."""
