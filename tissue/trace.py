@@ -5,14 +5,14 @@ few samples more on either side reach out through the skin, so that the sheet al
 the body or at a real end of the blade; they lie from their anchored neighbour as the blade does.
 """
 
-from tissue.anchors import FREE, LEFT, Anchors, Edge, edge_frame
+from tissue.anchors import FREE, LEFT, Anchors, Edge, edge_frame, sample_point
 from tissue.body import OUTER, Body, walk
-from tissue.geometry import Matrix3, barycentric_in, node_altitude
+from tissue.geometry import Matrix3
 from tissue.holding import offset_from
 from tissue.jit import kernel
 from tissue.path import Path
 from tissue.rotation import mean_rotation, turned_back
-from tissue.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
+from tissue.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 
 OUTREACH = 3
 """Samples that the chain reaches out beyond the last one in the tissue: half a mean node size. With
@@ -20,10 +20,6 @@ one, a corner of the skin between two samples can stay uncut."""
 
 SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
-
-MOST_OBLIQUE = 0.3
-"""Cosine between the way ahead and the outward normal of the skin, above which a sample that leaves
-there has cut through."""
 
 STEEPEST = 1.0
 """How far the path may go sideways per way ahead. Steeper steps leave tetrahedra uncut."""
@@ -65,7 +61,7 @@ def trace_path(
                 store(path.t1, k, vec3(anchors.rest, k))
             elif not path.known[k]:
                 store(path.t1, k, axpy(-margin, ahead, vec3(anchors.rest, k)))
-            if anchors.state[k] == LEFT:
+            if anchors.state[k] == LEFT and _advances(edge, forward, k, n):
                 _reach_out(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
     for k in range(n):
         if anchors.state[k] == FREE:
@@ -96,27 +92,18 @@ def forget_path(path: Path) -> None:
 
 
 @kernel
-def _reach_out(body: Body, k: int, p: Vec3, path: Path) -> None:
-    """Let the sheet end at `p` [m], straight ahead, where a sample left the body through its back.
+def _advances(edge: Edge, forward: Vec3, k: int, n: int) -> bool:
+    """Whether the blade moves forward at sample `k` of `n`, rather than backs off."""
+    way = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
+    return dot(way, forward) > 0.0
 
-    Not where it left sideways, through the top or the bottom: ahead of it there is uncut tissue.
-    """
+
+@kernel
+def _reach_out(body: Body, k: int, p: Vec3, path: Path) -> None:
+    """Let the sheet end at `p` [m] where a sample left the body, if that is outside."""
     at = walk(body, p, path.seed[k])
-    if at.inside or at.link != OUTER:
-        return
-    there = barycentric_in(p, body.rest, body.tetrahedra, at.tetrahedron)
-    left_at = vec3(path.t1, k)
-    here = barycentric_in(left_at, body.rest, body.tetrahedra, at.tetrahedron)
-    way = norm(sub(p, left_at))
-    for f in range(4):
-        if body.links[at.tetrahedron, f] == OUTER and there[f] < 0.0:
-            # A weight falls by one over the altitude: this is the way along the outward normal.
-            outwards = (here[f] - there[f]) * node_altitude(
-                body.rest, body.tetrahedra, at.tetrahedron, f
-            )
-            if outwards > MOST_OBLIQUE * way:
-                store(path.t1, k, p)
-                return
+    if not at.inside and at.link == OUTER:
+        store(path.t1, k, p)
 
 
 @kernel
