@@ -69,8 +69,7 @@ FILES = {  # and about what their unit of length is, in metres
     "sofaenv_tissue_volume.msh": 1.0,
 }
 EXTENT = 0.2
-"""Longest side to which the meshes of others are scaled [m]. Their tetrahedra are coarse; at half of
-it a phantom's toughness strains the banana's more than springs bear (`tissue.TOUGHEST`)."""
+"""Longest side to which the meshes of others are scaled [m]: twice an organ's; they are coarse."""
 
 
 @pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")

@@ -16,7 +16,10 @@ from tissue.vec3 import Vec3, add, dot, lerp, scale, sub, vec3
 
 @kernel
 def resolve_bridges(cut: Cut) -> None:
-    """Resolve the bridges among tetrahedra that were active or changed, and are active no more."""
+    """Resolve the bridges among tetrahedra that were active or changed, and are active no more.
+
+    These stay in `work.previous`, for a last look at their faces.
+    """
     work, visits = cut.work, cut.visits
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
@@ -28,18 +31,18 @@ def resolve_bridges(cut: Cut) -> None:
         if visits.tetrahedra[work.previous[i]] != epoch:
             work.previous[n] = work.previous[i]
             n += 1
+    work.n_previous[0] = n
     for i in range(n):
         _resolve(cut, work.previous[i])
         if cut.change.counts[FULL] != 0:
-            break
-    work.n_previous[0] = 0
+            return
 
 
 @kernel
 def remember_active(cut: Cut) -> None:
     """Note the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
     work, change = cut.work, cut.change
-    n = work.n_previous[0]
+    n = 0
     for i in range(work.n_active[0]):
         if n < len(work.previous):
             work.previous[n] = work.active[i]

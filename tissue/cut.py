@@ -6,7 +6,7 @@ from tissue.arrays import Arrays
 from tissue.body import Body
 from tissue.jit import kernel
 from tissue.path import Path, plane_near
-from tissue.sheet import Sheet, touch
+from tissue.sheet import Sheet, on_sheet, put_on_sheet
 from tissue.star import LARGEST_STAR, Visits
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import dot, sub, vec3
@@ -168,11 +168,10 @@ def note_dirty(change: Change, t: int) -> None:
 def flag(cut: Cut, node: int) -> None:
     """Let `node` lie on the sheet."""
     sheet = cut.sheet
-    touch(sheet, node)
-    if sheet.offset[node] < 0.0:
+    if not on_sheet(sheet, node):
         p = vec3(cut.body.rest, node)
         plane = plane_near(cut.path, p)
-        sheet.offset[node] = abs(dot(sub(p, plane.point), plane.normal))
+        put_on_sheet(sheet, node, abs(dot(sub(p, plane.point), plane.normal)))
     change = cut.change
     if change.counts[N_FLAGGED] < len(change.flagged):
         change.flagged[change.counts[N_FLAGGED]] = node

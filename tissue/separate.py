@@ -9,7 +9,7 @@ from tissue.cut import FULL, N_DIRTY, N_FACES, N_FLAGGED, Cut, note_dirty
 from tissue.geometry import tetrahedron_volume, triangle_area
 from tissue.jit import kernel
 from tissue.path import plane_near
-from tissue.sheet import decide_side, decided_side, on_sheet, side_of, touch
+from tissue.sheet import decide_side, decided_side, on_sheet, put_on_sheet, see_side, side_of
 from tissue.star import star
 from tissue.vec3 import Vec3, dot, sub, vec3
 
@@ -32,16 +32,32 @@ def open_sheet(cut: Cut) -> None:
 
 
 @kernel
+def close_sheet(cut: Cut) -> None:
+    """Cut what is left to cut along the whole sheet: now the sides of all its nodes are known."""
+    sheet = cut.sheet
+    for i in range(sheet.n_nodes[0]):
+        _mark_star(cut, sheet.nodes[i])
+    open_sheet(cut)
+
+
+@kernel
+def _mark_star(cut: Cut, node: int) -> None:
+    around = cut.work.around_too
+    n = star(cut.body, cut.visits, node, cut.body.node_tetrahedron[node], around)
+    for i in range(n):
+        _mark_around(cut, around[i])
+
+
+@kernel
 def _mark(cut: Cut) -> None:
-    """Cut every face between the two sides, in the tetrahedra that this step can have changed."""
-    body, work, change = cut.body, cut.work, cut.change
+    """Cut every face between the two sides, near the blade, behind it, and where nodes were put."""
+    work, change = cut.work, cut.change
     for i in range(work.n_active[0]):
         _mark_around(cut, work.active[i])
+    for i in range(work.n_previous[0]):  # by now the sides of all their nodes have been seen
+        _mark_around(cut, work.previous[i])
     for i in range(change.counts[N_FLAGGED]):
-        node = change.flagged[i]
-        n = star(body, cut.visits, node, body.node_tetrahedron[node], work.around)
-        for j in range(n):
-            _mark_around(cut, work.around[j])
+        _mark_star(cut, change.flagged[i])
 
 
 @kernel
@@ -300,8 +316,7 @@ def _copy_node(cut: Cut, node: int) -> int:
         body.lattice_rest[copy, x] = body.lattice_rest[node, x]
     body.fixed[copy] = body.fixed[node]
     body.masses[copy] = 0.0
-    touch(sheet, node)
-    sheet.node_stamp[copy] = sheet.node_stamp[node]
-    sheet.offset[copy] = sheet.offset[node]
-    sheet.side[copy] = sheet.side[node]
+    if on_sheet(sheet, node):
+        put_on_sheet(sheet, copy, sheet.offset[node])
+    see_side(sheet, copy, side_of(sheet, node), True)
     return copy

@@ -23,6 +23,10 @@ class Sheet(Arrays):
     """Distance of an on-sheet node from the true sheet [m], -1 for others; (node capacity,)."""
     side: IntArray
     """Side of the sheet that a node was seen on, +1 or -1, 0 if not seen; (node capacity,)."""
+    nodes: IntArray
+    """The nodes on the sheet, in the order in which they came, shape (node capacity,)."""
+    n_nodes: IntArray
+    """How many they are, shape (1,)."""
     tetrahedron_stamp: IntArray
     """Shape (tetrahedron capacity,)."""
     tetrahedron_side: IntArray
@@ -38,6 +42,8 @@ def new_sheet(n_nodes: int, n_tetrahedra: int) -> Sheet:
         node_stamp=np.zeros(n_nodes, np.int64),
         offset=np.full(n_nodes, -1.0),
         side=np.zeros(n_nodes, np.int64),
+        nodes=np.zeros(n_nodes, np.int64),
+        n_nodes=np.zeros(1, np.int64),
         tetrahedron_stamp=np.zeros(n_tetrahedra, np.int64),
         tetrahedron_side=np.zeros(n_tetrahedra, np.int64),
         front=np.full(2, -1, np.int64),
@@ -50,6 +56,7 @@ def grown_sheet(sheet: Sheet, n_nodes: int, n_tetrahedra: int) -> Sheet:
         node_stamp=grown(sheet.node_stamp, n_nodes),
         offset=grown(sheet.offset, n_nodes, -1.0),
         side=grown(sheet.side, n_nodes),
+        nodes=grown(sheet.nodes, n_nodes),
         tetrahedron_stamp=grown(sheet.tetrahedron_stamp, n_tetrahedra),
         tetrahedron_side=grown(sheet.tetrahedron_side, n_tetrahedra),
     )
@@ -59,6 +66,7 @@ def grown_sheet(sheet: Sheet, n_nodes: int, n_tetrahedra: int) -> Sheet:
 def begin_sheet(sheet: Sheet) -> None:
     """Forget the last incision and begin another."""
     sheet.number[0] += 1
+    sheet.n_nodes[0] = 0
     sheet.front[0] = -1
     sheet.front[1] = -1
 
@@ -107,3 +115,12 @@ def decide_side(sheet: Sheet, t: int, side: int) -> None:
     """Decide that tetrahedron `t` is on that side."""
     sheet.tetrahedron_stamp[t] = sheet.number[0]
     sheet.tetrahedron_side[t] = side
+
+
+@kernel
+def put_on_sheet(sheet: Sheet, node: int, offset: float) -> None:
+    """Let `node` lie on the sheet, that far from where it truly is [m]."""
+    touch(sheet, node)
+    sheet.offset[node] = offset
+    sheet.nodes[sheet.n_nodes[0]] = node
+    sheet.n_nodes[0] += 1

@@ -32,7 +32,7 @@ from tissue.material import Material
 from tissue.path import new_path, put_on_lattice
 from tissue.pieces import count_pieces
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
-from tissue.separate import open_sheet
+from tissue.separate import close_sheet, open_sheet
 from tissue.sheet import begin_sheet, grown_sheet, new_sheet
 from tissue.slipping import relocate
 from tissue.snapping import insert_crossings
@@ -335,7 +335,7 @@ class Tissue:
         find_crossings(cut)
         return 1
 
-    def _cut(self, anchors: Anchors) -> None:
+    def _cut(self, anchors: Anchors, *, ends: bool = False) -> None:
         """Insert the sheet into the mesh, open it, and renew what depends on the mesh."""
         while True:
             cut = self._cut_arrays()
@@ -343,7 +343,10 @@ class Tissue:
             insert_crossings(cut)
             extend_fronts(cut)
             resolve_bridges(cut)
-            open_sheet(cut)
+            if ends:
+                close_sheet(cut)
+            else:
+                open_sheet(cut)
             remember_active(cut)
             n = touched_nodes(self._body, self._change, self._visits, self._nodes)
             if n:
@@ -363,7 +366,7 @@ class Tissue:
             return
         self._work.n_active[0] = 0
         self._work.n_crossings[0] = 0
-        self._cut(anchors)
+        self._cut(anchors, ends=True)
         begin_sheet(self._sheet)
         forget_path(self._path)
         self._work.n_previous[0] = 0
