@@ -55,12 +55,12 @@ class Change(Arrays):
     faces: IntArray
     """Faces cut: tetrahedron, face, tetrahedron, face; shape (CHANGES, 4)."""
     counts: IntArray
-    """How many of each, of splits, and whether there was too little room; shape (5,)."""
+    """How many of each, and whether there was too little room; shape (4,)."""
     area: FloatArray
     """Area of the faces cut, at rest, since the body was made [m2]; shape (1,)."""
 
 
-N_FLAGGED, N_DIRTY, N_FACES, N_SPLITS, FULL = 0, 1, 2, 3, 4
+N_FLAGGED, N_DIRTY, N_FACES, FULL = 0, 1, 2, 3
 """Places in `Change.counts`."""
 
 
@@ -121,7 +121,7 @@ def new_change() -> Change:
         flagged=np.zeros(CHANGES, np.int64),
         dirty=np.zeros(CHANGES, np.int64),
         faces=np.zeros((CHANGES, 4), np.int64),
-        counts=np.zeros(5, np.int64),
+        counts=np.zeros(4, np.int64),
         area=np.zeros(1),
     )
 

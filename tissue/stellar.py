@@ -6,7 +6,7 @@ into children of positive volume.
 """
 
 from tissue.body import NODES, TETRAHEDRA, local_index
-from tissue.cut import FULL, N_FLAGGED, N_SPLITS, PASS_NODES, SPARE_NODES, Cut, note_dirty
+from tissue.cut import FULL, N_FLAGGED, PASS_NODES, SPARE_NODES, Cut, note_dirty
 from tissue.geometry import smallest_altitude
 from tissue.jit import kernel
 from tissue.predicates import nearest
@@ -123,7 +123,6 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
     for i in range(n):
         for e in range(n_ends):
             _link_child(cut, n, i, e, n_ends, a, b, c)
-    change.counts[N_SPLITS] += n
     return node
 
 
