@@ -105,8 +105,9 @@ def test_a_surface_arrives_bit_for_bit_and_within_the_bound():
 
 
 def test_what_arrives_may_be_written_to():
-    messages.unpack_snapshot(messages.pack_snapshot(TETRAHEDRON)).positions[0] = 1.0
-    messages.unpack_surface(messages.pack_surface(SKIN)).triangles[0] = 1
+    snapshot = messages.unpack_snapshot(messages.pack_snapshot(TETRAHEDRON))
+    surface = messages.unpack_surface(messages.pack_surface(SKIN))
+    assert all(array.flags.writeable for array in (*snapshot, *surface))
 
 
 def test_a_description_arrives_with_every_property_of_the_material():
