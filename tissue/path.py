@@ -118,3 +118,15 @@ def put_on_lattice(path: Path, lattice: Lattice) -> None:
                 max(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
                 max(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
             )
+
+
+@kernel
+def path_moved(path: Path) -> bool:
+    """Whether any piece of the edge moved through the material in this step."""
+    for k in range(len(path.linked) - 1):
+        if path.linked[k]:
+            for j in range(k, k + 2):
+                d = sub(vec3(path.t1, j), vec3(path.t0, j))
+                if dot(d, d) > 0.0:
+                    return True
+    return False

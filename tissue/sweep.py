@@ -8,7 +8,6 @@ from tissue.cut import Cut
 from tissue.jit import kernel
 from tissue.path import Path
 from tissue.predicates import orient3d, pierces, point
-from tissue.vec3 import dot, sub, vec3
 
 
 @kernel
@@ -153,15 +152,3 @@ def _crossed_at(path: Path, cut: Cut, a: int, b: int, k: int) -> float:
     else:
         return -1.0
     return float(va) / (float(va) - float(vb))
-
-
-@kernel
-def path_moved(path: Path) -> bool:
-    """Whether any piece of the edge moved through the material in this step."""
-    for k in range(len(path.linked) - 1):
-        if path.linked[k]:
-            for j in range(k, k + 2):
-                d = sub(vec3(path.t1, j), vec3(path.t0, j))
-                if dot(d, d) > 0.0:
-                    return True
-    return False

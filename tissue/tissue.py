@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
@@ -22,24 +22,20 @@ from tissue.anchors import (
     is_engaged,
     new_anchors,
 )
-from tissue.body import NODES, TETRAHEDRA, build_body, grown_body
+from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
 from tissue.border import checked_edge, checked_fixed, checked_gravity, checked_positions
-from tissue.bridges import remember_active, resolve_bridges
-from tissue.cut import FULL, SPARE_NODES, Cut, Quality, clear_changes, new_change, new_work
-from tissue.front import extend_fronts
+from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import meet, seize
 from tissue.material import Material
-from tissue.path import new_path, put_on_lattice
+from tissue.path import Path, new_path, path_moved, put_on_lattice
 from tissue.pieces import count_pieces
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
-from tissue.separate import close_sheet, open_sheet
-from tissue.sheet import begin_sheet, grown_sheet, new_sheet
+from tissue.scheme import Scheme
 from tissue.slipping import relocate
-from tissue.snapping import insert_crossings
 from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
-from tissue.star import LARGEST_STAR, mean_node_size, no_visits
+from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
+from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
-from tissue.sweep import find_active_tetrahedra, find_crossings, path_moved
 from tissue.touched import largest_frequency, touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -152,10 +148,7 @@ class Tissue:
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._springs = no_springs(n_nodes, 20 * n_nodes + POOL_MARGIN)
-        self._sheet = new_sheet(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
-        self._work = new_work(n_tetrahedra)
-        self._change = new_change()
         self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
         self._edge_length = 0.0
         self._path = new_path(2)
@@ -168,11 +161,15 @@ class Tissue:
         self._warn_of_toughness()
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
-        self._quality = Quality(
-            snap=quality.snap,
-            floor=quality.floor * self.node_size,
-            guard=quality.guard * self.node_size,
-            crumb=float(quality.crumb * volume / n_tetrahedra),
+        self._scheme: Scheme = StellarScheme(
+            Quality(
+                snap=quality.snap,
+                floor=quality.floor * self.node_size,
+                guard=quality.guard * self.node_size,
+                crumb=float(quality.crumb * volume / n_tetrahedra),
+            ),
+            n_nodes,
+            n_tetrahedra,
         )
         self._grow()
 
@@ -218,10 +215,10 @@ class Tissue:
             if sweep is not None:
                 self._hold(anchors, edge, end)
             relaxed = perf_counter()
-            detected = self._detect() if sweep is not None else 0
+            detected = sweep is not None and self._detect()
             collided = perf_counter()
             if detected:
-                self._cut(anchors)
+                self._cut(self._scheme.cut)
             relaxation += relaxed - started
             collision += collided - relaxed
             topology += perf_counter() - collided
@@ -319,57 +316,42 @@ class Tissue:
         seize(anchors, self._body, self._visits, edge, when, self._around)
         meet(anchors, self._body, edge, when)
         if not is_engaged(anchors):
-            self._end_incision(anchors)
+            self._end_incision()
             return
         self._incising = True
         margin = SHEET_MARGIN * self.node_size
         trace_path(anchors, self._body, edge, when, margin, self._path)
 
-    def _detect(self) -> int:
+    def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
         if not self._incising or not path_moved(self._path):
-            return 0
+            return False
         put_on_lattice(self._path, self._body.lattice)
-        cut = self._cut_arrays()
-        find_active_tetrahedra(cut)
-        find_crossings(cut)
-        return 1
+        self._scheme.detect(self._body, self._visits, self._path)
+        return True
 
-    def _cut(self, anchors: Anchors, *, ends: bool = False) -> None:
-        """Insert the sheet into the mesh, open it, and renew what depends on the mesh."""
+    def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
+        """Cut what was detected, and renew what depends on the mesh."""
+        change = self._scheme.change
         while True:
-            cut = self._cut_arrays()
-            clear_changes(self._change)
-            insert_crossings(cut)
-            extend_fronts(cut)
-            resolve_bridges(cut)
-            if ends:
-                close_sheet(cut)
-            else:
-                open_sheet(cut)
-            remember_active(cut)
-            n = touched_nodes(self._body, self._change, self._visits, self._nodes)
+            one_pass(self._body, self._visits, self._path)
+            n = touched_nodes(self._body, change, self._visits, self._nodes)
             if n:
                 self._build_rows(self._nodes, n)
-                relocate(anchors, self._body, self._visits, self._around)
-            if not self._change.counts[FULL]:
-                break
+                relocate(self._anchors, self._body, self._visits, self._around)
+            full = bool(change.counts[FULL])
             self._grow()
-            cut = self._cut_arrays()
-            find_active_tetrahedra(cut)
-            find_crossings(cut)
-        self._grow()
+            if not full:
+                return
+            self._scheme.detect(self._body, self._visits, self._path)
 
-    def _end_incision(self, anchors: Anchors) -> None:
+    def _end_incision(self) -> None:
         """Resolve what the blade left behind, and let the next contact begin another sheet."""
         if not self._incising:
             return
-        self._work.n_active[0] = 0
-        self._work.n_crossings[0] = 0
-        self._cut(anchors, ends=True)
-        begin_sheet(self._sheet)
+        self._cut(self._scheme.end)
+        self._scheme.forget()
         forget_path(self._path)
-        self._work.n_previous[0] = 0
         self._incising = False
 
     def _warn_of_toughness(self) -> None:
@@ -419,10 +401,10 @@ class Tissue:
             bounds=bounds,
             n_tetrahedra=self.n_tetrahedra,
             n_nodes=self.n_nodes,
-            n_active=int(self._work.n_active[0]),
+            n_active=self._scheme.n_active,
             active_point_tetrahedron=int(self._path.seed[0]) if sweep is not None else -1,
             anchored_length=anchored_length(anchors),
-            cut_area=float(self._change.area[0]),
+            cut_area=float(self._scheme.change.area[0]),
             work_of_blade=float(totals[WORK_OF_BLADE]),
             work_of_cutting=float(totals[WORK_OF_CUTTING]),
             n_substeps=n_substeps,
@@ -438,23 +420,12 @@ class Tissue:
             return self._anchors
         n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
         n = min(max(n, 2), MOST_SAMPLES)
-        self._end_incision(self._anchors)
+        self._end_incision()
         totals = self._anchors.totals
         self._anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
         self._edge_length = length
         self._path = new_path(n)
         return self._anchors
-
-    def _cut_arrays(self) -> Cut:
-        return Cut(
-            body=self._body,
-            visits=self._visits,
-            sheet=self._sheet,
-            path=self._path,
-            change=self._change,
-            work=self._work,
-            quality=self._quality,
-        )
 
     def _build_rows(self, nodes: np.ndarray, n: int) -> None:
         """Write masses and springs of the first `n` of `nodes`, and update the frequency bound."""
@@ -490,10 +461,8 @@ class Tissue:
             return
         self._body = grown_body(body, n_nodes, n_tetrahedra)
         self._springs = grown_springs(self._springs, n_nodes, len(self._springs.neighbour))
-        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._visits = no_visits(n_nodes, n_tetrahedra)
-        self._work = self._work.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
-        self._work.hash_stamps[:] = 0
+        self._scheme.grow(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
 

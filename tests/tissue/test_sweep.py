@@ -7,9 +7,9 @@ import pytest
 
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
-from tissue.path import put_on_lattice
+from tissue.path import path_moved, put_on_lattice
 from tissue.shapes import grid
-from tissue.sweep import find_active_tetrahedra, find_crossings, path_moved
+from tissue.sweep import find_active_tetrahedra, find_crossings
 
 pytestmark = [
     pytest.mark.kernel,
