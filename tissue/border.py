@@ -86,3 +86,34 @@ def checked_edge(sweep: BladeSweep) -> Edge:
             )
         points += [Vec3(*row) for row in rows.tolist()]
     return Edge(*points)
+
+
+def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the places of a cutting edge, and where it faces in each.
+
+    Raises:
+        ValueError: an array has another shape, is not finite, or an edge faces along itself.
+    """
+    rows = np.array(edges, dtype=np.float64)
+    if rows.ndim != 3 or rows.shape[2] != 3 or min(rows.shape[:2]) < 2:
+        raise ValueError(
+            f"edges have shape {rows.shape}; they are two or more places of two or more points: "
+            "(n_places, n_points, 3)"
+        )
+    ways = np.array(forward, dtype=np.float64)
+    if ways.shape not in ((3,), (len(rows), 3)):
+        raise ValueError(f"forward has shape {ways.shape}; it is (3,) or ({len(rows)}, 3)")
+    if not (np.isfinite(rows).all() and np.isfinite(ways).all()):
+        raise ValueError("edges and forward hold a number that is not finite")
+    ways = np.broadcast_to(ways, (len(rows), 3)).copy()
+    along = rows[:, -1] - rows[:, 0]
+    across = np.linalg.norm(np.cross(along, ways), axis=1)
+    limit = ALONG_EDGE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
+    wrong = np.flatnonzero(~(across > limit))
+    if len(wrong):
+        i = int(wrong[0])
+        raise ValueError(
+            f"the edge in place {i} has no length or cuts along itself: forward is "
+            f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
+        )
+    return rows, ways / np.linalg.norm(ways, axis=1)[:, None]

@@ -3,17 +3,17 @@
 import numpy as np
 
 from tissue.anchors import ANCHORED, FREE, RELEASED, Anchors, Edge, anchor_position, sample_point
-from tissue.body import TETRAHEDRA, Body
+from tissue.body import Body
 from tissue.geometry import (
     Matrix3,
     barycentric_in,
     interpolate,
-    smallest_weight,
 )
 from tissue.jit import kernel
 from tissue.rotation import mean_rotation, turned_back
 from tissue.slipping import find, put
 from tissue.star import Visits
+from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, dot, sub, vec3
 
@@ -58,42 +58,35 @@ def seize(
 
 
 @kernel
-def meet(anchors: Anchors, body: Body, edge: Edge, when: float) -> None:
+def meet(anchors: Anchors, body: Body, grid: TetrahedronGrid, edge: Edge, when: float) -> None:
     """Anchor the free samples that have come into the tissue by themselves."""
     n = len(anchors.state)
-    low = Vec3(np.inf, np.inf, np.inf)
-    high = Vec3(-np.inf, -np.inf, -np.inf)
-    n_free = 0
+    for k in range(n):
+        if anchors.state[k] != FREE:
+            continue
+        b = sample_point(edge, k, n, when)
+        t = tetrahedron_at(body, grid, body.positions, b)
+        if t >= 0:
+            w = barycentric_in(b, body.positions, body.tetrahedra, t)
+            put(anchors, body, k, t, interpolate(w, body.rest, body.tetrahedra, t))
+            anchors.slipped[k] = False
+
+
+@kernel
+def near_box(anchors: Anchors, edge: Edge, when: float, low: Vec3, high: Vec3) -> bool:
+    """Whether the box of the free samples meets that from `low` to `high` [m]."""
+    n = len(anchors.state)
+    min_x = min_y = min_z = np.inf
+    max_x = max_y = max_z = -np.inf
     for k in range(n):
         if anchors.state[k] == FREE:
             b = sample_point(edge, k, n, when)
-            low = Vec3(min(low.x, b.x), min(low.y, b.y), min(low.z, b.z))
-            high = Vec3(max(high.x, b.x), max(high.y, b.y), max(high.z, b.z))
-            n_free += 1
-    if n_free == 0:
-        return
-    x = body.positions
-    for t in range(body.counts[TETRAHEDRA]):
-        a = body.tetrahedra[t, 0]
-        b = body.tetrahedra[t, 1]
-        c = body.tetrahedra[t, 2]
-        d = body.tetrahedra[t, 3]
-        if min(min(x[a, 0], x[b, 0]), min(x[c, 0], x[d, 0])) > high.x:
-            continue
-        if max(max(x[a, 0], x[b, 0]), max(x[c, 0], x[d, 0])) < low.x:
-            continue
-        if min(min(x[a, 1], x[b, 1]), min(x[c, 1], x[d, 1])) > high.y:
-            continue
-        if max(max(x[a, 1], x[b, 1]), max(x[c, 1], x[d, 1])) < low.y:
-            continue
-        if min(min(x[a, 2], x[b, 2]), min(x[c, 2], x[d, 2])) > high.z:
-            continue
-        if max(max(x[a, 2], x[b, 2]), max(x[c, 2], x[d, 2])) < low.z:
-            continue
-        for k in range(n):
-            if anchors.state[k] == FREE:
-                w = barycentric_in(sample_point(edge, k, n, when), x, body.tetrahedra, t)
-                if smallest_weight(w) >= 0.0:
-                    p = interpolate(w, body.rest, body.tetrahedra, t)
-                    put(anchors, body, k, t, p)
-                    anchors.slipped[k] = False
+            min_x = min(min_x, b.x)
+            min_y = min(min_y, b.y)
+            min_z = min(min_z, b.z)
+            max_x = max(max_x, b.x)
+            max_y = max(max_y, b.y)
+            max_z = max(max_z, b.z)
+    if min_x > high.x or min_y > high.y or min_z > high.z:
+        return False
+    return not (max_x < low.x or max_y < low.y or max_z < low.z)

@@ -130,3 +130,20 @@ def path_moved(path: Path) -> bool:
                 if dot(d, d) > 0.0:
                     return True
     return False
+
+
+def resampled(rows: FloatArray, spacing: float, most: int) -> FloatArray:
+    """Return polylines, shape (n_rows, n, 3), with equally many points on each piece.
+
+    Points are at most `spacing` [m] apart in the longest row, but no more than `most`.
+    """
+    lengths = np.linalg.norm(np.diff(rows, axis=1), axis=2).max(axis=0)
+    n_parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), 1)
+    scale_down = min(1.0, (most - 1) / n_parts.sum())
+    n_parts = np.maximum((n_parts * scale_down).astype(np.int64), 1)
+    at = np.concatenate(
+        [i + np.arange(n) / n for i, n in enumerate(n_parts)] + [[float(len(n_parts))]]
+    )
+    i = np.minimum(at.astype(np.int64), len(n_parts) - 1)
+    share = (at - i)[None, :, None]
+    return (1.0 - share) * rows[:, i] + share * rows[:, i + 1]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
+import numpy.typing as npt
 
 from tissue.anchors import (
     IMPULSE,
@@ -23,12 +24,19 @@ from tissue.anchors import (
     new_anchors,
 )
 from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
-from tissue.border import checked_edge, checked_fixed, checked_gravity, checked_positions
+from tissue.border import (
+    checked_edge,
+    checked_edges,
+    checked_fixed,
+    checked_gravity,
+    checked_positions,
+)
 from tissue.cut import FULL, SPARE_NODES, Quality
-from tissue.holding import meet, seize
+from tissue.holding import meet, near_box, seize
 from tissue.material import Material
-from tissue.path import Path, new_path, path_moved, put_on_lattice
+from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import count_pieces
+from tissue.prescribed import begin_path, prescribe_path
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme
 from tissue.slipping import relocate
@@ -36,6 +44,8 @@ from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
+from tissue.survey import survey
+from tissue.tetrahedron_grid import MOST_APPENDED, build_grid, no_grid
 from tissue.touched import largest_frequency, touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -64,6 +74,9 @@ steep curves leave tetrahedra that bridge the cut."""
 
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
+
+GRID_MARGIN = 0.5
+"""How far nodes go before the search for contact is prepared anew, per mean node size."""
 
 ROOM_FOR_TETRAHEDRA = 1 << 12
 """Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
@@ -151,6 +164,7 @@ class Tissue:
         self._stages = new_stages(n_nodes)
         self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
         self._edge_length = 0.0
+        self._grid = no_grid()
         self._path = new_path(2)
         self._incising = False
 
@@ -186,8 +200,8 @@ class Tissue:
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of the body [m], shape (2, 3)."""
-        positions = self._body.positions[: self.n_nodes]
-        return np.stack([positions.min(axis=0), positions.max(axis=0)])
+        seen = survey(self._body, self._grid.positions)
+        return np.array([seen.low, seen.high])
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Let the body live through `dt` [s] while the blade does `sweep`.
@@ -225,6 +239,47 @@ class Tissue:
         return self._result(
             anchors, edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation)
         )
+
+    def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
+        """Cut along a given surface in the body at rest: no blade, no force, no time passes.
+
+        For tissue that was cut before the scene begins, and for cuts that must be where they are
+        told. The surface is ruled: the edge goes in straight lines from each of its places to the
+        next. As with a blade only its front cuts; where a point of it goes back, it cuts nothing
+        until it is ahead of where it has been.
+
+        Args:
+            edges: Places of the cutting edge in the body at rest [m], from tip to heel, shape
+                (n_places, n_points, 3), at least two of each.
+            forward: Where the edge faces in each place, shape (n_places, 3); or always, (3,).
+
+        Returns:
+            Area of the faces cut [m2], one side of each.
+
+        Raises:
+            ValueError: an array has another shape, is not finite, or an edge faces along itself.
+        """
+        rows, ways = checked_edges(edges, forward)
+        self._end_incision()
+        before = float(self._scheme.change.area[0])
+        spacing = self.node_size / SAMPLES_PER_NODE_SIZE
+        rows = resampled(rows, spacing, MOST_SAMPLES)
+        blade, self._path = self._path, new_path(rows.shape[1])
+        grid = build_grid(self._body, self._body.rest, 0.0)
+        begin_path(self._path, rows[0])
+        self._incising = True
+        for i in range(1, len(rows)):
+            n = self._n_parts(rows[i] - rows[i - 1])
+            for j in range(1, n + 1):
+                at = j / n
+                points = (1.0 - at) * rows[i - 1] + at * rows[i]
+                way = Vec3(*((1.0 - at) * ways[i - 1] + at * ways[i]).tolist())
+                prescribe_path(self._path, self._body, grid, points, way)
+                if self._detect():
+                    self._cut(self._scheme.cut)
+        self._end_incision()
+        self._path = blade
+        return float(self._scheme.change.area[0]) - before
 
     def settle(self) -> int:
         """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
@@ -314,13 +369,28 @@ class Tissue:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
         clear_forces(anchors, self._body, self._stages.external)
         seize(anchors, self._body, self._visits, edge, when, self._around)
-        meet(anchors, self._body, edge, when)
+        self._renew_grid(anchors, edge, when)
+        meet(anchors, self._body, self._grid, edge, when)
         if not is_engaged(anchors):
             self._end_incision()
             return
         self._incising = True
         margin = SHEET_MARGIN * self.node_size
         trace_path(anchors, self._body, edge, when, margin, self._path)
+
+    def _renew_grid(self, anchors: Anchors, edge: Edge, when: float) -> None:
+        """Build the grid anew where samples may come into the tissue and it is out of date."""
+        body, grid = self._body, self._grid
+        seen = survey(body, grid.positions)
+        if not near_box(anchors, edge, when, seen.low, seen.high):
+            return
+        is_current = bool(
+            seen.motion_squared <= grid.margin**2
+            and grid.n_tetrahedra[0] > 0
+            and self.n_tetrahedra - grid.n_tetrahedra[0] <= MOST_APPENDED
+        )
+        if not is_current and math.isfinite(seen.high.x):
+            self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
@@ -372,8 +442,12 @@ class Tissue:
         if sweep is None:
             return 1
         t0, t1 = sweep
-        travel = max(np.linalg.norm(t1.tip - t0.tip), np.linalg.norm(t1.heel - t0.heel))
-        return max(1, math.ceil(travel / (INCREMENT * self.node_size)))
+        return self._n_parts(np.array([t1.tip - t0.tip, t1.heel - t0.heel]))
+
+    def _n_parts(self, ways: FloatArray) -> int:
+        """Return in how many parts points of the edge go these ways [m], shape (n, 3)."""
+        longest = float(np.sqrt((ways**2).sum(axis=1).max()))
+        return max(1, math.ceil(longest / (INCREMENT * self.node_size)))
 
     def _result(
         self,

@@ -1,0 +1,48 @@
+"""Where the body is, and how far its nodes went since they were looked at last."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.body import NODES, Body
+from tissue.jit import kernel
+from tissue.types import FloatArray
+from tissue.vec3 import Vec3
+
+
+class Survey(NamedTuple):
+    """One look at all nodes."""
+
+    low: Vec3
+    """Lowest corner of the body [m]; not finite where the motion became unstable."""
+    high: Vec3
+    """Highest corner [m]."""
+    motion_squared: float
+    """Square of the longest way of a node since it was at `before` [m2]."""
+
+
+@kernel
+def survey(body: Body, before: FloatArray) -> Survey:
+    """Look at all nodes; `before` [m], shape (n, 3), has the places of the first n of them."""
+    x = body.positions
+    n = body.counts[NODES]
+    low_x = low_y = low_z = np.inf
+    high_x = high_y = high_z = -np.inf
+    total = 0.0
+    for i in range(n):
+        low_x = min(low_x, x[i, 0])
+        low_y = min(low_y, x[i, 1])
+        low_z = min(low_z, x[i, 2])
+        high_x = max(high_x, x[i, 0])
+        high_y = max(high_y, x[i, 1])
+        high_z = max(high_z, x[i, 2])
+        total += x[i, 0] + x[i, 1] + x[i, 2]
+    if not np.isfinite(total):  # a comparison with nan is false: min and max would overlook it
+        high_x = total
+    motion_squared = 0.0
+    for i in range(min(n, len(before))):
+        dx = x[i, 0] - before[i, 0]
+        dy = x[i, 1] - before[i, 1]
+        dz = x[i, 2] - before[i, 2]
+        motion_squared = max(motion_squared, dx * dx + dy * dy + dz * dz)
+    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z), motion_squared)
