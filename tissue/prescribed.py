@@ -3,7 +3,7 @@
 from tissue.body import Body, walk
 from tissue.jit import kernel
 from tissue.path import Path
-from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at, tetrahedron_near
+from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at, tetrahedron_in_box
 from tissue.types import FloatArray
 from tissue.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
 
@@ -39,15 +39,33 @@ def prescribe_path(
         store(path.forward, k, forward)
         if dot(sub(p, start), forward) > 0.0:
             store(path.t1, k, p)
-            path.seed[k] = _find_seed(body, grid, p, path.seed[k])
+    for k in range(n):
+        path.seed[k] = _find_seed(path, body, grid, k)
 
 
 @kernel
-def _find_seed(body: Body, grid: TetrahedronGrid, p: Vec3, before: int) -> int:
-    """A tetrahedron at or near the rest point `p` [m]."""
-    if before >= 0:
-        at = walk(body, p, before)
+def _find_seed(path: Path, body: Body, grid: TetrahedronGrid, k: int) -> int:
+    """A tetrahedron that holds sample `k`, or else one that the way of its segment may meet."""
+    p = vec3(path.t1, k)
+    if path.seed[k] >= 0:
+        at = walk(body, p, path.seed[k])
         if at.inside:
             return at.tetrahedron
     t = tetrahedron_at(body, grid, body.rest, p)
-    return t if t >= 0 else tetrahedron_near(grid, p)
+    if t >= 0:
+        return t
+    other = min(k + 1, len(path.member) - 1)
+    a = vec3(path.t0, k)
+    b = vec3(path.t0, other)
+    c = vec3(path.t1, other)
+    low = Vec3(
+        min(min(a.x, b.x), min(c.x, p.x)),
+        min(min(a.y, b.y), min(c.y, p.y)),
+        min(min(a.z, b.z), min(c.z, p.z)),
+    )
+    high = Vec3(
+        max(max(a.x, b.x), max(c.x, p.x)),
+        max(max(a.y, b.y), max(c.y, p.y)),
+        max(max(a.z, b.z), max(c.z, p.z)),
+    )
+    return tetrahedron_in_box(body, grid, body.rest, low, high)

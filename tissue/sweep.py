@@ -24,6 +24,13 @@ def find_active_tetrahedra(cut: Cut) -> None:
             _note_segments(cut, t, n)
             work.active[n] = t
             n += 1
+    for i in range(work.n_previous[0]):
+        t = work.previous[i]
+        if visits.tetrahedra[t] != epoch and n < len(work.active):
+            visits.tetrahedra[t] = epoch
+            if _note_segments(cut, t, n):
+                work.active[n] = t
+                n += 1
     i = 0
     while i < n:
         t = work.active[i]

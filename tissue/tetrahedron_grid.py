@@ -83,17 +83,20 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
 
 
 @kernel
+def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, float]:
+    """Least and greatest coordinate along axis `c` of tetrahedron `t` [m]."""
+    p = positions[body.tetrahedra[t, 0], c]
+    q = positions[body.tetrahedra[t, 1], c]
+    r = positions[body.tetrahedra[t, 2], c]
+    s = positions[body.tetrahedra[t, 3], c]
+    return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
+
+
+@kernel
 def _cell_range(body: Body, grid: TetrahedronGrid, t: int, c: int) -> tuple[int, int]:
     """First and last cell along axis `c` that the widened box of tetrahedron `t` meets."""
-    x = grid.positions
-    p = x[body.tetrahedra[t, 0], c]
-    q = x[body.tetrahedra[t, 1], c]
-    r = x[body.tetrahedra[t, 2], c]
-    s = x[body.tetrahedra[t, 3], c]
-    low = min(min(p, q), min(r, s)) - grid.margin - grid.origin[c]
-    high = max(max(p, q), max(r, s)) + grid.margin - grid.origin[c]
-    last = grid.shape[c] - 1
-    return max(0, int(low / grid.spacing)), min(last, int(high / grid.spacing))
+    low, high = _extent(body, grid.positions, t, c)
+    return _cells_between(grid, low - grid.margin, high + grid.margin, c)
 
 
 @kernel
@@ -165,9 +168,36 @@ def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: 
 
 
 @kernel
-def tetrahedron_near(grid: TetrahedronGrid, p: Vec3) -> int:
-    """A tetrahedron in the cell of `p` [m], or -1."""
-    cell = cell_of(grid, p)
-    if cell < 0 or grid.first[cell] == grid.first[cell + 1]:
-        return -1
-    return grid.items[grid.first[cell]]
+def tetrahedron_in_box(
+    body: Body, grid: TetrahedronGrid, positions: FloatArray, low: Vec3, high: Vec3
+) -> int:
+    """The first tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
+    x0, x1 = _cells_between(grid, low.x, high.x, 0)
+    y0, y1 = _cells_between(grid, low.y, high.y, 1)
+    z0, z1 = _cells_between(grid, low.z, high.z, 2)
+    for i in range(x0, x1 + 1):
+        for j in range(y0, y1 + 1):
+            for k in range(z0, z1 + 1):
+                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
+                for at in range(grid.first[cell], grid.first[cell + 1]):
+                    if _meets_box(body, positions, grid.items[at], low, high):
+                        return grid.items[at]
+    return -1
+
+
+@kernel
+def _cells_between(grid: TetrahedronGrid, low: float, high: float, c: int) -> tuple[int, int]:
+    """First and last cell along axis `c` between two coordinates [m]."""
+    last = grid.shape[c] - 1
+    first = np.floor((low - grid.origin[c]) / grid.spacing)
+    final = np.floor((high - grid.origin[c]) / grid.spacing)
+    return int(max(first, 0.0)), int(min(final, float(last)))
+
+
+@kernel
+def _meets_box(body: Body, positions: FloatArray, t: int, low: Vec3, high: Vec3) -> bool:
+    for c in range(3):
+        smallest, largest = _extent(body, positions, t, c)
+        if smallest > high[c] or largest < low[c]:
+            return False
+    return True
