@@ -48,6 +48,8 @@ class Body(Arrays):
     """Nodes that do not move, shape (capacity,)."""
     node_tetrahedron: IntArray
     """One tetrahedron around each node; the others follow through links. Shape (capacity,)."""
+    twin: IntArray
+    """Ring of the nodes that were one before a cut doubled it: the next one. Shape (capacity,)."""
     tetrahedra: IntArray
     """Node indices, shape (capacity, 4)."""
     links: IntArray
@@ -97,6 +99,7 @@ def build_body(
         masses=np.zeros(n),
         fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
         node_tetrahedron=node_tetrahedron,
+        twin=np.arange(n),
         tetrahedra=tetrahedra.copy(),
         links=build_links(tetrahedra),
         counts=np.array([n, len(tetrahedra)], dtype=np.int64),

@@ -316,6 +316,8 @@ def _copy_node(cut: Cut, node: int) -> int:
         body.lattice_rest[copy, x] = body.lattice_rest[node, x]
     body.fixed[copy] = body.fixed[node]
     body.masses[copy] = 0.0
+    body.twin[copy] = body.twin[node]
+    body.twin[node] = copy
     if on_sheet(sheet, node):
         put_on_sheet(sheet, copy, sheet.offset[node])
     see_side(sheet, copy, side_of(sheet, node), True)

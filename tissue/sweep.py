@@ -4,49 +4,97 @@ Paper, section 3. The list of active tetrahedra is found anew in each step from 
 hold the anchors, through faces: the cost is that of the tetrahedra along the blade.
 """
 
+from tissue.body import CUT
 from tissue.cut import Cut
 from tissue.jit import kernel
 from tissue.path import Path
 from tissue.predicates import orient3d, pierces, point
+from tissue.sheet import on_sheet
 
 
 @kernel
 def find_active_tetrahedra(cut: Cut) -> None:
-    """Find the tetrahedra whose box at rest meets the box of a swept piece of the edge."""
+    """Find the tetrahedra whose box at rest meets the box of a swept piece of the edge.
+
+    They are searched through faces: from those that hold a sample, from those that were active or
+    changed in the step before, and from one lip of an earlier cut to the other.
+    """
     body, path, work, visits = cut.body, cut.path, cut.work, cut.visits
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
-    n = 0
+    work.n_active[0] = 0
     for k in range(len(path.seed)):
-        t = path.seed[k]
-        if t >= 0 and visits.tetrahedra[t] != epoch and n < len(work.active):
-            visits.tetrahedra[t] = epoch
-            _note_segments(cut, t, n)
-            work.active[n] = t
-            n += 1
+        if path.seed[k] >= 0:
+            _visit(cut, path.seed[k], epoch, True)
     for i in range(work.n_previous[0]):
-        t = work.previous[i]
-        if visits.tetrahedra[t] != epoch and n < len(work.active):
-            visits.tetrahedra[t] = epoch
-            if _note_segments(cut, t, n):
-                work.active[n] = t
-                n += 1
+        _visit(cut, work.previous[i], epoch, False)
     i = 0
-    while i < n:
+    while i < work.n_active[0]:
         t = work.active[i]
         i += 1
         for f in range(4):
             link = body.links[t, f]
-            if link < 0:
-                continue
-            other = link // 4
-            if visits.tetrahedra[other] == epoch or n == len(work.active):
-                continue
-            visits.tetrahedra[other] = epoch
-            if _note_segments(cut, other, n):
-                work.active[n] = other
-                n += 1
-    work.n_active[0] = n
+            if link >= 0:
+                _visit(cut, link // 4, epoch, False)
+            elif link == CUT:
+                _visit_other_lip(cut, t, f, epoch)
+
+
+@kernel
+def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
+    """Let tetrahedron `t` be active if it meets the swept edge, or holds a sample of it."""
+    work, visits = cut.work, cut.visits
+    n = work.n_active[0]
+    if visits.tetrahedra[t] == epoch or n == len(work.active):
+        return
+    visits.tetrahedra[t] = epoch
+    if _note_segments(cut, t, n) or is_seed:
+        work.active[n] = t
+        work.n_active[0] = n + 1
+
+
+@kernel
+def _visit_other_lip(cut: Cut, t: int, f: int, epoch: int) -> None:
+    """Visit the tetrahedra that touched cut face `f` of `t` from the other side.
+
+    They are the stars of the twins of its nodes. Those on the current sheet are left out: the lips
+    of the current incision still hang together ahead of the blade.
+    """
+    body, visits = cut.body, cut.visits
+    for k in range(4):
+        node = body.tetrahedra[t, k]
+        if k == f or visits.nodes[node] == epoch or on_sheet(cut.sheet, node):
+            continue
+        visits.nodes[node] = epoch
+        twin = body.twin[node]
+        while twin != node:
+            if visits.nodes[twin] != epoch:
+                visits.nodes[twin] = epoch
+                _visit_star(cut, twin, epoch)
+            twin = body.twin[twin]
+
+
+@kernel
+def _visit_star(cut: Cut, node: int, epoch: int) -> None:
+    """Visit the tetrahedra around `node`."""
+    body, around = cut.body, cut.work.around
+    around[0] = body.node_tetrahedron[node]
+    n = 1
+    i = 0
+    while i < n:
+        t = around[i]
+        i += 1
+        _visit(cut, t, epoch, False)
+        for f in range(4):
+            link = body.links[t, f]
+            if body.tetrahedra[t, f] != node and link >= 0 and n < len(around):
+                other = link // 4
+                seen = False
+                for j in range(n):
+                    seen = seen or around[j] == other
+                if not seen:
+                    around[n] = other
+                    n += 1
 
 
 @kernel
