@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, cross, dot, norm, scale, sub, vec3
+from tissue.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 
 
 class Weights(NamedTuple):
@@ -165,3 +165,36 @@ def normalised(a: Vec3) -> Vec3:
     if length == 0.0 or not math.isfinite(length):
         return Vec3(0.0, 0.0, 0.0)
     return scale(1.0 / length, a)
+
+
+@kernel
+def nearest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3:
+    """The point of triangle abc nearest to `p`, by Voronoi regions (Ericson 2005, 5.1.5)."""
+    ab = sub(b, a)
+    ac = sub(c, a)
+    ap = sub(p, a)
+    d1 = dot(ab, ap)
+    d2 = dot(ac, ap)
+    if d1 <= 0.0 and d2 <= 0.0:
+        return a
+    bp = sub(p, b)
+    d3 = dot(ab, bp)
+    d4 = dot(ac, bp)
+    if d3 >= 0.0 and d4 <= d3:
+        return b
+    cp = sub(p, c)
+    d5 = dot(ab, cp)
+    d6 = dot(ac, cp)
+    if d6 >= 0.0 and d5 <= d6:
+        return c
+    vc = d1 * d4 - d3 * d2
+    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        return axpy(d1 / (d1 - d3), ab, a)
+    vb = d5 * d2 - d1 * d6
+    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        return axpy(d2 / (d2 - d6), ac, a)
+    va = d3 * d6 - d5 * d4
+    if va <= 0.0 and d4 >= d3 and d5 >= d6:
+        return axpy((d4 - d3) / ((d4 - d3) + (d5 - d6)), sub(c, b), b)
+    total = va + vb + vc
+    return axpy(vb / total, ab, axpy(vc / total, ac, a))

@@ -2,7 +2,17 @@
 
 import numpy as np
 
-from tissue.anchors import ANCHORED, FREE, RELEASED, Anchors, Edge, anchor_position, sample_point
+from tissue.anchors import (
+    ANCHORED,
+    FREE,
+    RELEASED,
+    RETRACTED,
+    Anchors,
+    Edge,
+    anchor_position,
+    edge_frame,
+    sample_point,
+)
 from tissue.body import Body
 from tissue.geometry import (
     Matrix3,
@@ -10,8 +20,10 @@ from tissue.geometry import (
     interpolate,
 )
 from tissue.jit import kernel
+from tissue.path import Path
 from tissue.rotation import mean_rotation, turned_back
 from tissue.slipping import find, put
+from tissue.slit import behind_edge, in_slit
 from tissue.star import Visits
 from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
@@ -26,16 +38,52 @@ def offset_from(edge: Edge, rotation: Matrix3, when: float, n: int, k: int, besi
 
 
 @kernel
+def let_go(
+    anchors: Anchors,
+    body: Body,
+    visits: Visits,
+    path: Path,
+    edge: Edge,
+    when: float,
+    queue: IntArray,
+) -> None:
+    """Free the samples that backed off and then went elsewhere: into tissue not cut yet.
+
+    A blade that backs off, goes deeper and then forward again cuts below its old slit.
+    """
+    n = len(anchors.state)
+    rotation = mean_rotation(anchors, body)
+    for k in range(n):
+        if anchors.state[k] != RETRACTED:
+            continue
+        a = anchor_position(anchors, body, body.positions, k)
+        way = turned_back(rotation, sub(sample_point(edge, k, n, when), a))
+        p = add(vec3(anchors.rest, k), way)
+        if behind_edge(path, p):
+            continue
+        if find(body, visits, p, anchors.tetrahedron[k], queue).inside:
+            anchors.state[k] = FREE
+            path.known[k] = False
+
+
+@kernel
 def seize(
-    anchors: Anchors, body: Body, visits: Visits, edge: Edge, when: float, queue: IntArray
+    anchors: Anchors,
+    body: Body,
+    visits: Visits,
+    edge: Edge,
+    when: float,
+    reach: float,
+    queue: IntArray,
 ) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
     The edge trails behind the blade by the same distance along its length: a sample is in the
-    tissue if the point that far behind it is.
+    tissue if the point that far behind it is. `reach` [m]: see `in_slit`.
     """
     n = len(anchors.state)
     rotation = mean_rotation(anchors, body)
+    along, forward, _ = edge_frame(edge, when)
     for sweep in range(2):
         for i in range(n):
             k = i if sweep == 0 else n - 1 - i
@@ -47,7 +95,7 @@ def seize(
             offset = offset_from(edge, rotation, when, n, k, beside)
             p = add(vec3(anchors.rest, beside), offset)
             place = find(body, visits, p, anchors.tetrahedron[beside], queue)
-            if not place.inside:
+            if not place.inside or in_slit(body, place.tetrahedron, p, along, forward, reach):
                 continue
             put(anchors, body, k, place.tetrahedron, p)
             anchors.slipped[k] = False
@@ -58,9 +106,15 @@ def seize(
 
 
 @kernel
-def meet(anchors: Anchors, body: Body, grid: TetrahedronGrid, edge: Edge, when: float) -> None:
-    """Anchor the free samples that have come into the tissue by themselves."""
+def meet(
+    anchors: Anchors, body: Body, grid: TetrahedronGrid, edge: Edge, when: float, reach: float
+) -> None:
+    """Anchor the free samples that have come into the tissue by themselves.
+
+    `reach` [m]: see `in_slit`.
+    """
     n = len(anchors.state)
+    along, forward, _ = edge_frame(edge, when)
     for k in range(n):
         if anchors.state[k] != FREE:
             continue
@@ -68,8 +122,10 @@ def meet(anchors: Anchors, body: Body, grid: TetrahedronGrid, edge: Edge, when: 
         t = tetrahedron_at(body, grid, body.positions, b)
         if t >= 0:
             w = barycentric_in(b, body.positions, body.tetrahedra, t)
-            put(anchors, body, k, t, interpolate(w, body.rest, body.tetrahedra, t))
-            anchors.slipped[k] = False
+            p = interpolate(w, body.rest, body.tetrahedra, t)
+            if not in_slit(body, t, p, along, forward, reach):
+                put(anchors, body, k, t, p)
+                anchors.slipped[k] = False
 
 
 @kernel

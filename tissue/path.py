@@ -33,7 +33,7 @@ class Path(Arrays):
     member: BoolArray
     """Whether the sample is part of the chain at the end, shape (n,)."""
     known: BoolArray
-    """Whether it ever was in this incision, so that its `t1` tells where it was; shape (n,)."""
+    """Whether it was so in the step before, so that its `t1` tells where it was; shape (n,)."""
     linked: BoolArray
     """Whether sample and next sample span a piece of the sheet, shape (n,)."""
     boxes: IntArray

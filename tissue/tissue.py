@@ -32,7 +32,7 @@ from tissue.border import (
     checked_positions,
 )
 from tissue.cut import FULL, SPARE_NODES, Quality
-from tissue.holding import meet, near_box, seize
+from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import count_pieces
@@ -175,10 +175,11 @@ class Tissue:
         self._warn_of_toughness()
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
+        self._snap_floor = quality.floor * self.node_size
         self._scheme: Scheme = StellarScheme(
             Quality(
                 snap=quality.snap,
-                floor=quality.floor * self.node_size,
+                floor=self._snap_floor,
                 guard=quality.guard * self.node_size,
                 crumb=float(quality.crumb * volume / n_tetrahedra),
             ),
@@ -368,9 +369,11 @@ class Tissue:
     def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
         clear_forces(anchors, self._body, self._stages.external)
-        seize(anchors, self._body, self._visits, edge, when, self._around)
+        reach = self._snap_floor
+        let_go(anchors, self._body, self._visits, self._path, edge, when, self._around)
+        seize(anchors, self._body, self._visits, edge, when, reach, self._around)
         self._renew_grid(anchors, edge, when)
-        meet(anchors, self._body, self._grid, edge, when)
+        meet(anchors, self._body, self._grid, edge, when, reach)
         if not is_engaged(anchors):
             self._end_incision()
             return

@@ -77,7 +77,7 @@ def trace_path(
                 behind = margin if begun else 0.0
                 store(path.t0, k, axpy(-behind, ahead, vec3(path.t1, k)))
     for k in range(n):
-        path.known[k] = path.known[k] or path.member[k]
+        path.known[k] = path.member[k]
         path.linked[k] = k + 1 < n and path.member[k] and path.member[k + 1]
         if anchors.state[k] == LEFT:
             anchors.state[k] = FREE
