@@ -29,7 +29,7 @@ from tissue.jit import kernel
 from tissue.rotation import to_material
 from tissue.star import Visits
 from tissue.types import IntArray
-from tissue.vec3 import Vec3, add, axpy, dot, norm, store, sub, vec3
+from tissue.vec3 import Vec3, add, dot, norm, store, sub, vec3
 
 SEARCH = 512
 """Tetrahedra that the search beyond a cut face looks at, at most."""
@@ -43,7 +43,7 @@ class Place(NamedTuple):
     inside: bool
     """Whether it holds the point."""
     beyond_skin: bool
-    """Where it does not: whether the skin is between them, rather than a cut."""
+    """Where it does not: whether the skin is between them, or the lip of an earlier cut."""
 
 
 @kernel
@@ -82,7 +82,7 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
     w = barycentric_in(p, body.rest, body.tetrahedra, closest)
     for f in range(4):
         if w[f] == closest_weight:
-            return Place(closest, False, body.links[closest, f] == OUTER)
+            return Place(closest, False, body.links[closest, f] < 0)
     return Place(closest, False, False)
 
 
@@ -145,7 +145,7 @@ def slip(
     """
     n = len(anchors.state)
     frame = edge_frame(edge, when)
-    forward = frame[1]
+    along, forward, flat = frame
     for k in range(n):
         if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
             continue
@@ -155,10 +155,12 @@ def slip(
         if ahead < 0.0:
             if anchors.state[k] == ANCHORED:
                 anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
-            beside = norm(axpy(-ahead, forward, d))
-            anchors.state[k] = FREE if beside > reach else RETRACTED
+            anchors.state[k] = FREE if abs(dot(d, flat)) > reach else RETRACTED
             continue
         if anchors.state[k] == RETRACTED:
+            if abs(dot(d, along)) > reach:  # it comes back elsewhere
+                anchors.state[k] = FREE
+                continue
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
             anchors.state[k] = ANCHORED
         step = surplus_of(anchors, k, d, frame, toughness)

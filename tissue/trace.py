@@ -60,7 +60,7 @@ def trace_path(
             if anchors.slipped[k]:
                 store(path.t1, k, vec3(anchors.rest, k))
             elif not path.known[k]:
-                store(path.t1, k, axpy(-margin, ahead, vec3(anchors.rest, k)))
+                store(path.t1, k, _behind(body, vec3(anchors.rest, k), margin, ahead, path.seed[k]))
             if anchors.state[k] == LEFT and _advances(edge, forward, k, n):
                 _reach_out(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
     for k in range(n):
@@ -73,9 +73,10 @@ def trace_path(
                 store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
             if path.known[k]:
                 _never_back(path, k, sideways)
-            else:  # a new member begins outside the skin, behind where it is met now
-                behind = margin if begun else 0.0
-                store(path.t0, k, axpy(-behind, ahead, vec3(path.t1, k)))
+            elif begun:  # a new member begins outside the skin, behind where it is met now
+                store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
+            else:
+                store(path.t0, k, vec3(path.t1, k))
     for k in range(n):
         path.known[k] = path.member[k]
         path.linked[k] = k + 1 < n and path.member[k] and path.member[k + 1]
@@ -96,6 +97,18 @@ def _advances(edge: Edge, forward: Vec3, k: int, n: int) -> bool:
     """Whether the blade moves forward at sample `k` of `n`, rather than backs off."""
     way = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
     return dot(way, forward) > 0.0
+
+
+@kernel
+def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
+    """Where a sheet begins that is met at `p` [m]: outside the skin, or in a slit that is there.
+
+    In the midst of tissue, where a tip was driven in, it begins at `p` itself.
+    """
+    behind = axpy(-margin, ahead, p)
+    if seed >= 0 and walk(body, behind, seed).inside:
+        return p
+    return behind
 
 
 @kernel
