@@ -321,4 +321,5 @@ def _copy_node(cut: Cut, node: int) -> int:
     if on_sheet(sheet, node):
         put_on_sheet(sheet, copy, sheet.offset[node])
     see_side(sheet, copy, side_of(sheet, node), True)
+    sheet.past_offset[copy] = sheet.past_offset[node]
     return copy

@@ -21,6 +21,8 @@ class Sheet(Arrays):
     """Shape (node capacity,)."""
     offset: FloatArray
     """Distance of an on-sheet node from the true sheet [m], -1 for others; (node capacity,)."""
+    past_offset: FloatArray
+    """The largest offset that a node had on earlier sheets [m], -1 if none; (node capacity,)."""
     side: IntArray
     """Side of the sheet that a node was seen on, +1 or -1, 0 if not seen; (node capacity,)."""
     nodes: IntArray
@@ -41,6 +43,7 @@ def new_sheet(n_nodes: int, n_tetrahedra: int) -> Sheet:
         number=np.ones(1, np.int64),
         node_stamp=np.zeros(n_nodes, np.int64),
         offset=np.full(n_nodes, -1.0),
+        past_offset=np.full(n_nodes, -1.0),
         side=np.zeros(n_nodes, np.int64),
         nodes=np.zeros(n_nodes, np.int64),
         n_nodes=np.zeros(1, np.int64),
@@ -55,6 +58,7 @@ def grown_sheet(sheet: Sheet, n_nodes: int, n_tetrahedra: int) -> Sheet:
     return sheet.replaced(
         node_stamp=grown(sheet.node_stamp, n_nodes),
         offset=grown(sheet.offset, n_nodes, -1.0),
+        past_offset=grown(sheet.past_offset, n_nodes, -1.0),
         side=grown(sheet.side, n_nodes),
         nodes=grown(sheet.nodes, n_nodes),
         tetrahedron_stamp=grown(sheet.tetrahedron_stamp, n_tetrahedra),
@@ -76,6 +80,7 @@ def touch(sheet: Sheet, node: int) -> None:
     """Make sure that the entries of `node` belong to the current incision."""
     if sheet.node_stamp[node] != sheet.number[0]:
         sheet.node_stamp[node] = sheet.number[0]
+        sheet.past_offset[node] = max(sheet.past_offset[node], sheet.offset[node])
         sheet.offset[node] = -1.0
         sheet.side[node] = 0
 
@@ -84,6 +89,14 @@ def touch(sheet: Sheet, node: int) -> None:
 def on_sheet(sheet: Sheet, node: int) -> bool:
     """Whether `node` lies on the sheet of the current incision."""
     return sheet.node_stamp[node] == sheet.number[0] and sheet.offset[node] >= 0.0
+
+
+@kernel
+def past_offset(sheet: Sheet, node: int) -> float:
+    """The largest distance of `node` from an earlier sheet that it lies on [m], or -1."""
+    if sheet.node_stamp[node] != sheet.number[0]:
+        return max(sheet.past_offset[node], sheet.offset[node])
+    return sheet.past_offset[node]
 
 
 @kernel

@@ -9,7 +9,7 @@ import math
 from tissue.cut import FULL, Cut, flag
 from tissue.jit import kernel
 from tissue.path import plane_at
-from tissue.sheet import on_sheet, see_side
+from tissue.sheet import on_sheet, past_offset, see_side
 from tissue.star import node_size
 from tissue.stellar import (
     edge_split_is_good,
@@ -29,9 +29,14 @@ EXPLAINED_SHARE = 0.05
 
 @kernel
 def snap_distance(cut: Cut, node: int) -> float:
-    """Distance within which a crossing moves to `node` [m]."""
+    """Distance within which a crossing moves to `node` [m].
+
+    A node on an earlier cut may lie further from that sheet than its smaller neighbours let a new
+    one be: it draws crossings from there too, so that the same cut again adds nothing.
+    """
     size = node_size(cut.body, cut.visits, node, cut.work.around)
-    return max(cut.quality.snap * size, cut.quality.floor)
+    past = EXPLAINED * max(past_offset(cut.sheet, node), 0.0)
+    return max(max(cut.quality.snap * size, cut.quality.floor), past)
 
 
 @kernel
