@@ -40,56 +40,103 @@ class Event(NamedTuple):
     leaving: bool
 
 
+class Way(NamedTuple):
+    """A straight way through the body at rest."""
+
+    start: Point
+    stop: Point
+    origin: Vec3
+    """Where it starts [m]."""
+    direction: Vec3
+    """From start to stop [m]."""
+
+
 @kernel
 def extend_fronts(cut: Cut) -> None:
     """Extend the crack front at the tip and at the heel by their way in this step."""
-    last = len(cut.path.seed) - 1
+    path, front = cut.path, cut.sheet.front
+    last = len(path.seed) - 1
     for end in range(2):
         sample = 0 if end == 0 else last
-        if cut.path.member[sample]:
-            _extend_front(cut, end, sample)
+        if path.member[sample]:
+            origin = vec3(path.t0, sample)
+            way = Way(
+                point(path.lattice_t0, sample),
+                point(path.lattice_t1, sample),
+                origin,
+                sub(vec3(path.t1, sample), origin),
+            )
+            front[end] = _lay_front(cut, way, front[end])
         else:
-            cut.sheet.front[end] = -1
+            front[end] = -1
 
 
 @kernel
-def _extend_front(cut: Cut, end: int, sample: int) -> None:
-    front = cut.sheet.front
+def bring_front_to_blade(cut: Cut) -> None:
+    """Lay the crack front along the edge itself, where it rests: the cut opens up to there.
+
+    Without, it opens up to the last faces that the edge has left behind, up to an element late.
+    While the edge moves on that is soon made good, and every front that is laid adds nodes.
+    """
+    path, front = cut.path, cut.sheet.front
+    last = len(path.seed) - 1
+    node = front[0] if path.member[0] else -1
+    for k in range(last):
+        if not path.linked[k]:
+            node = -1
+            continue
+        origin = vec3(path.t1, k)
+        way = Way(
+            point(path.lattice_t1, k),
+            point(path.lattice_t1, k + 1),
+            origin,
+            sub(vec3(path.t1, k + 1), origin),
+        )
+        node = _lay_front(cut, way, node)
+        if cut.change.counts[FULL] != 0:
+            return
+    if node >= 0 and path.member[last] and front[1] >= 0:
+        _join(cut, node, front[1])
+
+
+@kernel
+def _lay_front(cut: Cut, way: Way, before: int) -> int:
+    """Put a node where the way passes each face, and join them, the first one to node `before`.
+
+    Returns the last node; -1 where the way has left the body, or never was in it.
+    """
     when = 0.0
     for _ in range(MOST_EVENTS):
-        event = _next_event(cut, sample, when)
+        event = _next_event(cut, way, when)
         if event.when > 1.0:
-            return
+            return before
         when = event.when + PARAMETER_GAP
         node = insert_in_face(cut, event.a, event.b, event.c, event.weights)
         if node < 0:
-            return
-        if front[end] >= 0 and not (event.outer and not event.leaving):
-            _join(cut, front[end], node)
-        front[end] = -1 if event.outer and event.leaving else node
+            return before
+        if before >= 0 and not (event.outer and not event.leaving):
+            _join(cut, before, node)
+        before = -1 if event.outer and event.leaving else node
         if cut.change.counts[FULL] != 0:
-            return
+            return before
+    return before
 
 
 @kernel
-def _next_event(cut: Cut, sample: int, after: float) -> Event:
-    """The first face that the way of a sample pierces after that fraction of the step."""
-    path, work, change = cut.path, cut.work, cut.change
-    start = point(path.lattice_t0, sample)
-    stop = point(path.lattice_t1, sample)
+def _next_event(cut: Cut, way: Way, after: float) -> Event:
+    """The first face that the way pierces after that fraction of it."""
+    work, change = cut.work, cut.change
     best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), False, False)
     for i in range(work.n_active[0]):
-        best = _earlier_event(cut, work.active[i], sample, start, stop, after, best)
+        best = _earlier_event(cut, work.active[i], way, after, best)
     for i in range(change.counts[N_DIRTY]):
-        best = _earlier_event(cut, change.dirty[i], sample, start, stop, after, best)
+        best = _earlier_event(cut, change.dirty[i], way, after, best)
     return best
 
 
 @kernel
-def _earlier_event(
-    cut: Cut, t: int, sample: int, start: Point, stop: Point, after: float, best: Event
-) -> Event:
-    body, path = cut.body, cut.path
+def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Event:
+    body = cut.body
     for f in range(4):
         link = body.links[t, f]
         if link >= 0 and link // 4 < t:
@@ -100,12 +147,10 @@ def _earlier_event(
         pa = point(body.lattice_rest, a)
         pb = point(body.lattice_rest, b)
         pc = point(body.lattice_rest, c)
-        if not pierces(start, stop, pa, pb, pc):
+        if not pierces(way.start, way.stop, pa, pb, pc):
             continue
-        origin = vec3(path.t0, sample)
-        way = sub(vec3(path.t1, sample), origin)
         when, w = _meet_plane(
-            origin, way, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
+            way.origin, way.direction, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
         )
         when = min(max(when, PARAMETER_GAP), 1.0)
         if not after < when < best.when:
@@ -114,7 +159,7 @@ def _earlier_event(
             sub(vec3(body.rest, b), vec3(body.rest, a)), sub(vec3(body.rest, c), vec3(body.rest, a))
         )
         apex = sub(vec3(body.rest, body.tetrahedra[t, f]), vec3(body.rest, a))
-        leaving = dot(normal, way) * dot(normal, apex) < 0.0
+        leaving = dot(normal, way.direction) * dot(normal, apex) < 0.0
         best = Event(when, a, b, c, w, link < 0, leaving)
     return best
 

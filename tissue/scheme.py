@@ -31,6 +31,10 @@ class Scheme(Protocol):
         """Cut what was detected: one pass."""
         ...
 
+    def rest(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut up to the edge itself, which rests: one pass."""
+        ...
+
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut what is left when the blade has left the incision: one pass."""
         ...

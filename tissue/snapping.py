@@ -6,11 +6,13 @@ on the order of crossings and no thin tetrahedron with four nodes on the sheet a
 
 import math
 
+from tissue.body import CUT
 from tissue.cut import FULL, Cut, flag
+from tissue.geometry import normalised
 from tissue.jit import kernel
-from tissue.path import plane_at
+from tissue.path import SAME_WAY, plane_at
 from tissue.sheet import on_sheet, past_offset, see_side
-from tissue.star import node_size
+from tissue.star import node_size, star
 from tissue.stellar import (
     edge_split_is_good,
     face_split_is_good,
@@ -32,11 +34,36 @@ def snap_distance(cut: Cut, node: int) -> float:
     """Distance within which a crossing moves to `node` [m].
 
     A node on an earlier cut may lie further from that sheet than its smaller neighbours let a new
-    one be: it draws crossings from there too, so that the same cut again adds nothing.
+    one be. It draws crossings from there too, so that the same cut again adds nothing.
     """
     size = node_size(cut.body, cut.visits, node, cut.work.around)
-    past = EXPLAINED * max(past_offset(cut.sheet, node), 0.0)
-    return max(max(cut.quality.snap * size, cut.quality.floor), past)
+    distance = max(cut.quality.snap * size, cut.quality.floor)
+    past = EXPLAINED * past_offset(cut.sheet, node)
+    if past > distance and _is_on_such_a_cut(cut, node):
+        return past
+    return distance
+
+
+@kernel
+def _is_on_such_a_cut(cut: Cut, node: int) -> bool:
+    """Whether the cut through `node` lies as the sheet does: a face of it, or all that is known."""
+    body, around = cut.body, cut.work.around
+    sideways = vec3(cut.path.sideways, 0)
+    n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
+    any_face = False
+    for i in range(n):
+        t = around[i]
+        for f in range(4):
+            if body.links[t, f] != CUT or body.tetrahedra[t, f] == node:
+                continue
+            any_face = True
+            a = vec3(body.rest, body.tetrahedra[t, (f + 1) % 4])
+            b = vec3(body.rest, body.tetrahedra[t, (f + 2) % 4])
+            c = vec3(body.rest, body.tetrahedra[t, (f + 3) % 4])
+            normal = normalised(cross(sub(b, a), sub(c, a)))
+            if abs(dot(normal, sideways)) >= SAME_WAY:
+                return True
+    return not any_face
 
 
 @kernel

@@ -11,7 +11,7 @@ import numpy as np
 from tissue.body import Body
 from tissue.bridges import remember_active, resolve_bridges
 from tissue.cut import Cut, Quality, clear_changes, new_change, new_work
-from tissue.front import extend_fronts
+from tissue.front import bring_front_to_blade, extend_fronts
 from tissue.path import Path
 from tissue.separate import close_sheet, open_sheet
 from tissue.sheet import begin_sheet, grown_sheet, new_sheet
@@ -50,6 +50,15 @@ class StellarScheme:
         """See `Scheme`."""
         cut = self._arrays(body, visits, path)
         self._insert(cut)
+        open_sheet(cut)
+        remember_active(cut)
+
+    def rest(self, body: Body, visits: Visits, path: Path) -> None:
+        """See `Scheme`."""
+        cut = self._arrays(body, visits, path)
+        clear_changes(cut.change)
+        bring_front_to_blade(cut)
+        resolve_bridges(cut)
         open_sheet(cut)
         remember_active(cut)
 

@@ -72,6 +72,12 @@ INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
 steep curves leave tetrahedra that bridge the cut."""
 
+RESTING_SPEED = 0.2
+"""Mean node sizes per second below which the edge counts as at rest."""
+RESTING_TIME = 0.02
+"""How long it is so before the cut opens up to the edge [s]. A trembling hand stands still for an
+instant at each turn; to lay a crack front there each time would shred the mesh."""
+
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
 
@@ -167,6 +173,8 @@ class Tissue:
         self._grid = no_grid()
         self._path = new_path(2)
         self._incising = False
+        self._is_open = False
+        self._calm = 0.0
 
         every_node = np.arange(n_nodes)
         self._frequency_squared = 0.0
@@ -237,6 +245,8 @@ class Tissue:
             relaxation += relaxed - started
             collision += collided - relaxed
             topology += perf_counter() - collided
+        if self._incising and not self._is_open and sweep is not None and self._rests(sweep, dt):
+            self._open_up()
         return self._result(
             anchors, edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation)
         )
@@ -270,7 +280,7 @@ class Tissue:
         begin_path(self._path, rows[0])
         self._incising = True
         for i in range(1, len(rows)):
-            n = self._n_parts(rows[i] - rows[i - 1])
+            n = self._n_parts(float(np.linalg.norm(rows[i] - rows[i - 1], axis=1).max()))
             for j in range(1, n + 1):
                 at = j / n
                 points = (1.0 - at) * rows[i - 1] + at * rows[i]
@@ -399,9 +409,26 @@ class Tissue:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
         if not self._incising or not path_moved(self._path):
             return False
+        self._is_open = False
         put_on_lattice(self._path, self._body.lattice)
         self._scheme.detect(self._body, self._visits, self._path)
         return True
+
+    def _open_up(self) -> None:
+        """Cut up to the edge itself: it rests, or leaves the way that it came."""
+        put_on_lattice(self._path, self._body.lattice)
+        self._scheme.detect(self._body, self._visits, self._path)
+        self._cut(self._scheme.rest)
+        self._is_open = True
+
+    def _rests(self, sweep: BladeSweep, dt: float) -> bool:
+        """Whether the edge has rested for a while by the end of this step."""
+        travel = self._travel(sweep)
+        if path_moved(self._path) or travel > RESTING_SPEED * self.node_size * dt:
+            self._calm = 0.0
+        else:
+            self._calm += dt
+        return self._calm >= RESTING_TIME
 
     def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
         """Cut what was detected, and renew what depends on the mesh."""
@@ -422,6 +449,9 @@ class Tissue:
         """Resolve what the blade left behind, and let the next contact begin another sheet."""
         if not self._incising:
             return
+        if not self._is_open:
+            self._open_up()
+        self._is_open = False
         self._cut(self._scheme.end)
         self._scheme.forget()
         forget_path(self._path)
@@ -444,13 +474,17 @@ class Tissue:
         """Return in how many parts the step is taken, so that the edge moves little in each."""
         if sweep is None:
             return 1
-        t0, t1 = sweep
-        return self._n_parts(np.array([t1.tip - t0.tip, t1.heel - t0.heel]))
+        return self._n_parts(self._travel(sweep))
 
-    def _n_parts(self, ways: FloatArray) -> int:
-        """Return in how many parts points of the edge go these ways [m], shape (n, 3)."""
-        longest = float(np.sqrt((ways**2).sum(axis=1).max()))
-        return max(1, math.ceil(longest / (INCREMENT * self.node_size)))
+    def _n_parts(self, travel: float) -> int:
+        """Return in how many parts the edge goes that far [m]."""
+        return max(1, math.ceil(travel / (INCREMENT * self.node_size)))
+
+    @staticmethod
+    def _travel(sweep: BladeSweep) -> float:
+        """Return how far the edge moves [m]: the further of its two ends."""
+        t0, t1 = sweep
+        return max(math.dist(t1.tip, t0.tip), math.dist(t1.heel, t0.heel))
 
     def _result(
         self,
