@@ -32,6 +32,7 @@ from tissue.rotation import rotation_of, to_material
 from tissue.shapes import grid
 from tissue.slipping import find, put, slip
 from tissue.star import LARGEST_STAR, no_visits
+from tissue.tetrahedron_grid import build_grid
 from tissue.vec3 import Vec3, vec3
 
 pytestmark = pytest.mark.kernel
@@ -57,7 +58,8 @@ class Held:
         self.queue = np.zeros(LARGEST_STAR, dtype=np.int64)
         self.anchors = new_anchors(N, 0.016, STIFF)
         self.forces = np.zeros_like(self.body.rest)
-        meet(self.anchors, self.body, edge_at(0.009), 1.0)
+        grid = build_grid(self.body, self.body.positions, 0.0)
+        meet(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3)
 
     def pull(self, edge, toughness=TOUGH):
         x = self.body.positions
@@ -90,7 +92,8 @@ def test_the_samples_stand_for_the_whole_edge():
 
 def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     anchors = new_anchors(N, 0.016, STIFF)
-    meet(anchors, held.body, edge_at(-0.001), 1.0)
+    grid = build_grid(held.body, held.body.positions, 0.0)
+    meet(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3)
     assert not is_engaged(anchors)
     x = held.body.positions
     pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, TOUGH, held.forces)
@@ -205,7 +208,7 @@ def test_the_blade_works_force_times_way(held):
 def test_the_neighbours_of_an_anchored_sample_that_are_inside_are_anchored_too(held):
     held.anchors.state[:] = FREE
     held.anchors.state[2] = ANCHORED
-    seize(held.anchors, held.body, held.visits, edge_at(0.0095), 1.0, held.queue)
+    seize(held.anchors, held.body, held.visits, edge_at(0.0095), 1.0, 1e-3, held.queue)
     assert (held.anchors.state == ANCHORED).all()
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009, atol=1e-12)
 
