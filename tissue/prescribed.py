@@ -3,7 +3,12 @@
 from tissue.body import Body, walk
 from tissue.jit import kernel
 from tissue.path import Path
-from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at, tetrahedron_in_box
+from tissue.tetrahedron_grid import (
+    TetrahedronGrid,
+    list_appended,
+    tetrahedron_at,
+    tetrahedron_in_box,
+)
 from tissue.types import FloatArray
 from tissue.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
 
@@ -28,6 +33,7 @@ def prescribe_path(
 
     A sample that is not ahead of where it has been is held there: only the edge cuts, not the back.
     """
+    list_appended(body, body.rest, grid)
     n = len(path.member)
     along = sub(vec3(points, n - 1), vec3(points, 0))
     flat = cross(forward, along)

@@ -116,6 +116,7 @@ def _build_row(
             other = body.tetrahedra[around[i], k]
             if other != node and visits.nodes[other] != epoch:
                 visits.nodes[other] = epoch
+                visits.place[other] = n
                 n += 1
     if n > springs.room[node]:
         room = (n + ROW_QUANTUM - 1) // ROW_QUANTUM * ROW_QUANTUM
@@ -123,7 +124,8 @@ def _build_row(
         springs.room[node] = room
         springs.used[0] += room
     first = springs.first[node]
-    n = 0
+    for slot in range(first, first + n):
+        springs.stiffness[slot] = 0.0
     mass = 0.0
     for i in range(n_around):
         t = around[i]
@@ -131,16 +133,10 @@ def _build_row(
         mass += density * volume / 4.0
         for k in range(4):
             other = body.tetrahedra[t, k]
-            if other == node:
-                continue
-            slot = first
-            while slot < first + n and springs.neighbour[slot] != other:
-                slot += 1
-            if slot == first + n:
+            if other != node:
+                slot = first + visits.place[other]
                 springs.neighbour[slot] = other
-                springs.stiffness[slot] = 0.0
-                n += 1
-            springs.stiffness[slot] += volume
+                springs.stiffness[slot] += volume
     springs.count[node] = n
     body.masses[node] = mass
     here = vec3(body.rest, node)

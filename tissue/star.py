@@ -21,6 +21,8 @@ class Visits(Arrays):
     """Search that saw each tetrahedron last, shape (capacity,)."""
     nodes: IntArray
     """Search that saw each node last, shape (capacity,)."""
+    place: IntArray
+    """Where in a list of that search a node is, shape (capacity,)."""
 
 
 def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
@@ -29,6 +31,7 @@ def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
         epoch=np.zeros(1, np.int64),
         tetrahedra=np.zeros(n_tetrahedra, np.int64),
         nodes=np.zeros(n_nodes, np.int64),
+        place=np.zeros(n_nodes, np.int64),
     )
 
 

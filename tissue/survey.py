@@ -1,4 +1,4 @@
-"""Where the body is, and how far its nodes went since they were looked at last."""
+"""Where the body is."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,6 @@ import numpy as np
 
 from tissue.body import NODES, Body
 from tissue.jit import kernel
-from tissue.types import FloatArray
 from tissue.vec3 import Vec3
 
 
@@ -17,13 +16,11 @@ class Survey(NamedTuple):
     """Lowest corner of the body [m]; not finite where the motion became unstable."""
     high: Vec3
     """Highest corner [m]."""
-    motion_squared: float
-    """Square of the longest way of a node since it was at `before` [m2]."""
 
 
 @kernel
-def survey(body: Body, before: FloatArray) -> Survey:
-    """Look at all nodes; `before` [m], shape (n, 3), has the places of the first n of them."""
+def survey(body: Body) -> Survey:
+    """Look at all nodes."""
     x = body.positions
     n = body.counts[NODES]
     low_x = low_y = low_z = np.inf
@@ -39,10 +36,4 @@ def survey(body: Body, before: FloatArray) -> Survey:
         total += x[i, 0] + x[i, 1] + x[i, 2]
     if not np.isfinite(total):  # a comparison with nan is false: min and max would overlook it
         high_x = total
-    motion_squared = 0.0
-    for i in range(min(n, len(before))):
-        dx = x[i, 0] - before[i, 0]
-        dy = x[i, 1] - before[i, 1]
-        dz = x[i, 2] - before[i, 2]
-        motion_squared = max(motion_squared, dx * dx + dy * dy + dz * dz)
-    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z), motion_squared)
+    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z))

@@ -1,7 +1,9 @@
 """A grid of cells that lists the tetrahedra near each: where a point is, without asking them all.
 
-It is built from the boxes of all tetrahedra, widened by a margin, and stays right until a node has
-moved by more than that. Tetrahedra that a cut appends are not in it: they are few, and asked all.
+Each tetrahedron is listed in the cells that its box meets, widened by a margin. Where a node has
+gone further than the margin, the tetrahedra around it are listed again where they are now: what is
+listed in vain costs a look, never a wrong answer. So the cost of a step is that of the nodes that
+went far, and of one pass over all nodes to find them.
 """
 
 import numpy as np
@@ -10,6 +12,7 @@ from tissue.arrays import Arrays
 from tissue.body import NODES, TETRAHEDRA, Body
 from tissue.geometry import barycentric_in, smallest_weight
 from tissue.jit import kernel
+from tissue.star import Visits, star
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3
 
@@ -20,29 +23,38 @@ lists of cells, more make long lists in each."""
 MOST_CELLS = 1 << 20
 """Cells at most, for a body that fills little of its box."""
 
-MOST_APPENDED = 512
-"""Appended tetrahedra after which the grid is built anew; asking them all takes some 2 us."""
+ENTRIES_PER_TETRAHEDRON = 16
+"""Room for entries. A tetrahedron meets some eight cells; when the room is used up the grid is
+built anew."""
+
+LEAST_ENTRIES = 1 << 14
+"""Room for entries at least."""
+
+LISTED, ENTRIES = 0, 1
+"""Places in `TetrahedronGrid.counts`."""
 
 
 class TetrahedronGrid(Arrays):
-    """Lists of tetrahedra, one a cell."""
+    """Linked lists of tetrahedra, one a cell."""
 
     origin: FloatArray
     """Lowest corner [m], shape (3,)."""
     spacing: float
     """Edge of a cell [m]."""
     shape: IntArray
-    """Cells along each axis, shape (3,)."""
-    first: IntArray
-    """Where each cell's list begins in `items`, and where the last one ends; (n_cells + 1,)."""
-    items: IntArray
-    """Tetrahedra, cell after cell."""
-    n_tetrahedra: IntArray
-    """How many tetrahedra there were, shape (1,)."""
-    positions: FloatArray
-    """Where the nodes were [m], shape (n_nodes, 3)."""
+    """Cells along each axis, shape (3,). Those on the rim reach to infinity."""
+    head: IntArray
+    """First entry of each cell's list, -1 if it is empty; shape (n_cells,)."""
+    following: IntArray
+    """The next entry of the same list, -1 at its end; shape (room,)."""
+    entry: IntArray
+    """Tetrahedron of each entry, shape (room,)."""
+    counts: IntArray
+    """How many tetrahedra are listed, and how many entries there are; shape (2,)."""
+    listed_at: FloatArray
+    """Where the nodes were when they were listed last [m], shape (node capacity, 3)."""
     margin: float
-    """By how much the boxes were widened [m]."""
+    """By how much the boxes are widened [m]."""
 
 
 def no_grid() -> TetrahedronGrid:
@@ -50,11 +62,12 @@ def no_grid() -> TetrahedronGrid:
     return TetrahedronGrid(
         origin=np.zeros(3),
         spacing=1.0,
-        shape=np.zeros(3, np.int64),
-        first=np.zeros(1, np.int64),
-        items=np.zeros(0, np.int64),
-        n_tetrahedra=np.zeros(1, np.int64),
-        positions=np.zeros((0, 3)),
+        shape=np.ones(3, np.int64),
+        head=np.full(1, -1, np.int64),
+        following=np.zeros(0, np.int64),
+        entry=np.zeros(0, np.int64),
+        counts=np.zeros(2, np.int64),
+        listed_at=np.zeros((0, 3)),
         margin=0.0,
     )
 
@@ -62,24 +75,84 @@ def no_grid() -> TetrahedronGrid:
 def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronGrid:
     """Return the grid of all tetrahedra at `positions` [m], widened by `margin` [m]."""
     n_nodes, n_tetrahedra = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
-    positions = positions[:n_nodes].copy()
-    low = positions.min(axis=0) - margin
-    size = positions.max(axis=0) + margin - low
+    low = positions[:n_nodes].min(axis=0) - margin
+    size = positions[:n_nodes].max(axis=0) + margin - low
     n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), MOST_CELLS)
     spacing = float(max(np.cbrt(size.prod() / n_cells), size.max() / n_cells))
     shape = np.floor(size / spacing).astype(np.int64) + 1
-    grid = no_grid().replaced(
-        origin=low,
-        spacing=spacing,
-        shape=shape,
-        first=np.zeros(int(shape.prod()) + 1, np.int64),
-        n_tetrahedra=np.array([n_tetrahedra]),
-        positions=positions,
-        margin=margin,
-    )
-    grid = grid.replaced(items=np.empty(count_items(body, grid), np.int64))
-    fill_items(body, grid)
-    return grid
+    room = max(ENTRIES_PER_TETRAHEDRON * n_tetrahedra, LEAST_ENTRIES)
+    while True:
+        grid = TetrahedronGrid(
+            origin=low,
+            spacing=spacing,
+            shape=shape,
+            head=np.full(int(shape.prod()), -1, np.int64),
+            following=np.empty(room, np.int64),
+            entry=np.empty(room, np.int64),
+            counts=np.zeros(2, np.int64),
+            listed_at=positions.copy(),
+            margin=margin,
+        )
+        if list_appended(body, positions, grid):
+            return grid
+        room *= 2
+
+
+@kernel
+def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> bool:
+    """List the tetrahedra that were appended since the last call; return whether there was room."""
+    while grid.counts[LISTED] < body.counts[TETRAHEDRA]:
+        t = grid.counts[LISTED]
+        for k in range(4):
+            node = body.tetrahedra[t, k]
+            for c in range(3):
+                grid.listed_at[node, c] = positions[node, c]
+        if not _list_tetrahedron(body, positions, grid, t):
+            return False
+        grid.counts[LISTED] += 1
+    return True
+
+
+@kernel
+def list_moved(body: Body, visits: Visits, grid: TetrahedronGrid, around: IntArray) -> bool:
+    """List the tetrahedra around nodes that went far again; return whether there was room.
+
+    `around` is scratch of shape (LARGEST_STAR,).
+    """
+    x = body.positions
+    limit = grid.margin * grid.margin
+    for node in range(body.counts[NODES]):
+        dx = x[node, 0] - grid.listed_at[node, 0]
+        dy = x[node, 1] - grid.listed_at[node, 1]
+        dz = x[node, 2] - grid.listed_at[node, 2]
+        if dx * dx + dy * dy + dz * dz <= limit:
+            continue
+        for c in range(3):
+            grid.listed_at[node, c] = x[node, c]
+        n = star(body, visits, node, body.node_tetrahedron[node], around)
+        for i in range(n):
+            if not _list_tetrahedron(body, x, grid, around[i]):
+                return False
+    return True
+
+
+@kernel
+def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int) -> bool:
+    x0, x1 = _cell_range(body, positions, grid, t, 0)
+    y0, y1 = _cell_range(body, positions, grid, t, 1)
+    z0, z1 = _cell_range(body, positions, grid, t, 2)
+    if grid.counts[ENTRIES] + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
+        return False
+    for i in range(x0, x1 + 1):
+        for j in range(y0, y1 + 1):
+            for k in range(z0, z1 + 1):
+                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
+                at = grid.counts[ENTRIES]
+                grid.counts[ENTRIES] += 1
+                grid.entry[at] = t
+                grid.following[at] = grid.head[cell]
+                grid.head[cell] = at
+    return True
 
 
 @kernel
@@ -93,105 +166,55 @@ def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, f
 
 
 @kernel
-def _cell_range(body: Body, grid: TetrahedronGrid, t: int, c: int) -> tuple[int, int]:
+def _cell_range(
+    body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int, c: int
+) -> tuple[int, int]:
     """First and last cell along axis `c` that the widened box of tetrahedron `t` meets."""
-    low, high = _extent(body, grid.positions, t, c)
-    return _cells_between(grid, low - grid.margin, high + grid.margin, c)
+    low, high = _extent(body, positions, t, c)
+    return _cell_along(grid, low - grid.margin, c), _cell_along(grid, high + grid.margin, c)
 
 
 @kernel
-def count_items(body: Body, grid: TetrahedronGrid) -> int:
-    """Write where each cell's list will end to `grid.first`; return the length of all lists."""
-    first = grid.first
-    for i in range(len(first)):
-        first[i] = 0
-    for t in range(grid.n_tetrahedra[0]):
-        x0, x1 = _cell_range(body, grid, t, 0)
-        y0, y1 = _cell_range(body, grid, t, 1)
-        z0, z1 = _cell_range(body, grid, t, 2)
-        for i in range(x0, x1 + 1):
-            for j in range(y0, y1 + 1):
-                for k in range(z0, z1 + 1):
-                    first[(i * grid.shape[1] + j) * grid.shape[2] + k] += 1
-    total = 0
-    for i in range(len(first)):
-        total += first[i]
-        first[i] = total
-    return total
-
-
-@kernel
-def fill_items(body: Body, grid: TetrahedronGrid) -> None:
-    """Write the lists; `grid.first`, where they end so far, becomes where they begin."""
-    first = grid.first
-    for back in range(grid.n_tetrahedra[0]):
-        t = grid.n_tetrahedra[0] - 1 - back
-        x0, x1 = _cell_range(body, grid, t, 0)
-        y0, y1 = _cell_range(body, grid, t, 1)
-        z0, z1 = _cell_range(body, grid, t, 2)
-        for i in range(x0, x1 + 1):
-            for j in range(y0, y1 + 1):
-                for k in range(z0, z1 + 1):
-                    cell = (i * grid.shape[1] + j) * grid.shape[2] + k
-                    first[cell] -= 1
-                    grid.items[first[cell]] = t
-
-
-@kernel
-def cell_of(grid: TetrahedronGrid, p: Vec3) -> int:
-    """The cell that holds `p` [m], or -1 outside the grid."""
-    x = (p.x - grid.origin[0]) / grid.spacing
-    y = (p.y - grid.origin[1]) / grid.spacing
-    z = (p.z - grid.origin[2]) / grid.spacing
-    if not (0.0 <= x < grid.shape[0] and 0.0 <= y < grid.shape[1] and 0.0 <= z < grid.shape[2]):
-        return -1
-    return (int(x) * grid.shape[1] + int(y)) * grid.shape[2] + int(z)
+def _cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
+    """The cell along axis `c` that holds a coordinate [m]."""
+    cell = (coordinate - grid.origin[c]) / grid.spacing
+    return int(min(max(cell, 0.0), grid.shape[c] - 1.0))
 
 
 @kernel
 def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: Vec3) -> int:
-    """The first tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
+    """The tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
 
-    The order is that of their numbers, so that a point on a face between two is always found in
-    the same one.
+    It is the one of the lowest number, so that a point on a face is always found in the same one.
     """
-    cell = cell_of(grid, p)
-    if cell >= 0:
-        for i in range(grid.first[cell], grid.first[cell + 1]):
-            w = barycentric_in(p, positions, body.tetrahedra, grid.items[i])
-            if smallest_weight(w) >= 0.0:
-                return grid.items[i]
-    for t in range(grid.n_tetrahedra[0], body.counts[TETRAHEDRA]):
-        if smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0:
-            return t
-    return -1
+    i = _cell_along(grid, p.x, 0)
+    j = _cell_along(grid, p.y, 1)
+    k = _cell_along(grid, p.z, 2)
+    found = -1
+    at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
+    while at >= 0:
+        t = grid.entry[at]
+        is_first = found < 0 or t < found
+        if is_first and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0:
+            found = t
+        at = grid.following[at]
+    return found
 
 
 @kernel
 def tetrahedron_in_box(
     body: Body, grid: TetrahedronGrid, positions: FloatArray, low: Vec3, high: Vec3
 ) -> int:
-    """The first tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
-    x0, x1 = _cells_between(grid, low.x, high.x, 0)
-    y0, y1 = _cells_between(grid, low.y, high.y, 1)
-    z0, z1 = _cells_between(grid, low.z, high.z, 2)
-    for i in range(x0, x1 + 1):
-        for j in range(y0, y1 + 1):
-            for k in range(z0, z1 + 1):
-                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
-                for at in range(grid.first[cell], grid.first[cell + 1]):
-                    if _meets_box(body, positions, grid.items[at], low, high):
-                        return grid.items[at]
+    """A tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
+    for i in range(_cell_along(grid, low.x, 0), _cell_along(grid, high.x, 0) + 1):
+        for j in range(_cell_along(grid, low.y, 1), _cell_along(grid, high.y, 1) + 1):
+            for k in range(_cell_along(grid, low.z, 2), _cell_along(grid, high.z, 2) + 1):
+                at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
+                while at >= 0:
+                    if _meets_box(body, positions, grid.entry[at], low, high):
+                        return grid.entry[at]
+                    at = grid.following[at]
     return -1
-
-
-@kernel
-def _cells_between(grid: TetrahedronGrid, low: float, high: float, c: int) -> tuple[int, int]:
-    """First and last cell along axis `c` between two coordinates [m]."""
-    last = grid.shape[c] - 1
-    first = np.floor((low - grid.origin[c]) / grid.spacing)
-    final = np.floor((high - grid.origin[c]) / grid.spacing)
-    return int(max(first, 0.0)), int(min(final, float(last)))
 
 
 @kernel

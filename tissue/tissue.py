@@ -45,7 +45,7 @@ from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
 from tissue.survey import survey
-from tissue.tetrahedron_grid import MOST_APPENDED, build_grid, no_grid
+from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
 from tissue.touched import largest_frequency, touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -82,7 +82,7 @@ SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
 
 GRID_MARGIN = 0.5
-"""How far nodes go before the search for contact is prepared anew, per mean node size."""
+"""How far a node goes before it is listed for the search of contact again, per mean node size."""
 
 ROOM_FOR_TETRAHEDRA = 1 << 12
 """Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
@@ -209,7 +209,7 @@ class Tissue:
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of the body [m], shape (2, 3)."""
-        seen = survey(self._body, self._grid.positions)
+        seen = survey(self._body)
         return np.array([seen.low, seen.high])
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
@@ -382,8 +382,7 @@ class Tissue:
         reach = self._snap_floor
         let_go(anchors, self._body, self._visits, self._path, edge, when, self._around)
         seize(anchors, self._body, self._visits, edge, when, reach, self._around)
-        self._renew_grid(anchors, edge, when)
-        meet(anchors, self._body, self._grid, edge, when, reach)
+        self._meet(anchors, edge, when)
         if not is_engaged(anchors):
             self._end_incision()
             return
@@ -391,19 +390,20 @@ class Tissue:
         margin = SHEET_MARGIN * self.node_size
         trace_path(anchors, self._body, edge, when, margin, self._path)
 
-    def _renew_grid(self, anchors: Anchors, edge: Edge, when: float) -> None:
-        """Build the grid anew where samples may come into the tissue and it is out of date."""
-        body, grid = self._body, self._grid
-        seen = survey(body, grid.positions)
-        if not near_box(anchors, edge, when, seen.low, seen.high):
+    def _meet(self, anchors: Anchors, edge: Edge, when: float) -> None:
+        """Anchor the samples that have come into the tissue by themselves."""
+        body = self._body
+        seen = survey(body)
+        if not (math.isfinite(seen.high.x) and near_box(anchors, edge, when, seen.low, seen.high)):
             return
-        is_current = bool(
-            seen.motion_squared <= grid.margin**2
-            and grid.n_tetrahedra[0] > 0
-            and self.n_tetrahedra - grid.n_tetrahedra[0] <= MOST_APPENDED
+        has_room = (
+            len(self._grid.listed_at) == len(body.positions)
+            and list_moved(body, self._visits, self._grid, self._around)
+            and list_appended(body, body.positions, self._grid)
         )
-        if not is_current and math.isfinite(seen.high.x):
+        if not has_room:
             self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
+        meet(anchors, body, self._grid, edge, when, self._snap_floor)
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
