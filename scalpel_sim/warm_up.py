@@ -36,7 +36,7 @@ def warm_up() -> None:
     tissue.step(None, DT)
     tissue.surface()
     tissue.snapshot()
-    tissue.pieces()
+    tissue.n_pieces()
 
 
 def _edge(fraction: float) -> BladeSegment:

@@ -36,7 +36,7 @@ def expect_sound(before, tissue: Tissue, pieces: int) -> None:
     after = tissue.snapshot()
     assert soundness.faults(before, after) == []
     assert soundness.n_pieces(after.tetrahedra) == pieces
-    assert tissue.pieces() == pieces
+    assert tissue.n_pieces() == pieces
 
 
 @pytest.mark.parametrize("stroke", strokes.THROUGH)
@@ -81,7 +81,7 @@ def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
     mesh = raw._replace(positions=raw.positions * (EXTENT / longest))
     tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.1))
     before = tissue.snapshot()
-    whole = tissue.pieces()
+    whole = tissue.n_pieces()
     planned = plan(stroke, mesh)
     poses = [planned.pose(t) for t in np.arange(0.0, planned.duration + strokes.DT, strokes.DT)]
     strokes.make(tissue, poses)
@@ -108,7 +108,7 @@ def test_a_cut_along_a_plane_of_the_mesh_adds_no_tetrahedra_and_has_its_area():
     results = strokes.make(tissue, strokes.straight(grid()))
     assert tissue.n_tetrahedra == 576
     assert results[-1].cut_area == pytest.approx(0.06 * 0.04, rel=1e-12)
-    assert tissue.pieces() == 2
+    assert tissue.n_pieces() == 2
 
 
 DEGENERATE = {
@@ -216,7 +216,7 @@ def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
         tissue.settle()
         strokes.make(tissue, strokes.upright(0.0207 * stretch, -0.01, 0.03, -0.01, 0.05))
         tissue.settle()
-        assert tissue.pieces() == 1
+        assert tissue.n_pieces() == 1
         return gap(tissue)
 
     gaps = [slit(stretch) for stretch in (1.0, 1.05, 1.15)]

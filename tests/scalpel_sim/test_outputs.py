@@ -10,10 +10,23 @@ from scalpel_sim.outputs import FORCES, FRAMES_PER_FLUSH, INITIAL, PLOT, SUMMARY
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.recording import COLUMNS, Recording
 from scalpel_sim.summary import Summary, summarise
+from tissue.pieces import pieces_of
 from tissue.shapes import grid
 from tissue.types import Snapshot
 
 DT = 1e-3
+
+PIECES = pieces_of(
+    Snapshot(
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.zeros((8, 3)),
+        np.ones(8),
+        np.array([[3, 0, 1, 2], [7, 4, 5, 6]]),
+        np.arange(8) == 4,
+    )
+)
+"""Two tetrahedra, the second of which is held."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +54,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
         wall_seconds=wall_seconds,
         tetrahedra_initial=6,
         tetrahedra_final=8,
-        pieces=2,
+        pieces=PIECES,
         counters={},
         settings={"stroke": "straight"},
     )
