@@ -8,6 +8,7 @@ import pytest
 
 from scalpel_sim.planning import plan
 from tests import bodies, soundness, strokes
+from tissue.material import Material
 from tissue.mesh_io import read_mesh
 from tissue.shapes import grid, organ
 from tissue.tissue import Tissue
@@ -195,7 +196,7 @@ def test_a_blade_drawn_back_in_its_cut_feels_nothing():
     tissue = at_rest(grid())
     strokes.make(tissue, there)
     results = strokes.make(tissue, [*reversed(there)])
-    assert np.abs([r.wrench.force for r in results[20:]]).max() == 0.0
+    assert np.abs([r.wrench.force for r in results[20:]]).max() < 1e-15  # lips touch: rounding
 
 
 def gap(tissue: Tissue) -> float:
@@ -212,7 +213,11 @@ def gap(tissue: Tissue) -> float:
 def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
     def slit(stretch):
         x = MESHES[mesh].positions
-        tissue = at_rest(MESHES[mesh], positions=x * [stretch, 1.0, 1.0])
+        # So easy to cut that no tetrahedron is dragged inside out, from where springs may not turn
+        # it back: what is asked here is how lips gape.
+        tissue = at_rest(
+            MESHES[mesh], material=Material(toughness=5.0), positions=x * [stretch, 1.0, 1.0]
+        )
         tissue.settle()
         strokes.make(tissue, strokes.upright(0.0207 * stretch, -0.01, 0.03, -0.01, 0.05))
         tissue.settle()

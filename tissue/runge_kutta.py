@@ -19,7 +19,7 @@ import numpy as np
 from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
-from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, remember_start, resolve
+from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
 from tissue.jit import kernel
 from tissue.slipping import slip
 from tissue.springs import Springs, accelerations
@@ -136,7 +136,7 @@ def relax(
         at = begin + i * share
         if contact.state[IS_PENDING] == 0:
             if is_awake:
-                remember_start(contact, body)
+                prepare(contact, body)
             runge_kutta_nystroem(
                 body,
                 springs,

@@ -53,6 +53,8 @@ class Candidates(Arrays):
     """Outward, weighted by area [m2], at the search; shape (node capacity, 3)."""
     triangle: IntArray
     """Nodes, counter-clockwise seen from outside; shape (capacity, 3)."""
+    behind: IntArray
+    """The tetrahedron behind each triangle, shape (capacity,)."""
     edge: IntArray
     """Nodes, shape (2 * capacity, 2)."""
     low: FloatArray
@@ -79,6 +81,7 @@ def new_candidates(n_nodes: int, capacity: int) -> Candidates:
         reference=np.zeros((n_nodes, 3)),
         normal=np.zeros((n_nodes, 3)),
         triangle=np.zeros((capacity, 3), np.int64),
+        behind=np.zeros(capacity, np.int64),
         edge=np.zeros((2 * capacity, 2), np.int64),
         low=np.zeros((2 * capacity, 3)),
         high=np.zeros((2 * capacity, 3)),
@@ -170,6 +173,7 @@ def _gather_triangles(candidates: Candidates, faces: Faces, body: Body, margin: 
         if row == len(candidates.triangle):
             return False
         counts[N_TRIANGLES] += 1
+        candidates.behind[row] = face // 4
         for k in range(3):
             candidates.triangle[row, k] = _face_node(candidates, body, face, k)
         _note_nodes(candidates, body, row)

@@ -1,6 +1,8 @@
-"""Boxes by the cells of a uniform grid that they reach into: the hash table of Teschner et al. 2003.
+"""Boxes by the cells of a uniform grid that they reach into, in a hash table.
 
 The table is built anew each time, by counting: no lists, no allocation, and always the same order.
+
+Source: Teschner et al. (2003), Optimized spatial hashing for collision detection.
 """
 
 import math

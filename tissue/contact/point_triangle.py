@@ -41,6 +41,25 @@ def weights_below(at: Corners, area: Vec3) -> tuple[float, float]:
     return b, c
 
 
+class Below(NamedTuple):
+    """The point of a triangle's plane under p."""
+
+    b: float
+    """Weight of the triangle's second corner."""
+    c: float
+    """Weight of its third corner."""
+    normal: Vec3
+    """Unit vector outwards."""
+
+
+@kernel
+def under(at: Corners) -> Below:
+    """Find the point of the triangle's plane under p."""
+    area = cross(sub(at.b, at.a), sub(at.c, at.a))
+    b, c = weights_below(at, area)
+    return Below(b, c, scale(1.0 / norm(area), area))
+
+
 @kernel
 def is_within(b: float, c: float) -> bool:
     """Whether weights belong to a point in the triangle, or on its rim."""

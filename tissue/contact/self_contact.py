@@ -22,7 +22,7 @@ from tissue.contact.faces import (
     renew_faces,
     with_room,
 )
-from tissue.contact.impulses import new_contacts
+from tissue.contact.impulses import grown_contacts, new_contacts
 from tissue.contact.resolve import (
     FLOOR_IMPULSE,
     IS_AWAKE,
@@ -67,10 +67,12 @@ class SelfContact:
         self.arrays = ContactState(
             faces=new_faces(n_tetrahedra),
             candidates=new_candidates(n_nodes, CAPACITY),
-            **self._of_pairs(n_nodes),
+            contacts=new_contacts(self._n_pairs(n_nodes)),
+            found=np.zeros(self._n_pairs(n_nodes), np.int64),
             start=np.zeros((n_nodes, 3)),
             depth=np.zeros(n_nodes),
             depth_epoch=np.zeros(n_nodes, np.int64),
+            tangled=np.zeros(n_nodes, np.int64),
             state=np.zeros(4, np.int64),
             totals=np.zeros(N_TOTALS),
             friction=float(friction),
@@ -109,6 +111,7 @@ class SelfContact:
         self.arrays = self.arrays.replaced(faces=faces)
         state[IS_AWAKE] |= faces.counts[0] > 0
         state[IS_STALE] = 1
+        self.arrays.contacts.count[0] = 0  # their nodes may be others now
 
     def look_for_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; its skin may touch then, too."""
@@ -137,7 +140,7 @@ class SelfContact:
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         arrays = self.arrays
-        of_nodes = ("start", "depth", "depth_epoch")
+        of_nodes = ("start", "depth", "depth_epoch", "tangled")
         self.arrays = arrays.replaced(
             faces=grown_faces(arrays.faces, n_tetrahedra),
             candidates=grown_candidates(arrays.candidates, n_nodes),
@@ -146,6 +149,11 @@ class SelfContact:
         )
 
     def _of_pairs(self, n_nodes: int) -> dict[str, object]:
-        """Return the arrays with a place for every pair, and for every node with the floor."""
-        capacity = 16 * self._capacity + n_nodes
-        return {"contacts": new_contacts(capacity), "found": np.zeros(capacity, np.int64)}
+        """Return the arrays of pairs with room for all of them."""
+        n_pairs = self._n_pairs(n_nodes)
+        contacts = grown_contacts(self.arrays.contacts, n_pairs)
+        return {"contacts": contacts, "found": np.zeros(n_pairs, np.int64)}
+
+    def _n_pairs(self, n_nodes: int) -> int:
+        """Return how many pairs there is room for, every node on the floor among them."""
+        return 16 * self._capacity + n_nodes
