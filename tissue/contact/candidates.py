@@ -1,7 +1,7 @@
 """Broad phase: the pairs of node and triangle, and of edge and edge, that may come to touch.
 
-The pairs are found with a margin and used until a node has moved by half of it. Only what is near
-an active face is looked at (see `faces`): the cost is that of the neighbourhood of the cuts.
+The pairs are found with a margin and used until a node has moved by half of it. Only faces of cuts
+and skin near another piece are looked at (see `faces`): the cost is that of their neighbourhood.
 """
 
 import math
@@ -9,8 +9,8 @@ import math
 import numpy as np
 
 from tissue.arrays import Arrays
-from tissue.body import Body, grown
-from tissue.contact.faces import N_FACES, WITH_SKIN, Faces, is_active
+from tissue.body import NODES, Body, grown
+from tissue.contact.faces import N_FACES, Faces, may_touch, measure_pieces
 from tissue.contact.grid import (
     Grid,
     bucket_of,
@@ -85,7 +85,8 @@ def new_candidates(n_nodes: int, capacity: int) -> Candidates:
         edge=np.zeros((2 * capacity, 2), np.int64),
         low=np.zeros((2 * capacity, 3)),
         high=np.zeros((2 * capacity, 3)),
-        grid=new_grid(1 << (2 * capacity - 1).bit_length(), 16 * capacity),
+        # As many buckets as items, nearly: with a quarter of them the search took twice as long.
+        grid=new_grid(1 << (8 * capacity - 1).bit_length(), 16 * capacity),
         point_triangle=np.zeros((8 * capacity, 2), np.int64),
         edge_edge=np.zeros((8 * capacity, 2), np.int64),
         counts=np.zeros(5, np.int64),
@@ -126,49 +127,34 @@ def find_candidates(
         start: Where they were before the Runge-Kutta step that is looked at [m].
         margin: [m].
     """
-    if not _gather_triangles(candidates, faces, body, margin):
-        return False
-    move = _largest_move(candidates, body, start)
+    move = _largest_move(body, start)
     if not move <= FARTHEST:
+        clear(candidates)
         return True
     reach = margin + 2.0 * move
+    if not _gather_triangles(candidates, faces, body, reach):
+        return False
     return _pair_points(candidates, body, reach) and _pair_edges(candidates, body, reach)
 
 
 @kernel
-def _gather_triangles(candidates: Candidates, faces: Faces, body: Body, margin: float) -> bool:
-    """Write the faces that are active, or near to those that are, with their nodes."""
+def clear(candidates: Candidates) -> None:
+    """Forget all."""
+    for i in range(len(candidates.counts)):
+        candidates.counts[i] = 0
+
+
+@kernel
+def _gather_triangles(candidates: Candidates, faces: Faces, body: Body, reach: float) -> bool:
+    """Write the faces that may touch, with their nodes."""
+    clear(candidates)
     counts = candidates.counts
-    for i in range(len(counts)):
-        counts[i] = 0
     candidates.search[0] += 1
-    x = body.positions
-    low_x = low_y = low_z = np.inf
-    high_x = high_y = high_z = -np.inf
-    with_skin = faces.counts[WITH_SKIN] == 1
-    if with_skin:
-        for i in range(faces.counts[N_FACES]):
-            if is_active(faces, body, faces.face[i]):
-                for k in range(3):
-                    node = _face_node(candidates, body, faces.face[i], k)
-                    low_x, high_x = min(low_x, x[node, 0]), max(high_x, x[node, 0])
-                    low_y, high_y = min(low_y, x[node, 1]), max(high_y, x[node, 1])
-                    low_z, high_z = min(low_z, x[node, 2]), max(high_z, x[node, 2])
+    measure_pieces(faces, body)
     for i in range(faces.counts[N_FACES]):
         face = faces.face[i]
-        if with_skin and not is_active(faces, body, face):
-            a = vec3(x, _face_node(candidates, body, face, 0))
-            b = vec3(x, _face_node(candidates, body, face, 1))
-            c = vec3(x, _face_node(candidates, body, face, 2))
-            if (
-                max(a.x, max(b.x, c.x)) < low_x - 2.0 * margin
-                or min(a.x, min(b.x, c.x)) > high_x + 2.0 * margin
-                or max(a.y, max(b.y, c.y)) < low_y - 2.0 * margin
-                or min(a.y, min(b.y, c.y)) > high_y + 2.0 * margin
-                or max(a.z, max(b.z, c.z)) < low_z - 2.0 * margin
-                or min(a.z, min(b.z, c.z)) > high_z + 2.0 * margin
-            ):
-                continue
+        if not may_touch(faces, body, face, reach):
+            continue
         row = counts[N_TRIANGLES]
         if row == len(candidates.triangle):
             return False
@@ -205,13 +191,14 @@ def _note_nodes(candidates: Candidates, body: Body, row: int) -> None:
 
 
 @kernel
-def _largest_move(candidates: Candidates, body: Body, start: FloatArray) -> float:
-    """How far a candidate node has moved since `start`, at most [m]."""
+def _largest_move(body: Body, start: FloatArray) -> float:
+    """How far a node has moved since `start`, at most [m]; NaN where it is not finite."""
     most = 0.0
-    for i in range(candidates.counts[N_NODES]):
-        node = candidates.node[i]
+    for node in range(body.counts[NODES]):
         d = sub(vec3(body.positions, node), vec3(start, node))
-        most = max(most, dot(d, d))
+        square = dot(d, d)
+        if not square <= most:
+            most = square
     return math.sqrt(most)
 
 

@@ -9,7 +9,7 @@ from tissue.arrays import Arrays
 from tissue.body import CUT, TETRAHEDRA, Body, grown
 from tissue.cut import N_DIRTY, Change
 from tissue.jit import kernel
-from tissue.types import BoolArray, IntArray
+from tissue.types import FloatArray, IntArray
 
 N_FACES, WITH_SKIN = 0, 1
 """Places in `Faces.counts`."""
@@ -22,8 +22,13 @@ class Faces(Arrays):
     """4 * tetrahedron + local face, shape (capacity,)."""
     place: IntArray
     """Where in `face` each face is, or -1; shape (tetrahedron capacity, 4)."""
-    loose: BoolArray
-    """Whether a tetrahedron is in a piece other than the largest, shape (tetrahedron capacity,)."""
+    piece: IntArray
+    """The piece that each tetrahedron is in, or -1 where it is younger than the last look for
+    pieces; shape (tetrahedron capacity,)."""
+    low: FloatArray
+    """Scratch: lowest corner of each piece [m], shape (n_pieces, 3)."""
+    high: FloatArray
+    """Scratch: highest corner of each piece [m], shape (n_pieces, 3)."""
     counts: IntArray
     """How many faces there are, and whether skin is among them; shape (2,)."""
 
@@ -33,7 +38,9 @@ def new_faces(n_tetrahedra: int) -> Faces:
     return Faces(
         face=np.zeros(256, np.int64),
         place=np.full((n_tetrahedra, 4), -1, np.int64),
-        loose=np.zeros(n_tetrahedra, np.bool_),
+        piece=np.full(n_tetrahedra, -1, np.int64),
+        low=np.zeros((1, 3)),
+        high=np.zeros((1, 3)),
         counts=np.zeros(2, np.int64),
     )
 
@@ -41,7 +48,7 @@ def new_faces(n_tetrahedra: int) -> Faces:
 def grown_faces(faces: Faces, n_tetrahedra: int) -> Faces:
     """Return the faces with room for that many tetrahedra."""
     return faces.replaced(
-        place=grown(faces.place, n_tetrahedra, -1), loose=grown(faces.loose, n_tetrahedra)
+        place=grown(faces.place, n_tetrahedra, -1), piece=grown(faces.piece, n_tetrahedra, -1)
     )
 
 
@@ -98,8 +105,54 @@ def _renew(faces: Faces, body: Body, t: int) -> None:
             faces.place[t, f] = -1
 
 
+def in_pieces(faces: Faces, piece: IntArray, n_pieces: int) -> Faces:
+    """Return the faces of a body that is in these pieces: that of each tetrahedron, (n_tets,)."""
+    faces.piece[: len(piece)] = piece
+    return faces.replaced(low=np.zeros((n_pieces, 3)), high=np.zeros((n_pieces, 3)))
+
+
 @kernel
-def is_active(faces: Faces, body: Body, face: int) -> bool:
-    """Whether a face is one of a cut, or of a loose piece: what the others must be near to."""
+def measure_pieces(faces: Faces, body: Body) -> None:
+    """Write the corners of each piece, from its faces."""
+    for p in range(len(faces.low)):
+        for x in range(3):
+            faces.low[p, x] = np.inf
+            faces.high[p, x] = -np.inf
+    for i in range(faces.counts[N_FACES]):
+        t = faces.face[i] // 4
+        p = faces.piece[t]
+        if p < 0:
+            continue
+        for k in range(4):
+            if k != faces.face[i] % 4:
+                node = body.tetrahedra[t, k]
+                for x in range(3):
+                    faces.low[p, x] = min(faces.low[p, x], body.positions[node, x])
+                    faces.high[p, x] = max(faces.high[p, x], body.positions[node, x])
+
+
+@kernel
+def may_touch(faces: Faces, body: Body, face: int, reach: float) -> bool:
+    """Whether a face is one of a cut, or skin within reach of the box around another piece."""
     t = face // 4
-    return body.links[t, face % 4] == CUT or faces.loose[t]
+    if body.links[t, face % 4] == CUT or faces.piece[t] < 0:
+        return True
+    for p in range(len(faces.low)):
+        if p != faces.piece[t] and _is_near(faces, body, face, p, reach):
+            return True
+    return False
+
+
+@kernel
+def _is_near(faces: Faces, body: Body, face: int, p: int, reach: float) -> bool:
+    for x in range(3):
+        low = np.inf
+        high = -np.inf
+        for k in range(4):
+            if k != face % 4:
+                at = body.positions[body.tetrahedra[face // 4, k], x]
+                low = min(low, at)
+                high = max(high, at)
+        if low > faces.high[p, x] + reach or high < faces.low[p, x] - reach:
+            return False
+    return True

@@ -18,6 +18,7 @@ from tissue.contact.faces import (
     collect_faces,
     count_faces,
     grown_faces,
+    in_pieces,
     new_faces,
     renew_faces,
     with_room,
@@ -118,14 +119,15 @@ class SelfContact:
         faces = self.arrays.faces
         n_tetrahedra = int(body.counts[TETRAHEDRA])
         piece, queue = np.empty((2, n_tetrahedra), np.int64)
-        if label_pieces(body, piece, queue) == 1:
+        n_pieces = label_pieces(body, piece, queue)
+        if n_pieces == 1:
             return
-        faces.loose[:n_tetrahedra] = piece != np.bincount(piece).argmax()
+        faces = in_pieces(faces, piece, n_pieces)
         if not faces.counts[WITH_SKIN]:
             faces = with_room(faces, count_faces(body, True))
             faces.counts[WITH_SKIN] = 1
             collect_faces(faces, body)
-            self.arrays = self.arrays.replaced(faces=faces)
+        self.arrays = self.arrays.replaced(faces=faces)
         self.arrays.state[[IS_AWAKE, IS_STALE]] = 1
 
     def make_room(self) -> None:
