@@ -12,7 +12,7 @@ from tests.tissue import mesh_writers as write
 from tissue.boundary import side_nodes
 from tissue.mesh_io import MeshError, read_mesh, write_vtu
 from tissue.shapes import grid
-from tissue.types import Snapshot
+from tissue.types import Snapshot, TetrahedralMesh
 from tissue.validation import checked
 
 BLOCK = grid((2, 1, 2), (0.03, 0.02, 0.01))
