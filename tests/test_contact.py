@@ -76,6 +76,22 @@ def live(tissue: Tissue, seconds: float, every: int = 50) -> float:
     return worst
 
 
+def incised(mesh: TetrahedralMesh, at: float, until: float, **options) -> Tissue:
+    """Return a body cut by an upright plane at x, from its front to a place along y."""
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, **options)
+    edges = [[(at, y, -0.01), (at, y, 0.05)] for y in (-0.01, until)]
+    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
+    return tissue
+
+
+def squeeze(tissue: Tissue, by: float) -> None:
+    """Move the held sides towards each other, each by a way along x [m]."""
+    body, n = tissue._body, tissue.n_nodes
+    held = body.fixed[:n]
+    middle = body.rest[:n, 0].mean()
+    body.positions[:n][held, 0] += np.where(body.rest[:n][held, 0] < middle, by, -by)
+
+
 PAIRS = {
     "the same mesh": ((6, 6, 2), (0.0, 0.0)),
     "another mesh": ((5, 4, 2), (0.0, 0.0)),
@@ -116,12 +132,9 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     )
     strokes.make(tissue, strokes.slanted(mesh, lean=0.1, rake=0.2))
     assert tissue.n_pieces() == 2
-    body = tissue._body
-    held = body.fixed[: tissue.n_nodes]
-    inwards = np.where(body.rest[: tissue.n_nodes][held, 0] < 0.03, 1e-5, -1e-5)
     worst = 0.0
-    for _ in range(300):  # the held sides come nearer, slowly
-        body.positions[: tissue.n_nodes][held, 0] += inwards
+    for _ in range(300):
+        squeeze(tissue, 1e-5)
         worst = max(worst, live(tissue, 0.005, every=5))
         if tissue.step(None, strokes.DT).touch.force > 1.0:
             break
@@ -132,18 +145,43 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     assert speed(tissue) < AT_REST
 
 
-def test_freshly_cut_lips_that_nothing_presses_feel_nothing():
-    mesh = bodies.jittered(3, 0)
-    tissue = Tissue(mesh, Material(toughness=2.0), fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
-    strokes.make(tissue, strokes.straight(mesh))
-    n = tissue.n_nodes
-    tissue._body.positions[:n] = tissue._body.rest[:n]
-    tissue._body.velocities[:n] = 0.0
-    tissue._contact.arrays.contacts.count[0] = 0  # what pressed while the blade was in is over
+@pytest.mark.parametrize("until", [0.02, 0.06], ids=["a slit", "clean through"])
+def test_freshly_cut_lips_that_nothing_presses_feel_nothing(until):
+    tissue = incised(bodies.jittered(3, 0), 0.0207, until)
     for _ in range(50):
         touch = tissue.step(None, strokes.DT).touch
         assert touch.force < 1e-12 and touch.penetration < 1e-12
     assert speed(tissue) < 1e-12
+
+
+def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
+    mesh = grid((4, 6, 4), (0.04, 0.06, 0.04))
+    tissue = incised(mesh, 0.0207, 0.03, material=Material(viscous_damping=20.0))
+    assert tissue.n_pieces() == 1
+    for _ in range(200):
+        squeeze(tissue, 1e-5)
+        for _ in range(2):
+            pressed = tissue.step(None, strokes.DT).touch.force
+    for _ in range(300):
+        pressed = tissue.step(None, strokes.DT).touch.force
+    assert pressed > 0.5
+    surface = tissue.surface()
+    lips = np.unique(surface.triangles[surface.is_cut])
+    a, b, c = (surface.positions[surface.triangles[surface.is_cut][:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    for p in surface.positions[lips]:
+        height = ((p - a) * normals).sum(axis=1)
+        weights = np.stack(
+            [
+                np.einsum("ij,ij->i", np.cross(c - p, b - p), -normals),
+                np.einsum("ij,ij->i", np.cross(a - p, c - p), -normals),
+                np.einsum("ij,ij->i", np.cross(b - p, a - p), -normals),
+            ]
+        )
+        under = (weights > 0.0).all(axis=0) & (height < 0.0) & (height > -0.4 * ELEMENT)
+        assert not under.any() or height[under].min() > -ALLOWED
+    assert len(lips) > 20
 
 
 def test_before_the_first_cut_contact_has_nothing_to_look_at():
