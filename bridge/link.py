@@ -46,8 +46,8 @@ class TissueLink(Protocol):
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
 
-    def pieces(self) -> int:
-        """Return the number of connected pieces."""
+    def n_pieces(self) -> int:
+        """Return the number of connected pieces; `tissue.pieces.pieces_of` tells more."""
 
     def close(self) -> None:
         """Let go of the tissue."""
@@ -82,9 +82,9 @@ class InProcessLink:
         """See `TissueLink.surface`."""
         return self._tissue.surface()
 
-    def pieces(self) -> int:
-        """See `TissueLink.pieces`."""
-        return self._tissue.pieces()
+    def n_pieces(self) -> int:
+        """See `TissueLink.n_pieces`."""
+        return self._tissue.n_pieces()
 
     def close(self) -> None:
         """See `TissueLink.close`."""

@@ -23,6 +23,7 @@ from tissue.types import (
     Snapshot,
     StepResult,
     Surface,
+    Touch,
     Wrench,
 )
 
@@ -85,25 +86,29 @@ def _checked_step(dt: float) -> float:
     return dt
 
 
-_RESULT = struct.Struct("<25d5q")
+_RESULT = struct.Struct("<30d6q")
 RESULT_BYTES = _RESULT.size
 
 
 def pack_result(result: StepResult) -> bytes:
     """Return a reply: the floats of a result in the order of its fields, then its integers."""
-    vectors = (*result.wrench, result.force_on_tissue, *result.bounds)
+    touch = result.touch
+    vectors = (*result.wrench, result.force_on_tissue, *result.bounds, touch.force_of_floor)
     return _RESULT.pack(
         *np.concatenate(vectors).tolist(),
         result.anchored_length,
         result.cut_area,
         result.work_of_blade,
         result.work_of_cutting,
+        touch.penetration,
+        touch.force,
         *result.profile,
         result.n_tetrahedra,
         result.n_nodes,
         result.n_active,
         result.active_point_tetrahedron,
         result.n_substeps,
+        touch.n_contacts,
     )
 
 
@@ -119,20 +124,20 @@ def unpack_result(payload: bytes) -> StepResult:
     if len(payload) != _RESULT.size:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_RESULT.size}")
     fields = _RESULT.unpack(payload)
-    rows = np.array(fields[:18]).reshape(6, 3)
-    length, area, work, work_of_cutting, collision, topology, relaxation = fields[18:25]
-    n_tetrahedra, n_nodes, n_active, point_tetrahedron, n_substeps = fields[25:]
+    rows = np.array(fields[:21]).reshape(7, 3)
+    length, area, work, work_of_cutting, penetration, force = fields[21:27]
+    n_tetrahedra, n_nodes, n_active, point_tetrahedron, n_substeps, n_contacts = fields[30:]
     _check_counts(n_nodes, n_tetrahedra)
     if not (0 <= n_active <= n_tetrahedra and -1 <= point_tetrahedron < n_tetrahedra):
         raise MessageError(
             f"{n_active} active tetrahedra and tip in {point_tetrahedron}, of {n_tetrahedra}"
         )
-    if n_substeps < 0:
-        raise MessageError(f"{n_substeps} substeps")
+    if n_substeps < 0 or n_contacts < 0:
+        raise MessageError(f"{n_substeps} substeps and {n_contacts} contacts")
     return StepResult(
         wrench=Wrench(*rows[:3]),
         force_on_tissue=rows[3],
-        bounds=rows[4:],
+        bounds=rows[4:6],
         n_tetrahedra=n_tetrahedra,
         n_nodes=n_nodes,
         n_active=n_active,
@@ -142,7 +147,8 @@ def unpack_result(payload: bytes) -> StepResult:
         work_of_blade=work,
         work_of_cutting=work_of_cutting,
         n_substeps=n_substeps,
-        profile=Profile(collision, topology, relaxation),
+        touch=Touch(n_contacts, penetration, force, rows[6]),
+        profile=Profile(*fields[27:30]),
     )
 
 

@@ -250,7 +250,7 @@ class TissueServer:
         if frame.kind == Kind.SURFACE:
             return pack_surface(self._link.surface())
         if frame.kind == Kind.PIECES:
-            return pack_pieces(self._link.pieces())
+            return pack_pieces(self._link.n_pieces())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
     def _send(self, peer: _Peer, message: bytes) -> None:

@@ -88,8 +88,8 @@ class TcpLink:
         limit = surface_bytes(self._n_tetrahedra)
         return self._ask(Kind.SURFACE, b"", limit, unpack_surface)
 
-    def pieces(self) -> int:
-        """See `TissueLink.pieces`."""
+    def n_pieces(self) -> int:
+        """See `TissueLink.n_pieces`."""
         return self._ask(Kind.PIECES, b"", PIECES_BYTES, unpack_pieces)
 
     def close(self) -> None:

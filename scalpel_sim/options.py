@@ -33,6 +33,10 @@ class Body:
     "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
     gravity: float | None = None
     "Gravity, downwards [m/s2]."
+    friction: float | None = None
+    "Coefficient of friction of cut faces, pieces and the floor."
+    floor: float | None = None
+    "Height of a floor [m], below the body: pieces that are cut loose land on it."
 
 
 @Parameter(name="*")

@@ -92,7 +92,7 @@ def _tissue_elsewhere(
     except BaseException:
         link.close()
         raise
-    elsewhere = {"fixed", "stretch", "gravity"}  # the server knows, and does not say
+    elsewhere = {"fixed", "stretch", "gravity", "floor"}  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
 
@@ -132,4 +132,6 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         toughness=body.toughness,
         stretch=body.stretch,
         gravity=body.gravity,
+        friction=body.friction,
+        floor=body.floor,
     )

@@ -1,6 +1,6 @@
 """The table that a run prints, with the paper's figures beside ours where it has them."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
@@ -11,6 +11,11 @@ STAGE_NAMES = dict(
     zip(STAGES, ("relaxation", "pictures", "topology, geometry", "collision"), strict=True)
 )
 
+MOST_PIECES = 8
+"""Pieces that the table has rows for, the largest; `summary.json` has them all."""
+
+G_PER_KG = 1e3
+CM3_PER_M3 = 1e6
 MM2_PER_M2 = 1e6
 MJ_PER_J = 1e3
 
@@ -64,6 +69,8 @@ def print_table(summary: Summary, console: Console) -> None:
         f"{paper.tetrahedra_final:,}" if paper else "",
     )
     row("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
+    for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
+        row(f"  piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
     row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
     row("peak force", f"{summary.force_peak_n:.3f} N")
     row("mean force", f"{summary.force_mean_n:.3f} N")
@@ -83,3 +90,9 @@ def print_table(summary: Summary, console: Console) -> None:
         )
     row("other (arm, bridge)", f"{summary.share['other']:.1%}")
     console.print(table)
+
+
+def _piece(piece: dict[str, Any]) -> str:
+    """Return the figures of one piece."""
+    volume, mass = piece["volume_m3"] * CM3_PER_M3, piece["mass_kg"] * G_PER_KG
+    return f"{piece['tetrahedra']:,} tetrahedra, {volume:.3g} cm³, {mass:.3g} g"

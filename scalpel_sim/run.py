@@ -13,6 +13,7 @@ from scalpel_sim.replay import ReplayWriter
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.summary import COMPLETE, Summary, summarise
+from tissue.pieces import pieces_of
 
 log = logging.getLogger(__name__)
 
@@ -78,8 +79,9 @@ def perform(
         outputs.write_forces(simulation.recording, all_rows=True)
     pieces = None
     with unwritten:
-        pieces = link.pieces()
-        outputs.write_mesh(files.FINAL, link.snapshot())
+        end = link.snapshot()
+        pieces = pieces_of(end)
+        outputs.write_mesh(files.FINAL, end)
     result = simulation.bridge.result
     summary = summarise(
         simulation.recording,

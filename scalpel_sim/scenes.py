@@ -47,6 +47,8 @@ class Scene:
     Living tissue is under tension: a slit opens."""
     gravity: float = STANDARD_GRAVITY
     """[m/s2], along -z."""
+    floor: float | None = None
+    """Height of a floor on which loose pieces land [m], tissue frame; None: they fall for ever."""
     stroke: str = "straight"
     """A name known to `scalpel_sim.stroke`, or a CSV file."""
     speed: float = 0.06

@@ -1,12 +1,14 @@
 """A run in twenty numbers: what `summary.json` holds and the table prints."""
 
 import platform
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from scalpel_sim.recording import Recording
 from scalpel_sim.version import version
+from tissue.types import Piece
 
 COMPLETE = "complete"
 """The status of a run that reached its end; any other status says what ended it."""
@@ -38,6 +40,8 @@ class Summary(NamedTuple):
     tetrahedra_final: int
     pieces: int | None
     """None where the link to the tissue was lost."""
+    each_piece: list[dict[str, Any]]
+    """The pieces, the largest first: see `tissue.types.Piece`."""
     cut_area_m2: float
     force_peak_n: float
     """Largest force that the blade felt, after the device's limits."""
@@ -64,7 +68,7 @@ def summarise(
     wall_seconds: float,
     tetrahedra_initial: int,
     tetrahedra_final: int,
-    pieces: int | None,
+    pieces: Sequence[Piece] | None,
     counters: dict[str, int],
     settings: dict[str, Any],
 ) -> Summary:
@@ -86,7 +90,8 @@ def summarise(
         frame_rate_p99=float(1.0 / slow),
         tetrahedra_initial=tetrahedra_initial,
         tetrahedra_final=tetrahedra_final,
-        pieces=pieces,
+        pieces=None if pieces is None else len(pieces),
+        each_piece=[_as_numbers(piece) for piece in pieces or ()],
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
@@ -96,6 +101,21 @@ def summarise(
         settings=settings,
         versions=versions(),
     )
+
+
+def _as_numbers(piece: Piece) -> dict[str, Any]:
+    """Return a piece as numbers with their units, for JSON."""
+    return {
+        "tetrahedra": piece.n_tetrahedra,
+        "held": piece.is_held,
+        "volume_m3": piece.volume,
+        "rest_volume_m3": piece.rest_volume,
+        "mass_kg": piece.mass,
+        "centre_m": piece.centre.tolist(),
+        "velocity_m_s": piece.velocity.tolist(),
+        "angular_velocity_rad_s": piece.angular_velocity.tolist(),
+        "inertia_kg_m2": piece.inertia.tolist(),
+    }
 
 
 def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:

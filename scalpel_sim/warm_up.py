@@ -6,7 +6,7 @@ from tissue.boundary import fixed_nodes
 from tissue.jit import cache_directory
 from tissue.shapes import grid
 from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep
+from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
 
 SIDE = 0.02
 """Of the block that is cut [m]."""
@@ -36,7 +36,10 @@ def warm_up() -> None:
     tissue.step(None, DT)
     tissue.surface()
     tissue.snapshot()
-    tissue.pieces()
+    tissue.n_pieces()
+    apart = np.vstack([mesh.positions, mesh.positions + 2.0 * SIDE])
+    both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
+    Tissue(TetrahedralMesh(apart, both)).step(None, DT)  # as where a piece comes loose
 
 
 def _edge(fraction: float) -> BladeSegment:

@@ -8,6 +8,7 @@ import pytest
 
 from scalpel_sim.planning import plan
 from tests import bodies, soundness, strokes
+from tissue.material import Material
 from tissue.mesh_io import read_mesh
 from tissue.shapes import grid, organ
 from tissue.tissue import Tissue
@@ -36,7 +37,7 @@ def expect_sound(before, tissue: Tissue, pieces: int) -> None:
     after = tissue.snapshot()
     assert soundness.faults(before, after) == []
     assert soundness.n_pieces(after.tetrahedra) == pieces
-    assert tissue.pieces() == pieces
+    assert tissue.n_pieces() == pieces
 
 
 @pytest.mark.parametrize("stroke", strokes.THROUGH)
@@ -81,7 +82,7 @@ def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
     mesh = raw._replace(positions=raw.positions * (EXTENT / longest))
     tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.1))
     before = tissue.snapshot()
-    whole = tissue.pieces()
+    whole = tissue.n_pieces()
     planned = plan(stroke, mesh)
     poses = [planned.pose(t) for t in np.arange(0.0, planned.duration + strokes.DT, strokes.DT)]
     strokes.make(tissue, poses)
@@ -108,7 +109,7 @@ def test_a_cut_along_a_plane_of_the_mesh_adds_no_tetrahedra_and_has_its_area():
     results = strokes.make(tissue, strokes.straight(grid()))
     assert tissue.n_tetrahedra == 576
     assert results[-1].cut_area == pytest.approx(0.06 * 0.04, rel=1e-12)
-    assert tissue.pieces() == 2
+    assert tissue.n_pieces() == 2
 
 
 DEGENERATE = {
@@ -195,7 +196,7 @@ def test_a_blade_drawn_back_in_its_cut_feels_nothing():
     tissue = at_rest(grid())
     strokes.make(tissue, there)
     results = strokes.make(tissue, [*reversed(there)])
-    assert np.abs([r.wrench.force for r in results[20:]]).max() == 0.0
+    assert np.abs([r.wrench.force for r in results[20:]]).max() < 1e-15  # lips touch: rounding
 
 
 def gap(tissue: Tissue) -> float:
@@ -212,11 +213,15 @@ def gap(tissue: Tissue) -> float:
 def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
     def slit(stretch):
         x = MESHES[mesh].positions
-        tissue = at_rest(MESHES[mesh], positions=x * [stretch, 1.0, 1.0])
+        # So easy to cut that no tetrahedron is dragged inside out, from where springs may not turn
+        # it back: what is asked here is how lips gape.
+        tissue = at_rest(
+            MESHES[mesh], material=Material(toughness=2.0), positions=x * [stretch, 1.0, 1.0]
+        )
         tissue.settle()
         strokes.make(tissue, strokes.upright(0.0207 * stretch, -0.01, 0.03, -0.01, 0.05))
         tissue.settle()
-        assert tissue.pieces() == 1
+        assert tissue.n_pieces() == 1
         return gap(tissue)
 
     gaps = [slit(stretch) for stretch in (1.0, 1.05, 1.15)]

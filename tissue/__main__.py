@@ -86,7 +86,7 @@ def report(cut: CutThrough) -> str:
         "frames per second": f"{_rate(np.median(frame))} median, "
         f"{_rate(np.percentile(frame, 99))} at the 99th percentile",
         "tetrahedra": f"{cut.n_tetrahedra} -> {last.n_tetrahedra}",
-        "pieces": f"{cut.tissue.pieces()}",
+        "pieces": f"{cut.tissue.n_pieces()}",
         "cut area": f"{last.cut_area * 1e4:.4g} cm2",
         "mean force in contact": f"{np.mean(in_contact):.3g} N" if in_contact else "no contact",
     }

@@ -117,3 +117,20 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
             f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
         )
     return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
+
+
+def checked_floor(floor: float | None, lowest: float) -> None:
+    """Refuse a floor that is no height, or that the body, whose lowest node is there, is under.
+
+    Raises:
+        ValueError: it is not finite, or not below the body.
+    """
+    if floor is None:
+        return
+    if not np.isfinite(floor):
+        raise ValueError(f"floor is {floor} m; it must be a finite height, or None for no floor")
+    if floor > lowest:
+        raise ValueError(
+            f"the floor is at {floor:g} m and the body reaches down to {lowest:g} m: put the floor "
+            "at that height or below, or lift the body's positions"
+        )

@@ -19,6 +19,7 @@ import numpy as np
 from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
+from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
 from tissue.jit import kernel
 from tissue.slipping import slip
 from tissue.springs import Springs, accelerations
@@ -92,6 +93,7 @@ def relax(
     edge: Edge,
     visits: Visits,
     stages: Stages,
+    contact: ContactState,
     queue: IntArray,
     gravity: FloatArray,
     retardation_time: float,
@@ -101,9 +103,12 @@ def relax(
     dt: float,
     begin: float,
     end: float,
+    first: int,
     n: int,
-) -> None:
-    """Advance the body by `n` Runge-Kutta steps, anchors pulling and slipping.
+) -> int:
+    """Advance the body by `n` Runge-Kutta steps, anchors pulling and slipping; return how many.
+
+    Fewer than `n` means that contact needs room: give it some, and go on from the step returned.
 
     Args:
         body: Positions and velocities are written.
@@ -112,6 +117,7 @@ def relax(
         edge: The cutting edge over the whole time step of length `dt` [s].
         visits: For searches.
         stages: Scratch.
+        contact: What may touch; corrects positions and velocities after each step.
         queue: Scratch.
         gravity: [m/s2], shape (3,).
         retardation_time: Damping along springs [s].
@@ -121,27 +127,38 @@ def relax(
         dt: Length of the time step [s].
         begin: Fraction of the time step at which to begin.
         end: Fraction at which to end.
+        first: Step to begin with: 0, or where it stopped for want of room.
         n: Number of Runge-Kutta steps.
     """
     share = (end - begin) / n
-    for i in range(n):
+    is_awake = contact.state[IS_AWAKE] == 1
+    for i in range(first, n):
         at = begin + i * share
-        runge_kutta_nystroem(
-            body,
-            springs,
-            anchors,
-            edge,
-            stages,
-            gravity,
-            retardation_time,
-            viscous_damping,
-            toughness,
-            dt,
-            at,
-            share,
-        )
+        if contact.state[IS_PENDING] == 0:
+            if is_awake:
+                prepare(contact, body)
+            runge_kutta_nystroem(
+                body,
+                springs,
+                anchors,
+                edge,
+                stages,
+                gravity,
+                retardation_time,
+                viscous_damping,
+                toughness,
+                dt,
+                at,
+                share,
+            )
+        if is_awake:
+            contact.state[IS_PENDING] = 1
+            if not resolve(contact, body, share * dt):
+                return i
+            contact.state[IS_PENDING] = 0
         clear_forces(anchors, body, stages.external)  # before anchors go to other nodes
         slip(anchors, body, visits, edge, at + share, toughness, reach, queue)
+    return n
 
 
 @kernel

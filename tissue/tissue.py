@@ -28,14 +28,16 @@ from tissue.border import (
     checked_edge,
     checked_edges,
     checked_fixed,
+    checked_floor,
     checked_gravity,
     checked_positions,
 )
+from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
-from tissue.pieces import count_pieces
+from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme
@@ -52,6 +54,8 @@ from tissue.types import (
     BladeSweep,
     BoolArray,
     FloatArray,
+    IntArray,
+    Piece,
     Profile,
     Snapshot,
     StepResult,
@@ -138,6 +142,7 @@ class Tissue:
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
         gravity: [m/s2].
+        floor: Height of a floor, for example a table, below the body [m]; None for no floor.
         quality: How closely cuts follow the blade.
 
     Raises:
@@ -153,6 +158,7 @@ class Tissue:
         fixed: BoolArray | None = None,
         positions: FloatArray | None = None,
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
+        floor: float | None = None,
         quality: CutQuality | None = None,
     ) -> None:
         expect_sound(mesh)
@@ -194,6 +200,8 @@ class Tissue:
             n_nodes,
             n_tetrahedra,
         )
+        checked_floor(floor, float(self.bounds[0, 2]))
+        self._contact = SelfContact(self._body, self.node_size, self.material.friction, floor)
         self._grow()
 
     @property
@@ -228,6 +236,7 @@ class Tissue:
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
         anchors = self._anchors_of(sweep)
         anchors.totals[:WORK_OF_BLADE] = 0.0
+        self._contact.begin()
         collision = topology = relaxation = 0.0
         n_substeps = 0
         n_increments = self._n_increments(sweep)
@@ -303,14 +312,18 @@ class Tissue:
         step = self._stable_step(self._frequency_squared)
         energy = 0.0
         for done in range(0, LONGEST_SETTLING, n_each):
-            self._relax_by(anchors, NOWHERE, n_each * step, 0.0, 1.0, n_each)
             n = self.n_nodes
             velocities = self._body.velocities[:n]
+            velocities_t0 = velocities.copy()
+            self._relax_by(anchors, NOWHERE, n_each * step, 0.0, 1.0, n_each)
+            accelerations = self._stages.a4[:n]
+            if self._contact.is_awake:  # what holds a body on the floor is not in the springs
+                accelerations = (velocities - velocities_t0) / (n_each * step)
             before, energy = energy, float((self._body.masses[:n, None] * velocities**2).sum())
             if energy < before:
                 velocities[:] = 0.0
                 energy = 0.0
-            if np.abs(self._stages.a4[:n]).max() < SETTLED * 9.81:
+            if np.abs(accelerations).max() < SETTLED * 9.81:
                 velocities[:] = 0.0
                 return done + n_each
         return LONGEST_SETTLING
@@ -331,10 +344,18 @@ class Tissue:
         """Return the boundary triangles, skin and cut faces apart."""
         return boundary_surface(self._body)
 
-    def pieces(self) -> int:
+    def n_pieces(self) -> int:
         """Return the number of connected pieces."""
         piece, queue = np.empty((2, self.n_tetrahedra), dtype=np.int64)
-        return count_pieces(self._body, piece, queue)
+        return label_pieces(self._body, piece, queue)
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Return the connected pieces and their mass properties, the largest at rest first."""
+        return pieces_of(self.snapshot())
+
+    def piece_of_tetrahedra(self) -> IntArray:
+        """Return the piece that each tetrahedron is in, shape (n_tets,): its place in `pieces`."""
+        return piece_of_tetrahedra(self.snapshot())
 
     # stages of a step
 
@@ -357,24 +378,31 @@ class Tissue:
         self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float, n: int
     ) -> None:
         material = self.material
-        relax(
-            self._body,
-            self._springs,
-            anchors,
-            edge,
-            self._visits,
-            self._stages,
-            self._around,
-            self._gravity,
-            material.retardation_time,
-            material.viscous_damping,
-            material.toughness,
-            self.node_size,
-            dt,
-            begin,
-            end,
-            n,
-        )
+        done = 0
+        while True:
+            done = relax(
+                self._body,
+                self._springs,
+                anchors,
+                edge,
+                self._visits,
+                self._stages,
+                self._contact.arrays,
+                self._around,
+                self._gravity,
+                material.retardation_time,
+                material.viscous_damping,
+                material.toughness,
+                self.node_size,
+                dt,
+                begin,
+                end,
+                done,
+                n,
+            )
+            if done == n:
+                return
+            self._contact.make_room()
 
     def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
@@ -439,6 +467,7 @@ class Tissue:
             if n:
                 self._build_rows(self._nodes, n)
                 relocate(self._anchors, self._body, self._visits, self._around)
+                self._contact.mesh_changed(self._body, change)
             full = bool(change.counts[FULL])
             self._grow()
             if not full:
@@ -454,6 +483,7 @@ class Tissue:
         self._is_open = False
         self._cut(self._scheme.end)
         self._scheme.forget()
+        self._contact.look_for_pieces(self._body)
         forget_path(self._path)
         self._incising = False
 
@@ -519,6 +549,7 @@ class Tissue:
             work_of_blade=float(totals[WORK_OF_BLADE]),
             work_of_cutting=float(totals[WORK_OF_CUTTING]),
             n_substeps=n_substeps,
+            touch=self._contact.touch(dt),
             profile=profile,
         )
 
@@ -574,6 +605,7 @@ class Tissue:
         self._springs = grown_springs(self._springs, n_nodes, len(self._springs.neighbour))
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
+        self._contact.grow(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
 

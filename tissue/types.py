@@ -54,6 +54,21 @@ class Profile(NamedTuple):
     """RX: forces, edge anchors, Runge-Kutta."""
 
 
+class Touch(NamedTuple):
+    """How the body touched itself and the floor in one step."""
+
+    n_contacts: int
+    """Contacts that pressed at the end of the step: node on triangle, edge on edge, node on floor.
+    Meshes that meet node on node share one contact among several."""
+    penetration: float
+    """Greatest depth that was left after a Runge-Kutta step [m]."""
+    force: float
+    """Sum of the normal forces between faces of the body, averaged over the step [N]."""
+    force_of_floor: FloatArray
+    """What the floor does to the body, averaged over the step [N], shape (3,): from outside, unlike
+    the forces between its faces, which add up to zero."""
+
+
 class StepResult(NamedTuple):
     """What one step did."""
 
@@ -79,6 +94,7 @@ class StepResult(NamedTuple):
     """Work that slipping through the material took, since the start [J]: toughness times area."""
     n_substeps: int
     """Runge-Kutta steps taken in this step."""
+    touch: Touch
     profile: Profile
 
 
@@ -119,3 +135,31 @@ class Surface(NamedTuple):
     """Indices into the vertices, shape (n_triangles, 3), counter-clockwise seen from outside."""
     is_cut: BoolArray
     """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
+
+
+class Piece(NamedTuple):
+    """A connected piece of the body and its mass properties; its mass is at its nodes. Copies."""
+
+    n_tetrahedra: int
+    n_nodes: int
+    is_held: bool
+    """Whether one of its nodes is fixed. A piece that is not falls."""
+    rest_volume: float
+    """[m3]."""
+    volume: float
+    """Now [m3]."""
+    mass: float
+    """[kg]."""
+    centre: FloatArray
+    """Centre of mass [m], shape (3,)."""
+    velocity: FloatArray
+    """Of the centre of mass [m/s], shape (3,)."""
+    angular_momentum: FloatArray
+    """About the centre of mass [kg m2/s], shape (3,)."""
+    inertia: FloatArray
+    """Tensor of inertia about the centre of mass [kg m2], shape (3, 3)."""
+
+    @property
+    def angular_velocity(self) -> FloatArray:
+        """That of a rigid body of this momentum and inertia [rad/s], shape (3,)."""
+        return np.asarray(np.linalg.lstsq(self.inertia, self.angular_momentum)[0])

@@ -29,7 +29,7 @@ def compile_kernels() -> None:
         tip, heel = np.array([0.009, y, -0.005]), np.array([0.009, y, 0.025])
         bridge.step(BladeSegment(tip, heel, np.array([0.0, 1.0, 0.0])), 1e-3)
     tissue.surface()
-    tissue.pieces()
+    tissue.n_pieces()
 
 
 if __name__ == "__main__":

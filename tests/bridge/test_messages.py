@@ -18,6 +18,7 @@ from tissue.types import (
     Snapshot,
     StepResult,
     Surface,
+    Touch,
     Wrench,
 )
 
@@ -43,12 +44,12 @@ def sweeps(draw):
 
 @st.composite
 def results(draw):
-    vectors = draw(rows(6, any_float))
+    vectors = draw(rows(7, any_float))
     n_tetrahedra = draw(counts)
     return StepResult(
         wrench=Wrench(*vectors[:3]),
         force_on_tissue=vectors[3],
-        bounds=vectors[4:],
+        bounds=vectors[4:6],
         n_tetrahedra=n_tetrahedra,
         n_nodes=draw(counts),
         n_active=draw(st.integers(0, n_tetrahedra)),
@@ -58,6 +59,7 @@ def results(draw):
         work_of_blade=draw(any_float),
         work_of_cutting=draw(any_float),
         n_substeps=draw(counts),
+        touch=Touch(draw(counts), draw(any_float), draw(any_float), vectors[6]),
         profile=Profile(*draw(st.tuples(any_float, any_float, any_float))),
     )
 
@@ -111,7 +113,7 @@ def test_what_arrives_may_be_written_to():
 
 
 def test_a_description_arrives_with_every_property_of_the_material():
-    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4)
+    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4, 0.2)
     sent = TissueDescription("slab", material, np.array([[0.0, 0.1, 0.2], [1, 2, 3]]), 576, 175)
     received = messages.unpack_description(messages.pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)
@@ -186,12 +188,14 @@ def test_a_count_that_lies_is_refused(counts):
         ({"active_point_tetrahedron": -2}, "tip in -2"),
         ({"n_tetrahedra": -1}, "-1 elements"),
         ({"n_substeps": -1}, "-1 substeps"),
+        ({"touch": Touch(-1, 0.0, 0.0, np.zeros(3))}, "-1 contacts"),
     ],
 )
 def test_a_result_with_impossible_counts_is_refused(change, why):
     zeros = np.zeros(3)
     wrench, bounds, profile = Wrench(zeros, zeros, zeros), np.zeros((2, 3)), Profile(0.0, 0.0, 0.0)
-    good = StepResult(wrench, zeros, bounds, 3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1, profile)
+    touch = Touch(0, 0.0, 0.0, zeros)
+    good = StepResult(wrench, zeros, bounds, 3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1, touch, profile)
     with pytest.raises(MessageError, match=why):
         messages.unpack_result(messages.pack_result(good._replace(**change)))
 

@@ -97,7 +97,7 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert [bits(r) for r in felt_here] == [bits(r) for r in felt_there]
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
-    assert here.pieces() == link.pieces()
+    assert here.n_pieces() == link.n_pieces()
 
 
 def test_every_client_finds_the_tissue_as_at_the_start(server, upright):
@@ -361,7 +361,7 @@ def test_a_request_that_was_interrupted_does_not_put_the_link_out_of_step(link, 
         patch.setattr(link, "_answer_to", interrupt)
         with pytest.raises(KeyboardInterrupt):
             link.snapshot()
-    assert link.pieces() == 1
+    assert link.n_pieces() == 1
     assert link.step(None, DT).n_tetrahedra == 72
 
 

@@ -4,16 +4,39 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.outputs import FORCES, FRAMES_PER_FLUSH, INITIAL, PLOT, SUMMARY, Outputs
+from scalpel_sim.outputs import (
+    FORCES,
+    FRAMES_PER_FLUSH,
+    INITIAL,
+    PLOT,
+    SUMMARY,
+    Outputs,
+    summary_json,
+)
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.recording import COLUMNS, Recording
+from scalpel_sim.report import print_table
 from scalpel_sim.summary import Summary, summarise
+from tissue.pieces import pieces_of
 from tissue.shapes import grid
 from tissue.types import Snapshot
 
 DT = 1e-3
+
+PIECES = pieces_of(
+    Snapshot(
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.zeros((8, 3)),
+        np.ones(8),
+        np.array([[3, 0, 1, 2], [7, 4, 5, 6]]),
+        np.arange(8) == 4,
+    )
+)
+"""Two tetrahedra, the second of which is held."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +64,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
         wall_seconds=wall_seconds,
         tetrahedra_initial=6,
         tetrahedra_final=8,
-        pieces=2,
+        pieces=PIECES,
         counters={},
         settings={"stroke": "straight"},
     )
@@ -147,6 +170,22 @@ def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
     assert {"scalpel_sim", "python", "numpy", "numba", "mujoco", "platform"} <= set(
         found["versions"]
     )
+
+
+def test_the_summary_tells_of_each_piece():
+    summary = json.loads(summary_json(summary_of(recorded(10))))
+    assert summary["pieces"] == len(summary["each_piece"]) == 2
+    assert [piece["held"] for piece in summary["each_piece"]] == [False, True]
+    first = summary["each_piece"][0]
+    assert first["volume_m3"] == pytest.approx(1 / 6) and first["mass_kg"] == 4.0
+    assert first["centre_m"] == [0.25] * 3 and np.shape(first["inertia_kg_m2"]) == (3, 3)
+
+
+def test_the_table_has_a_row_for_each_piece():
+    console = Console(record=True, width=100)
+    print_table(summary_of(recorded(10)), console)
+    text = console.export_text()
+    assert "piece 1, loose" in text and "piece 2, held" in text
 
 
 def test_the_shares_sum_to_one():

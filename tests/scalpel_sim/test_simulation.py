@@ -161,9 +161,9 @@ class BreakingLink(InProcessLink):
         self._use()
         return super().surface()
 
-    def pieces(self):
+    def n_pieces(self):
         self._use()
-        return super().pieces()
+        return super().n_pieces()
 
 
 def test_an_arm_that_loses_its_tissue_in_the_middle_of_a_cut_is_let_go():

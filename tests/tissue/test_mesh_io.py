@@ -12,7 +12,7 @@ from tests.tissue import mesh_writers as write
 from tissue.boundary import side_nodes
 from tissue.mesh_io import MeshError, read_mesh, write_vtu
 from tissue.shapes import grid
-from tissue.types import Snapshot
+from tissue.types import Snapshot, TetrahedralMesh
 from tissue.validation import checked
 
 BLOCK = grid((2, 1, 2), (0.03, 0.02, 0.01))
@@ -343,6 +343,22 @@ def test_a_snapshot_is_read_by_meshio_to_the_last_bit(tmp_path):
     assert np.array_equal(mesh.point_data["velocity"], snapshot().velocities)
     assert np.array_equal(mesh.point_data["mass"], snapshot().masses)
     assert np.array_equal(mesh.point_data["fixed"].astype(bool), snapshot().fixed)
+
+
+def test_the_piece_of_each_tetrahedron_is_among_the_cell_data(tmp_path):
+    alone = TetrahedralMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    n = len(BLOCK.positions)
+    body = Snapshot(
+        np.vstack([alone.positions - 5.0, BLOCK.positions]),
+        np.vstack([alone.positions * 0.001, BLOCK.positions]),
+        np.zeros((n + 4, 3)),
+        np.ones(n + 4),
+        np.vstack([alone.tetrahedra, BLOCK.tetrahedra + 4]),
+        np.zeros(n + 4, dtype=bool),
+    )
+    write_vtu(tmp_path / "body.vtu", body)
+    (piece,) = meshio.read(tmp_path / "body.vtu").cell_data["piece"]
+    assert piece.tolist() == [1] + [0] * len(BLOCK.tetrahedra)  # the largest at rest is 0
 
 
 def test_a_snapshot_is_a_mesh_that_we_read(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 
 from tests import bodies, soundness, strokes
 from tissue.body import CUT, build_body
-from tissue.pieces import count_pieces
+from tissue.pieces import label_pieces
 from tissue.shapes import grid
 from tissue.surface import boundary_surface
 from tissue.tissue import Tissue
@@ -39,9 +39,9 @@ def test_a_single_tetrahedron_shows_its_four_faces():
 def test_pieces_hang_together_through_faces_that_are_not_cut():
     body = build_body(bodies.two_tetrahedra(), None, None)
     piece, queue = np.zeros((2, 2), dtype=np.int64)
-    assert count_pieces(body, piece, queue) == 1
+    assert label_pieces(body, piece, queue) == 1
     body.links[0, 0] = body.links[1, 0] = CUT
-    assert count_pieces(body, piece, queue) == 2
+    assert label_pieces(body, piece, queue) == 2
     assert piece.tolist() == [0, 1]
 
 

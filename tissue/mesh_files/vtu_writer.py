@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from tissue.pieces import piece_of_tetrahedra
 from tissue.types import Snapshot
 
 VTK_TETRA = 10
@@ -22,7 +23,8 @@ def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
     """Write `snapshot` to `path`.
 
     The points are the current positions [m]; the point data are `rest_position` [m],
-    `velocity` [m/s], `mass` [kg] and `fixed` (0 or 1). Numbers keep all their bits. The file
+    `velocity` [m/s], `mass` [kg] and `fixed` (0 or 1); the cell data are `piece`, the connected
+    piece that a tetrahedron is in, 0 for the largest. Numbers keep all their bits. The file
     appears under its name only when it is complete, so an interrupted write leaves the old one.
 
     Raises:
@@ -64,6 +66,9 @@ def _lines(snapshot: Snapshot) -> Iterator[str]:
     yield from _data_array("mass", snapshot.masses, "f8")
     yield from _data_array("fixed", snapshot.fixed, "u1")
     yield "</PointData>"
+    yield "<CellData>"
+    yield from _data_array("piece", piece_of_tetrahedra(snapshot), "i8")
+    yield "</CellData>"
     yield "</Piece>"
     yield "</UnstructuredGrid>"
     yield "</VTKFile>"

@@ -1,0 +1,339 @@
+"""Pieces, lips and the floor: nothing goes through anything, and all comes to rest."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tissue.material import Material
+from tissue.pieces import piece_of_tetrahedra, pieces_of
+from tissue.shapes import grid
+from tissue.springs import elastic_energy
+from tissue.surface import OUTWARD
+from tissue.tissue import Tissue
+from tissue.types import Snapshot, TetrahedralMesh
+
+ELEMENT = 0.01
+"""Edge of a cell in all bodies of these tests [m]."""
+
+ALLOWED = 0.01 * ELEMENT
+"""How deep one body may be in another [m]."""
+
+AT_REST = 0.01
+"""Speed [m/s] below which no node moves by more than 10 um in a frame."""
+
+SLAB = (0.06, 0.06, 0.02)
+NO_GRAVITY = (0.0, 0.0, 0.0)
+
+
+def joined(first: TetrahedralMesh, second: TetrahedralMesh, offset) -> TetrahedralMesh:
+    """Return two bodies as one mesh, the second moved by an offset [m]."""
+    return TetrahedralMesh(
+        np.vstack([first.positions, second.positions + np.asarray(offset)]),
+        np.vstack([first.tetrahedra, second.tetrahedra + len(first.positions)]),
+    )
+
+
+def depth_of_overlap(body: Snapshot) -> float:
+    """Return how deep a node of one piece is in another, at most [m]; by looking at every pair.
+
+    A node in a tetrahedron of another piece is as deep as it is far from that piece's surface: from
+    the nearest plane of a boundary face around there, at least.
+    """
+    piece = piece_of_tetrahedra(body)
+    of_node = np.zeros(len(body.positions), dtype=np.int64)
+    of_node[body.tetrahedra] = piece[:, None]
+    corners = body.positions[body.tetrahedra]
+    to_weights = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+    faces = np.sort(body.tetrahedra[:, OUTWARD].reshape(-1, 3), axis=1)
+    _, same, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+    boundary = body.tetrahedra[:, OUTWARD].reshape(-1, 3)[count[same.ravel()] == 1]
+    a, b, c = (body.positions[boundary[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    worst = 0.0
+    for node, p in enumerate(body.positions):
+        w = np.einsum("tij,tj->ti", to_weights, p - corners[:, 0])
+        inside = (w.min(axis=1) > 0.0) & (w.sum(axis=1) < 1.0) & (piece != of_node[node])
+        if inside.any():
+            other = of_node[boundary[:, 0]] == piece[inside][0]
+            below = -((p - a[other]) * normals[other]).sum(axis=1)
+            worst = max(worst, float(below[below > 0.0].min()))
+    return worst
+
+
+def speed(tissue: Tissue) -> float:
+    return float(np.linalg.norm(tissue.snapshot().velocities, axis=1).max())
+
+
+def live(tissue: Tissue, seconds: float, every: int = 50) -> float:
+    """Let the body live; return the deepest overlap seen, in every 50th frame [m]."""
+    worst = 0.0
+    for i in range(round(seconds / strokes.DT)):
+        result = tissue.step(None, strokes.DT)
+        if i % every == 0:
+            worst = max(worst, depth_of_overlap(tissue.snapshot()))
+        worst = max(worst, result.touch.penetration)
+    return worst
+
+
+def incised(mesh: TetrahedralMesh, at: float, until: float, **options) -> Tissue:
+    """Return a body cut by an upright plane at x, from its front to a place along y."""
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, **options)
+    edges = [[(at, y, -0.01), (at, y, 0.05)] for y in (-0.01, until)]
+    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
+    return tissue
+
+
+def squeeze(tissue: Tissue, by: float) -> None:
+    """Move the held sides towards each other, each by a way along x [m]."""
+    body, n = tissue._body, tissue.n_nodes
+    held = body.fixed[:n]
+    middle = body.rest[:n, 0].mean()
+    body.positions[:n][held, 0] += np.where(body.rest[:n][held, 0] < middle, by, -by)
+
+
+PAIRS = {
+    "the same mesh": ((6, 6, 2), (0.0, 0.0)),
+    "another mesh": ((5, 4, 2), (0.0, 0.0)),
+    "half beside each other": ((6, 6, 2), (0.013, 0.007)),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pair):
+    """The upper one lies on the lower; gravity is such that it weighs 1 N."""
+    cells, beside = PAIRS[pair]
+    lower = grid((6, 6, 2), SLAB)
+    mesh = joined(lower, grid(cells, SLAB), (*beside, SLAB[2] + 1e-3))
+    weight = 1.0 / (1000.0 * np.prod(SLAB))
+    # A damped body rests sooner; where it rests is the same.
+    tissue = Tissue(
+        mesh,
+        Material(viscous_damping=20.0),
+        fixed=mesh.positions[:, 2] == 0.0,
+        gravity=(0.0, 0.0, -weight),
+    )
+    assert live(tissue, 1.5) < ALLOWED
+    last = tissue.step(None, strokes.DT)
+    assert last.touch.n_contacts > 10
+    assert last.touch.force == pytest.approx(1.0, rel=0.25)  # faces bend: not all point upwards
+    assert speed(tissue) < AT_REST
+    upper = tissue.pieces()[1 if tissue.pieces()[0].is_held else 0]
+    assert np.linalg.norm(upper.velocity) < 1e-3
+    assert upper.centre[2] > 1.4 * SLAB[2]
+
+
+def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_come_to_rest():
+    """A block cut in two and squeezed between its held sides."""
+    mesh = grid((6, 4, 4), (0.06, 0.04, 0.04))
+    sides = bodies.sides(mesh)
+    tissue = Tissue(
+        mesh, Material(toughness=2.0, viscous_damping=20.0), fixed=sides, gravity=NO_GRAVITY
+    )
+    strokes.make(tissue, strokes.slanted(mesh, lean=0.1, rake=0.2))
+    assert tissue.n_pieces() == 2
+    worst = 0.0
+    for _ in range(300):
+        squeeze(tissue, 1e-5)
+        worst = max(worst, live(tissue, 0.005, every=5))
+        if tissue.step(None, strokes.DT).touch.force > 1.0:
+            break
+    worst = max(worst, live(tissue, 0.5))
+    assert worst < ALLOWED
+    last = tissue.step(None, strokes.DT)
+    assert last.touch.force == pytest.approx(1.0, rel=0.2)
+    assert speed(tissue) < AT_REST
+
+
+@pytest.mark.parametrize("until", [0.02, 0.06], ids=["a slit", "clean through"])
+def test_freshly_cut_lips_that_nothing_presses_feel_nothing(until):
+    tissue = incised(bodies.jittered(3, 0), 0.0207, until)
+    for _ in range(50):
+        touch = tissue.step(None, strokes.DT).touch
+        assert touch.force < 1e-12 and touch.penetration < 1e-12
+    assert speed(tissue) < 1e-12
+
+
+def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
+    mesh = grid((4, 6, 4), (0.04, 0.06, 0.04))
+    tissue = incised(mesh, 0.0207, 0.03, material=Material(viscous_damping=20.0))
+    assert tissue.n_pieces() == 1
+    for _ in range(200):
+        squeeze(tissue, 1e-5)
+        for _ in range(2):
+            pressed = tissue.step(None, strokes.DT).touch.force
+    for _ in range(300):
+        pressed = tissue.step(None, strokes.DT).touch.force
+    assert pressed > 0.5
+    surface = tissue.surface()
+    lips = np.unique(surface.triangles[surface.is_cut])
+    a, b, c = (surface.positions[surface.triangles[surface.is_cut][:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    for p in surface.positions[lips]:
+        height = ((p - a) * normals).sum(axis=1)
+        weights = np.stack(
+            [
+                np.einsum("ij,ij->i", np.cross(c - p, b - p), -normals),
+                np.einsum("ij,ij->i", np.cross(a - p, c - p), -normals),
+                np.einsum("ij,ij->i", np.cross(b - p, a - p), -normals),
+            ]
+        )
+        under = (weights > 0.0).all(axis=0) & (height < 0.0) & (height > -0.4 * ELEMENT)
+        assert not under.any() or height[under].min() > -ALLOWED
+    assert len(lips) > 20
+
+
+def test_before_the_first_cut_contact_has_nothing_to_look_at():
+    mesh = grid((4, 4, 4), (0.04,) * 3)
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh))
+    assert not tissue._contact.is_awake
+    tissue.step(None, strokes.DT)
+    assert not tissue._contact.arrays.start.any()
+    strokes.make(tissue, strokes.straight(mesh))
+    assert tissue._contact.is_awake
+
+
+def falling(height=0.02, material=None, gravity=(0.0, 0.0, -9.81), **options):
+    """Return a loose block some way above a floor at 0."""
+    mesh = grid((3, 3, 2), (0.03, 0.03, 0.02))
+    lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, height]))
+    return Tissue(lifted, material, gravity=gravity, floor=0.0, **options)
+
+
+def test_a_block_that_falls_on_the_floor_stays_on_it_and_comes_to_rest():
+    tissue = falling()
+    for _ in range(2000):
+        result = tissue.step(None, strokes.DT)
+        assert result.bounds[0, 2] > -ALLOWED
+    assert speed(tissue) < AT_REST
+    assert result.touch.force_of_floor[2] == pytest.approx(0.018 * 9.81, rel=0.05)
+    assert result.touch.force == 0.0
+
+
+@pytest.mark.parametrize(("degrees", "slides"), [(10.0, False), (15.0, False), (19.0, True)])
+def test_friction_of_0_3_holds_a_block_on_a_slope_of_less_than_16_7_degrees(degrees, slides):
+    """The floor is level; gravity leans."""
+    slope = np.radians(degrees)
+    material = Material(viscous_damping=2.0, friction=0.3)
+    tissue = falling(0.0, material, 9.81 * np.array([np.sin(slope), 0.0, -np.cos(slope)]))
+    for _ in range(500):
+        tissue.step(None, strokes.DT)
+    before = tissue.pieces()[0].centre[0]
+    for _ in range(300):
+        tissue.step(None, strokes.DT)
+    moved = tissue.pieces()[0].centre[0] - before
+    assert moved > 0.01 if slides else abs(moved) < 1e-4
+
+
+def energy(tissue: Tissue, gravity: float = 0.0) -> float:
+    """Return kinetic, elastic and potential energy [J]."""
+    body = tissue.snapshot()
+    kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
+    weight = gravity * float(body.masses @ body.positions[:, 2])
+    return kinetic + elastic_energy(tissue._springs, tissue._body) + weight
+
+
+@pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])
+def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(closing, young):
+    """Undamped, of unlike meshes, edges and corners first, at a third of their speed of sound."""
+    first, second = grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3)
+    mesh = joined(first, second, (0.007, 0.004, 0.032))
+    tissue = Tissue(
+        mesh, Material(young, viscous_damping=0.0, retardation_time=0.0), gravity=NO_GRAVITY
+    )
+    n, m = len(first.positions), len(mesh.positions)
+    tissue._body.velocities[n:m] = [0.1, 0.0, -closing]
+
+    def momentum():
+        body = tissue.snapshot()
+        return (body.masses[:, None] * body.velocities).sum(axis=0)
+
+    before, energy_t0 = momentum(), energy(tissue)
+    worst = live(tissue, 0.1, every=5)
+    np.testing.assert_allclose(momentum(), before, atol=1e-12 * np.linalg.norm(before))
+    assert energy(tissue) < energy_t0
+    assert worst < ALLOWED
+    body = tissue.snapshot()
+    speeds = [body.velocities[part, 2].mean() for part in (slice(0, n), slice(n, m))]
+    assert speeds[1] > speeds[0] - 0.9 * closing  # they did meet
+
+
+def test_the_energy_of_a_block_that_bounces_never_exceeds_what_it_fell_with():
+    tissue = falling(0.05, Material(viscous_damping=0.0))
+    at_first = energy(tissue, 9.81)
+    highest = max(
+        energy(tissue, 9.81) for _ in range(500) if tissue.step(None, strokes.DT) is not None
+    )
+    assert highest < at_first * (1.0 + 1e-9)
+    assert energy(tissue, 9.81) < 0.8 * at_first
+
+
+def test_crossed_beams_meet_edge_on_edge():
+    """Each turned on its edge, so that no node comes near a face of the other."""
+    beam = grid((6, 1, 1), (0.06, 0.01, 0.01))
+    c = np.sqrt(0.5)
+    on_edge = (beam.positions - [0.03, 0.005, 0.005]) @ np.array(
+        [[1.0, 0.0, 0.0], [0.0, c, c], [0.0, -c, c]]
+    )
+    lower = beam._replace(positions=on_edge)
+    upper = beam._replace(positions=on_edge[:, [1, 0, 2]] * [1.0, -1.0, 1.0])
+    mesh = joined(lower, upper, (0.005, 0.005, 0.0145))
+    n = len(on_edge)
+    fixed = np.arange(len(mesh.positions)) < n
+    tissue = Tissue(mesh, Material(viscous_damping=20.0), fixed=fixed, gravity=(0.0, 0.0, -2.0))
+    low, ridge = mesh.positions[n:, 2].min(), mesh.positions[:n, 2].max()
+    edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
+    assert edge.sum() == 2 and low > ridge
+    for _ in range(300):
+        touch = tissue.step(None, strokes.DT).touch
+        # The edge between the two nodes lies across the middle of an edge of the lower beam.
+        assert tissue.snapshot().positions[n:][edge, 2].mean() > ridge - ALLOWED
+    assert touch.n_contacts > 0
+
+
+def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
+    mesh = grid((4, 2, 2), (0.04, 0.02, 0.02))
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=mesh.positions[:, 0] <= 0.02, floor=-0.03)
+    strokes.make(tissue, strokes.straight(mesh, 0.75))
+    for _ in range(1000):
+        result = tissue.step(None, strokes.DT)
+    held, loose = pieces_of(tissue.snapshot())
+    assert held.is_held and not loose.is_held
+    assert -0.03 < loose.centre[2] < -0.015
+    assert result.touch.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
+    assert np.linalg.norm(loose.velocity) < AT_REST
+
+
+def test_contact_gives_the_same_bits_twice():
+    def run():
+        mesh = joined(grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031))
+        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
+        results = [tissue.step(None, strokes.DT) for _ in range(100)]
+        assert results[-1].touch.n_contacts > 0
+        return tissue.snapshot()
+
+    for one, other in zip(run(), run(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
+    def run():
+        mesh = joined(grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031))
+        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
+        for _ in range(60):
+            tissue.step(None, strokes.DT)
+        return tissue.snapshot()
+
+    roomy = run()
+    monkeypatch.setattr("tissue.contact.self_contact.CAPACITY", 8)
+    for one, other in zip(roomy, run(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])
+def test_a_floor_that_is_none_or_in_the_body_is_refused(floor):
+    mesh = grid((1, 1, 1), (0.01,) * 3)
+    lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, 0.01]))
+    with pytest.raises(ValueError, match="floor"):
+        Tissue(lifted, floor=floor)

@@ -1,0 +1,105 @@
+"""What impulses keep: momentum, and that no energy is made."""
+
+import numpy as np
+import pytest
+
+from tissue.body import build_body
+from tissue.contact.impulses import add_contact, gap, new_contacts, push_apart, stop_approach
+from tissue.geometry import Weights
+from tissue.shapes import grid
+from tissue.vec3 import Vec3
+
+pytestmark = pytest.mark.kernel
+
+UP = Vec3(0.0, 0.0, 1.0)
+STEP = 1e-3
+
+
+def bodies_of(seed=0, n_contacts=12):
+    """Return nodes with random masses and velocities, and random contacts that overlap a little."""
+    random = np.random.default_rng(seed)
+    body = build_body(grid((2, 2, 2)), None, None)
+    n = len(body.rest)
+    body.masses[:] = random.uniform(1e-4, 1e-3, n)
+    body.velocities[:] = random.normal(size=(n, 3))
+    contacts = new_contacts(n_contacts)
+    for _ in range(n_contacts):
+        a, b, c, d = random.choice(n, 4, replace=False).tolist()
+        w = random.dirichlet([1.0, 1.0, 1.0]).tolist()
+        normal = random.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        weights = Weights(1.0, *(-x for x in w))
+        add_contact(contacts, body, (a, b, c, d), weights, Vec3(*normal.tolist()), 0.0)
+    return body, contacts
+
+
+def kinetic(body):
+    return 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
+
+
+def momentum(body):
+    return (body.masses[:, None] * body.velocities).sum(axis=0)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.3, 2.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_impulses_keep_momentum_and_only_take_energy(seed, coefficient):
+    body, contacts = bodies_of(seed)
+    energy, before = kinetic(body), momentum(body)
+    centre = body.masses @ body.positions
+    push_apart(contacts, body, body.positions.copy(), coefficient, 0.0)
+    np.testing.assert_allclose(body.masses @ body.positions, centre, rtol=1e-12)
+    stop_approach(contacts, body, coefficient, STEP, 0.0)
+    np.testing.assert_allclose(momentum(body), before, atol=1e-12 * np.abs(before).max())
+    assert kinetic(body) < energy
+    assert contacts.impulse.min() >= 0.0
+    assert (
+        np.linalg.norm(contacts.friction, axis=1) <= coefficient * contacts.impulse * (1 + 1e-12)
+    ).all()
+
+
+def one_on_floor(velocity, depth=0.0):
+    """Return a body whose node 0 is on the floor, or in it."""
+    body = build_body(grid((1, 1, 1)), None, None)
+    body.masses[:] = 0.5
+    body.positions[0, 2] = -depth
+    body.velocities[0] = velocity
+    contacts = new_contacts(1)
+    add_contact(contacts, body, (0, 0, 0, 0), Weights(1.0, 0.0, 0.0, 0.0), UP, 0.0)
+    return body, contacts
+
+
+def test_a_node_that_hits_the_floor_stops_and_slides_on_as_coulomb_says():
+    body, contacts = one_on_floor([1.0, 0.0, -2.0])
+    stop_approach(contacts, body, 0.3, STEP, 0.0)
+    assert body.velocities[0].tolist() == pytest.approx([1.0 - 0.3 * 2.0, 0.0, 0.0])
+    assert contacts.impulse[0] == pytest.approx(0.5 * 2.0)
+
+
+def test_within_the_cone_friction_stops_it():
+    body, contacts = one_on_floor([0.5, 0.0, -2.0])
+    stop_approach(contacts, body, 0.3, STEP, 0.0)
+    assert np.abs(body.velocities[0]).max() < 1e-15
+
+
+def test_a_node_that_leaves_is_not_held():
+    body, contacts = one_on_floor([1.0, 0.0, 2.0])
+    stop_approach(contacts, body, 0.3, STEP, 0.0)
+    assert body.velocities[0].tolist() == [1.0, 0.0, 2.0]
+    assert contacts.impulse[0] == 0.0
+
+
+def test_a_node_in_the_floor_is_put_on_it():
+    body, contacts = one_on_floor([0.0, 0.0, 0.0], depth=1e-4)
+    push_apart(contacts, body, body.positions.copy(), 0.3, 0.0)
+    assert gap(contacts, body, 0) == pytest.approx(0.0, abs=1e-18)
+
+
+def test_fixed_nodes_take_any_impulse():
+    body, contacts = bodies_of()
+    body.fixed[:] = True
+    x, v = body.positions.copy(), body.velocities.copy()
+    push_apart(contacts, body, x.copy(), 0.3, 0.0)
+    stop_approach(contacts, body, 0.3, STEP, 0.0)
+    np.testing.assert_array_equal(body.positions, x)
+    np.testing.assert_array_equal(body.velocities, v)

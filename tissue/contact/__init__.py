@@ -1,0 +1,1 @@
+"""Contact of the body with itself and with the floor: lips, pieces, and what lies on the table."""

@@ -1,0 +1,116 @@
+"""Whether two edges of the skin went through each other during a step."""
+
+from typing import NamedTuple
+
+from tissue.jit import kernel
+from tissue.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
+
+NEARLY_PARALLEL = 1e-3
+"""Sine of the angle between edges below which they have no crossing to speak of. Their nodes meet
+the triangles beside them instead."""
+
+END = 1e-3
+"""Share of an edge at each end that is left to the node there, which meets triangles."""
+
+
+class EdgeEdge(NamedTuple):
+    """Two edges that went through each other, seen at the end of the step."""
+
+    is_through: bool
+    normal: Vec3
+    """Unit vector from the second to the first, as they should lie."""
+    s: float
+    """Where along the first edge."""
+    t: float
+    """Where along the second."""
+
+
+class Edges(NamedTuple):
+    """The ends of two edges at one instant."""
+
+    a: Vec3
+    b: Vec3
+    c: Vec3
+    d: Vec3
+
+
+class Crossing(NamedTuple):
+    """Where two lines are closest."""
+
+    is_one: bool
+    """Whether they are not parallel."""
+    normal: Vec3
+    """Unit vector across both."""
+    gap: float
+    """From the second to the first along it [m]."""
+    s: float
+    t: float
+
+
+@kernel
+def crossing_of(at: Edges) -> Crossing:
+    """Find where the lines ab and cd are closest."""
+    u = sub(at.b, at.a)
+    v = sub(at.d, at.c)
+    n = cross(u, v)
+    square = dot(n, n)
+    if square <= NEARLY_PARALLEL * NEARLY_PARALLEL * dot(u, u) * dot(v, v):
+        return Crossing(False, n, 0.0, 0.0, 0.0)
+    w = sub(at.c, at.a)
+    s = dot(cross(w, v), n) / square
+    t = dot(cross(w, u), n) / square
+    length = norm(n)
+    return Crossing(True, scale(1.0 / length, n), -dot(w, n) / length, s, t)
+
+
+@kernel
+def edge_edge(
+    t0: Edges, t1: Edges, outward: Vec3, other_outward: Vec3, slack: float, nothing_yet: float
+) -> EdgeEdge:
+    """Tell whether ab went through cd, from outside to inside, between t0 and t1.
+
+    They did if they now overlap by no more than they have moved. What overlaps by more has always
+    done so: two edges of one body on either side of it.
+
+    Args:
+        t0: Before the step.
+        t1: After it.
+        outward: Out of the body at ab; any length.
+        other_outward: The same at cd.
+        slack: How deep they may have been at t0 [m]: where they could not be pushed apart.
+        nothing_yet: Depth that is none [m].
+    """
+    outside = EdgeEdge(False, outward, 0.0, 0.0)
+    normal = cross(sub(t1.b, t1.a), sub(t1.d, t1.c))
+    towards = dot(normal, outward)
+    away = dot(normal, other_outward)
+    if away > 0.0 > towards:
+        way = 1.0
+    elif away < 0.0 < towards:
+        way = -1.0
+    else:
+        return outside  # the edges do not face each other
+    if way * dot(normal, sub(t1.a, t1.c)) >= 0.0:
+        return outside
+    now = crossing_of(t1)
+    if not (now.is_one and is_inner(now.s) and is_inner(now.t)):
+        return outside
+    depth = -way * now.gap
+    if not depth > nothing_yet:
+        return outside
+    moved = sub(between(t1, now.s, now.t), between(t0, now.s, now.t))
+    if depth > slack + norm(moved):
+        return outside
+    return EdgeEdge(True, scale(way, now.normal), now.s, now.t)
+
+
+@kernel
+def between(at: Edges, s: float, t: float) -> Vec3:
+    """Vector from a point of the second edge to one of the first [m]."""
+    return sub(lerp(s, at.a, at.b), lerp(t, at.c, at.d))
+
+
+@kernel
+def is_inner(s: float) -> bool:
+    """Whether a place along an edge is not at its ends."""
+    return END <= s <= 1.0 - END

@@ -1,0 +1,325 @@
+"""Contacts as constraints on four nodes, and the impulses that keep them.
+
+A contact asks that the gap, n . sum(w_i x_i), be not negative. The weights of a node and of the
+point under it in a triangle, or of two points on two edges, add up to zero: what is added to one
+side is taken from the other, and momentum is kept to the last bit but rounding.
+
+Contacts act at both ends of a Runge-Kutta step:
+
+- before it, contacts that lasted give half of the impulse that they gave in the last step. Where
+  nothing changes this is half of what is needed, the other half follows at the end, and nodes that
+  are pressed neither move nor show a speed (the leapfrog's way to split a force);
+- after it, positions are corrected, in the metric of the masses, to where no gap is negative;
+- then velocities, by impulses that stop the approach and nothing more (plastic impact), or that
+  take back what was given too much before. No contact ever pulls.
+
+Friction follows the same law in positions and velocities: within Coulomb's cone it holds the points
+together, on the cone it slides. All of it by Gauss-Seidel, in a fixed order.
+
+Sources: Moreau (1988), Unilateral contact and dry friction in finite freedom dynamics, for the
+plastic impact; Mueller et al. (2007), Position based dynamics, for corrections by weight over mass.
+"""
+
+import numpy as np
+
+from tissue.arrays import Arrays
+from tissue.body import Body, grown
+from tissue.geometry import Weights
+from tissue.jit import kernel
+from tissue.types import FloatArray, IntArray
+from tissue.vec3 import Vec3, axpy, dot, norm, scale, store, sub, vec3
+
+SWEEPS = 10
+"""Gauss-Seidel sweeps at most. Two stacked blocks need 10 to 20; what is left is pushed out in the
+steps that follow."""
+
+FRICTION_SWEEPS = 4
+"""Sweeps of friction: nodes of one face hold it together, so few are needed."""
+
+
+class Contacts(Arrays):
+    """The contacts of one Runge-Kutta step."""
+
+    node: IntArray
+    """Shape (capacity, 4)."""
+    weight: FloatArray
+    """Shape (capacity, 4); they add up to 0, or to 1 where the other side is the floor."""
+    normal: FloatArray
+    """Unit vector, from the side of the negative weights to the other; shape (capacity, 3)."""
+    floor: FloatArray
+    """Height of the floor where the other side is the floor, else 0 [m]; shape (capacity,)."""
+    mobility: FloatArray
+    """Sum of squared weight over mass [1/kg], shape (capacity,)."""
+    shift: FloatArray
+    """Correction of positions along the normal [kg m], shape (capacity,)."""
+    closing: FloatArray
+    """Speed at which the sides may approach, for they are apart [m/s]; shape (capacity,)."""
+    drag: FloatArray
+    """Correction of positions across it [kg m], shape (capacity, 3)."""
+    impulse: FloatArray
+    """Along the normal, in this step [N s], shape (capacity,)."""
+    last_impulse: FloatArray
+    """In the step before, 0 where there was none [N s]; shape (capacity,)."""
+    friction: FloatArray
+    """Across it [N s], shape (capacity, 3)."""
+    count: IntArray
+    """Shape (1,)."""
+
+
+def new_contacts(capacity: int) -> Contacts:
+    """Return no contacts, with room for that many."""
+    return Contacts(
+        node=np.zeros((capacity, 4), np.int64),
+        weight=np.zeros((capacity, 4)),
+        normal=np.zeros((capacity, 3)),
+        floor=np.zeros(capacity),
+        mobility=np.zeros(capacity),
+        shift=np.zeros(capacity),
+        closing=np.zeros(capacity),
+        drag=np.zeros((capacity, 3)),
+        impulse=np.zeros(capacity),
+        last_impulse=np.zeros(capacity),
+        friction=np.zeros((capacity, 3)),
+        count=np.zeros(1, np.int64),
+    )
+
+
+def grown_contacts(contacts: Contacts, capacity: int) -> Contacts:
+    """Return the contacts with room for that many."""
+    names = set(Contacts.__annotations__) - {"count"}
+    return contacts.replaced(**{name: grown(getattr(contacts, name), capacity) for name in names})
+
+
+@kernel
+def is_tangled(contacts: Contacts, k: int, tangled: IntArray, epoch: int) -> bool:
+    """Whether a node of contact `k` has its `tangled` at `epoch`."""
+    node = contacts.node
+    return (
+        tangled[node[k, 0]] == epoch
+        or tangled[node[k, 1]] == epoch
+        or tangled[node[k, 2]] == epoch
+        or tangled[node[k, 3]] == epoch
+    )
+
+
+@kernel
+def press(contacts: Contacts, body: Body, tangled: IntArray, epoch: int) -> None:
+    """Keep the contacts that pressed, and give half of the impulse of those that lasted.
+
+    Nodes whose `tangled` is `epoch` are let go.
+    """
+    n = 0
+    for k in range(contacts.count[0]):
+        if contacts.impulse[k] == 0.0 or is_tangled(contacts, k, tangled, epoch):
+            continue
+        # An impact is over: what it took in one step is not needed in the next.
+        lasting = 0.5 * min(contacts.impulse[k], contacts.last_impulse[k])
+        share = lasting / contacts.impulse[k]
+        for q in range(4):
+            contacts.node[n, q] = contacts.node[k, q]
+            contacts.weight[n, q] = contacts.weight[k, q]
+        for x in range(3):
+            contacts.normal[n, x] = contacts.normal[k, x]
+            contacts.friction[n, x] = share * contacts.friction[k, x]
+            contacts.drag[n, x] = 0.0
+        contacts.floor[n] = contacts.floor[k]
+        contacts.mobility[n] = contacts.mobility[k]
+        contacts.shift[n] = 0.0
+        contacts.last_impulse[n] = contacts.impulse[k]
+        contacts.impulse[n] = lasting
+        given = axpy(lasting, vec3(contacts.normal, n), vec3(contacts.friction, n))
+        _apply(contacts, body, n, given, body.velocities)
+        n += 1
+    contacts.count[0] = n
+
+
+@kernel
+def turn(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec3) -> None:
+    """Let contact `k` be where its sides now meet."""
+    contacts.weight[k, 0] = weights.a
+    contacts.weight[k, 1] = weights.b
+    contacts.weight[k, 2] = weights.c
+    contacts.weight[k, 3] = weights.d
+    store(contacts.normal, k, normal)
+    contacts.mobility[k] = _mobility(contacts, body, k)
+
+
+@kernel
+def _mobility(contacts: Contacts, body: Body, k: int) -> float:
+    mobility = 0.0
+    for q in range(4):
+        node = contacts.node[k, q]
+        if not body.fixed[node]:
+            mobility += contacts.weight[k, q] ** 2 / body.masses[node]
+    return mobility
+
+
+@kernel
+def is_contact_of(contacts: Contacts, k: int, nodes: tuple[int, int, int, int]) -> bool:
+    """Whether contact `k` is between these nodes; two edges may come in either order."""
+    row = contacts.node
+    a, b, c, d = row[k, 0], row[k, 1], row[k, 2], row[k, 3]
+    return (a, b, c, d) == nodes or (contacts.weight[k, 1] > 0.0 and (c, d, a, b) == nodes)
+
+
+@kernel
+def add_contact(
+    contacts: Contacts,
+    body: Body,
+    nodes: tuple[int, int, int, int],
+    weights: Weights,
+    normal: Vec3,
+    floor: float,
+) -> None:
+    """Add a contact and push it apart, unless it is there already or nothing in it can move."""
+    k = contacts.count[0]
+    if k == len(contacts.shift):
+        return
+    for other in range(k):
+        if is_contact_of(contacts, other, nodes):
+            return
+    for q in range(4):
+        contacts.node[k, q] = nodes[q]
+    turn(contacts, body, k, weights, normal)
+    if contacts.mobility[k] == 0.0:
+        return
+    contacts.count[0] += 1
+    contacts.floor[k] = floor
+    contacts.shift[k] = 0.0
+    contacts.impulse[k] = 0.0
+    contacts.last_impulse[k] = 0.0
+    for x in range(3):
+        contacts.drag[k, x] = 0.0
+        contacts.friction[k, x] = 0.0
+    _push(contacts, body, k)
+
+
+@kernel
+def difference(contacts: Contacts, k: int, values: FloatArray) -> Vec3:
+    """Weighted sum of nodal values at contact `k`: one side less the other."""
+    total = Vec3(0.0, 0.0, 0.0)
+    for q in range(4):
+        total = axpy(contacts.weight[k, q], vec3(values, contacts.node[k, q]), total)
+    return total
+
+
+@kernel
+def gap(contacts: Contacts, body: Body, k: int) -> float:
+    """Distance of the two sides along the normal [m], negative where they overlap."""
+    return (
+        dot(vec3(contacts.normal, k), difference(contacts, k, body.positions)) - contacts.floor[k]
+    )
+
+
+@kernel
+def _apply(contacts: Contacts, body: Body, k: int, correction: Vec3, values: FloatArray) -> None:
+    """Add a correction [kg m] or [kg m/s] to the nodes of contact `k`, each by its weight."""
+    for q in range(4):
+        node = contacts.node[k, q]
+        if not body.fixed[node]:
+            share = contacts.weight[k, q] / body.masses[node]
+            values[node, 0] += share * correction.x
+            values[node, 1] += share * correction.y
+            values[node, 2] += share * correction.z
+
+
+@kernel
+def _push(contacts: Contacts, body: Body, k: int) -> float:
+    """Close the gap of contact `k`, or what of its correction is too much; return the move [m]."""
+    before = contacts.shift[k]
+    now = max(before - gap(contacts, body, k) / contacts.mobility[k], 0.0)
+    if now == before:
+        return 0.0
+    contacts.shift[k] = now
+    normal = vec3(contacts.normal, k)
+    _apply(contacts, body, k, scale(now - before, normal), body.positions)
+    return abs(now - before) * contacts.mobility[k]
+
+
+@kernel
+def push_apart(
+    contacts: Contacts, body: Body, start: FloatArray, coefficient: float, small: float
+) -> None:
+    """Move nodes to where no gap is negative, and back by what friction holds.
+
+    Args:
+        contacts: `shift` and `drag` are written.
+        body: Positions are written.
+        start: Positions before the step [m].
+        coefficient: Of friction.
+        small: Move at which the sweeps end [m].
+    """
+    for _ in range(SWEEPS):
+        most = 0.0
+        for k in range(contacts.count[0]):
+            most = max(most, _push(contacts, body, k))
+        if most <= small:
+            break
+    for _ in range(FRICTION_SWEEPS):
+        for k in range(contacts.count[0]):
+            if contacts.shift[k] > 0.0:
+                moved = sub(difference(contacts, k, body.positions), difference(contacts, k, start))
+                limit = coefficient * contacts.shift[k]
+                _hold(contacts, body, k, moved, limit, contacts.drag, body.positions)
+
+
+@kernel
+def stop_approach(
+    contacts: Contacts, body: Body, coefficient: float, seconds: float, small: float
+) -> None:
+    """Give impulses that stop the sides' approach, and their sliding as far as friction can.
+
+    Sides that are still apart, for they were pressed in the last step, may close their gap.
+
+    Args:
+        contacts: `impulse` and `friction` are written.
+        body: Velocities are written.
+        coefficient: Of friction.
+        seconds: Length of the Runge-Kutta step [s].
+        small: Change of the gap at which the sweeps end [m].
+    """
+    for k in range(contacts.count[0]):
+        contacts.closing[k] = max(gap(contacts, body, k), 0.0) / seconds
+    for _ in range(SWEEPS):
+        most = 0.0
+        for k in range(contacts.count[0]):
+            normal = vec3(contacts.normal, k)
+            speed = dot(normal, difference(contacts, k, body.velocities))
+            before = contacts.impulse[k]
+            now = max(before - (speed + contacts.closing[k]) / contacts.mobility[k], 0.0)
+            contacts.impulse[k] = now
+            if now != before:
+                _apply(contacts, body, k, scale(now - before, normal), body.velocities)
+                most = max(most, abs(now - before) * contacts.mobility[k])
+        if most * seconds <= small:
+            break
+    for _ in range(FRICTION_SWEEPS):
+        for k in range(contacts.count[0]):
+            if contacts.impulse[k] > 0.0 or norm(vec3(contacts.friction, k)) > 0.0:
+                sliding = difference(contacts, k, body.velocities)
+                limit = coefficient * contacts.impulse[k]
+                _hold(contacts, body, k, sliding, limit, contacts.friction, body.velocities)
+
+
+@kernel
+def _hold(
+    contacts: Contacts,
+    body: Body,
+    k: int,
+    relative: Vec3,
+    limit: float,
+    held: FloatArray,
+    values: FloatArray,
+) -> None:
+    """Take away the part of `relative` across the normal, by at most `limit` in all."""
+    normal = vec3(contacts.normal, k)
+    across = axpy(-dot(relative, normal), normal, relative)
+    before = vec3(held, k)
+    now = axpy(-1.0 / contacts.mobility[k], across, before)
+    size = norm(now)
+    if size > limit:
+        now = scale(limit / size, now)
+    held[k, 0] = now.x
+    held[k, 1] = now.y
+    held[k, 2] = now.z
+    _apply(contacts, body, k, sub(now, before), values)

@@ -1,0 +1,161 @@
+"""`SelfContact`: owns the arrays of contact, and says when there is anything to look for.
+
+Lips of a cut, pieces, and the floor: no node goes through a triangle, no edge through an edge.
+Before the first face is cut, in a body of one piece without a floor, it costs nothing.
+
+What is found is what went through between two Runge-Kutta steps, from outside to inside. So nodes
+of one body that lie close under a triangle of it are never mistaken for contact, at any speed
+nothing passes unseen as long as it moves less than its own element in a step, and what overlaps
+from the start is left alone rather than torn apart.
+"""
+
+import numpy as np
+
+from tissue.body import TETRAHEDRA, Body, grown
+from tissue.contact.candidates import grown_candidates, new_candidates
+from tissue.contact.faces import (
+    WITH_SKIN,
+    collect_faces,
+    count_faces,
+    grown_faces,
+    in_pieces,
+    new_faces,
+    renew_faces,
+    with_room,
+)
+from tissue.contact.impulses import grown_contacts, new_contacts
+from tissue.contact.resolve import (
+    FLOOR_IMPULSE,
+    IS_AWAKE,
+    IS_STALE,
+    N_TOTALS,
+    N_TOUCHING,
+    PENETRATION,
+    PRESSURE_IMPULSE,
+    ContactState,
+)
+from tissue.cut import N_DIRTY, Change
+from tissue.pieces import label_pieces
+from tissue.types import Touch
+
+MARGIN = 0.25
+"""How far apart candidates may be, per mean node size. Larger: more pairs to look at in each step;
+smaller: a search more often."""
+
+TOUCH = 1e-6
+"""Distance that is none, per mean node size: thousands of times below what one could measure,
+thousands above rounding. Without it a node left on a triangle might be on either side of it."""
+
+CAPACITY = 256
+"""Triangles that there is room for at first."""
+
+
+class SelfContact:
+    """Contact of one body with itself and with the floor.
+
+    Args:
+        body: At its start.
+        node_size: Its mean node size [m].
+        friction: Coefficient of friction.
+        floor: Height of the floor [m], or None.
+    """
+
+    def __init__(
+        self, body: Body, node_size: float, friction: float, floor: float | None = None
+    ) -> None:
+        n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+        self._capacity = CAPACITY
+        self.arrays = ContactState(
+            faces=new_faces(n_tetrahedra),
+            candidates=new_candidates(n_nodes, CAPACITY),
+            contacts=new_contacts(self._n_pairs(n_nodes)),
+            found=np.zeros(self._n_pairs(n_nodes), np.int64),
+            start=np.zeros((n_nodes, 3)),
+            depth=np.zeros(n_nodes),
+            depth_epoch=np.zeros(n_nodes, np.int64),
+            tangled=np.zeros(n_nodes, np.int64),
+            state=np.zeros(4, np.int64),
+            totals=np.zeros(N_TOTALS),
+            friction=float(friction),
+            floor=-np.inf if floor is None else float(floor),
+            margin=float(MARGIN * node_size),
+            touch=float(TOUCH * node_size),
+        )
+        self.arrays.state[IS_AWAKE] = floor is not None
+        self.look_for_pieces(body)
+
+    @property
+    def is_awake(self) -> bool:
+        """Whether there is anything that could touch."""
+        return bool(self.arrays.state[IS_AWAKE])
+
+    def begin(self) -> None:
+        """Begin to count anew."""
+        self.arrays.totals[:] = 0.0
+
+    def touch(self, dt: float) -> Touch:
+        """Return what was counted, over the time `dt` [s]."""
+        totals = self.arrays.totals
+        per_second = 1.0 / dt if dt > 0.0 else 0.0
+        return Touch(
+            n_contacts=int(totals[N_TOUCHING]),
+            penetration=float(totals[PENETRATION]),
+            force=float(totals[PRESSURE_IMPULSE] * per_second),
+            force_of_floor=totals[FLOOR_IMPULSE : FLOOR_IMPULSE + 3] * per_second,
+        )
+
+    def mesh_changed(self, body: Body, change: Change) -> None:
+        """Take in the faces that a pass of a cut made."""
+        state, faces = self.arrays.state, self.arrays.faces
+        faces = with_room(faces, 4 * int(change.counts[N_DIRTY]))
+        renew_faces(faces, body, change)
+        self.arrays = self.arrays.replaced(faces=faces)
+        state[IS_AWAKE] |= faces.counts[0] > 0
+        state[IS_STALE] = 1
+        self.arrays.contacts.count[0] = 0  # their nodes may be others now
+
+    def look_for_pieces(self, body: Body) -> None:
+        """Find out whether the body is in pieces; its skin may touch then, too."""
+        faces = self.arrays.faces
+        n_tetrahedra = int(body.counts[TETRAHEDRA])
+        piece, queue = np.empty((2, n_tetrahedra), np.int64)
+        n_pieces = label_pieces(body, piece, queue)
+        if n_pieces == 1:
+            return
+        faces = in_pieces(faces, piece, n_pieces)
+        if not faces.counts[WITH_SKIN]:
+            faces = with_room(faces, count_faces(body, True))
+            faces.counts[WITH_SKIN] = 1
+            collect_faces(faces, body)
+        self.arrays = self.arrays.replaced(faces=faces)
+        self.arrays.state[[IS_AWAKE, IS_STALE]] = 1
+
+    def make_room(self) -> None:
+        """Double the room for what may touch."""
+        self._capacity *= 2
+        n_nodes = len(self.arrays.depth)
+        search = self.arrays.candidates.search
+        candidates = new_candidates(n_nodes, self._capacity)
+        candidates.search[:] = search
+        self.arrays = self.arrays.replaced(candidates=candidates, **self._of_pairs(n_nodes))
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        arrays = self.arrays
+        of_nodes = ("start", "depth", "depth_epoch", "tangled")
+        self.arrays = arrays.replaced(
+            faces=grown_faces(arrays.faces, n_tetrahedra),
+            candidates=grown_candidates(arrays.candidates, n_nodes),
+            **self._of_pairs(n_nodes),
+            **{name: grown(getattr(arrays, name), n_nodes) for name in of_nodes},
+        )
+
+    def _of_pairs(self, n_nodes: int) -> dict[str, object]:
+        """Return the arrays of pairs with room for all of them."""
+        n_pairs = self._n_pairs(n_nodes)
+        contacts = grown_contacts(self.arrays.contacts, n_pairs)
+        return {"contacts": contacts, "found": np.zeros(n_pairs, np.int64)}
+
+    def _n_pairs(self, n_nodes: int) -> int:
+        """Return how many pairs there is room for, every node on the floor among them."""
+        return 16 * self._capacity + n_nodes
