@@ -34,6 +34,7 @@ def make_tissue(scene: Scene) -> Tissue:
         fixed=fixed,
         positions=pulled_apart(mesh.positions, scene.fixed, scene.stretch),
         gravity=(0.0, 0.0, -scene.gravity),
+        quality=scene.quality,
     )
     if fixed.any():
         tissue.settle()

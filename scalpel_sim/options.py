@@ -29,6 +29,12 @@ class Body:
     "Density [kg/m3]."
     toughness: float | None = None
     "Fracture toughness: what a square metre of cut costs [J/m2]."
+    snap: float | None = None
+    """Where the blade passes nearer to a node than this share of the node's size, the cut goes
+    through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""
+    guard: float | None = None
+    """No new element is thinner than this share of the mean node size, at most 0.5; best is half of
+    --snap [default: 0.15]."""
     stretch: float | None = None
     "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
     gravity: float | None = None

@@ -7,6 +7,7 @@ import numpy as np
 
 from scalpel_sim.recording import Recording
 from scalpel_sim.version import version
+from tissue.quality import QualityReport
 
 COMPLETE = "complete"
 """The status of a run that reached its end; any other status says what ended it."""
@@ -38,6 +39,8 @@ class Summary(NamedTuple):
     tetrahedra_final: int
     pieces: int | None
     """None where the link to the tissue was lost."""
+    quality: dict[str, float] | None
+    """Path error against time step, see `quality_figures`; None where the link was lost."""
     cut_area_m2: float
     force_peak_n: float
     """Largest force that the blade felt, after the device's limits."""
@@ -65,6 +68,7 @@ def summarise(
     tetrahedra_initial: int,
     tetrahedra_final: int,
     pieces: int | None,
+    quality: QualityReport | None,
     counters: dict[str, int],
     settings: dict[str, Any],
 ) -> Summary:
@@ -87,6 +91,7 @@ def summarise(
         tetrahedra_initial=tetrahedra_initial,
         tetrahedra_final=tetrahedra_final,
         pieces=pieces,
+        quality=None if quality is None else quality_figures(quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
@@ -96,6 +101,23 @@ def summarise(
         settings=settings,
         versions=versions(),
     )
+
+
+def quality_figures(report: QualityReport) -> dict[str, float]:
+    """Return how far the cut is off the blade's path, and what it did to elements and time step."""
+    return {
+        "path_error_mean_m": report.path_error_mean,
+        "path_error_largest_m": report.path_error_largest,
+        "path_error_mean_node_sizes": report.path_error_mean / report.node_size,
+        "path_error_largest_node_sizes": report.path_error_largest / report.node_size,
+        "node_size_m": report.node_size,
+        "guard_m": report.guard,
+        "smallest_altitude_initial_m": report.initial.altitude,
+        "smallest_altitude_m": report.now.altitude,
+        "tetrahedra_growth": report.growth,
+        "frequency_growth": report.frequency_growth,
+        "substep_growth": report.substep_growth,
+    }
 
 
 def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:

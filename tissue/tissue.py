@@ -3,7 +3,6 @@
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -34,9 +33,11 @@ from tissue.border import (
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
+from tissue.measures import lowest_altitude, path_error
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import count_pieces
 from tissue.prescribed import begin_path, prescribe_path
+from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme
 from tissue.slipping import relocate
@@ -110,24 +111,6 @@ class TissueError(RuntimeError):
     """The tissue cannot go on."""
 
 
-@dataclass(frozen=True)
-class CutQuality:
-    """How closely the cut follows the blade, against how small the elements get that it makes.
-
-    In units of the mesh's mean node size (the smallest altitude of the tetrahedra around a node).
-    Larger values give larger elements and time steps, and a rougher cut.
-    """
-
-    snap: float = 0.3
-    """A crossing nearer to a node than this share of that node's size uses the node."""
-    floor: float = 0.3
-    """... or nearer than this share of the mean node size."""
-    guard: float = 0.15
-    """No altitude of a new tetrahedron is smaller than this share of the mean node size."""
-    crumb: float = 1.0
-    """A piece smaller than this share of the mean tetrahedron is not cut loose."""
-
-
 class Tissue:
     """A soft body of tetrahedra: masses at nodes, springs along edges, and a blade that cuts it.
 
@@ -194,6 +177,8 @@ class Tissue:
             n_nodes,
             n_tetrahedra,
         )
+        self._guard = quality.guard * self.node_size
+        self._at_first = self._measures()
         self._grow()
 
     @property
@@ -335,6 +320,19 @@ class Tissue:
         """Return the number of connected pieces."""
         piece, queue = np.empty((2, self.n_tetrahedra), dtype=np.int64)
         return count_pieces(self._body, piece, queue)
+
+    def quality(self) -> QualityReport:
+        """Return the path error of the cuts so far, and what they did to elements and time step."""
+        error = path_error(self._body)
+        return QualityReport(
+            n_cut_nodes=error.n_nodes,
+            path_error_mean=error.mean,
+            path_error_largest=error.largest,
+            node_size=self.node_size,
+            guard=self._guard,
+            initial=self._at_first,
+            now=self._measures(),
+        )
 
     # stages of a step
 
@@ -485,6 +483,14 @@ class Tissue:
         """Return how far the edge moves [m]: the further of its two ends."""
         t0, t1 = sweep
         return max(math.dist(t1.tip, t0.tip), math.dist(t1.heel, t0.heel))
+
+    def _measures(self) -> Measures:
+        return Measures(
+            n_tetrahedra=self.n_tetrahedra,
+            altitude=lowest_altitude(self._body),
+            frequency=math.sqrt(self._frequency_squared),
+            time_step=self._stable_step(self._frequency_squared),
+        )
 
     def _result(
         self,
