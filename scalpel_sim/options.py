@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -10,6 +10,8 @@ SceneName = Annotated[
     str | None,
     Parameter(help="organ (default), slab, grid2 or grid7."),
 ]
+
+FigureNumber = Annotated[Literal[10, 11, 12], Parameter(help="10, 11 or 12.")]
 
 
 @Parameter(name="*")
