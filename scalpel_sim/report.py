@@ -1,12 +1,12 @@
 """The table that a run prints, with the paper's figures beside ours where it has them."""
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.summary import COMPLETE, STAGES, Summary
+from scalpel_sim.table_1 import TABLE_1
 
 STAGE_NAMES = dict(
     zip(STAGES, ("relaxation", "pictures", "topology, geometry", "collision"), strict=True)
@@ -17,19 +17,7 @@ MM2_PER_M2 = 1e6
 MJ_PER_J = 1e3
 
 
-class PaperRow(NamedTuple):
-    """A row of Table 1 of Bielser, Maiwald and Gross (1998), measured on an SGI Indigo 2."""
-
-    tetrahedra_initial: int
-    tetrahedra_final: int
-    frame_rate: float
-    percent: dict[str, float]
-
-
-TABLE_1 = {
-    "grid2": PaperRow(48, 354, 3.78, {"RX": 82.1, "RD": 11.4, "GC": 1.7, "CD": 0.3}),
-    "slab": PaperRow(576, 2446, 1.14, {"RX": 92.2, "RD": 4.9, "GC": 0.1, "CD": 0.5}),
-}
+PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
 """By scene. The paper has no such figures for the other bodies."""
 
 
@@ -57,7 +45,7 @@ def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> 
 
 def print_table(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
-    paper = TABLE_1.get(summary.scene)
+    paper = PAPER.get(summary.scene)
     table = Table(
         title=f"{summary.scene}: {summary.settings['stroke']} stroke",
         title_justify="left",

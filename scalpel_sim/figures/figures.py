@@ -13,7 +13,7 @@ from scalpel_sim import textures
 from scalpel_sim.draping import drape
 from scalpel_sim.errors import RunError
 from scalpel_sim.figures.camera import Margins, View, framing
-from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_12, Moment, moments
+from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, moments
 from scalpel_sim.figures.paint import Thing, paint, texture_of
 from scalpel_sim.figures.table import table_below
 from scalpel_sim.figures.wire import draw_mesh
@@ -60,7 +60,7 @@ def draw_figure(number: int, path: Path) -> Drawn:
 
 
 def _figure_10() -> tuple[list[FloatArray], Drawn]:
-    seen = moments(FIGURE_10)
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
     view = _view(seen, WITH_TOOL)
     panels = [_picture(view, moment, with_tool=True) for moment in seen]
     caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
@@ -68,7 +68,7 @@ def _figure_10() -> tuple[list[FloatArray], Drawn]:
 
 
 def _figure_11() -> tuple[list[FloatArray], Drawn]:
-    seen = moments(FIGURE_10)
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
     view = _view(seen, BODY_ALONE)
     ends = [seen[0], seen[-1]]
     panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]

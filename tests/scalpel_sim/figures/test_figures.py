@@ -8,7 +8,7 @@ import pytest
 
 from scalpel_sim.cli import command_line
 from scalpel_sim.figures import figures
-from scalpel_sim.figures.cuts import FIGURE_10, moments
+from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
 from scalpel_sim.figures.wire import edges_of
 
 
@@ -38,7 +38,7 @@ def test_each_figure_is_one_command(number, n_panels, small, capsys):
 
 
 def test_figure_10_grows_from_576_tetrahedra_as_the_blade_goes_through_and_its_cut_gapes():
-    seen = moments(FIGURE_10)
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
     counts = [len(moment.snapshot.tetrahedra) for moment in seen]
     assert counts[0] == 576 and counts == sorted(counts) and counts[3] > counts[1] > 576
     areas = [moment.surface.is_cut.sum() for moment in seen]
