@@ -37,6 +37,7 @@ def warm_up() -> None:
     tissue.surface()
     tissue.snapshot()
     tissue.pieces()
+    tissue.quality()
 
 
 def _edge(fraction: float) -> BladeSegment:

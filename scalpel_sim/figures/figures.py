@@ -29,7 +29,7 @@ STEEL = (0.80, 0.82, 0.85)
 RELIEF = 0.02
 WIDTH, HEIGHT = 640, 520
 """Of each panel [pixels]."""
-WITH_TOOL = Margins(side=0.05, top=0.17, bottom=0.04)
+WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
 GAP = 12
 """Between panels [pixels]."""
@@ -126,7 +126,7 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
     """Write panels, two in a row, each with its letter and label below, and the title last."""
     n_rows = math.ceil(len(panels) / 2)
     width = 2 * WIDTH + 3 * GAP
-    height = n_rows * (HEIGHT + LINE + GAP) + LINE + 2 * GAP
+    height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
     figure = Figure(figsize=(width / DOTS_PER_INCH, height / DOTS_PER_INCH), facecolor="white")
     for i, (panel, label) in enumerate(zip(panels, labels, strict=True)):
         left = GAP + (i % 2) * (WIDTH + GAP)
@@ -144,8 +144,8 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         )
     figure.text(
         0.5,
-        (GAP + LINE / 2) / height,
-        f"{title}. After Bielser, Maiwald, Gross (1998)",
+        (GAP + LINE) / height,
+        f"{title}\n(after Bielser, Maiwald, Gross 1998)",
         ha="center",
         va="center",
         fontsize=8.5,
