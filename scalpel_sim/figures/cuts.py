@@ -22,7 +22,7 @@ TOOL = ("blade", "stylus")
 
 FIGURE_10 = Cut(
     replace(SCENES["slab"], stretch=STRETCH),
-    way=np.array([[0.43, -0.2], [0.57, 1.5]]),
+    way=np.array([[0.4, -0.2], [0.62, 1.5]]),
     depth=0.7,
     lean=0.12,
 )
