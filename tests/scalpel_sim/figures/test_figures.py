@@ -33,7 +33,7 @@ def test_each_figure_is_one_command(number, n_panels, small, capsys):
     assert len(said["labels"]) == len(said["n_tetrahedra"]) == n_panels
     image = matplotlib.image.imread(said["file"])
     assert image.shape[0] > 120 and image.shape[1] > 300
-    assert 0.01 < red(image) < 0.5
+    assert 0.002 < red(image) < 0.5  # lines are thin
     assert (image[:, :, :3].min(axis=2) > 0.9).mean() > 0.3  # on white
 
 
