@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 from tissue.material import Material
+from tissue.quality import QualityReport
 from tissue.types import BladeSweep, FloatArray, Snapshot, StepResult, Surface
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -49,6 +50,9 @@ class TissueLink(Protocol):
     def n_pieces(self) -> int:
         """Return the number of connected pieces; `tissue.pieces.pieces_of` tells more."""
 
+    def quality(self) -> QualityReport:
+        """Return the path error of the cuts so far, and what they did to elements and time step."""
+
     def close(self) -> None:
         """Let go of the tissue."""
 
@@ -85,6 +89,10 @@ class InProcessLink:
     def n_pieces(self) -> int:
         """See `TissueLink.n_pieces`."""
         return self._tissue.n_pieces()
+
+    def quality(self) -> QualityReport:
+        """See `TissueLink.quality`."""
+        return self._tissue.quality()
 
     def close(self) -> None:
         """See `TissueLink.close`."""

@@ -21,6 +21,7 @@ from bridge.messages import (
     pack_description,
     pack_error,
     pack_pieces,
+    pack_quality,
     pack_result,
     pack_snapshot,
     pack_surface,
@@ -251,6 +252,8 @@ class TissueServer:
             return pack_surface(self._link.surface())
         if frame.kind == Kind.PIECES:
             return pack_pieces(self._link.n_pieces())
+        if frame.kind == Kind.QUALITY:
+            return pack_quality(self._link.quality())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
     def _send(self, peer: _Peer, message: bytes) -> None:

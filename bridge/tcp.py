@@ -10,6 +10,7 @@ from bridge.messages import (
     LARGEST_DESCRIPTION,
     LARGEST_ERROR,
     PIECES_BYTES,
+    QUALITY_BYTES,
     RESULT_BYTES,
     pack_step,
     snapshot_bytes,
@@ -17,11 +18,13 @@ from bridge.messages import (
     unpack_description,
     unpack_error,
     unpack_pieces,
+    unpack_quality,
     unpack_result,
     unpack_snapshot,
     unpack_surface,
 )
 from bridge.wire import LARGEST_REPLY, Frame, FrameReader, Kind, MessageError, pack_frame
+from tissue.quality import QualityReport
 from tissue.types import BladeSweep, Snapshot, StepResult, Surface
 
 Value = TypeVar("Value")
@@ -91,6 +94,10 @@ class TcpLink:
     def n_pieces(self) -> int:
         """See `TissueLink.n_pieces`."""
         return self._ask(Kind.PIECES, b"", PIECES_BYTES, unpack_pieces)
+
+    def quality(self) -> QualityReport:
+        """See `TissueLink.quality`."""
+        return self._ask(Kind.QUALITY, b"", QUALITY_BYTES, unpack_quality)
 
     def close(self) -> None:
         """See `TissueLink.close`."""

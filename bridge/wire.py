@@ -39,6 +39,7 @@ class Kind(enum.IntEnum):
     SURFACE = 4
     PIECES = 5
     ERROR = 6
+    QUALITY = 7
 
 
 class Frame(NamedTuple):

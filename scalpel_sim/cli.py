@@ -1,14 +1,17 @@
-"""The command line: `scalpel-sim run`, `view` and `serve`."""
+"""The command line: `scalpel-sim run`, `view`, `serve`, `bench` and `figure`."""
 
+import json
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT
+from scalpel_sim.bench.commands import bench
 from scalpel_sim.console import progress, report, say, say_error, talking
 from scalpel_sim.errors import (
     EXIT_OK,
@@ -17,7 +20,7 @@ from scalpel_sim.errors import (
     exit_code,
     one_line,
 )
-from scalpel_sim.options import Body, Motion, SceneName, Talk
+from scalpel_sim.options import Body, FigureNumber, Motion, SceneName, Talk
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.version import version
@@ -137,6 +140,44 @@ def serve(
                 f"{served.name} at {address}; Ctrl-C ends it", flush=True
             ),
         )
+
+
+app.command(bench)
+
+
+@app.command
+def figure(
+    number: FigureNumber,
+    /,
+    *,
+    output: Path | None = None,
+    talk: Talk = Talk(),
+) -> None:
+    """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
+
+    Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
+    the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells.
+
+    Args:
+        number: 10, 11 or 12.
+        output: The file; figure10.png (11, 12) in this folder if not given.
+    """
+    from scalpel_sim.outputs import check_file
+
+    path = output or Path(f"figure{number}.png")
+    with talking(talk):
+        check_file(path, ".png", "--output")
+        from scalpel_sim.figures.figures import draw_figure
+        from scalpel_sim.ready import load_kernels
+
+        load_kernels(talk)
+        if not talk.quiet:
+            say(f"cutting and drawing Figure {number}: about half a minute")
+        drawn = draw_figure(number, path)
+        if talk.json:
+            print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
+        elif not talk.quiet:
+            print(f"{path}: {drawn.caption}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -10,6 +10,8 @@ SceneName = Annotated[
     str | None,
     Parameter(help="organ (default), slab, grid2 or grid7."),
 ]
+
+FigureNumber = Annotated[Literal[10, 11, 12], Parameter(help="10, 11 or 12.")]
 
 
 @Parameter(name="*")
@@ -29,6 +31,12 @@ class Body:
     "Density [kg/m3]."
     toughness: float | None = None
     "Fracture toughness: what a square metre of cut costs [J/m2]."
+    snap: float | None = None
+    """Where the blade passes nearer to a node than this share of the node's size, the cut goes
+    through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""
+    guard: float | None = None
+    """No new element is thinner than this share of the mean node size, at most 0.5; best is half of
+    --snap [default: 0.15]."""
     stretch: float | None = None
     "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
     gravity: float | None = None

@@ -114,6 +114,35 @@ def check_folder(folder: Path) -> None:
     _explained(folder, try_to_write)
 
 
+def check_file(path: Path, suffix: str, option: str) -> None:
+    """Make sure that a file can be written, before the work that fills it.
+
+    Args:
+        path: The file; one that is there will be overwritten.
+        suffix: What its name must end in.
+        option: What chose it, for the message.
+
+    Raises:
+        UsageError: another suffix, a folder, or in a folder that is not there.
+        RunError: the system refuses.
+    """
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"{option} is {path}; its name must end in {suffix}")
+    if path.is_dir() or not path.parent.is_dir():
+        reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        raise UsageError(f"{option} is {path}, and {reason}; choose another file")
+    is_new = not path.exists()
+    try:
+        with path.open("ab"):
+            pass
+        if is_new:
+            path.unlink()
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another {option}"
+        ) from error
+
+
 def summary_json(summary: Summary) -> str:
     """Return the summary as JSON text."""
     return json.dumps(summary._asdict(), indent=2, allow_nan=False)

@@ -1,11 +1,13 @@
 """The table that a run prints, with the paper's figures beside ours where it has them."""
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.summary import COMPLETE, STAGES, Summary
+from scalpel_sim.table_1 import TABLE_1
 
 STAGE_NAMES = dict(
     zip(STAGES, ("relaxation", "pictures", "topology, geometry", "collision"), strict=True)
@@ -16,29 +18,40 @@ MOST_PIECES = 8
 
 G_PER_KG = 1e3
 CM3_PER_M3 = 1e6
+MM_PER_M = 1e3
 MM2_PER_M2 = 1e6
 MJ_PER_J = 1e3
 
 
-class PaperRow(NamedTuple):
-    """A row of Table 1 of Bielser, Maiwald and Gross (1998), measured on an SGI Indigo 2."""
-
-    tetrahedra_initial: int
-    tetrahedra_final: int
-    frame_rate: float
-    percent: dict[str, float]
-
-
-TABLE_1 = {
-    "grid2": PaperRow(48, 354, 3.78, {"RX": 82.1, "RD": 11.4, "GC": 1.7, "CD": 0.3}),
-    "slab": PaperRow(576, 2446, 1.14, {"RX": 92.2, "RD": 4.9, "GC": 0.1, "CD": 0.5}),
-}
+PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
 """By scene. The paper has no such figures for the other bodies."""
+
+
+def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> None:
+    """Add how far the cut is off the blade's path, and what following it costs."""
+    mean, largest, altitude, before = (
+        f"{quality[name] * MM_PER_M:.3g}"
+        for name in (
+            "path_error_mean_m",
+            "path_error_largest_m",
+            "smallest_altitude_m",
+            "smallest_altitude_initial_m",
+        )
+    )
+    sizes = quality["path_error_mean_node_sizes"], quality["path_error_largest_node_sizes"]
+    row("path error, mean", f"{mean} mm, {sizes[0]:.2g} node sizes")
+    row("path error, largest", f"{largest} mm, {sizes[1]:.2g} node sizes")
+    guards = quality["smallest_altitude_m"] / quality["guard_m"] if quality["guard_m"] > 0.0 else 0
+    row("smallest altitude", f"{altitude} mm" + (f", {guards:.2g} x the guard" if guards else ""))
+    row("smallest altitude before", f"{before} mm")
+    row("growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}")
+    row("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
+    row("growth of substeps", f"{quality['substep_growth']:.2f}")
 
 
 def print_table(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
-    paper = TABLE_1.get(summary.scene)
+    paper = PAPER.get(summary.scene)
     table = Table(
         title=f"{summary.scene}: {summary.settings['stroke']} stroke",
         title_justify="left",
@@ -71,6 +84,8 @@ def print_table(summary: Summary, console: Console) -> None:
     row("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
     for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
         row(f"  piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
+    if summary.quality is not None:
+        _add_quality(row, summary.quality)
     row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
     row("peak force", f"{summary.force_peak_n:.3f} N")
     row("mean force", f"{summary.force_mean_n:.3f} N")

@@ -77,10 +77,11 @@ def perform(
     unwritten = _Attempts()
     with unwritten:
         outputs.write_forces(simulation.recording, all_rows=True)
-    pieces = None
+    pieces = quality = None
     with unwritten:
         end = link.snapshot()
         pieces = pieces_of(end)
+        quality = link.quality()
         outputs.write_mesh(files.FINAL, end)
     result = simulation.bridge.result
     summary = summarise(
@@ -93,6 +94,7 @@ def perform(
         tetrahedra_initial=body.n_tetrahedra,
         tetrahedra_final=body.n_tetrahedra if result is None else result.n_tetrahedra,
         pieces=pieces,
+        quality=quality,
         counters=simulation.bridge.counters._asdict(),
         settings=settings,
     )

@@ -13,6 +13,7 @@ from scalpel_sim.planning import STROKES
 from scalpel_sim.stroke import Stroke, from_csv
 from tissue.material import Material
 from tissue.mesh_io import read_mesh
+from tissue.quality import CutQuality
 from tissue.shapes import grid, organ
 from tissue.types import TetrahedralMesh
 
@@ -26,6 +27,9 @@ body after itself instead of cutting it."""
 PARENCHYMA = Material(young_modulus=15e3, density=1060.0, toughness=30.0)
 """Firm organ tissue: stiffness of a liver at small strain, toughness well below the 150 J/m2 of
 liver with its vessels, so that toughness / young_modulus is 2 mm here too."""
+
+AS_USUAL = CutQuality()
+"""How closely cuts follow the blade, unless it is said otherwise."""
 
 STANDARD_GRAVITY = 9.81
 """[m/s2], along -z."""
@@ -42,6 +46,8 @@ class Scene:
     material: Material = PHANTOM
     fixed: str = "left,right"
     """Which nodes do not move: names of sides, a box, or `none`; see `tissue.boundary`."""
+    quality: CutQuality = AS_USUAL
+    """How closely cuts follow the blade, against how small the elements get."""
     stretch: float = 0.05
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""
@@ -73,7 +79,7 @@ class Scene:
         """Return the numbers and names of the scene, for a report."""
         found = {field.name: getattr(self, field.name) for field in fields(self)}
         del found["name"], found["mesh"]
-        return found | {"material": asdict(self.material)}
+        return found | {"material": asdict(self.material), "quality": asdict(self.quality)}
 
 
 SCENES = {
@@ -173,7 +179,8 @@ def read_stroke(scene: Scene) -> Stroke | None:
 
 
 def changed(scene: Scene, **changes: Any) -> Scene:
-    """Return the scene with those fields and material properties replaced that are not None.
+    """Return the scene with those fields, material properties and qualities replaced that are not
+    None. `snap` is the floor of snapping too: nodes of slivers snap as those of the mean element.
 
     A stretch that came with the scene is dropped where other sides are held; one that was asked
     for stays, and is refused later where nothing can be pulled.
@@ -181,5 +188,9 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("fixed", scene.fixed) != scene.fixed:
         given.setdefault("stretch", 0.0)
-    material = {name: given.pop(name) for name in list(given) if hasattr(scene.material, name)}
-    return replace(scene, material=replace(scene.material, **material), **given)
+    if "snap" in given:
+        given["floor"] = given["snap"]
+    for part in (scene.material, scene.quality):
+        own = {name: given.pop(name) for name in list(given) if hasattr(part, name)}
+        given["material" if part is scene.material else "quality"] = replace(part, **own)
+    return replace(scene, **given)

@@ -8,6 +8,7 @@ import numpy as np
 
 from scalpel_sim.recording import Recording
 from scalpel_sim.version import version
+from tissue.quality import QualityReport
 from tissue.types import Piece
 
 COMPLETE = "complete"
@@ -42,6 +43,8 @@ class Summary(NamedTuple):
     """None where the link to the tissue was lost."""
     each_piece: list[dict[str, Any]]
     """The pieces, the largest first: see `tissue.types.Piece`."""
+    quality: dict[str, float] | None
+    """Path error against time step, see `quality_figures`; None where the link was lost."""
     cut_area_m2: float
     force_peak_n: float
     """Largest force that the blade felt, after the device's limits."""
@@ -69,6 +72,7 @@ def summarise(
     tetrahedra_initial: int,
     tetrahedra_final: int,
     pieces: Sequence[Piece] | None,
+    quality: QualityReport | None,
     counters: dict[str, int],
     settings: dict[str, Any],
 ) -> Summary:
@@ -92,6 +96,7 @@ def summarise(
         tetrahedra_final=tetrahedra_final,
         pieces=None if pieces is None else len(pieces),
         each_piece=[_as_numbers(piece) for piece in pieces or ()],
+        quality=None if quality is None else quality_figures(quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
@@ -115,6 +120,23 @@ def _as_numbers(piece: Piece) -> dict[str, Any]:
         "velocity_m_s": piece.velocity.tolist(),
         "angular_velocity_rad_s": piece.angular_velocity.tolist(),
         "inertia_kg_m2": piece.inertia.tolist(),
+    }
+
+
+def quality_figures(report: QualityReport) -> dict[str, float]:
+    """Return how far the cut is off the blade's path, and what it did to elements and time step."""
+    return {
+        "path_error_mean_m": report.path_error_mean,
+        "path_error_largest_m": report.path_error_largest,
+        "path_error_mean_node_sizes": report.path_error_mean / report.node_size,
+        "path_error_largest_node_sizes": report.path_error_largest / report.node_size,
+        "node_size_m": report.node_size,
+        "guard_m": report.guard,
+        "smallest_altitude_initial_m": report.initial.altitude,
+        "smallest_altitude_m": report.now.altitude,
+        "tetrahedra_growth": report.growth,
+        "frequency_growth": report.frequency_growth,
+        "substep_growth": report.substep_growth,
     }
 
 

@@ -40,6 +40,7 @@ def warm_up() -> None:
     apart = np.vstack([mesh.positions, mesh.positions + 2.0 * SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
     Tissue(TetrahedralMesh(apart, both)).step(None, DT)  # as where a piece comes loose
+    tissue.quality()
 
 
 def _edge(fraction: float) -> BladeSegment:

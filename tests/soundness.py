@@ -156,3 +156,9 @@ def _n_groups(n: int, pairs: IntArray) -> int:
     for a, b in pairs.tolist():
         parent[root(a)] = root(b)
     return sum(parent[i] == i for i in range(n))
+
+
+def smallest_altitude(rest: FloatArray, tetrahedra: IntArray) -> float:
+    """Return the least altitude of all tetrahedra [m]: three times volume over largest face."""
+    faces = [triangle_areas(rest, tetrahedra[:, face]) for face in OUTWARD]
+    return float((3.0 * volumes(rest, tetrahedra) / np.max(faces, axis=0)).min())

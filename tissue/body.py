@@ -46,6 +46,9 @@ class Body(Arrays):
     """Lumped [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
     fixed: BoolArray
     """Nodes that do not move, shape (capacity,)."""
+    off_path: FloatArray
+    """How far a cut's node lies from where the blade passed [m], 0 for others; shape (capacity,).
+    Of several cuts through it, the largest."""
     node_tetrahedron: IntArray
     """One tetrahedron around each node; the others follow through links. Shape (capacity,)."""
     twin: IntArray
@@ -98,6 +101,7 @@ def build_body(
         velocities=np.zeros_like(rest),
         masses=np.zeros(n),
         fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
+        off_path=np.zeros(n),
         node_tetrahedron=node_tetrahedron,
         twin=np.arange(n),
         tetrahedra=tetrahedra.copy(),

@@ -171,7 +171,9 @@ def flag(cut: Cut, node: int) -> None:
     if not on_sheet(sheet, node):
         p = vec3(cut.body.rest, node)
         plane = plane_near(cut.path, p)
-        put_on_sheet(sheet, node, abs(dot(sub(p, plane.point), plane.normal)))
+        offset = abs(dot(sub(p, plane.point), plane.normal))
+        put_on_sheet(sheet, node, offset)
+        cut.body.off_path[node] = max(cut.body.off_path[node], offset)
     change = cut.change
     if change.counts[N_FLAGGED] < len(change.flagged):
         change.flagged[change.counts[N_FLAGGED]] = node

@@ -318,6 +318,7 @@ def _copy_node(cut: Cut, node: int) -> int:
     body.masses[copy] = 0.0
     body.twin[copy] = body.twin[node]
     body.twin[node] = copy
+    body.off_path[copy] = body.off_path[node]
     if on_sheet(sheet, node):
         put_on_sheet(sheet, copy, sheet.offset[node])
     see_side(sheet, copy, side_of(sheet, node), True)

@@ -143,6 +143,7 @@ def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     body.fixed[node] = body.fixed[a] and body.fixed[b] and (c < 0 or body.fixed[c])
     body.masses[node] = 0.0
     body.twin[node] = node
+    body.off_path[node] = 0.0
     touch(cut.sheet, node)
     return node
 

@@ -3,7 +3,6 @@
 import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
@@ -36,9 +35,11 @@ from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
+from tissue.measures import lowest_altitude, path_error
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
+from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme
 from tissue.slipping import relocate
@@ -114,24 +115,6 @@ class TissueError(RuntimeError):
     """The tissue cannot go on."""
 
 
-@dataclass(frozen=True)
-class CutQuality:
-    """How closely the cut follows the blade, against how small the elements get that it makes.
-
-    In units of the mesh's mean node size (the smallest altitude of the tetrahedra around a node).
-    Larger values give larger elements and time steps, and a rougher cut.
-    """
-
-    snap: float = 0.3
-    """A crossing nearer to a node than this share of that node's size uses the node."""
-    floor: float = 0.3
-    """... or nearer than this share of the mean node size."""
-    guard: float = 0.15
-    """No altitude of a new tetrahedron is smaller than this share of the mean node size."""
-    crumb: float = 1.0
-    """A piece smaller than this share of the mean tetrahedron is not cut loose."""
-
-
 class Tissue:
     """A soft body of tetrahedra: masses at nodes, springs along edges, and a blade that cuts it.
 
@@ -202,6 +185,8 @@ class Tissue:
         )
         checked_floor(floor, float(self.bounds[0, 2]))
         self._contact = SelfContact(self._body, self.node_size, self.material.friction, floor)
+        self._guard = quality.guard * self.node_size
+        self._at_first = self._measures()
         self._grow()
 
     @property
@@ -356,6 +341,19 @@ class Tissue:
     def piece_of_tetrahedra(self) -> IntArray:
         """Return the piece that each tetrahedron is in, shape (n_tets,): its place in `pieces`."""
         return piece_of_tetrahedra(self.snapshot())
+
+    def quality(self) -> QualityReport:
+        """Return the path error of the cuts so far, and what they did to elements and time step."""
+        error = path_error(self._body)
+        return QualityReport(
+            n_cut_nodes=error.n_nodes,
+            path_error_mean=error.mean,
+            path_error_largest=error.largest,
+            node_size=self.node_size,
+            guard=self._guard,
+            initial=self._at_first,
+            now=self._measures(),
+        )
 
     # stages of a step
 
@@ -515,6 +513,14 @@ class Tissue:
         """Return how far the edge moves [m]: the further of its two ends."""
         t0, t1 = sweep
         return max(math.dist(t1.tip, t0.tip), math.dist(t1.heel, t0.heel))
+
+    def _measures(self) -> Measures:
+        return Measures(
+            n_tetrahedra=self.n_tetrahedra,
+            altitude=lowest_altitude(self._body),
+            frequency=math.sqrt(self._frequency_squared),
+            time_step=self._stable_step(self._frequency_squared),
+        )
 
     def _result(
         self,

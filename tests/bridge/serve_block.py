@@ -30,6 +30,7 @@ def compile_kernels() -> None:
         bridge.step(BladeSegment(tip, heel, np.array([0.0, 1.0, 0.0])), 1e-3)
     tissue.surface()
     tissue.n_pieces()
+    tissue.quality()
 
 
 if __name__ == "__main__":

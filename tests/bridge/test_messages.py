@@ -11,6 +11,7 @@ from bridge.link import TissueDescription
 from bridge.wire import MessageError
 from tests.bridge.bits import bits
 from tissue.material import Material
+from tissue.quality import Measures, QualityReport
 from tissue.types import (
     BladeSegment,
     BladeSweep,
@@ -125,6 +126,30 @@ def test_a_number_of_pieces_and_an_error_arrive():
     assert messages.unpack_error(messages.pack_error("no blade: 3 µm")) == "no blade: 3 µm"
 
 
+QUALITY = QualityReport(
+    7, 1e-5, 3e-5, 3e-3, 4e-4, Measures(576, 3e-3, 900.0, 2e-3), Measures(800, 5e-4, 3e3, np.inf)
+)
+
+
+def test_a_quality_report_arrives_bit_for_bit():
+    assert bits(messages.unpack_quality(messages.pack_quality(QUALITY))) == bits(QUALITY)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_cut_nodes": -1},
+        {"path_error_mean": np.nan},
+        {"guard": -1e-9},
+        {"now": QUALITY.now._replace(altitude=-np.inf)},
+        {"initial": QUALITY.initial._replace(n_tetrahedra=0)},
+    ],
+)
+def test_a_quality_report_of_no_body_is_refused(change):
+    with pytest.raises(MessageError):
+        messages.unpack_quality(messages.pack_quality(QUALITY._replace(**change)))
+
+
 def test_the_longest_error_fits():
     assert len(messages.pack_error("\U0001f52a" * 10**6)) <= messages.LARGEST_ERROR
 
@@ -209,7 +234,9 @@ def test_a_description_of_no_real_material_is_refused():
 
 
 @given(
-    st.sampled_from(["step", "result", "snapshot", "surface", "pieces", "description", "error"]),
+    st.sampled_from(
+        ["step", "result", "snapshot", "surface", "pieces", "quality", "description", "error"],
+    ),
     st.binary(max_size=400),
 )
 @example("error", b"\xa1\x80")  # a string that is no UTF-8

@@ -98,6 +98,8 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
     assert here.n_pieces() == link.n_pieces()
+    assert bits(here.quality()) == bits(link.quality())
+    assert link.quality().n_cut_nodes > 0
 
 
 def test_every_client_finds_the_tissue_as_at_the_start(server, upright):

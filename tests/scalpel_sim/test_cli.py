@@ -48,6 +48,12 @@ WRONG_USE = {
     "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
     "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
     "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
+    "a snap beyond the node": (["run", "slab", "--snap", "2"], "snap is 2"),
+    "a guard that no split passes": (["run", "slab", "--guard", "nan"], "guard is nan"),
+    "a quality for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--snap", "0.1"],
+        "scalpel-sim serve",
+    ),
     "no speed": (["run", "slab", "--speed", "0"], "speed"),
     "an output folder that is a file": (["run", "slab", "--out", "{text}"], "is a file"),
     "an address that is none": (["run", "--connect", "here"], "here"),
@@ -144,7 +150,15 @@ def test_verbose_shows_where_an_error_came_from(files, capsys):
 def test_a_run_prints_the_table_of_the_paper_and_writes_every_file(files, capsys):
     assert command_line(["run", "slab", "--seconds", "0.05"]) == 0
     out, err = capsys.readouterr()
-    for words in ("real-time factor", "tetrahedra after", "2,446", "1.14", "RX", "92.2 %"):
+    for words in (
+        "real-time factor",
+        "tetrahedra after",
+        "2,446",
+        "1.14",
+        "RX",
+        "92.2 %",
+        "path error",
+    ):
         assert words in out
     assert sorted(os.listdir("out/slab")) == sorted(NAMES)
     assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
@@ -171,6 +185,19 @@ def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
     assert command_line(words) == 0
     material = json.loads(capsys.readouterr().out)["settings"]["material"]
     assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+def test_snap_and_guard_trade_the_path_of_the_cut_against_the_time_step(files, capsys):
+    def quality_with(*words):
+        cut = ["run", "grid2", "--stroke", "curved", "--seconds", "0.9", "--json", *words]
+        assert command_line(cut) == 0
+        return json.loads(capsys.readouterr().out)["quality"]
+
+    rough = quality_with("--snap", "0.6", "--guard", "0.3")
+    fine = quality_with("--snap", "0.02", "--guard", "0.01")
+    assert rough["guard_m"] <= rough["smallest_altitude_m"]
+    assert fine["path_error_mean_m"] < rough["path_error_mean_m"]
+    assert fine["substep_growth"] > rough["substep_growth"] >= 1.0
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])

@@ -21,10 +21,20 @@ from scalpel_sim.recording import COLUMNS, Recording
 from scalpel_sim.report import print_table
 from scalpel_sim.summary import Summary, summarise
 from tissue.pieces import pieces_of
+from tissue.quality import Measures, QualityReport
 from tissue.shapes import grid
 from tissue.types import Snapshot
 
 DT = 1e-3
+QUALITY = QualityReport(
+    n_cut_nodes=9,
+    path_error_mean=1e-4,
+    path_error_largest=6e-4,
+    node_size=2e-3,
+    guard=3e-4,
+    initial=Measures(6, 2e-3, 1000.0, 2e-3),
+    now=Measures(9, 4e-4, 3000.0, 5e-4),
+)
 
 PIECES = pieces_of(
     Snapshot(
@@ -65,6 +75,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
         tetrahedra_initial=6,
         tetrahedra_final=8,
         pieces=PIECES,
+        quality=QUALITY,
         counters={},
         settings={"stroke": "straight"},
     )
@@ -162,7 +173,8 @@ def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
     found = json.loads((tmp_path / SUMMARY).read_text())
     promised = (
         "scene seed simulated_seconds wall_seconds real_time_factor frame_rate_median "
-        "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces cut_area_m2 force_peak_n "
+        "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
+        "force_peak_n "
         "force_mean_n work_of_blade_j share versions"
     )
     assert set(promised.split()) <= set(found)
@@ -186,6 +198,15 @@ def test_the_table_has_a_row_for_each_piece():
     print_table(summary_of(recorded(10)), console)
     text = console.export_text()
     assert "piece 1, loose" in text and "piece 2, held" in text
+
+
+def test_the_summary_has_the_trade_between_path_error_and_time_step():
+    found = summary_of(recorded(10)).quality
+    assert found["path_error_mean_node_sizes"] == pytest.approx(0.05)
+    assert found["path_error_largest_node_sizes"] == pytest.approx(0.3)
+    assert found["tetrahedra_growth"] == pytest.approx(1.5)
+    assert found["frequency_growth"] == pytest.approx(3.0)
+    assert found["substep_growth"] == pytest.approx(4.0)
 
 
 def test_the_shares_sum_to_one():

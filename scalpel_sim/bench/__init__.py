@@ -1,0 +1,1 @@
+"""Benchmarks that anyone can repeat: warm, medians, and what was measured said beside it."""

@@ -1,0 +1,102 @@
+"""The cuts of the paper's figures, and what they look like at their moments."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.cuts import Cut, prepare_cut
+from scalpel_sim.draping import TriangleMesh
+from scalpel_sim.model_shapes import Shape, body_poses, shapes_of
+from scalpel_sim.scenes import SCENES
+from scalpel_sim.simulation import Simulation
+from tissue.types import FloatArray, Snapshot, Surface
+
+STRETCH = 0.3
+"""How far the held sides are pulled apart, as a fraction: the paper's displacement boundary
+conditions, and enough for the cut to gape."""
+REST = 0.4
+"""Time after the stroke in which the tissue swings out [s]."""
+TOOL = ("blade", "stylus")
+"""Bodies of the arm that are seen in a picture; the rest of it would stand in the way."""
+
+FIGURE_10 = Cut(
+    replace(SCENES["slab"], stretch=STRETCH),
+    way=np.array([[0.4, -0.2], [0.62, 1.5]]),
+    depth=0.7,
+    lean=0.12,
+)
+"""Off the planes of the grid in every direction: a cut along them would split nothing."""
+FIGURE_10_MOMENTS = (0.0, 0.35, 0.65, 1.0)
+"""As shares of the stroke; the last is after the rest."""
+
+FIGURE_12 = (
+    Cut(
+        replace(SCENES["grid2"], stretch=STRETCH),
+        way=np.array(
+            [[0.15, -0.3], [0.3, 0.0], [0.62, 0.45], [0.55, 0.8], [0.3, 1.1], [-0.2, 1.5]]
+        ),
+        depth=0.75,
+    ),
+    Cut(
+        replace(SCENES["grid7"], stretch=STRETCH),
+        way=np.array(
+            [[0.5, -0.25], [0.35, 0.15], [0.45, 0.45], [0.65, 0.7], [0.55, 1.0], [0.4, 1.6]]
+        ),
+        depth=0.7,
+    ),
+)
+"""An arc and an S: the paper's "arbitrary cutting trajectories on even coarse initial meshes"."""
+
+
+class Moment(NamedTuple):
+    """A body and the scalpel at one instant, tissue frame."""
+
+    snapshot: Snapshot
+    surface: Surface
+    tool: list[tuple[TriangleMesh, Shape]]
+    """The parts of the scalpel, tissue frame, and what they are."""
+
+
+def moments(cut: Cut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:
+    """Do a cut, and return what it looks like at shares of its stroke; 1 is after the rest."""
+    simulation = prepare_cut(cut)
+    duration = simulation.stroke.duration
+    found = []
+    for share in shares:
+        simulation.run(duration + REST if share == 1.0 else share * duration)
+        link = simulation.link
+        found.append(Moment(link.snapshot(), link.surface(), _tool(simulation)))
+    return found
+
+
+def _tool(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
+    """Return the scalpel as it is held now, tissue frame."""
+    model, poses = simulation.arm.model, body_poses(simulation.arm.data)
+    frame = simulation.frame
+    found = []
+    for shape in shapes_of(model):
+        if model.body(shape.body).name not in TOOL or shape.is_target:
+            continue
+        mesh = _posed(_posed(shape.mesh, shape.pose), poses[shape.body])
+        mesh = mesh._replace(
+            positions=frame.points_to_tissue(mesh.positions),
+            normals=frame.vectors_to_tissue(mesh.normals),
+        )
+        found.append((mesh, shape))
+    return found
+
+
+def _posed(mesh: TriangleMesh, pose: FloatArray) -> TriangleMesh:
+    """Return a mesh moved to a pose: position [m] and quaternion (w, x, y, z), shape (7,)."""
+    w, x, y, z = pose[3:]
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    return mesh._replace(
+        positions=mesh.positions @ turn.T + pose[:3], normals=mesh.normals @ turn.T
+    )

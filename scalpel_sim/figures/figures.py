@@ -1,0 +1,159 @@
+"""The paper's figures, each as one PNG: the cut is done, its moments are drawn and laid out."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from scalpel_sim import textures
+from scalpel_sim.draping import drape
+from scalpel_sim.errors import RunError
+from scalpel_sim.figures.camera import Margins, View, framing
+from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, moments
+from scalpel_sim.figures.paint import Thing, paint, texture_of
+from scalpel_sim.figures.table import table_below
+from scalpel_sim.figures.wire import draw_mesh
+from scalpel_sim.stage import TILES_PER_BODY
+from tissue.types import FloatArray
+
+WHITE = (1.0, 1.0, 1.0)
+TOWARDS_EYE = np.array([0.9, -2.0, 1.9])
+"""Where the eye stands, in diagonals of the body: one looks along the cut, and into it."""
+LAMP = np.array([-0.6, -0.5, 1.2])
+"""From behind the viewer's left shoulder, so that the light falls into the cut."""
+STEEL = (0.80, 0.82, 0.85)
+RELIEF = 0.02
+WIDTH, HEIGHT = 640, 520
+"""Of each panel [pixels]."""
+WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
+BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
+GAP = 12
+"""Between panels [pixels]."""
+LINE = 26
+"""Height of a line of text [pixels]."""
+DOTS_PER_INCH = 150
+
+
+class Drawn(NamedTuple):
+    """What a figure shows."""
+
+    caption: str
+    labels: list[str]
+    """One for each panel."""
+    n_tetrahedra: list[int]
+    """In each panel."""
+
+
+def draw_figure(number: int, path: Path) -> Drawn:
+    """Do the cuts of Figure 10, 11 or 12, write its PNG, and return what it shows.
+
+    Raises:
+        RunError: the file could not be written.
+    """
+    panels, drawn = {10: _figure_10, 11: _figure_11, 12: _figure_12}[number]()
+    _lay_out(panels, drawn.labels, f"Figure {number}: {drawn.caption}", path)
+    return drawn
+
+
+def _figure_10() -> tuple[list[FloatArray], Drawn]:
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
+    view = _view(seen, WITH_TOOL)
+    panels = [_picture(view, moment, with_tool=True) for moment in seen]
+    caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
+    return panels, _drawn(caption, seen, ["", "", "", ""])
+
+
+def _figure_11() -> tuple[list[FloatArray], Drawn]:
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
+    view = _view(seen, BODY_ALONE)
+    ends = [seen[0], seen[-1]]
+    panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]
+    caption = "mesh structures of the first and the last frame of Figure 10"
+    return panels, _drawn(caption, ends, ["", ""])
+
+
+def _figure_12() -> tuple[list[FloatArray], Drawn]:
+    seen = [moments(cut)[-1] for cut in FIGURE_12]
+    panels = [_picture(_view([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
+    cells = ["2 × 2 × 2 cells, ", "7 × 7 × 7 cells, "]
+    return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)
+
+
+def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Drawn:
+    counts = [len(moment.snapshot.tetrahedra) for moment in seen]
+    labels = [f"{a}{n:,} tetrahedra" for a, n in zip(prefixes, counts, strict=True)]
+    return Drawn(caption, labels, counts)
+
+
+def _view(seen: Sequence[Moment], margins: Margins) -> View:
+    """Return the view that holds the body at all moments."""
+    points = np.concatenate([moment.surface.positions for moment in seen])
+    return framing(points, _diagonal(seen[0]) * TOWARDS_EYE, WIDTH, HEIGHT, margins)
+
+
+def _diagonal(moment: Moment) -> float:
+    """Return the length of the body at rest from corner to corner [m]."""
+    return float(np.linalg.norm(np.ptp(moment.surface.rest_positions, axis=0)))
+
+
+def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
+    """Return the textured body on a white table, with the scalpel or without."""
+    surface = moment.surface
+    draped = drape(surface, _diagonal(moment) / TILES_PER_BODY)
+    skin, inside = texture_of(textures.skin()), texture_of(textures.cut_face())
+    things = [Thing(draped.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
+    if len(draped.cut.triangles):
+        scattered = (0.12, 0.03, 0.03)  # without it a narrow cut looks black
+        things.append(
+            Thing(
+                draped.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0, glow=scattered
+            )
+        )
+    for mesh, shape in moment.tool if with_tool else ():
+        red, green, blue = STEEL if shape.is_blade else shape.colour[:3].tolist()
+        gloss = 1.2 if shape.is_blade else 0.4
+        things.append(Thing(mesh, (red, green, blue), gloss=gloss, shininess=80.0, is_slender=True))
+    bounds = np.stack([surface.positions.min(axis=0), surface.positions.max(axis=0)])
+    things.append(Thing(table_below(bounds), WHITE, catches_shadows_only=True))
+    return paint(view, things, lamp=LAMP, background=WHITE)
+
+
+def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path) -> None:
+    """Write panels, two in a row, each with its letter and label below, and the title last."""
+    n_rows = math.ceil(len(panels) / 2)
+    width = 2 * WIDTH + 3 * GAP
+    height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
+    figure = Figure(figsize=(width / DOTS_PER_INCH, height / DOTS_PER_INCH), facecolor="white")
+    for i, (panel, label) in enumerate(zip(panels, labels, strict=True)):
+        left = GAP + (i % 2) * (WIDTH + GAP)
+        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + GAP) + LINE
+        axes = figure.add_axes((left / width, bottom / height, WIDTH / width, HEIGHT / height))
+        axes.imshow(panel, interpolation="none", aspect="auto")
+        axes.set_axis_off()
+        figure.text(
+            (left + WIDTH / 2) / width,
+            (bottom - LINE / 2) / height,
+            f"{'abcd'[i]})  {label}",
+            ha="center",
+            va="center",
+            fontsize=8,
+        )
+    figure.text(
+        0.5,
+        (GAP + LINE) / height,
+        f"{title}\n(after Bielser, Maiwald, Gross 1998)",
+        ha="center",
+        va="center",
+        fontsize=8.5,
+        style="italic",
+    )
+    try:
+        FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH, format="png")
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another --output"
+        ) from error

@@ -1,0 +1,62 @@
+"""A mesh as a drawing: its edges, pale behind its faces; the faces that a blade made are red."""
+
+import numpy as np
+
+from scalpel_sim.figures.camera import View
+from scalpel_sim.figures.rasterise import draw_segments, rasterise
+from tissue.types import FloatArray, IntArray, Snapshot, Surface
+
+PAPER = (1.0, 1.0, 1.0)
+SKIN_FACE, CUT_FACE = (0.955, 0.96, 0.97), (1.0, 0.86, 0.84)
+SKIN_LINE, CUT_LINE = (0.13, 0.16, 0.22), (0.75, 0.10, 0.10)
+HIDDEN = 0.13
+"""Opacity of lines behind faces: they tell how deep the mesh goes, and do not confuse."""
+THICKNESS = 1.1
+"""Of the lines [pixels]."""
+SLACK = 2e-3
+"""How much nearer, as a fraction, a face must be to hide a line: lines lie on faces, and faces that
+are this thin beside their distance hide nothing that one would miss."""
+
+
+def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) -> FloatArray:
+    """Return a drawing of the mesh, sRGB from 0 to 1, shape (view.height, view.width, 3).
+
+    Args:
+        view: What is seen.
+        body: Whose edges are drawn.
+        surface: Its faces, which hide what is behind them.
+        samples: Along each side of a pixel, against steps.
+    """
+    fine = view._replace(
+        width=samples * view.width, height=samples * view.height, scale=samples * view.scale
+    )
+    corners = fine.project(surface.positions)[surface.triangles]
+    raster = rasterise(corners, fine.width, fine.height)
+    image = np.empty((fine.height, fine.width, 3))
+    image[:] = PAPER
+    seen = raster.triangle >= 0
+    is_cut = np.zeros_like(seen)
+    is_cut[seen] = surface.is_cut[raster.triangle[seen]]
+    image[seen] = SKIN_FACE
+    image[is_cut] = CUT_FACE
+
+    of_cut = edges_of(surface.triangles[surface.is_cut])
+    groups = (
+        (edges_of(body.tetrahedra), body.positions, SKIN_LINE, False),
+        (edges_of(surface.triangles[~surface.is_cut]), surface.positions, SKIN_LINE, True),
+        (of_cut, surface.positions, CUT_LINE, True),
+    )
+    for edges, positions, colour, is_surface in groups:
+        visible, hidden = np.zeros(seen.shape), np.zeros(seen.shape)
+        ends = np.ascontiguousarray(fine.project(positions)[edges])
+        draw_segments(ends, raster.nearness, samples * THICKNESS, SLACK, visible, hidden)
+        drawn = visible if is_surface else HIDDEN * np.maximum(visible, hidden)
+        image += drawn[:, :, None] * (np.array(colour) - image)
+    return image.reshape(view.height, samples, view.width, samples, 3).mean(axis=(1, 3))
+
+
+def edges_of(cells: IntArray) -> IntArray:
+    """Return the edges of triangles or tetrahedra, each once, shape (n_edges, 2)."""
+    n = cells.shape[1]
+    pairs = [cells[:, [i, j]] for i in range(n) for j in range(i + 1, n)]
+    return np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)

@@ -1,0 +1,67 @@
+"""The figures of the paper: real cuts, drawn small."""
+
+import json
+
+import matplotlib.image
+import numpy as np
+import pytest
+
+from scalpel_sim.cli import command_line
+from scalpel_sim.figures import figures
+from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
+from scalpel_sim.figures.wire import edges_of
+
+
+@pytest.fixture
+def small(monkeypatch, tmp_path):
+    """Draw small panels, in a folder of its own."""
+    monkeypatch.setattr(figures, "WIDTH", 150)
+    monkeypatch.setattr(figures, "HEIGHT", 120)
+    monkeypatch.chdir(tmp_path)
+
+
+def red(image: np.ndarray) -> float:
+    """Return the share of pixels that are clearly red."""
+    return float(((image[:, :, 0] > 0.35) & (image[:, :, 1] < 0.5 * image[:, :, 0])).mean())
+
+
+@pytest.mark.parametrize(("number", "n_panels"), [(10, 4), (11, 2), (12, 2)])
+def test_each_figure_is_one_command(number, n_panels, small, capsys):
+    assert command_line(["figure", str(number), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["file"] == f"figure{number}.png"
+    assert len(said["labels"]) == len(said["n_tetrahedra"]) == n_panels
+    image = matplotlib.image.imread(said["file"])
+    assert image.shape[0] > 120 and image.shape[1] > 300
+    assert 0.002 < red(image) < 0.5  # lines are thin
+    assert (image[:, :, :3].min(axis=2) > 0.9).mean() > 0.3  # on white
+
+
+def test_figure_10_grows_from_576_tetrahedra_as_the_blade_goes_through_and_its_cut_gapes():
+    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
+    counts = [len(moment.snapshot.tetrahedra) for moment in seen]
+    assert counts[0] == 576 and counts == sorted(counts) and counts[3] > counts[1] > 576
+    areas = [moment.surface.is_cut.sum() for moment in seen]
+    assert areas[0] == 0 and areas[1] < areas[2] <= areas[3]
+    last = seen[-1].surface
+    middle = last.positions[np.unique(last.triangles[last.is_cut])]
+    upper = middle[middle[:, 2] > 0.9 * middle[:, 2].max()]
+    assert np.ptp(upper[:, 0]) > 5e-3  # metres between the lips
+
+
+def test_a_tetrahedron_has_six_edges_and_two_that_share_a_face_have_nine():
+    assert len(edges_of(np.array([[0, 1, 2, 3]]))) == 6
+    assert len(edges_of(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))) == 9
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["9"], "10, 11, 12"),
+        (["10", "--output", "picture.jpg"], "must end in .png"),
+        (["10", "--output", "nowhere/picture.png"], "no folder nowhere"),
+    ],
+)
+def test_a_figure_that_is_none_or_has_no_place_is_refused(words, expected, small, capsys):
+    assert command_line(["figure", *words]) == 2
+    assert expected in capsys.readouterr().err
