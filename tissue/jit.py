@@ -14,7 +14,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 # Numba keys its disk cache on one source file. A kernel inlines kernels from other files, so the
 # cache directory is named after all of them: editing one can never revive an old binary.
-_SOURCES = sorted(Path(__file__).parent.glob("*.py"))
+_SOURCES = sorted(Path(__file__).parent.rglob("*.py"))
 _DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
 
 

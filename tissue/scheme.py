@@ -7,6 +7,20 @@ from tissue.cut import Change
 from tissue.path import Path
 from tissue.star import Visits
 
+SCHEMES = ("stellar", "paper")
+"""Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
+
+
+def checked_scheme(name: str) -> str:
+    """Return the name of a scheme.
+
+    Raises:
+        ValueError: there is no such scheme.
+    """
+    if name not in SCHEMES:
+        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(SCHEMES)}")
+    return name
+
 
 class Scheme(Protocol):
     """A way to cut a mesh. It owns the arrays of the current incision, not those of the body.

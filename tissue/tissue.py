@@ -34,11 +34,14 @@ from tissue.border import (
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
+from tissue.paper_scheme.records import with_room_to_hang
+from tissue.paper_scheme.scheme import PaperScheme
+from tissue.paper_scheme.statistics import SchemeStatistics
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import count_pieces
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
-from tissue.scheme import Scheme
+from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
 from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
@@ -138,7 +141,9 @@ class Tissue:
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
         gravity: [m/s2].
-        quality: How closely cuts follow the blade.
+        quality: How closely cuts follow the blade, where the scheme lets one choose.
+        scheme: How the mesh is cut: "stellar", or "paper" for that of Bielser, Maiwald and Gross,
+            with its limits (`tissue.paper_scheme`).
 
     Raises:
         MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
@@ -154,8 +159,10 @@ class Tissue:
         positions: FloatArray | None = None,
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
         quality: CutQuality | None = None,
+        scheme: str = "stellar",
     ) -> None:
         expect_sound(mesh)
+        checked_scheme(scheme)
         self.material = material or Material()
         self._gravity = checked_gravity(gravity)
         self._body = build_body(
@@ -163,6 +170,8 @@ class Tissue:
             checked_positions(positions, mesh.positions),
             checked_fixed(fixed, len(mesh.positions)),
         )
+        if scheme == "paper":
+            self._body = with_room_to_hang(self._body)
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
@@ -184,16 +193,17 @@ class Tissue:
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = quality.floor * self.node_size
-        self._scheme: Scheme = StellarScheme(
-            Quality(
+        self._scheme: Scheme
+        if scheme == "paper":
+            self._scheme = PaperScheme(self._body, self.material.density)
+        else:
+            lengths = Quality(
                 snap=quality.snap,
                 floor=self._snap_floor,
                 guard=quality.guard * self.node_size,
                 crumb=float(quality.crumb * volume / n_tetrahedra),
-            ),
-            n_nodes,
-            n_tetrahedra,
-        )
+            )
+            self._scheme = StellarScheme(lengths, n_nodes, n_tetrahedra)
         self._grow()
 
     @property
@@ -335,6 +345,12 @@ class Tissue:
         """Return the number of connected pieces."""
         piece, queue = np.empty((2, self.n_tetrahedra), dtype=np.int64)
         return count_pieces(self._body, piece, queue)
+
+    def scheme_statistics(self) -> SchemeStatistics | None:
+        """Return what the paper's scheme did so far; None where another scheme cuts."""
+        if isinstance(self._scheme, PaperScheme):
+            return self._scheme.statistics(self._body)
+        return None
 
     # stages of a step
 

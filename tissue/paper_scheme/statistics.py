@@ -1,0 +1,72 @@
+"""What the paper's scheme did to a mesh, and what it left behind."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.body import Body
+from tissue.hanging import HANGING
+from tissue.paper_scheme.cases import CASES
+from tissue.paper_scheme.collision import Waiting
+from tissue.paper_scheme.cut_edge_code import bit_of
+from tissue.paper_scheme.presplit import N_CHILDREN
+from tissue.paper_scheme.records import NO_NODE, NOT_CUT, WHOLE_STILL, Records, Table
+from tissue.paper_scheme.splitting import N_GUARDED, N_OF_CASE, N_OWN
+from tissue.types import IntArray
+
+
+class SchemeStatistics(NamedTuple):
+    """Counts since the body was made."""
+
+    n_cut: int
+    """Tetrahedra of the initial mesh that were split."""
+    n_of_case: dict[str, int]
+    """How many of them were split by each case, A to E."""
+    paper_count: int
+    """Tetrahedra in the paper's counting, in which a parent stays: initial + 17 a split one. The
+    mesh has one less a split, since child 0 takes the place of its parent."""
+    n_hanging_edge_nodes: int
+    """Edges with a node, some tetrahedron around which is whole."""
+    n_hanging_face_nodes: int
+    """Faces with a node, the tetrahedron on one side of which is whole; and `n_own_face_nodes`."""
+    n_guarded: int
+    """Split tetrahedra whose centre would have been flat or inverted, and whose face nodes were
+    drawn to the centroids."""
+    n_own_face_nodes: int
+    """Face nodes that the guard made for one tetrahedron alone, beside that of its neighbour."""
+    n_unsupported: int
+    """Tetrahedra that were left whole because their cut edges are none of the 37 codes."""
+    n_waiting: int
+    """Tetrahedra that the blade is still in, or was when it was last seen."""
+    n_ignored_crossings: int
+    """Crossings with edges of tetrahedra that were already split: each is processed only once."""
+
+
+def statistics(
+    body: Body, records: Records, table: Table, waiting: Waiting, tally: IntArray, n_ignored: int
+) -> SchemeStatistics:
+    """Count; takes a look at the whole initial mesh."""
+    is_split = records.first_child != WHOLE_STILL
+    codes = np.zeros(len(is_split), np.int64)
+    for e in range(6):
+        is_cut = records.crossed_at[records.edges_of[:, e]] != NOT_CUT
+        codes |= is_cut.astype(np.int64) << bit_of(e)
+    unsupported = ~is_split & (codes > 0) & (table.case[codes] < 0) & (waiting.is_listed == 0)
+    beside_whole = np.zeros(len(records.edges), dtype=bool)
+    beside_whole[records.edges_of[~is_split]] = True
+    has_node = records.edge_nodes[:, 0] != NO_NODE
+    hanging_faces = np.unique(body.links[: len(is_split)][body.links[: len(is_split)] <= HANGING])
+    n_cut = int(is_split.sum())
+    n_own = int(tally[N_OWN])
+    return SchemeStatistics(
+        n_cut=n_cut,
+        n_of_case={case: int(tally[N_OF_CASE + i]) for i, case in enumerate(CASES)},
+        paper_count=len(is_split) + N_CHILDREN * n_cut,
+        n_hanging_edge_nodes=int((has_node & beside_whole).sum()),
+        n_hanging_face_nodes=len(hanging_faces) + n_own,
+        n_guarded=int(tally[N_GUARDED]),
+        n_own_face_nodes=n_own,
+        n_unsupported=int(unsupported.sum()),
+        n_waiting=int(waiting.n[0]),
+        n_ignored_crossings=n_ignored,
+    )
