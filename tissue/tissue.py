@@ -195,7 +195,7 @@ class Tissue:
         self._snap_floor = quality.floor * self.node_size
         self._scheme: Scheme
         if scheme == "paper":
-            self._scheme = PaperScheme(self._body, self.material.density)
+            self._scheme = PaperScheme(self._body, self.material.density, self.node_size)
         else:
             lengths = Quality(
                 snap=quality.snap,

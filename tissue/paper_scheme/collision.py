@@ -9,6 +9,7 @@ from tissue.cut import Cut
 from tissue.front import MOST_EVENTS, PARAMETER_GAP, next_event
 from tissue.jit import kernel
 from tissue.paper_scheme.records import (
+    NO_NODE,
     NOT_CUT,
     Records,
     cut_edge_code,
@@ -17,7 +18,6 @@ from tissue.paper_scheme.records import (
     reference_at_face,
 )
 from tissue.path import Path
-from tissue.predicates import Point, orient3d, pierces, point
 from tissue.types import IntArray
 
 
@@ -30,17 +30,15 @@ class Waiting(Arrays):
     """How many they are, shape (1,)."""
     is_listed: IntArray
     """Whether a tetrahedron is in the list, shape (n_tets,)."""
-    touched: IntArray
-    """Step in which the blade was last found to be in each, shape (n_tets,)."""
-    step: IntArray
-    """Number of the current step, shape (1,)."""
 
 
 @kernel
 def record_crossings(cut: Cut, records: Records) -> int:
-    """Record the edges that were crossed, each once; return how many were of split tetrahedra.
+    """Record the edges that were crossed; return how many were of split tetrahedra.
 
-    Those are left alone: "each tetrahedron can only be processed once" (section 6).
+    Those are left alone: "each tetrahedron can only be processed once" (section 6). An edge that is
+    crossed a second time in one incision has both ends on one side again, and is not cut: a blade
+    that goes along an edge trembles from one side of it to the other.
     """
     work = cut.work
     n_ignored = 0
@@ -50,6 +48,9 @@ def record_crossings(cut: Cut, records: Records) -> int:
             n_ignored += 1
         elif records.crossed_at[e] == NOT_CUT:
             records.crossed_at[e] = work.crossing_at[i, 0]
+            records.crossed_in[e] = records.incision[0]
+        elif records.crossed_in[e] == records.incision[0] and records.edge_nodes[e, 0] == NO_NODE:
+            records.crossed_at[e] = NOT_CUT
     return n_ignored
 
 
@@ -84,59 +85,35 @@ def _record_tip(cut: Cut, records: Records, sample: int) -> None:
 
 @kernel
 def list_waiting(cut: Cut, records: Records, waiting: Waiting) -> None:
-    """List the tetrahedra that the blade is in, and those that it cut an edge of on its way."""
+    """List the tetrahedra of which the blade has cut an edge."""
     work = cut.work
-    waiting.step[0] += 1
     for i in range(work.n_active[0]):
         t = work.active[i]
-        if not is_whole(records, t):
-            continue
-        if _touches(cut.body, cut.path, t, work.segments[i, 0], work.segments[i, 1]):
-            waiting.touched[t] = waiting.step[0]
-        elif cut_edge_code(records, t) == 0:
-            continue
-        if waiting.is_listed[t] == 0:
+        if is_whole(records, t) and waiting.is_listed[t] == 0 and cut_edge_code(records, t) != 0:
             waiting.is_listed[t] = 1
             waiting.tetrahedra[waiting.n[0]] = t
             waiting.n[0] += 1
 
 
 @kernel
-def _touches(body: Body, path: Path, t: int, first: int, last: int) -> bool:
-    """Whether segments `first` to `last` of the edge, where they are now, meet tetrahedron `t`."""
-    for k in range(max(first, 0), last + 1):
-        if path.linked[k]:
-            p = point(path.lattice_t1, k)
-            q = point(path.lattice_t1, k + 1)
-            if _holds(body, t, p) or _is_pierced(body, t, p, q):
-                return True
-    return False
-
-
-@kernel
-def _holds(body: Body, t: int, p: Point) -> bool:
-    a = point(body.lattice_rest, body.tetrahedra[t, 0])
-    b = point(body.lattice_rest, body.tetrahedra[t, 1])
-    c = point(body.lattice_rest, body.tetrahedra[t, 2])
-    d = point(body.lattice_rest, body.tetrahedra[t, 3])
-    return (
-        orient3d(p, b, c, d) >= 0
-        and orient3d(a, p, c, d) >= 0
-        and orient3d(a, b, p, d) >= 0
-        and orient3d(a, b, c, p) >= 0
-    )
-
-
-@kernel
-def _is_pierced(body: Body, t: int, p: Point, q: Point) -> bool:
-    """Whether segment pq goes in or out through a face of `t`."""
-    for f in range(4):
-        if pierces(
-            p,
-            q,
-            point(body.lattice_rest, body.tetrahedra[t, (f + 1) % 4]),
-            point(body.lattice_rest, body.tetrahedra[t, (f + 2) % 4]),
-            point(body.lattice_rest, body.tetrahedra[t, (f + 3) % 4]),
-        ):
-            return True
-    return False
+def has_left(body: Body, path: Path, t: int, reach: float) -> bool:
+    """Whether the edge, where it is now, is farther than `reach` [m] from the box of `t`."""
+    grid = body.lattice_rest
+    margin = int(reach / body.lattice.spacing)
+    a = body.tetrahedra[t, 0]
+    b = body.tetrahedra[t, 1]
+    c = body.tetrahedra[t, 2]
+    d = body.tetrahedra[t, 3]
+    for k in range(len(path.linked) - 1):
+        if not path.linked[k] or reach < 0.0:
+            continue
+        is_near = True
+        for x in range(3):
+            low = min(min(grid[a, x], grid[b, x]), min(grid[c, x], grid[d, x]))
+            high = max(max(grid[a, x], grid[b, x]), max(grid[c, x], grid[d, x]))
+            p = path.lattice_t1[k, x]
+            q = path.lattice_t1[k + 1, x]
+            is_near = is_near and min(p, q) <= high + margin and max(p, q) >= low - margin
+        if is_near:
+            return False
+    return True

@@ -45,6 +45,10 @@ class Records(Arrays):
     crossed_at: FloatArray
     """Where the blade crossed each edge, as a fraction from its first end, or NOT_CUT; (n_edges,).
     """
+    crossed_in: IntArray
+    """Number of the incision in which it did, shape (n_edges,)."""
+    incision: IntArray
+    """Number of the current incision, shape (1,)."""
     edge_nodes: IntArray
     """The references to each edge's node, one for each end, or NO_NODE; shape (n_edges, 2)."""
     edge_held: IntArray
@@ -107,6 +111,8 @@ def records_of(body: Body) -> Records:
         first_edge=np.searchsorted(edges[:, 0], np.arange(n_nodes + 1)).astype(np.int64),
         faces=np.ascontiguousarray(faces),
         crossed_at=np.full(len(edges), NOT_CUT),
+        crossed_in=np.zeros(len(edges), np.int64),
+        incision=np.ones(1, np.int64),
         edge_nodes=np.full((len(edges), 2), NO_NODE),
         edge_held=np.zeros(len(edges), np.int64),
         tip_weights=np.zeros((len(faces), 3)),
