@@ -7,7 +7,7 @@ whose middle is taken.
 
 Whatever the points, the cores and the parts along edges have positive volumes: they are products of
 positive weights. The centre has not. With the exact points of a planar cut its four nodes are in
-one plane in cases B and E, and where the tip passes near an edge it can be inverted (6.3 % of
+one plane in cases B and E, and where the tip passes near an edge it can be inverted (7.7 % of
 random points). Hence two guards: `LIFT`, and `place_face_nodes` draws nodes to the centroids.
 """
 
