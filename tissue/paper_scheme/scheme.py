@@ -24,7 +24,7 @@ from tissue.paper_scheme.records import cut_edge_code, records_of, table
 from tissue.paper_scheme.splitting import N_TALLIES, Split, split
 from tissue.paper_scheme.statistics import SchemeStatistics, statistics
 from tissue.path import Path
-from tissue.sheet import new_sheet
+from tissue.sheet import grown_sheet, new_sheet
 from tissue.star import Visits
 from tissue.sweep import find_active_tetrahedra, find_crossings
 
@@ -63,9 +63,9 @@ class PaperScheme:
         self._references = np.zeros((5, N_NODES), np.int64)
         self._tally = np.zeros(N_TALLIES, np.int64)
         self._n_ignored = 0
-        # What a collision is found with; this scheme has no sheet, and moves nothing to a node.
+        # What a collision is found with. Nothing lies on the sheet: no node is moved to it.
         self._work = new_work(0)
-        self._sheet = new_sheet(0, 0)
+        self._sheet = new_sheet(len(body.rest), len(body.tetrahedra))
         self._quality = Quality(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 
     @property
@@ -104,7 +104,9 @@ class PaperScheme:
         self._work.n_previous[0] = 0
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """See `Scheme`. What grows with the mesh is the body's."""
+        """See `Scheme`."""
+        self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
+        self._work.hash_stamps[:] = 0  # they are numbers of searches, which begin anew
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return what was done so far."""
