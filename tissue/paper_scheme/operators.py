@@ -9,135 +9,100 @@ Neither does anything where a tetrahedron that was split before holds the node t
 from tissue.body import NODES, Body
 from tissue.jit import kernel
 from tissue.paper_scheme.cut_edge_code import is_cut
-from tissue.paper_scheme.placing import Placing
 from tissue.paper_scheme.presplit import CENTRE, EDGE_NODE, FACE_NODE
-from tissue.paper_scheme.records import (
-    NO_NODE,
-    Records,
-    Table,
-    reference_at_edge,
-    reference_at_face,
-)
+from tissue.paper_scheme.records import NO_NODE, reference_at_edge, reference_at_face
+from tissue.paper_scheme.split import Split
 from tissue.predicates import nearest
-from tissue.types import FloatArray, IntArray
 from tissue.vec3 import vec3
 
 
 @kernel
-def refer_to_nodes(
-    records: Records,
-    table: Table,
-    placing: Placing,
-    body: Body,
-    t: int,
-    code: int,
-    references: IntArray,
-) -> None:
+def refer_to_nodes(s: Split, t: int, code: int) -> None:
     """Write the node that each part of tetrahedron `t` refers to, making those that are missing.
 
     Args:
-        records: The initial mesh.
-        table: The lookup table.
-        placing: Where the nodes are.
-        body: Gets the new nodes.
-        t: An initial tetrahedron.
+        s: Gets the new nodes, and the references.
+        t: An initial tetrahedron, whose nodes have been placed.
         code: Its cut-edge code.
-        references: Global node of each local node, for each part; shape (5, 14).
     """
     for i in range(4):
-        references[i, i] = records.tetrahedra[t, i]
+        s.references[i, i] = s.records.tetrahedra[t, i]
     for e in range(6):
-        _split_edge(records, table, placing, body, t, code, e, references)
+        _split_edge(s, t, code, e)
     for k in range(4):
-        _split_face(records, table, placing, body, t, code, k, references)
+        if s.placing.is_own[k] == 1:
+            _make_own_node(s, t, code, k)
+        else:
+            _split_face(s, t, code, k)
+        local = FACE_NODE + k
+        s.references[CENTRE, local] = s.references[s.table.of_centre[code, k], local]
 
 
 @kernel
-def _split_edge(
-    records: Records,
-    table: Table,
-    placing: Placing,
-    body: Body,
-    t: int,
-    code: int,
-    e: int,
-    references: IntArray,
-) -> None:
+def _split_edge(s: Split, t: int, code: int, e: int) -> None:
+    records, nodes = s.records, s.records.edge_nodes
     edge = records.edges_of[t, e]
-    nodes = records.edge_nodes
     if nodes[edge, 0] == NO_NODE:
-        nodes[edge, 0] = nodes[edge, 1] = _new_node(
-            records, placing.weights, body, t, EDGE_NODE + e
-        )
+        nodes[edge, 0] = nodes[edge, 1] = _new_node(s, t, EDGE_NODE + e)
     if not is_cut(code, e):
         records.edge_held[edge] = 1
     elif nodes[edge, 0] == nodes[edge, 1] and records.edge_held[edge] == 0:
-        nodes[edge, 1] = _copy_node(body, nodes[edge, 0])
+        nodes[edge, 1] = _copy_node(s.body, nodes[edge, 0])
     for end in range(2):
-        i = table.edge_ends[e, end]
+        i = s.table.edge_ends[e, end]
         place = reference_at_edge(records, edge, records.tetrahedra[t, i])
-        references[i, EDGE_NODE + e] = nodes[edge, place]
+        s.references[i, EDGE_NODE + e] = nodes[edge, place]
 
 
 @kernel
-def _split_face(
-    records: Records,
-    table: Table,
-    placing: Placing,
-    body: Body,
-    t: int,
-    code: int,
-    k: int,
-    references: IntArray,
-) -> None:
+def _split_face(s: Split, t: int, code: int, k: int) -> None:
+    records, nodes = s.records, s.records.face_nodes
     face = records.faces_of[t, k]
     local = FACE_NODE + k
-    detached = table.detached[code, k]
-    nodes = records.face_nodes
-    if placing.is_own[k] == 1:
-        node = _new_node(records, placing.weights, body, t, local)
-        for c in range(3):
-            references[table.face_corners[k, c], local] = node
-        if detached >= 0:
-            references[detached, local] = _copy_node(body, node)
-        references[CENTRE, local] = references[table.of_centre[code, k], local]
-        return
     if nodes[face, 0] == NO_NODE:
-        nodes[face, 0] = _new_node(records, placing.weights, body, t, local)
-        nodes[face, 1] = nodes[face, 2] = nodes[face, 0]
+        nodes[face, 0] = nodes[face, 1] = nodes[face, 2] = _new_node(s, t, local)
         for c in range(3):
-            corner = table.face_corners[k, c]
+            corner = s.table.face_corners[k, c]
             place = reference_at_face(records, face, records.tetrahedra[t, corner])
-            records.face_weights[face, place] = placing.weights[local, corner]
+            records.face_weights[face, place] = s.placing.weights[local, corner]
+    detached = s.table.detached[code, k]
+    is_one = nodes[face, 0] == nodes[face, 1] and nodes[face, 1] == nodes[face, 2]
     if detached < 0:
         records.face_held[face] = 1
-    elif records.face_held[face] == 0 and _is_one(nodes, face):
+    elif is_one and records.face_held[face] == 0:
         place = reference_at_face(records, face, records.tetrahedra[t, detached])
-        nodes[face, place] = _copy_node(body, nodes[face, place])
+        nodes[face, place] = _copy_node(s.body, nodes[face, place])
     for c in range(3):
-        corner = table.face_corners[k, c]
+        corner = s.table.face_corners[k, c]
         place = reference_at_face(records, face, records.tetrahedra[t, corner])
-        references[corner, local] = nodes[face, place]
-    references[CENTRE, local] = references[table.of_centre[code, k], local]
+        s.references[corner, local] = nodes[face, place]
 
 
 @kernel
-def _is_one(nodes: IntArray, face: int) -> bool:
-    return nodes[face, 0] == nodes[face, 1] and nodes[face, 1] == nodes[face, 2]
+def _make_own_node(s: Split, t: int, code: int, k: int) -> None:
+    """Make a node in face `k` for this tetrahedron alone: the guard moved it."""
+    local = FACE_NODE + k
+    node = _new_node(s, t, local)
+    for c in range(3):
+        s.references[s.table.face_corners[k, c], local] = node
+    detached = s.table.detached[code, k]
+    if detached >= 0:
+        s.references[detached, local] = _copy_node(s.body, node)
 
 
 @kernel
-def _new_node(records: Records, weights: FloatArray, body: Body, t: int, local: int) -> int:
+def _new_node(s: Split, t: int, local: int) -> int:
     """Append a node where the field of tetrahedron `t` puts it; it has no mass yet."""
+    body, corners = s.body, s.records.tetrahedra
     node = _append_node(body)
     fixed = True
     for x in range(3):
         body.rest[node, x] = body.positions[node, x] = body.velocities[node, x] = 0.0
     for i in range(4):
-        w = weights[local, i]
+        w = s.placing.weights[local, i]
         if w == 0.0:
             continue
-        corner = records.tetrahedra[t, i]
+        corner = corners[t, i]
         fixed = fixed and body.fixed[corner]
         for x in range(3):
             body.rest[node, x] += w * body.rest[corner, x]

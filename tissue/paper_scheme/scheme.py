@@ -21,7 +21,8 @@ from tissue.paper_scheme.collision import (
 from tissue.paper_scheme.placing import new_placing
 from tissue.paper_scheme.presplit import N_NODES
 from tissue.paper_scheme.records import cut_edge_code, records_of, table
-from tissue.paper_scheme.splitting import N_TALLIES, Split, split
+from tissue.paper_scheme.split import N_TALLIES, Split
+from tissue.paper_scheme.splitting import split_tetrahedron
 from tissue.paper_scheme.statistics import SchemeStatistics, statistics
 from tissue.path import Path
 from tissue.sheet import grown_sheet, new_sheet
@@ -150,7 +151,7 @@ def split_left(s: Split, waiting: Waiting, path: Path, reach: float) -> None:
             code = cut_edge_code(s.records, t)
             keep = False
             if s.table.case[code] >= 0:
-                has_room = split(s, t, code)
+                has_room = split_tetrahedron(s, t, code)
                 keep = not has_room
         if keep:
             waiting.tetrahedra[n] = t

@@ -1,45 +1,23 @@
 """Split one tetrahedron in seventeen, and open it along the triangles of its case (section 4.2)."""
 
-from tissue.arrays import Arrays
 from tissue.body import CUT, NODES, OUTER, TETRAHEDRA, Body
-from tissue.cut import FULL, Change, note_dirty
+from tissue.cut import FULL, note_dirty
 from tissue.geometry import tetrahedron_volume, triangle_area
 from tissue.hanging import HANGING, join_list, leave_list
 from tissue.jit import kernel
 from tissue.paper_scheme.operators import refer_to_nodes
-from tissue.paper_scheme.placing import Placing, place_nodes
+from tissue.paper_scheme.placing import place_nodes
 from tissue.paper_scheme.presplit import N_CHILDREN
-from tissue.paper_scheme.records import Records, Table, child_of, is_whole
-from tissue.types import IntArray
+from tissue.paper_scheme.records import Records, child_of, is_whole
+from tissue.paper_scheme.split import N_GUARDED, N_OF_CASE, N_OWN, Split
 from tissue.vec3 import vec3
 
 MOST_NEW_NODES = 20
 """Nodes that one split can make: two on each edge, two in each face."""
 
-N_OF_CASE, N_GUARDED, N_OWN = 0, 5, 6
-"""Places in `Split.tally`: split tetrahedra of cases A to E, those whose nodes the guard moved, and
-face nodes that it made for one tetrahedron alone."""
-N_TALLIES = 7
-
-
-class Split(Arrays):
-    """What a split reads and writes."""
-
-    body: Body
-    records: Records
-    table: Table
-    change: Change
-    placing: Placing
-    references: IntArray
-    """Scratch: global node of each local node, for each part; shape (5, 14)."""
-    tally: IntArray
-    """Counts since the body was made, shape (N_TALLIES,)."""
-    density: float
-    """[kg/m3]."""
-
 
 @kernel
-def split(s: Split, t: int, code: int) -> bool:
+def split_tetrahedron(s: Split, t: int, code: int) -> bool:
     """Split the initial tetrahedron `t` by its code; whether there was room."""
     body, records, change = s.body, s.records, s.change
     if body.counts[NODES] + MOST_NEW_NODES > len(body.rest) or body.counts[
@@ -51,7 +29,7 @@ def split(s: Split, t: int, code: int) -> bool:
         s.tally[N_GUARDED] += 1
     for k in range(4):
         s.tally[N_OWN] += s.placing.is_own[k]
-    refer_to_nodes(records, s.table, s.placing, body, t, code, s.references)
+    refer_to_nodes(s, t, code)
     s.tally[N_OF_CASE + s.table.case[code]] += 1
     volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
     for i in range(4):

@@ -11,7 +11,7 @@ from tissue.paper_scheme.collision import Waiting
 from tissue.paper_scheme.cut_edge_code import bit_of
 from tissue.paper_scheme.presplit import N_CHILDREN
 from tissue.paper_scheme.records import NO_NODE, NOT_CUT, WHOLE_STILL, Records, Table
-from tissue.paper_scheme.splitting import N_GUARDED, N_OF_CASE, N_OWN
+from tissue.paper_scheme.split import N_GUARDED, N_OF_CASE, N_OWN
 from tissue.types import IntArray
 
 

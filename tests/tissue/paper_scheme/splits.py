@@ -8,7 +8,7 @@ from tests.tissue.kernels_of import DENSITY
 from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
 from tissue.paper_scheme.records import cut_edge_code, edge_between, with_room_to_hang
 from tissue.paper_scheme.scheme import PaperScheme
-from tissue.paper_scheme.splitting import split
+from tissue.paper_scheme.splitting import split_tetrahedron
 from tissue.types import FloatArray, IntArray, TetrahedralMesh
 
 
@@ -27,7 +27,7 @@ class Splits(NamedTuple):
     def split(self, t: int) -> int:
         """Split tetrahedron `t`; return its code."""
         code = cut_edge_code(self.scheme._records, t)
-        assert split(self.scheme._split(self.body), t, code)
+        assert split_tetrahedron(self.scheme._split(self.body), t, code)
         return code
 
     @property

@@ -90,7 +90,7 @@ def test_the_node_of_a_face_cut_across_is_in_the_middle_of_the_cut_but_for_the_l
 
 def test_the_node_of_a_face_with_the_tip_in_it_is_where_the_tip_passed():
     placing, _ = placed({(0, 1): 0.5}, tips={3: (0.5, 0.2, 0.3)})
-    off_the_sides = MARGIN + (1.0 - 3.0 * MARGIN) * np.array([0.5, 0.2, 0.3])
+    off_the_sides = 0.5 * MARGIN + (1.0 - 1.5 * MARGIN) * np.array([0.5, 0.2, 0.3])
     assert placing.weights[FACE_NODE + 3] == pytest.approx([*off_the_sides, 0.0])
 
 

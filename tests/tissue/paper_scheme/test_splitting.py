@@ -11,7 +11,7 @@ from tissue.cut import FULL
 from tissue.hanging import HANGING, behind, n_behind
 from tissue.paper_scheme.cases import TABLE
 from tissue.paper_scheme.cut_edge_code import EDGES, is_cut
-from tissue.paper_scheme.splitting import split
+from tissue.paper_scheme.splitting import split_tetrahedron
 from tissue.pieces import count_pieces
 from tissue.slipping import SEARCH, find
 from tissue.star import no_visits
@@ -167,6 +167,6 @@ def test_without_room_nothing_is_split():
     splits = splits_of(bodies.unit_tetrahedron())
     splits.cross(0, 1)
     splits.body.counts[TETRAHEDRA] = len(splits.body.tetrahedra) - 15
-    assert not split(splits.scheme._split(splits.body), 0, 0b100000)
+    assert not split_tetrahedron(splits.scheme._split(splits.body), 0, 0b100000)
     assert splits.scheme.change.counts[FULL] == 1
     assert splits.body.counts[NODES] == 4
