@@ -6,7 +6,7 @@ Paper, section 3, on top of what `tissue.sweep` and `tissue.front` find for any 
 from tissue.arrays import Arrays
 from tissue.body import Body
 from tissue.cut import Cut
-from tissue.front import MOST_EVENTS, PARAMETER_GAP, next_event
+from tissue.front import MOST_EVENTS, PARAMETER_GAP, next_event, way_of_sample
 from tissue.jit import kernel
 from tissue.paper_scheme.records import (
     NO_NODE,
@@ -66,9 +66,10 @@ def record_tips(cut: Cut, records: Records) -> None:
 
 @kernel
 def _record_tip(cut: Cut, records: Records, sample: int) -> None:
+    way = way_of_sample(cut.path, sample)
     when = 0.0
     for _ in range(MOST_EVENTS):
-        event = next_event(cut, sample, when)
+        event = next_event(cut, way, when)
         if event.when > 1.0:
             return
         when = event.when + PARAMETER_GAP

@@ -92,6 +92,11 @@ class PaperScheme:
         split_left(self._split(body), self._waiting, path, self._reach)
         remember_active(cut)
 
+    def rest(self, body: Body, visits: Visits, path: Path) -> None:
+        """See `Scheme`. Nothing is cut before the blade has left it (paper, section 4.3)."""
+        del body, visits, path
+        clear_changes(self.change)
+
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """See `Scheme`."""
         del visits
