@@ -34,9 +34,6 @@ from tissue.border import (
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
-from tissue.paper_scheme.records import with_room_to_hang
-from tissue.paper_scheme.scheme import PaperScheme
-from tissue.paper_scheme.statistics import SchemeStatistics
 from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
 from tissue.pieces import count_pieces
 from tissue.prescribed import begin_path, prescribe_path
@@ -56,6 +53,7 @@ from tissue.types import (
     BoolArray,
     FloatArray,
     Profile,
+    SchemeStatistics,
     Snapshot,
     StepResult,
     Surface,
@@ -171,6 +169,8 @@ class Tissue:
             checked_fixed(fixed, len(mesh.positions)),
         )
         if scheme == "paper":
+            from tissue.paper_scheme.records import with_room_to_hang
+
             self._body = with_room_to_hang(self._body)
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
@@ -194,7 +194,9 @@ class Tissue:
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = quality.floor * self.node_size
         self._scheme: Scheme
-        if scheme == "paper":
+        if scheme == "paper":  # imported late: its kernels would cost every start 0.8 s
+            from tissue.paper_scheme.scheme import PaperScheme
+
             self._scheme = PaperScheme(self._body, self.material.density, self.node_size)
         else:
             lengths = Quality(
@@ -348,9 +350,7 @@ class Tissue:
 
     def scheme_statistics(self) -> SchemeStatistics | None:
         """Return what the paper's scheme did so far; None where another scheme cuts."""
-        if isinstance(self._scheme, PaperScheme):
-            return self._scheme.statistics(self._body)
-        return None
+        return self._scheme.statistics(self._body)
 
     # stages of a step
 

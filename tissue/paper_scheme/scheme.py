@@ -23,11 +23,12 @@ from tissue.paper_scheme.presplit import N_NODES
 from tissue.paper_scheme.records import cut_edge_code, records_of, table
 from tissue.paper_scheme.split import N_TALLIES, Split
 from tissue.paper_scheme.splitting import split_tetrahedron
-from tissue.paper_scheme.statistics import SchemeStatistics, statistics
+from tissue.paper_scheme.statistics import statistics
 from tissue.path import Path
 from tissue.sheet import grown_sheet, new_sheet
 from tissue.star import Visits
 from tissue.sweep import find_active_tetrahedra, find_crossings
+from tissue.types import SchemeStatistics
 
 REACH = 0.25
 """How far from its box the blade must be to have left a tetrahedron, in mean node sizes. A blade in
@@ -115,7 +116,7 @@ class PaperScheme:
         self._work.hash_stamps[:] = 0  # they are numbers of searches, which begin anew
 
     def statistics(self, body: Body) -> SchemeStatistics:
-        """Return what was done so far."""
+        """See `Scheme`."""
         return statistics(
             body, self._records, self._table, self._waiting, self._tally, self._n_ignored
         )

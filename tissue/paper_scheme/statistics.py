@@ -1,6 +1,4 @@
-"""What the paper's scheme did to a mesh, and what it left behind."""
-
-from typing import NamedTuple
+"""Counts what the paper's scheme did to a mesh, and what it left behind."""
 
 import numpy as np
 
@@ -12,34 +10,7 @@ from tissue.paper_scheme.cut_edge_code import bit_of
 from tissue.paper_scheme.presplit import N_CHILDREN
 from tissue.paper_scheme.records import NO_NODE, NOT_CUT, WHOLE_STILL, Records, Table
 from tissue.paper_scheme.split import N_GUARDED, N_OF_CASE, N_OWN
-from tissue.types import IntArray
-
-
-class SchemeStatistics(NamedTuple):
-    """Counts since the body was made."""
-
-    n_cut: int
-    """Tetrahedra of the initial mesh that were split."""
-    n_of_case: dict[str, int]
-    """How many of them were split by each case, A to E."""
-    paper_count: int
-    """Tetrahedra in the paper's counting, in which a parent stays: initial + 17 a split one. The
-    mesh has one less a split, since child 0 takes the place of its parent."""
-    n_hanging_edge_nodes: int
-    """Edges with a node, some tetrahedron around which is whole."""
-    n_hanging_face_nodes: int
-    """Faces with a node, the tetrahedron on one side of which is whole; and `n_own_face_nodes`."""
-    n_guarded: int
-    """Split tetrahedra whose centre would have been flat or inverted, and whose face nodes were
-    drawn to the centroids."""
-    n_own_face_nodes: int
-    """Face nodes that the guard made for one tetrahedron alone, beside that of its neighbour."""
-    n_unsupported: int
-    """Tetrahedra that were left whole because their cut edges are none of the 37 codes."""
-    n_waiting: int
-    """Tetrahedra that the blade is still in, or was when it was last seen."""
-    n_ignored_crossings: int
-    """Crossings with edges of tetrahedra that were already split: each is processed only once."""
+from tissue.types import IntArray, SchemeStatistics
 
 
 def statistics(
