@@ -1,7 +1,8 @@
 """The arrays of a tetrahedral body, how they grow, and how to walk from tetrahedron to tetrahedron.
 
 Face `f` of a tetrahedron lies opposite its local node `f`. `links[t, f]` names what is behind it:
-4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went.
+4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went;
+or less where faces of two sizes meet (see hanging).
 Nodes and tetrahedra keep their numbers while they live; both are only ever appended.
 """
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.geometry import barycentric_in, smallest_weight
+from tissue.hanging import Hanging, behind, grown_hanging, is_open, n_behind, nothing_hanging
 from tissue.jit import kernel
 from tissue.predicates import Lattice, lattice_around
 from tissue.types import BoolArray, FloatArray, IntArray, TetrahedralMesh
@@ -60,6 +62,7 @@ class Body(Arrays):
     counts: IntArray
     """Number of nodes and of tetrahedra, shape (2,)."""
     lattice: Lattice
+    hanging: Hanging
 
 
 def build_links(tetrahedra: IntArray) -> IntArray:
@@ -108,6 +111,7 @@ def build_body(
         links=build_links(tetrahedra),
         counts=np.array([n, len(tetrahedra)], dtype=np.int64),
         lattice=lattice,
+        hanging=nothing_hanging(),
     )
 
 
@@ -121,10 +125,11 @@ def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
 def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     """Return the body with room for that many nodes and tetrahedra."""
     of_tetrahedra = ("tetrahedra", "links")
-    of_nodes = set(Body.__annotations__) - {*of_tetrahedra, "counts", "lattice"}
+    of_nodes = set(Body.__annotations__) - {*of_tetrahedra, "counts", "lattice", "hanging"}
     larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
     larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in of_tetrahedra}
-    return body.replaced(**larger)
+    hanging = grown_hanging(body.hanging, n_nodes, n_tetrahedra)
+    return body.replaced(**larger, hanging=hanging)
 
 
 @kernel
@@ -164,7 +169,7 @@ def walk(body: Body, p: Vec3, start: int) -> Walk:
         for f in range(4):
             weight = w[f]
             if weight < -INSIDE_TOLERANCE:
-                if body.links[t, f] >= 0:
+                if not is_open(body.links[t, f]):
                     if weight < lowest:
                         lowest = weight
                         way = f
@@ -172,5 +177,21 @@ def walk(body: Body, p: Vec3, start: int) -> Walk:
                     stopped_by = CUT
         if way < 0:
             return Walk(t, False, stopped_by)
-        t = body.links[t, way] // 4
+        t = _beyond(body, p, t, body.links[t, way])
     return Walk(t, False, 0)
+
+
+@kernel
+def _beyond(body: Body, p: Vec3, t: int, link: int) -> int:
+    """The tetrahedron behind a face of `t`; of six, the one that `p` [m] is least outside of."""
+    if link >= 0:
+        return link // 4
+    nearest = -1
+    largest = -np.inf
+    for i in range(n_behind(body.hanging, t, link)):
+        other = behind(body.hanging, t, link, i)
+        weight = smallest_weight(barycentric_in(p, body.rest, body.tetrahedra, other))
+        if weight > largest:
+            largest = weight
+            nearest = other
+    return nearest

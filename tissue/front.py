@@ -11,6 +11,7 @@ from typing import NamedTuple
 from tissue.body import local_index
 from tissue.cut import FULL, N_DIRTY, Cut
 from tissue.jit import kernel
+from tissue.path import Path
 from tissue.predicates import Point, pierces, point
 from tissue.snapping import insert_in_face
 from tissue.star import star
@@ -35,6 +36,8 @@ class Event(NamedTuple):
     b: int
     c: int
     weights: Vec3
+    half: int
+    """The face: 4 * tetrahedron + its local face."""
     outer: bool
     """Whether the face is on the skin or on a cut."""
     leaving: bool
@@ -59,16 +62,21 @@ def extend_fronts(cut: Cut) -> None:
     for end in range(2):
         sample = 0 if end == 0 else last
         if path.member[sample]:
-            origin = vec3(path.t0, sample)
-            way = Way(
-                point(path.lattice_t0, sample),
-                point(path.lattice_t1, sample),
-                origin,
-                sub(vec3(path.t1, sample), origin),
-            )
-            front[end] = _lay_front(cut, way, front[end])
+            front[end] = _lay_front(cut, way_of_sample(path, sample), front[end])
         else:
             front[end] = -1
+
+
+@kernel
+def way_of_sample(path: Path, sample: int) -> Way:
+    """The way of a sample of the edge in this step."""
+    origin = vec3(path.t0, sample)
+    return Way(
+        point(path.lattice_t0, sample),
+        point(path.lattice_t1, sample),
+        origin,
+        sub(vec3(path.t1, sample), origin),
+    )
 
 
 @kernel
@@ -107,7 +115,7 @@ def _lay_front(cut: Cut, way: Way, before: int) -> int:
     """
     when = 0.0
     for _ in range(MOST_EVENTS):
-        event = _next_event(cut, way, when)
+        event = next_event(cut, way, when)
         if event.when > 1.0:
             return before
         when = event.when + PARAMETER_GAP
@@ -123,10 +131,10 @@ def _lay_front(cut: Cut, way: Way, before: int) -> int:
 
 
 @kernel
-def _next_event(cut: Cut, way: Way, after: float) -> Event:
+def next_event(cut: Cut, way: Way, after: float) -> Event:
     """The first face that the way pierces after that fraction of it."""
     work, change = cut.work, cut.change
-    best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), False, False)
+    best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), -1, False, False)
     for i in range(work.n_active[0]):
         best = _earlier_event(cut, work.active[i], way, after, best)
     for i in range(change.counts[N_DIRTY]):
@@ -160,7 +168,7 @@ def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Eve
         )
         apex = sub(vec3(body.rest, body.tetrahedra[t, f]), vec3(body.rest, a))
         leaving = dot(normal, way.direction) * dot(normal, apex) < 0.0
-        best = Event(when, a, b, c, w, link < 0, leaving)
+        best = Event(when, a, b, c, w, 4 * t + f, link < 0, leaving)
     return best
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tissue.body import TETRAHEDRA, Body
+from tissue.hanging import behind, n_behind
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray, Piece, Snapshot
 from tissue.union_find import components
@@ -26,12 +27,15 @@ def label_pieces(body: Body, piece: IntArray, queue: IntArray) -> int:
         n = 1
         i = 0
         while i < n:
+            t = queue[i]
             for f in range(4):
-                link = body.links[queue[i], f]
-                if link >= 0 and piece[link // 4] < 0:
-                    piece[link // 4] = n_pieces
-                    queue[n] = link // 4
-                    n += 1
+                link = body.links[t, f]
+                for k in range(n_behind(body.hanging, t, link)):
+                    other = behind(body.hanging, t, link, k)
+                    if piece[other] < 0:
+                        piece[other] = n_pieces
+                        queue[n] = other
+                        n += 1
             i += 1
         n_pieces += 1
     return n_pieces

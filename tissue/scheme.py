@@ -6,6 +6,21 @@ from tissue.body import Body
 from tissue.cut import Change
 from tissue.path import Path
 from tissue.star import Visits
+from tissue.types import SchemeStatistics
+
+SCHEMES = ("stellar", "paper")
+"""Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
+
+
+def checked_scheme(name: str) -> str:
+    """Return the name of a scheme.
+
+    Raises:
+        ValueError: there is no such scheme.
+    """
+    if name not in SCHEMES:
+        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(SCHEMES)}")
+    return name
 
 
 class Scheme(Protocol):
@@ -41,6 +56,10 @@ class Scheme(Protocol):
 
     def forget(self) -> None:
         """Forget the incision; the next one is another."""
+        ...
+
+    def statistics(self, body: Body) -> SchemeStatistics | None:
+        """Return counts of what was done so far, if the scheme keeps any."""
         ...
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:

@@ -25,6 +25,7 @@ from tissue.geometry import (
     interpolate,
     smallest_weight,
 )
+from tissue.hanging import behind, is_open, n_behind
 from tissue.jit import kernel
 from tissue.rotation import to_material
 from tissue.star import Visits
@@ -73,16 +74,18 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
             closest = t
         for f in range(4):
             link = body.links[t, f]
-            if link >= 0 and visits.tetrahedra[link // 4] != epoch and n < SEARCH:
-                visits.tetrahedra[link // 4] = epoch
-                queue[n] = link // 4
-                n += 1
+            for k in range(n_behind(body.hanging, t, link)):
+                other = behind(body.hanging, t, link, k)
+                if visits.tetrahedra[other] != epoch and n < SEARCH:
+                    visits.tetrahedra[other] = epoch
+                    queue[n] = other
+                    n += 1
     if closest_weight >= -INSIDE_TOLERANCE:
         return Place(closest, True, False)
     w = barycentric_in(p, body.rest, body.tetrahedra, closest)
     for f in range(4):
         if w[f] == closest_weight:
-            return Place(closest, False, body.links[closest, f] < 0)
+            return Place(closest, False, is_open(body.links[closest, f]))
     return Place(closest, False, False)
 
 

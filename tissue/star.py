@@ -5,6 +5,7 @@ import numpy as np
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body, local_index
 from tissue.geometry import node_altitude
+from tissue.hanging import END
 from tissue.jit import kernel
 from tissue.types import IntArray
 
@@ -39,10 +40,13 @@ def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
 def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> int:
     """Write the tetrahedra around `node` that hang together with `start` to `out`; return how many.
 
-    They come in breadth-first order, `start` first.
+    They come in breadth-first order, `start` first. Where nodes may hang they are those of the list
+    of `node`.
     """
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
+    if len(body.hanging.first) > 0:
+        return _listed(body, visits, node, out)
     visits.tetrahedra[start] = epoch
     out[0] = start
     n = 1
@@ -61,6 +65,18 @@ def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> in
                 visits.tetrahedra[other] = epoch
                 out[n] = other
                 n += 1
+    return n
+
+
+@kernel
+def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
+    n = 0
+    corner = body.hanging.first[node]
+    while corner != END and n < LARGEST_STAR:
+        out[n] = corner // 4
+        visits.tetrahedra[out[n]] = visits.epoch[0]
+        n += 1
+        corner = body.hanging.next[corner]
     return n
 
 

@@ -18,6 +18,7 @@ from tissue.sheet import begin_sheet, grown_sheet, new_sheet
 from tissue.snapping import insert_crossings
 from tissue.star import Visits
 from tissue.sweep import find_active_tetrahedra, find_crossings
+from tissue.types import SchemeStatistics
 
 
 class StellarScheme:
@@ -81,6 +82,11 @@ class StellarScheme:
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._work = self._work.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._work.hash_stamps[:] = 0
+
+    def statistics(self, body: Body) -> SchemeStatistics | None:
+        """See `Scheme`. There are no cases to count, and nothing is left hanging."""
+        del body
+        return None
 
     def _insert(self, cut: Cut) -> None:
         clear_changes(cut.change)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from tissue.body import CUT, NODES, TETRAHEDRA, Body
+from tissue.hanging import is_open
 from tissue.jit import kernel
 from tissue.types import BoolArray, IntArray, Surface
 
@@ -18,7 +19,7 @@ def boundary_triangles(
     n = 0
     for t in range(body.counts[TETRAHEDRA]):
         for f in range(4):
-            if body.links[t, f] < 0:
+            if is_open(body.links[t, f]):
                 for k in range(3):
                     triangles[n, k] = body.tetrahedra[t, outward[f, k]]
                 is_cut[n] = body.links[t, f] == CUT

@@ -6,6 +6,7 @@ hold the anchors, through faces: the cost is that of the tetrahedra along the bl
 
 from tissue.body import CUT
 from tissue.cut import Cut
+from tissue.hanging import behind, n_behind
 from tissue.jit import kernel
 from tissue.path import Path
 from tissue.predicates import orient3d, pierces, point
@@ -34,9 +35,9 @@ def find_active_tetrahedra(cut: Cut) -> None:
         i += 1
         for f in range(4):
             link = body.links[t, f]
-            if link >= 0:
-                _visit(cut, link // 4, epoch, False)
-            elif link == CUT:
+            for k in range(n_behind(body.hanging, t, link)):
+                _visit(cut, behind(body.hanging, t, link, k), epoch, False)
+            if link == CUT:
                 _visit_other_lip(cut, t, f, epoch)
 
 

@@ -41,7 +41,7 @@ from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
-from tissue.scheme import Scheme
+from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
 from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
@@ -58,6 +58,7 @@ from tissue.types import (
     IntArray,
     Piece,
     Profile,
+    SchemeStatistics,
     Snapshot,
     StepResult,
     Surface,
@@ -126,7 +127,9 @@ class Tissue:
             nodes stay there: the paper's displacement boundary conditions.
         gravity: [m/s2].
         floor: Height of a floor, for example a table, below the body [m]; None for no floor.
-        quality: How closely cuts follow the blade.
+        quality: How closely cuts follow the blade, where the scheme lets one choose.
+        scheme: How the mesh is cut: "stellar", or "paper" for that of Bielser, Maiwald and Gross,
+            with its limits (`tissue.paper_scheme`).
 
     Raises:
         MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
@@ -143,8 +146,10 @@ class Tissue:
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
         floor: float | None = None,
         quality: CutQuality | None = None,
+        scheme: str = "stellar",
     ) -> None:
         expect_sound(mesh)
+        checked_scheme(scheme)
         self.material = material or Material()
         self._gravity = checked_gravity(gravity)
         self._body = build_body(
@@ -152,6 +157,10 @@ class Tissue:
             checked_positions(positions, mesh.positions),
             checked_fixed(fixed, len(mesh.positions)),
         )
+        if scheme == "paper":
+            from tissue.paper_scheme.records import with_room_to_hang
+
+            self._body = with_room_to_hang(self._body)
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
@@ -173,19 +182,22 @@ class Tissue:
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = quality.floor * self.node_size
-        self._scheme: Scheme = StellarScheme(
-            Quality(
+        self._scheme: Scheme
+        if scheme == "paper":  # imported late: its kernels would cost every start 0.8 s
+            from tissue.paper_scheme.scheme import PaperScheme
+
+            self._scheme = PaperScheme(self._body, self.material.density, self.node_size)
+        else:
+            lengths = Quality(
                 snap=quality.snap,
                 floor=self._snap_floor,
                 guard=quality.guard * self.node_size,
                 crumb=float(quality.crumb * volume / n_tetrahedra),
-            ),
-            n_nodes,
-            n_tetrahedra,
-        )
+            )
+            self._scheme = StellarScheme(lengths, n_nodes, n_tetrahedra)
         checked_floor(floor, float(self.bounds[0, 2]))
         self._contact = SelfContact(self._body, self.node_size, self.material.friction, floor)
-        self._guard = quality.guard * self.node_size
+        self._guard = 0.0 if scheme == "paper" else quality.guard * self.node_size
         self._at_first = self._measures()
         self._grow()
 
@@ -354,6 +366,10 @@ class Tissue:
             initial=self._at_first,
             now=self._measures(),
         )
+
+    def scheme_statistics(self) -> SchemeStatistics | None:
+        """Return what the paper's scheme did so far; None where another scheme cuts."""
+        return self._scheme.statistics(self._body)
 
     # stages of a step
 

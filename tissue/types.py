@@ -163,3 +163,30 @@ class Piece(NamedTuple):
     def angular_velocity(self) -> FloatArray:
         """That of a rigid body of this momentum and inertia [rad/s], shape (3,)."""
         return np.asarray(np.linalg.lstsq(self.inertia, self.angular_momentum)[0])
+
+
+class SchemeStatistics(NamedTuple):
+    """What the paper's scheme did to a mesh since the body was made, and what it left behind."""
+
+    n_cut: int
+    """Tetrahedra of the initial mesh that were split."""
+    n_of_case: dict[str, int]
+    """How many of them were split by each case, A to E."""
+    paper_count: int
+    """Tetrahedra in the paper's counting, in which a parent stays: initial + 17 a split one. The
+    mesh has one less a split, since child 0 takes the place of its parent."""
+    n_hanging_edge_nodes: int
+    """Edges with a node, some tetrahedron around which is whole."""
+    n_hanging_face_nodes: int
+    """Faces with a node, the tetrahedron on one side of which is whole; and `n_own_face_nodes`."""
+    n_guarded: int
+    """Split tetrahedra whose centre would have been flat or inverted, and whose face nodes were
+    drawn to the centroids."""
+    n_own_face_nodes: int
+    """Face nodes that the guard made for one tetrahedron alone, beside that of its neighbour."""
+    n_unsupported: int
+    """Tetrahedra that were left whole because their cut edges are none of the 37 codes."""
+    n_waiting: int
+    """Tetrahedra that the blade is still in, or was when it was last seen."""
+    n_ignored_crossings: int
+    """Crossings with edges of tetrahedra that were already split: each is processed only once."""
