@@ -35,6 +35,7 @@ def make_tissue(scene: Scene) -> Tissue:
         positions=pulled_apart(mesh.positions, scene.fixed, scene.stretch),
         gravity=(0.0, 0.0, -scene.gravity),
         quality=scene.quality,
+        scheme=scene.scheme,
     )
     if fixed.any():
         tissue.settle()

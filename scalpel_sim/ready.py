@@ -92,7 +92,13 @@ def _tissue_elsewhere(
     except BaseException:
         link.close()
         raise
-    elsewhere = {"fixed", "stretch", "gravity", "quality"}  # the server knows, and does not say
+    elsewhere = {
+        "fixed",
+        "stretch",
+        "gravity",
+        "quality",
+        "scheme",
+    }  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
 
@@ -130,6 +136,7 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         young_modulus=body.young,
         density=body.density,
         toughness=body.toughness,
+        scheme=body.scheme,
         snap=body.snap,
         guard=body.guard,
         stretch=body.stretch,
