@@ -36,6 +36,7 @@ def make_tissue(scene: Scene) -> Tissue:
         gravity=(0.0, 0.0, -scene.gravity),
         floor=scene.floor,
         quality=scene.quality,
+        scheme=scene.scheme,
     )
     if fixed.any():
         tissue.settle()

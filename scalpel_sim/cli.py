@@ -151,6 +151,7 @@ def figure(
     /,
     *,
     output: Path | None = None,
+    scheme: str = "stellar",
     talk: Talk = Talk(),
 ) -> None:
     """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
@@ -161,11 +162,14 @@ def figure(
     Args:
         number: 10, 11 or 12.
         output: The file; figure10.png (11, 12) in this folder if not given.
+        scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.outputs import check_file
+    from scalpel_sim.scenes import check_scheme
 
     path = output or Path(f"figure{number}.png")
     with talking(talk):
+        check_scheme(scheme)
         check_file(path, ".png", "--output")
         from scalpel_sim.figures.figures import draw_figure
         from scalpel_sim.ready import load_kernels
@@ -173,7 +177,7 @@ def figure(
         load_kernels(talk)
         if not talk.quiet:
             say(f"cutting and drawing Figure {number}: about half a minute")
-        drawn = draw_figure(number, path)
+        drawn = draw_figure(number, path, scheme)
         if talk.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
         elif not talk.quiet:

@@ -31,6 +31,8 @@ class Body:
     "Density [kg/m3]."
     toughness: float | None = None
     "Fracture toughness: what a square metre of cut costs [J/m2]."
+    scheme: str | None = None
+    "How the mesh is cut: stellar [default], or paper: the paper's own scheme, with its limits."
     snap: float | None = None
     """Where the blade passes nearer to a node than this share of the node's size, the cut goes
     through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""

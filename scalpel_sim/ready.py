@@ -98,6 +98,7 @@ def _tissue_elsewhere(
         "gravity",
         "floor",
         "quality",
+        "scheme",
     }  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
@@ -136,6 +137,7 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         young_modulus=body.young,
         density=body.density,
         toughness=body.toughness,
+        scheme=body.scheme,
         snap=body.snap,
         guard=body.guard,
         stretch=body.stretch,

@@ -17,6 +17,9 @@ from tissue.quality import CutQuality
 from tissue.shapes import grid, organ
 from tissue.types import TetrahedralMesh
 
+SCHEMES = ("stellar", "paper")
+"""As `tissue.scheme` has them, which is not imported here: it takes the compiler along."""
+
 ARMS = ("auto", "touch", "premium")
 
 PHANTOM = Material(young_modulus=10e3, density=1000.0, toughness=20.0)
@@ -35,6 +38,16 @@ STANDARD_GRAVITY = 9.81
 """[m/s2], along -z."""
 
 
+def check_scheme(name: str) -> None:
+    """Refuse a scheme of cutting that there is not.
+
+    Raises:
+        UsageError: the message says which there are.
+    """
+    if name not in SCHEMES:
+        raise unknown("scheme", name, SCHEMES)
+
+
 @dataclass(frozen=True)
 class Scene:
     """A body and what is to be done to it. Lengths in metres, tissue frame."""
@@ -48,6 +61,8 @@ class Scene:
     """Which nodes do not move: names of sides, a box, or `none`; see `tissue.boundary`."""
     quality: CutQuality = AS_USUAL
     """How closely cuts follow the blade, against how small the elements get."""
+    scheme: str = "stellar"
+    """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
     stretch: float = 0.05
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""
@@ -66,8 +81,9 @@ class Scene:
         """Refuse numbers that mean nothing.
 
         Raises:
-            UsageError: stretch, gravity or speed is out of range.
+            UsageError: stretch, gravity or speed is out of range; there is no such scheme.
         """
+        check_scheme(self.scheme)
         if not -0.5 <= self.stretch <= 1.0:
             raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")
         if not 0.0 <= self.gravity <= 100.0:

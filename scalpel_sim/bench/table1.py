@@ -18,7 +18,7 @@ from scalpel_sim.cuts import Cut, prepare_cut
 from scalpel_sim.model_shapes import body_poses, shapes_of
 from scalpel_sim.pictures import readings
 from scalpel_sim.recording import Recording
-from scalpel_sim.scenes import Scene
+from scalpel_sim.scenes import SCHEMES, Scene
 from scalpel_sim.simulation import Picture, Simulation
 from scalpel_sim.stage import Stage
 from scalpel_sim.summary import STAGES
@@ -28,7 +28,6 @@ from tissue.shapes import grid
 
 Cells = tuple[int, int, int]
 
-SCHEMES = ("stellar",)
 CELL = 0.01
 """Side of a cell [m]; the paper has no lengths."""
 WAY = np.array([[0.38, -0.4], [0.38, 1.6]])
@@ -118,13 +117,14 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
 def _run(cells: Cells, scheme: str) -> Row:
     """Do one cut."""
     size = [CELL * n for n in cells]
-    scene = Scene("table1", "a grid of the paper", lambda: grid(cells, size))
+    scene = Scene("table1", "a grid of the paper", lambda: grid(cells, size), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
     simulation = prepare_cut(Cut(scene, WAY, DEPTHS[cells]), tissue)
     spent_on: list[float] = []
     simulation.pictures.append(_into_nothing(simulation, spent_on))
     simulation.run(simulation.stroke.duration)
+    statistics = tissue.scheme_statistics()
     rows = _during_cut(simulation.recording)
     seconds = {stage: float(rows[name].sum()) for stage, name in STAGES.items()}
     total = float(rows["frame_s"].sum()) + seconds["RD"]
@@ -133,7 +133,7 @@ def _run(cells: Cells, scheme: str) -> Row:
         cells=cells,
         scheme=scheme,
         tetrahedra_initial=n_before,
-        tetrahedra_final=tissue.n_tetrahedra,
+        tetrahedra_final=tissue.n_tetrahedra if statistics is None else statistics.paper_count,
         frame_rate=len(rows["frame_s"]) / total,
         percent=percent | {"other": 100.0 - sum(percent.values())},
         picture_ms=1e3 * float(np.median(spent_on)),

@@ -58,6 +58,11 @@ class Moment(NamedTuple):
     """The parts of the scalpel, tissue frame, and what they are."""
 
 
+def by(scheme: str, cut: Cut) -> Cut:
+    """Return the same cut, done by that scheme."""
+    return cut._replace(scene=replace(cut.scene, scheme=scheme))
+
+
 def moments(cut: Cut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:
     """Do a cut, and return what it looks like at shares of its stroke; 1 is after the rest."""
     simulation = prepare_cut(cut)

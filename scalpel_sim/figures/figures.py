@@ -13,7 +13,7 @@ from scalpel_sim import textures
 from scalpel_sim.draping import drape
 from scalpel_sim.errors import RunError
 from scalpel_sim.figures.camera import Margins, View, framing
-from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, moments
+from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, by, moments
 from scalpel_sim.figures.paint import Thing, paint, texture_of
 from scalpel_sim.figures.table import table_below
 from scalpel_sim.figures.wire import draw_mesh
@@ -48,27 +48,33 @@ class Drawn(NamedTuple):
     """In each panel."""
 
 
-def draw_figure(number: int, path: Path) -> Drawn:
+def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
     """Do the cuts of Figure 10, 11 or 12, write its PNG, and return what it shows.
+
+    Args:
+        number: 10, 11 or 12.
+        path: Of the PNG.
+        scheme: How the mesh is cut.
 
     Raises:
         RunError: the file could not be written.
     """
-    panels, drawn = {10: _figure_10, 11: _figure_11, 12: _figure_12}[number]()
-    _lay_out(panels, drawn.labels, f"Figure {number}: {drawn.caption}", path)
+    panels, drawn = {10: _figure_10, 11: _figure_11, 12: _figure_12}[number](scheme)
+    how = "" if scheme == "stellar" else ", cut by the paper's own scheme"
+    _lay_out(panels, drawn.labels, f"Figure {number}: {drawn.caption}{how}", path)
     return drawn
 
 
-def _figure_10() -> tuple[list[FloatArray], Drawn]:
-    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
+def _figure_10(scheme: str) -> tuple[list[FloatArray], Drawn]:
+    seen = moments(by(scheme, FIGURE_10), FIGURE_10_MOMENTS)
     view = _view(seen, WITH_TOOL)
     panels = [_picture(view, moment, with_tool=True) for moment in seen]
     caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
     return panels, _drawn(caption, seen, ["", "", "", ""])
 
 
-def _figure_11() -> tuple[list[FloatArray], Drawn]:
-    seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
+def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
+    seen = moments(by(scheme, FIGURE_10), FIGURE_10_MOMENTS)
     view = _view(seen, BODY_ALONE)
     ends = [seen[0], seen[-1]]
     panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]
@@ -76,8 +82,8 @@ def _figure_11() -> tuple[list[FloatArray], Drawn]:
     return panels, _drawn(caption, ends, ["", ""])
 
 
-def _figure_12() -> tuple[list[FloatArray], Drawn]:
-    seen = [moments(cut)[-1] for cut in FIGURE_12]
+def _figure_12(scheme: str) -> tuple[list[FloatArray], Drawn]:
+    seen = [moments(by(scheme, cut))[-1] for cut in FIGURE_12]
     panels = [_picture(_view([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
     cells = ["2 × 2 × 2 cells, ", "7 × 7 × 7 cells, "]
     return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)

@@ -48,6 +48,11 @@ WRONG_USE = {
     "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
     "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
     "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
+    "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
+    "a figure by an unknown scheme": (
+        ["figure", "10", "--scheme", "mine"],
+        "Known: stellar, paper",
+    ),
     "a snap beyond the node": (["run", "slab", "--snap", "2"], "snap is 2"),
     "a guard that no split passes": (["run", "slab", "--guard", "nan"], "guard is nan"),
     "a quality for a tissue elsewhere": (

@@ -6,7 +6,7 @@ While the body is whole these are the faces of cuts; once it is in pieces, the s
 import numpy as np
 
 from tissue.arrays import Arrays
-from tissue.body import CUT, TETRAHEDRA, Body, grown
+from tissue.body import CUT, OUTER, TETRAHEDRA, Body, grown
 from tissue.cut import N_DIRTY, Change
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
@@ -74,7 +74,7 @@ def count_faces(body: Body, with_skin: bool) -> int:
     for t in range(body.counts[TETRAHEDRA]):
         for f in range(4):
             link = body.links[t, f]
-            if link == CUT or (with_skin and link < 0):
+            if link == CUT or (with_skin and link == OUTER):
                 n += 1
     return n
 
@@ -91,7 +91,7 @@ def _renew(faces: Faces, body: Body, t: int) -> None:
     counts = faces.counts
     for f in range(4):
         link = body.links[t, f]
-        wanted = link == CUT or (link < 0 and counts[WITH_SKIN] == 1)
+        wanted = link == CUT or (link == OUTER and counts[WITH_SKIN] == 1)
         at = faces.place[t, f]
         if wanted and at < 0:
             faces.face[counts[N_FACES]] = 4 * t + f

@@ -24,7 +24,7 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
     file = tmp_path / "table1.json"
     assert command_line(["bench", "table1", "--runs", "1", "--save", str(file)]) == 0
     printed = capsys.readouterr().out
-    for words in ("SGI Indigo 2", "3.78", "92.2", "2,446", "stellar", "pictures"):
+    for words in ("SGI Indigo 2", "3.78", "92.2", "2,446", "stellar", "354", "pictures"):
         assert words in printed
     found = json.loads(file.read_text())
     assert (found["benchmark"], found["runs"]) == ("table1", 1)
@@ -38,6 +38,10 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
         assert set(row["percent"]) == {"RX", "RD", "GC", "CD", "other"}
         assert all(share > 0.0 for share in row["percent"].values())
         assert sum(row["percent"].values()) == pytest.approx(100.0)
+    final = {(tuple(row["cells"]), row["scheme"]): row["tetrahedra_final"] for row in rows}
+    assert final[(2, 2, 2), "paper"] == 354  # as printed
+    assert final[(2, 4, 3), "paper"] == 960  # as printed
+    assert final[(4, 6, 4), "paper"] == 576 + 17 * 108  # the paper: 110
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,15 @@ def test_each_figure_is_one_command(number, n_panels, small, capsys):
     assert (image[:, :, :3].min(axis=2) > 0.9).mean() > 0.3  # on white
 
 
+def test_a_figure_can_be_cut_by_the_papers_own_scheme(small, capsys):
+    found = {}
+    for scheme in ("stellar", "paper"):
+        assert command_line(["figure", "11", "--json", "--scheme", scheme]) == 0
+        found[scheme] = json.loads(capsys.readouterr().out)["n_tetrahedra"]
+    assert found["stellar"][0] == found["paper"][0] == 576
+    assert found["paper"][1] > 2 * found["stellar"][1]
+
+
 def test_figure_10_grows_from_576_tetrahedra_as_the_blade_goes_through_and_its_cut_gapes():
     seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
     counts = [len(moment.snapshot.tetrahedra) for moment in seen]
