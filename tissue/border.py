@@ -85,7 +85,34 @@ def checked_edge(sweep: BladeSweep) -> Edge:
                 f"{rows[2].tolist()}, from tip to heel is {along.tolist()}"
             )
         points += [Vec3(*row) for row in rows.tolist()]
-    return Edge(*points)
+    edge = Edge(*points)
+    expect_small_turn(
+        np.array([np.subtract(edge.heel_t0, edge.tip_t0), np.subtract(edge.heel_t1, edge.tip_t1)]),
+        np.array([edge.forward_t0, edge.forward_t1]),
+    )
+    return edge
+
+
+def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:
+    """Check that the blade turns by less than a right angle from each place to the next.
+
+    Between two places it is interpolated; halfway round it would have no direction.
+
+    Args:
+        along: From tip to heel, shape (n_places, 3).
+        forward: Where it faces, shape (n_places, 3).
+
+    Raises:
+        ValueError: it turns further.
+    """
+    for what, way in (("edge", along), ("forward", forward)):
+        wrong = np.flatnonzero(~((way[1:] * way[:-1]).sum(axis=1) > 0.0))
+        if len(wrong):
+            i = int(wrong[0])
+            raise ValueError(
+                f"the blade's {what} turns by a right angle or more in one step, from "
+                f"{way[i].tolist()} to {way[i + 1].tolist()}; turn it in smaller steps"
+            )
 
 
 def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -116,6 +143,7 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
             f"the edge in place {i} has no length or cuts along itself: forward is "
             f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
         )
+    expect_small_turn(along, ways)
     return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
 
 

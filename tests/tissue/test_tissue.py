@@ -47,6 +47,19 @@ def test_a_blade_that_faces_along_its_own_edge_is_refused(tissue, forward):
         tissue.step(sweep_to(forward=np.array(forward)), 1e-3)
 
 
+@pytest.mark.parametrize(
+    "turned",
+    [
+        {"forward": -POSE.forward},
+        {"forward": np.array([1.0, 0.0, 0.0])},
+        {"tip": POSE.heel, "heel": POSE.tip},
+    ],
+)
+def test_a_blade_that_turns_by_a_right_angle_in_one_step_is_refused(tissue, turned):
+    with pytest.raises(ValueError, match="smaller steps"):
+        tissue.step(sweep_to(**turned), 1e-3)
+
+
 @pytest.mark.parametrize("dt", [-1e-3, np.nan, np.inf])
 def test_a_time_step_that_is_negative_or_not_finite_is_refused(tissue, dt):
     with pytest.raises(ValueError, match="dt"):
