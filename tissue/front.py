@@ -145,6 +145,8 @@ def next_event(cut: Cut, way: Way, after: float) -> Event:
 @kernel
 def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Event:
     body = cut.body
+    if _is_beyond(cut, t, way):
+        return best
     for f in range(4):
         link = body.links[t, f]
         if link >= 0 and link // 4 < t:
@@ -170,6 +172,22 @@ def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Eve
         leaving = dot(normal, way.direction) * dot(normal, apex) < 0.0
         best = Event(when, a, b, c, w, 4 * t + f, link < 0, leaving)
     return best
+
+
+@kernel
+def _is_beyond(cut: Cut, t: int, way: Way) -> bool:
+    """Whether the boxes of a tetrahedron and a way are apart."""
+    grid, nodes = cut.body.lattice_rest, cut.body.tetrahedra
+    for x in range(3):
+        low = min(way.start[x], way.stop[x])
+        high = max(way.start[x], way.stop[x])
+        p = grid[nodes[t, 0], x]
+        q = grid[nodes[t, 1], x]
+        r = grid[nodes[t, 2], x]
+        s = grid[nodes[t, 3], x]
+        if min(min(p, q), min(r, s)) > high or max(max(p, q), max(r, s)) < low:
+            return True
+    return False
 
 
 @kernel

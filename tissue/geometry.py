@@ -168,6 +168,16 @@ def normalised(a: Vec3) -> Vec3:
 
 
 @kernel
+def nearest_on_segment(a: Vec3, b: Vec3, p: Vec3) -> Vec3:
+    """The point between `a` and `b` nearest to `p`."""
+    along = sub(b, a)
+    squared = dot(along, along)
+    if squared == 0.0:
+        return a
+    return axpy(min(1.0, max(0.0, dot(sub(p, a), along) / squared)), along, a)
+
+
+@kernel
 def nearest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3:
     """The point of triangle abc nearest to `p`, by Voronoi regions (Ericson 2005, 5.1.5)."""
     ab = sub(b, a)

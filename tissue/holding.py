@@ -52,6 +52,11 @@ def let_go(
     A blade that backs off, goes deeper and then forward again cuts below its old slit.
     """
     n = len(anchors.state)
+    any_retracted = False
+    for k in range(n):
+        any_retracted = any_retracted or anchors.state[k] == RETRACTED
+    if not any_retracted:
+        return
     rotation = mean_rotation(anchors, body)
     for k in range(n):
         if anchors.state[k] != RETRACTED:

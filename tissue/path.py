@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.arrays import Arrays
-from tissue.geometry import normalised
+from tissue.geometry import nearest_on_segment, normalised
 from tissue.jit import kernel
 from tissue.predicates import Lattice, nearest
 from tissue.types import BoolArray, FloatArray, IntArray
-from tissue.vec3 import Vec3, add, cross, dot, scale, sub, vec3
+from tissue.vec3 import Vec3, cross, dot, sub, vec3
 
 SAME_WAY = 0.7
 """Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
@@ -69,31 +69,29 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
     """The sheet at the point of segment `k` of the edge that is nearest to `p` [m]."""
     tip = vec3(path.t1, k)
     along = sub(vec3(path.t1, k + 1), tip)
-    squared = dot(along, along)
-    u = 0.0
-    if squared > 0.0:
-        u = min(1.0, max(0.0, dot(sub(p, tip), along) / squared))
     normal = normalised(cross(vec3(path.forward, k), along))
     # Where anchors are in disorder the normal of the path means nothing; that of the blade does.
     sideways = vec3(path.sideways, 0)
     if dot(normal, sideways) < SAME_WAY:
         normal = sideways
-    return Plane(add(tip, scale(u, along)), normal)
+    return Plane(nearest_on_segment(tip, vec3(path.t1, k + 1), p), normal)
 
 
 @kernel
 def plane_near(path: Path, p: Vec3) -> Plane:
     """The sheet at the point of the edge that is nearest to `p` [m]."""
     best = np.inf
-    plane = Plane(p, Vec3(0.0, 0.0, 0.0))
+    nearest_segment = -1
     for k in range(len(path.linked) - 1):
         if path.linked[k]:
-            there = plane_at(path, k, p)
-            d = sub(p, there.point)
-            if dot(d, d) < best:
-                best = dot(d, d)
-                plane = there
-    return plane
+            d = sub(p, nearest_on_segment(vec3(path.t1, k), vec3(path.t1, k + 1), p))
+            squared = dot(d, d)
+            if squared < best:
+                best = squared
+                nearest_segment = k
+    if nearest_segment < 0:
+        return Plane(p, Vec3(0.0, 0.0, 0.0))
+    return plane_at(path, nearest_segment, p)
 
 
 @kernel

@@ -35,6 +35,7 @@ class StellarScheme:
         self._quality = quality
         self._sheet = new_sheet(n_nodes, n_tetrahedra)
         self._work = new_work(n_tetrahedra)
+        self._cut: Cut | None = None
 
     @property
     def n_active(self) -> int:
@@ -82,6 +83,7 @@ class StellarScheme:
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._work = self._work.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
         self._work.hash_stamps[:] = 0
+        self._cut = None
 
     def statistics(self, body: Body) -> SchemeStatistics | None:
         """See `Scheme`. There are no cases to count, and nothing is left hanging."""
@@ -95,6 +97,13 @@ class StellarScheme:
         resolve_bridges(cut)
 
     def _arrays(self, body: Body, visits: Visits, path: Path) -> Cut:
+        """Return all that a pass needs as one struct; made anew only where a part is another."""
+        cut = self._cut
+        if cut is None or not (cut.body is body and cut.visits is visits and cut.path is path):
+            self._cut = cut = self._struct(body, visits, path)
+        return cut
+
+    def _struct(self, body: Body, visits: Visits, path: Path) -> Cut:
         return Cut(
             body=body,
             visits=visits,

@@ -13,9 +13,11 @@ class Survey(NamedTuple):
     """One look at all nodes."""
 
     low: Vec3
-    """Lowest corner of the body [m]; not finite where the motion became unstable."""
+    """Lowest corner of the body [m]."""
     high: Vec3
-    """Highest corner [m]."""
+    """Highest corner [m]; not finite where the motion became unstable."""
+    is_finite: bool
+    """Whether all positions are."""
 
 
 @kernel
@@ -34,6 +36,7 @@ def survey(body: Body) -> Survey:
         high_y = max(high_y, x[i, 1])
         high_z = max(high_z, x[i, 2])
         total += x[i, 0] + x[i, 1] + x[i, 2]
-    if not np.isfinite(total):  # a comparison with nan is false: min and max would overlook it
+    is_finite = np.isfinite(total)
+    if not is_finite:  # a comparison with nan is false: min and max would overlook it
         high_x = total
-    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z))
+    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z), is_finite)

@@ -43,7 +43,7 @@ from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
-from tissue.springs import POOL_MARGIN, build_rows, grown_springs, no_springs
+from tissue.springs import build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
@@ -86,6 +86,9 @@ instant at each turn; to lay a crack front there each time would shred the mesh.
 
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
+
+ROOM_FOR_SPRINGS = 1 << 16
+"""Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
 
 GRID_MARGIN = 0.5
 """How far a node goes before it is listed for the search of contact again, per mean node size."""
@@ -164,7 +167,7 @@ class Tissue:
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
-        self._springs = no_springs(n_nodes, 20 * n_nodes + POOL_MARGIN)
+        self._springs = no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS)
         self._stages = new_stages(n_nodes)
         self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
         self._edge_length = 0.0
@@ -214,8 +217,8 @@ class Tissue:
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of the body [m], shape (2, 3)."""
-        seen = survey(self._body)
-        return np.array([seen.low, seen.high])
+        low, high, _ = survey(self._body)
+        return np.array([low, high])
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Let the body live through `dt` [s] while the blade does `sweep`.
@@ -435,9 +438,10 @@ class Tissue:
     def _meet(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor the samples that have come into the tissue by themselves."""
         body = self._body
-        seen = survey(body)
-        if not (math.isfinite(seen.high.x) and near_box(anchors, edge, when, seen.low, seen.high)):
-            return
+        if not self._incising:
+            low, high, is_finite = survey(body)
+            if not (is_finite and near_box(anchors, edge, when, low, high)):
+                return
         has_room = (
             len(self._grid.listed_at) == len(body.positions)
             and list_moved(body, self._visits, self._grid, self._around)

@@ -109,7 +109,8 @@ class SelfContact:
         state, faces = self.arrays.state, self.arrays.faces
         faces = with_room(faces, 4 * int(change.counts[N_DIRTY]))
         renew_faces(faces, body, change)
-        self.arrays = self.arrays.replaced(faces=faces)
+        if faces is not self.arrays.faces:
+            self.arrays = self.arrays.replaced(faces=faces)
         state[IS_AWAKE] |= faces.counts[0] > 0
         state[IS_STALE] = 1
         self.arrays.contacts.count[0] = 0  # their nodes may be others now
