@@ -11,6 +11,7 @@ from tissue.jit import kernel
 from tissue.path import Path
 from tissue.predicates import orient3d, pierces, point
 from tissue.sheet import on_sheet
+from tissue.vec3 import cross, dot, sub, vec3
 
 
 @kernel
@@ -202,9 +203,28 @@ def _crossed_at(path: Path, cut: Cut, a: int, b: int, k: int) -> float:
     if pierces(pa, pb, tip_t0, tip_t1, heel_t1):
         va = orient3d(tip_t0, tip_t1, heel_t1, pa)
         vb = orient3d(tip_t0, tip_t1, heel_t1, pb)
-    elif pierces(pa, pb, tip_t0, heel_t1, heel_t0):
+        return _fraction(cut, a, b, k, True, float(va) / (float(va) - float(vb)))
+    if pierces(pa, pb, tip_t0, heel_t1, heel_t0):
         va = orient3d(tip_t0, heel_t1, heel_t0, pa)
         vb = orient3d(tip_t0, heel_t1, heel_t0, pb)
-    else:
-        return -1.0
-    return float(va) / (float(va) - float(vb))
+        return _fraction(cut, a, b, k, False, float(va) / (float(va) - float(vb)))
+    return -1.0
+
+
+@kernel
+def _fraction(cut: Cut, a: int, b: int, k: int, ahead: bool, on_lattice: float) -> float:
+    """Where along ab it meets the plane of a triangle that segment `k` sweeps, unrounded.
+
+    The lattice decides that it does; where the point is, it would tell to a few millionths of the
+    body only. Where a plane nearly holds the edge, `on_lattice` is as good as any answer.
+    """
+    body, path = cut.body, cut.path
+    tip = vec3(path.t0, k)
+    u = sub(vec3(path.t1, k) if ahead else vec3(path.t1, k + 1), tip)
+    v = sub(vec3(path.t1, k + 1) if ahead else vec3(path.t0, k + 1), tip)
+    normal = cross(u, v)
+    height_a = dot(normal, sub(vec3(body.rest, a), tip))
+    height_b = dot(normal, sub(vec3(body.rest, b), tip))
+    if height_a * height_b >= 0.0:
+        return on_lattice
+    return height_a / (height_a - height_b)
