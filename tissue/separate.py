@@ -167,14 +167,15 @@ def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
 @kernel
 def _keep_crumbs(cut: Cut) -> None:
     """Link small closed pieces that this step made back to the side of larger contact."""
-    change, body, work = cut.change, cut.body, cut.work
+    change, body, work, visits = cut.change, cut.body, cut.work, cut.visits
     n_faces = change.counts[N_FACES]
+    first = visits.epoch[0] + 1
     for i in range(n_faces):
         for j in range(0, 4, 2):
             start = change.faces[i, j]
             if change.faces[i, 1] < 0:
                 continue
-            n = _small_piece(cut, start)
+            n = _small_piece(cut, start, first)
             if n == 0:
                 continue
             volume = 0.0
@@ -182,14 +183,21 @@ def _keep_crumbs(cut: Cut) -> None:
                 volume += tetrahedron_volume(body.rest, body.tetrahedra, work.around[m])
             if volume <= cut.quality.crumb:
                 _relink(cut, n)
+            for m in range(n):  # only what a search from `first` on left is known to be large
+                visits.tetrahedra[work.around[m]] = 0
 
 
 @kernel
-def _small_piece(cut: Cut, start: int) -> int:
-    """Collect the connected piece of `start` in `work.around`; 0 if it is not a small one."""
+def _small_piece(cut: Cut, start: int, first: int) -> int:
+    """Collect the connected piece of `start` in `work.around`; 0 if it is not a small one.
+
+    What a search since visit `first` has seen belongs to a piece that is not small.
+    """
     body, visits, piece = cut.body, cut.visits, cut.work.around
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
+    if visits.tetrahedra[start] >= first:
+        return 0
     visits.tetrahedra[start] = epoch
     piece[0] = start
     n = 1
@@ -198,7 +206,7 @@ def _small_piece(cut: Cut, start: int) -> int:
         for f in range(4):
             link = body.links[piece[i], f]
             if link >= 0 and visits.tetrahedra[link // 4] != epoch:
-                if n == CRUMB_TETRAHEDRA:
+                if n == CRUMB_TETRAHEDRA or visits.tetrahedra[link // 4] >= first:
                     return 0
                 visits.tetrahedra[link // 4] = epoch
                 piece[n] = link // 4

@@ -194,8 +194,11 @@ def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: 
     at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
     while at >= 0:
         t = grid.entry[at]
-        is_first = found < 0 or t < found
-        if is_first and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0:
+        is_candidate = (found < 0 or t < found) and _meets_box(body, positions, t, p, p)
+        if (
+            is_candidate
+            and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0
+        ):
             found = t
         at = grid.following[at]
     return found

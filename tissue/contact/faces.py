@@ -11,6 +11,9 @@ from tissue.cut import N_DIRTY, Change
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
 
+ROOM_FOR_FACES = 1 << 14
+"""Faces that there is room for at first: those of several cuts, so that few steps must grow it."""
+
 N_FACES, WITH_SKIN = 0, 1
 """Places in `Faces.counts`."""
 
@@ -36,7 +39,7 @@ class Faces(Arrays):
 def new_faces(n_tetrahedra: int) -> Faces:
     """Return no faces, of a body with room for that many tetrahedra."""
     return Faces(
-        face=np.zeros(256, np.int64),
+        face=np.zeros(ROOM_FOR_FACES, np.int64),
         place=np.full((n_tetrahedra, 4), -1, np.int64),
         piece=np.full(n_tetrahedra, -1, np.int64),
         low=np.zeros((1, 3)),
