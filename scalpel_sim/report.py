@@ -83,7 +83,7 @@ def print_table(summary: Summary, console: Console) -> None:
     )
     row("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
     for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
-        row(f"  piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
+        row(f"piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
     if summary.quality is not None:
         _add_quality(row, summary.quality)
     row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
@@ -110,4 +110,4 @@ def print_table(summary: Summary, console: Console) -> None:
 def _piece(piece: dict[str, Any]) -> str:
     """Return the figures of one piece."""
     volume, mass = piece["volume_m3"] * CM3_PER_M3, piece["mass_kg"] * G_PER_KG
-    return f"{piece['tetrahedra']:,} tetrahedra, {volume:.3g} cm³, {mass:.3g} g"
+    return f"{volume:.3g} cm³, {mass:.3g} g"

@@ -27,7 +27,7 @@ from tissue.slit import behind_edge, in_slit
 from tissue.star import Visits
 from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
-from tissue.vec3 import Vec3, add, dot, sub, vec3
+from tissue.vec3 import Vec3, add, dot, norm, sub, vec3
 
 
 @kernel
@@ -79,12 +79,14 @@ def seize(
     edge: Edge,
     when: float,
     reach: float,
+    far: float,
     queue: IntArray,
 ) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
     The edge trails behind the blade by the same distance along its length: a sample is in the
-    tissue if the point that far behind it is. `reach` [m]: see `in_slit`.
+    tissue if the point that far behind it is. `reach` [m]: see `in_slit`. `far` [m]: from further
+    away no tissue is taken hold of.
     """
     n = len(anchors.state)
     rotation = mean_rotation(anchors, body)
@@ -102,11 +104,13 @@ def seize(
             place = find(body, visits, p, anchors.tetrahedron[beside], queue)
             if not place.inside or in_slit(body, place.tetrahedron, p, along, forward, reach):
                 continue
+            w = barycentric_in(p, body.rest, body.tetrahedra, place.tetrahedron)
+            here = interpolate(w, body.positions, body.tetrahedra, place.tetrahedron)
+            d = sub(sample_point(edge, k, n, when), here)
+            if norm(d) > far:  # the tissue there is turned otherwise than what the edge holds
+                continue
             put(anchors, body, k, place.tetrahedron, p)
             anchors.slipped[k] = False
-            d = sub(
-                sample_point(edge, k, n, when), anchor_position(anchors, body, body.positions, k)
-            )
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
 
 

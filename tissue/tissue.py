@@ -43,6 +43,7 @@ from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
+from tissue.snapping import EXPLAINED
 from tissue.springs import build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
@@ -78,6 +79,10 @@ INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
 steep curves leave tetrahedra that bridge the cut."""
 
+FURTHEST_HOLD = 1.0
+"""How far from the edge tissue is taken hold of beside what it holds already, per mean node size. A
+lip that has turned aside would else draw the edge into the tissue behind it."""
+
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
 RESTING_TIME = 0.02
@@ -99,8 +104,9 @@ ROOM_FOR_TETRAHEDRA = 1 << 12
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
 
-SAME_LENGTH = 1e-6
-"""Relative change in length below which it is the same blade; rounding of its two ends is less."""
+SAME_LENGTH = 1e-3
+"""Relative change in length below which it is the same blade. Poses in single precision, or between
+two places of a turning blade, differ by less; another blade would begin another incision."""
 
 SETTLED = 1e-3
 """Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
@@ -184,7 +190,7 @@ class Tissue:
         self._warn_of_toughness()
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
-        self._snap_floor = quality.floor * self.node_size
+        self._snap_floor = float(quality.floor * self.node_size)
         self._scheme: Scheme
         if scheme == "paper":  # imported late: its kernels would cost every start 0.8 s
             from tissue.paper_scheme.scheme import PaperScheme
@@ -192,9 +198,9 @@ class Tissue:
             self._scheme = PaperScheme(self._body, self.material.density, self.node_size)
         else:
             lengths = Quality(
-                snap=quality.snap,
+                snap=float(quality.snap),
                 floor=self._snap_floor,
-                guard=quality.guard * self.node_size,
+                guard=float(quality.guard * self.node_size),
                 crumb=float(quality.crumb * volume / n_tetrahedra),
             )
             self._scheme = StellarScheme(lengths, n_nodes, n_tetrahedra)
@@ -424,9 +430,10 @@ class Tissue:
     def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
         clear_forces(anchors, self._body, self._stages.external)
-        reach = self._snap_floor
+        reach = EXPLAINED * self._snap_floor
         let_go(anchors, self._body, self._visits, self._path, edge, when, self._around)
-        seize(anchors, self._body, self._visits, edge, when, reach, self._around)
+        far = FURTHEST_HOLD * self.node_size
+        seize(anchors, self._body, self._visits, edge, when, reach, far, self._around)
         self._meet(anchors, edge, when)
         if not is_engaged(anchors):
             self._end_incision()
@@ -449,7 +456,7 @@ class Tissue:
         )
         if not has_room:
             self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
-        meet(anchors, body, self._grid, edge, when, self._snap_floor)
+        meet(anchors, body, self._grid, edge, when, EXPLAINED * self._snap_floor)
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
