@@ -293,7 +293,9 @@ class Tissue:
         blade, self._path = self._path, new_path(rows.shape[1])
         grid = build_grid(self._body, self._body.rest, 0.0)
         begin_path(self._path, rows[0])
+        prescribe_path(self._path, self._body, grid, rows[0], Vec3(*ways[0].tolist()))
         self._incising = True
+        self._open_up()  # where the edge begins within the body, so does the cut
         for i in range(1, len(rows)):
             n = self._n_parts(float(np.linalg.norm(rows[i] - rows[i - 1], axis=1).max()))
             for j in range(1, n + 1):
