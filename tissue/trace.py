@@ -14,9 +14,9 @@ from tissue.path import Path
 from tissue.rotation import mean_rotation, turned_back
 from tissue.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 
-OUTREACH = 3
-"""Samples that the chain reaches out beyond the last one in the tissue: half a mean node size. With
-one, a corner of the skin between two samples can stay uncut."""
+OUTREACH = 6
+"""Samples that the chain reaches out beyond the last one in the tissue: a mean node size. With one,
+or on coarse meshes with three, a corner of the skin between two samples can stay uncut."""
 
 SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""

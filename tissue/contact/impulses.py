@@ -64,10 +64,12 @@ class Contacts(Arrays):
     """Across it [N s], shape (capacity, 3)."""
     count: IntArray
     """Shape (1,)."""
+    most_push: float
+    """The most by which two sides are pushed apart in a step [m]."""
 
 
-def new_contacts(capacity: int) -> Contacts:
-    """Return no contacts, with room for that many."""
+def new_contacts(capacity: int, most_push: float) -> Contacts:
+    """Return no contacts, with room for that many; see `Contacts` for `most_push` [m]."""
     return Contacts(
         node=np.zeros((capacity, 4), np.int64),
         weight=np.zeros((capacity, 4)),
@@ -81,12 +83,13 @@ def new_contacts(capacity: int) -> Contacts:
         last_impulse=np.zeros(capacity),
         friction=np.zeros((capacity, 3)),
         count=np.zeros(1, np.int64),
+        most_push=most_push,
     )
 
 
 def grown_contacts(contacts: Contacts, capacity: int) -> Contacts:
     """Return the contacts with room for that many."""
-    names = set(Contacts.__annotations__) - {"count"}
+    names = set(Contacts.__annotations__) - {"count", "most_push"}
     return contacts.replaced(**{name: grown(getattr(contacts, name), capacity) for name in names})
 
 
@@ -228,6 +231,7 @@ def _push(contacts: Contacts, body: Body, k: int) -> float:
     """Close the gap of contact `k`, or what of its correction is too much; return the move [m]."""
     before = contacts.shift[k]
     now = max(before - gap(contacts, body, k) / contacts.mobility[k], 0.0)
+    now = min(now, contacts.most_push / contacts.mobility[k])
     if now == before:
         return 0.0
     contacts.shift[k] = now

@@ -46,6 +46,12 @@ TOUCH = 1e-6
 """Distance that is none, per mean node size: thousands of times below what one could measure,
 thousands above rounding. Without it a node left on a triangle might be on either side of it."""
 
+MOST_PUSH = 0.02
+"""How far two sides are pushed apart in one Runge-Kutta step at most, per mean node size. What they
+overlap beyond it is made good in the next steps. A push does work on the springs behind it that
+nobody paid for: without the limit, lips that a blade drags over each other gained speed without
+end."""
+
 CAPACITY = 256
 """Triangles that there is room for at first."""
 
@@ -68,7 +74,7 @@ class SelfContact:
         self.arrays = ContactState(
             faces=new_faces(n_tetrahedra),
             candidates=new_candidates(n_nodes, CAPACITY),
-            contacts=new_contacts(self._n_pairs(n_nodes)),
+            contacts=new_contacts(self._n_pairs(n_nodes), float(MOST_PUSH * node_size)),
             found=np.zeros(self._n_pairs(n_nodes), np.int64),
             start=np.zeros((n_nodes, 3)),
             depth=np.zeros(n_nodes),
