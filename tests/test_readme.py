@@ -34,6 +34,11 @@ def test_a_tissue_attached_to_ones_own_arm_is_cut_and_felt(capsys):
     assert int(pieces) == 2
 
 
+def test_a_body_is_cut_along_a_given_surface(capsys):
+    area, pieces = re.search(r"(\d+) mm2, (\d+) pieces", printed(BLOCKS[2], capsys)).groups()
+    assert float(area) == pytest.approx(60 * 40, rel=0.1) and int(pieces) == 2
+
+
 def test_every_file_that_a_run_writes_is_explained():
     assert [name for name in NAMES if f"`{name}`" not in README] == []
 

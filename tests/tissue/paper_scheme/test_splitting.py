@@ -12,7 +12,7 @@ from tissue.hanging import HANGING, behind, n_behind
 from tissue.paper_scheme.cases import TABLE
 from tissue.paper_scheme.cut_edge_code import EDGES, is_cut
 from tissue.paper_scheme.splitting import split_tetrahedron
-from tissue.pieces import count_pieces
+from tissue.pieces import label_pieces
 from tissue.slipping import SEARCH, find
 from tissue.star import no_visits
 from tissue.vec3 import Vec3
@@ -25,7 +25,7 @@ PIECES = {"A": 2, "B": 2, "C": 1, "D": 1, "E": 1}
 
 def n_pieces(splits):
     piece, queue = np.zeros((2, len(splits.tetrahedra)), np.int64)
-    return count_pieces(splits.body, piece, queue)
+    return label_pieces(splits.body, piece, queue)
 
 
 def split_one(code, mesh=None, at=0.4):
