@@ -9,7 +9,7 @@ from tissue.geometry import nearest_on_segment, normalised
 from tissue.jit import kernel
 from tissue.predicates import Lattice, nearest
 from tissue.types import BoolArray, FloatArray, IntArray
-from tissue.vec3 import Vec3, cross, dot, sub, vec3
+from tissue.vec3 import Vec3, cross, dot, norm, sub, vec3
 
 SAME_WAY = 0.7
 """Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
@@ -119,15 +119,14 @@ def put_on_lattice(path: Path, lattice: Lattice) -> None:
 
 
 @kernel
-def path_moved(path: Path) -> bool:
-    """Whether any piece of the edge moved through the material in this step."""
+def path_travel(path: Path) -> float:
+    """The longest way of a sample through the material in this step [m]."""
+    longest = 0.0
     for k in range(len(path.linked) - 1):
         if path.linked[k]:
             for j in range(k, k + 2):
-                d = sub(vec3(path.t1, j), vec3(path.t0, j))
-                if dot(d, d) > 0.0:
-                    return True
-    return False
+                longest = max(longest, norm(sub(vec3(path.t1, j), vec3(path.t0, j))))
+    return longest
 
 
 def resampled(rows: FloatArray, spacing: float, most: int) -> FloatArray:

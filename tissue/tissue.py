@@ -36,7 +36,7 @@ from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
 from tissue.measures import lowest_altitude, path_error
-from tissue.path import Path, new_path, path_moved, put_on_lattice, resampled
+from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.quality import CutQuality, Measures, QualityReport
@@ -462,7 +462,7 @@ class Tissue:
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
-        if not self._incising or not path_moved(self._path):
+        if not self._incising or path_travel(self._path) == 0.0:
             return False
         self._is_open = False
         put_on_lattice(self._path, self._body.lattice)
@@ -478,8 +478,8 @@ class Tissue:
 
     def _rests(self, sweep: BladeSweep, dt: float) -> bool:
         """Whether the edge has rested for a while by the end of this step."""
-        travel = self._travel(sweep)
-        if path_moved(self._path) or travel > RESTING_SPEED * self.node_size * dt:
+        travel = max(self._travel(sweep), path_travel(self._path))
+        if travel > RESTING_SPEED * self.node_size * dt:
             self._calm = 0.0
         else:
             self._calm += dt

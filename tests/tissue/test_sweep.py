@@ -7,7 +7,7 @@ import pytest
 
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
-from tissue.path import path_moved, put_on_lattice
+from tissue.path import path_travel, put_on_lattice
 from tissue.shapes import grid
 from tissue.sweep import find_active_tetrahedra, find_crossings
 
@@ -108,4 +108,4 @@ def test_no_tetrahedron_with_a_crossed_edge_is_missing_from_the_active_ones(mesh
 def test_an_edge_that_does_not_move_crosses_nothing(mesh):
     cut = swept(mesh, 0.0137, (0.0141, 0.0141), (-0.001, 0.031))
     assert crossed(cut) == {}
-    assert not path_moved(cut.path)
+    assert path_travel(cut.path) == 0.0
