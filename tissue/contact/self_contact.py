@@ -46,7 +46,7 @@ TOUCH = 1e-6
 """Distance that is none, per mean node size: thousands of times below what one could measure,
 thousands above rounding. Without it a node left on a triangle might be on either side of it."""
 
-MOST_PUSH = 0.02
+MOST_PUSH = 0.1
 """How far two sides are pushed apart in one Runge-Kutta step at most, per mean node size. What they
 overlap beyond it is made good in the next steps. A push does work on the springs behind it that
 nobody paid for: without the limit, lips that a blade drags over each other gained speed without

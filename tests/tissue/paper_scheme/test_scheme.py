@@ -87,7 +87,7 @@ def test_a_planar_cut_of_the_paper_s_block_leaves_as_many_hanging_nodes_as_expec
     tissue = uncut(block(*cells))
     tissue.incise(upright(block(*cells)), Y)
     statistics = tissue.scheme_statistics()
-    assert tissue.pieces() == 2
+    assert tissue.n_pieces() == 2
     of_case = {"A": n_cut * 2 // 3, "B": n_cut // 3, "C": 0, "D": 0, "E": 0}
     assert statistics.n_of_case == of_case
     assert statistics.n_hanging_edge_nodes == edge_nodes
@@ -100,7 +100,7 @@ def test_it_grows_2_to_3_times_as_much_as_ours():
     paper = uncut(mesh)
     for tissue in (ours, paper):
         tissue.incise(upright(mesh), Y)
-        assert tissue.pieces() == 2
+        assert tissue.n_pieces() == 2
     assert paper.n_tetrahedra == 2880
     assert ours.n_tetrahedra < 1110
 
@@ -220,7 +220,7 @@ def test_the_work_of_cutting_is_toughness_times_the_area_cut():
     mesh = grid((4, 6, 4))
     tissue = uncut(mesh, material=Material(toughness=20.0), fixed=bodies.sides(mesh))
     last = strokes.make(tissue, strokes.straight(mesh, 0.41))[-1]
-    assert tissue.pieces() == 2
+    assert tissue.n_pieces() == 2
     assert last.work_of_cutting == pytest.approx(20.0 * last.cut_area, rel=0.1)
 
 
@@ -241,7 +241,7 @@ def test_a_cut_that_needs_more_room_than_there_is_takes_several_passes():
     tissue.incise(upright(mesh)[[0, -1]], Y)
     statistics = tissue.scheme_statistics()
     assert statistics.n_of_case == {"A": 4 * 196, "B": 2 * 196, "C": 0, "D": 0, "E": 0}
-    assert tissue.pieces() == 2
+    assert tissue.n_pieces() == 2
     assert faults(before, tissue) == []
 
 
