@@ -61,12 +61,12 @@ def cuts_of(kind: str, mesh: TetrahedralMesh, seed: int) -> list[Incision]:
     return [incisions.incision(mesh, kind, seed)]
 
 
-def expected_pieces(kind: str) -> int | None:
-    """Return into how many pieces a box falls, if that is known."""
+def expected_pieces(mesh: str, kind: str) -> int | None:
+    """Return into how many pieces the body falls, if that is known: a banana may fall into many."""
+    if mesh in FILES or kind == "two that cross":
+        return None
     if kind == "three planes":
         return 8
-    if kind == "two that cross":
-        return None
     return 2 if kind in incisions.CLEAN_THROUGH else 1
 
 
@@ -80,11 +80,11 @@ def main() -> None:
     parser.add_argument("--kinds", default="", help="only those whose name holds this")
     given = parser.parse_args()
 
-    table = Table("mesh", "kind", "runs", "exceptions", "violations", "as many pieces as expected",
+    table = Table("mesh", "kind", "runs", "exceptions", "violations", "pieces as expected",
                   "growth, median", "most", "volume", "mass", "momentum", "s")  # fmt: skip
     wrong: list[str] = []
     total = 0
-    console = Console(width=150)
+    console = Console(width=170)
     for name, make in meshes().items():
         for kind in KINDS:
             if given.meshes not in name or given.kinds not in kind:
@@ -105,7 +105,7 @@ def main() -> None:
                     continue
                 verdicts.append(verdict)
                 n_violations += bool(verdict.faults)
-                expected = expected_pieces(kind)
+                expected = expected_pieces(name, kind)
                 as_expected = expected in (None, verdict.n_pieces)
                 n_as_expected += as_expected
                 if verdict.faults or not as_expected:
@@ -119,7 +119,7 @@ def main() -> None:
                 str(given.runs),
                 str(n_exceptions),
                 str(n_violations),
-                str(n_as_expected) if expected_pieces(kind) else "-",
+                str(n_as_expected) if expected_pieces(name, kind) else "-",
                 f"{np.median(growths):.2f}",
                 f"{max(growths):.2f}",
                 *(

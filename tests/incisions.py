@@ -156,3 +156,28 @@ def blade_on(cut: Incision, travel: float) -> Stroke:
         pose(tip, heel, way)
         for (tip, heel), way in zip(np.concatenate(edges), np.concatenate(forward), strict=True)
     ]
+
+
+def area_within(mesh: TetrahedralMesh, cut: Incision) -> float:
+    """Return the area of a flat incision inside the box that the body is [m2]."""
+    first, last = cut.edges[0], cut.edges[-1]
+    polygon = np.array([first[0], last[0], last[1], first[1]])
+    for axis in range(3):
+        x = mesh.positions[:, axis]
+        for sign, limit in ((1.0, x.max()), (-1.0, -x.min())):
+            polygon = _clipped(polygon, sign * polygon[:, axis] - limit)
+    spokes = polygon[1:] - polygon[0]
+    return 0.5 * float(np.linalg.norm(np.cross(spokes[:-1], spokes[1:]).sum(axis=0)))
+
+
+def _clipped(polygon: FloatArray, height: FloatArray) -> FloatArray:
+    """Return the part of a convex polygon where a linear function of its corners is negative."""
+    kept = []
+    for i in range(len(polygon)):
+        j = (i + 1) % len(polygon)
+        if height[i] <= 0.0:
+            kept.append(polygon[i])
+        if height[i] * height[j] < 0.0:
+            share = height[i] / (height[i] - height[j])
+            kept.append((1.0 - share) * polygon[i] + share * polygon[j])
+    return np.array(kept)
