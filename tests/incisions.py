@@ -143,19 +143,23 @@ def rotation(random: np.random.Generator) -> FloatArray:
 
 
 def blade_on(cut: Incision, travel: float) -> Stroke:
-    """Return the stroke of a blade along a surface, an end of it by at most `travel` [m] a frame."""
-    edges, forward = [cut.edges[:1]], [cut.forward[:1]]
-    for i in range(1, len(cut.edges)):
-        farthest = np.linalg.norm(cut.edges[i] - cut.edges[i - 1], axis=1).max()
+    """Return the stroke of a blade along a surface, an end of it by at most `travel` [m] a frame.
+
+    The blade is rigid: its middle goes straight from place to place, and it turns on the way.
+    """
+    middles, spans = cut.edges.mean(axis=1), cut.edges[:, 1] - cut.edges[:, 0]
+    half = 0.5 * float(np.linalg.norm(spans[0]))
+    stroke = []
+    for i in range(len(middles) - 1):
+        farthest = np.linalg.norm(cut.edges[i + 1] - cut.edges[i], axis=1).max()
         n = max(1, int(np.ceil(farthest / travel)))
-        at = np.arange(1, n + 1) / n
-        for rows, given in ((edges, cut.edges), (forward, cut.forward)):
-            share = at.reshape(-1, *([1] * (given.ndim - 1)))
-            rows.append((1.0 - share) * given[i - 1] + share * given[i])
-    return [
-        pose(tip, heel, way)
-        for (tip, heel), way in zip(np.concatenate(edges), np.concatenate(forward), strict=True)
-    ]
+        for at in np.arange(n) / n:
+            middle, span, forward = (
+                (1.0 - at) * x[i] + at * x[i + 1] for x in (middles, spans, cut.forward)
+            )
+            along = span / np.linalg.norm(span)
+            stroke.append(pose(middle - half * along, middle + half * along, forward))
+    return stroke
 
 
 def area_within(mesh: TetrahedralMesh, cut: Incision) -> float:
