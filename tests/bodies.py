@@ -118,9 +118,18 @@ def smallest_dihedral(mesh: TetrahedralMesh) -> float:
     """Return the smallest angle between two faces of a tetrahedron [degrees]."""
     x, tetrahedra = mesh.positions, mesh.tetrahedra
     smallest = 180.0
-    for a, b, c, d in ((0, 1, 2, 3), (0, 2, 1, 3), (0, 3, 1, 2), (1, 2, 0, 3), (1, 3, 0, 2), (2, 3, 0, 1)):
+    for a, b, c, d in (
+        (0, 1, 2, 3),
+        (0, 2, 1, 3),
+        (0, 3, 1, 2),
+        (1, 2, 0, 3),
+        (1, 3, 0, 2),
+        (2, 3, 0, 1),
+    ):
         p, q, r, s = (x[tetrahedra[:, k]] for k in (a, b, c, d))
         m, n = np.cross(q - p, r - p), np.cross(q - p, s - p)
-        cosines = np.einsum("ij,ij->i", m, n) / np.linalg.norm(m, axis=1) / np.linalg.norm(n, axis=1)
+        cosines = (
+            np.einsum("ij,ij->i", m, n) / np.linalg.norm(m, axis=1) / np.linalg.norm(n, axis=1)
+        )
         smallest = min(smallest, float(np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).min()))
     return smallest

@@ -54,7 +54,9 @@ def out_of_shape(mesh: TetrahedralMesh, seed: int) -> FloatArray:
     x = mesh.positions - middle
     bent = x @ (np.eye(3) + random.uniform(-0.1, 0.1, (3, 3))).T
     waves = 2.0 * np.pi * random.uniform(0.5, 1.0, 3) / np.ptp(mesh.positions, axis=0).max()
-    return middle + bent + 0.05 * np.sin(x @ waves)[:, None] * np.abs(x).max() * random.normal(size=3)
+    return (
+        middle + bent + 0.05 * np.sin(x @ waves)[:, None] * np.abs(x).max() * random.normal(size=3)
+    )
 
 
 def moving(tissue: Tissue, seed: int) -> None:

@@ -129,7 +129,9 @@ NOTHING = {
     "an edge in the skin": upright_at(0.0),
     "an edge that grazes the skin": upright_at(EDGE - 1e-13),
     "an edge that passes above the body": upright_at(0.02, 0.0400001),
-    "an edge along an edge of the body": straight((0.04, -0.01, 0.04), (0.05, -0.01, 0.05), (0, 0.06, 0)),
+    "an edge along an edge of the body": straight(
+        (0.04, -0.01, 0.04), (0.05, -0.01, 0.05), (0, 0.06, 0)
+    ),
 }
 
 

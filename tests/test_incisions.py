@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests import bodies, incisions, judged, soundness
 from tests.incisions import Incision
@@ -312,7 +314,9 @@ def test_19_the_mirror_image_of_a_cut_has_the_same_area_and_as_many_tetrahedra()
         image = TetrahedralMesh(mesh.positions * mirror, mesh.tetrahedra[:, [0, 1, 3, 2]])
         tissue, twin = at_rest(mesh, EXACT), at_rest(image, EXACT)
         area = tissue.incise(*cut)
-        assert twin.incise(cut.edges * mirror, cut.forward * mirror) == pytest.approx(area, rel=1e-9)
+        assert twin.incise(cut.edges * mirror, cut.forward * mirror) == pytest.approx(
+            area, rel=1e-9
+        )
         assert twin.n_tetrahedra == tissue.n_tetrahedra
 
 
@@ -360,6 +364,21 @@ def test_a_blade_in_motion_leaves_a_sound_body(kind):
     for made in MADE:
         mesh = MADE[made](7)
         assert judged.cut_by_blade(mesh, cuts_of(mesh, kind, 7)).faults == []
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(
+    st.sampled_from(GOOD),
+    st.integers(0, 10**6),
+    st.lists(st.tuples(st.sampled_from(list(incisions.KINDS)), st.integers(0, 10**6)), max_size=5),
+)
+def test_any_sequence_of_incisions_leaves_a_sound_body(made, seed, sequence):
+    """Also where a cut was made before, or meets others."""
+    mesh = MADE[made](seed)
+    cuts = [incisions.incision(mesh, kind, seed) for kind, seed in sequence]
+    verdict = judged.incised(mesh, cuts, seed)
+    assert verdict.faults == []
+    assert verdict.n_pieces >= 1
 
 
 @pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")

@@ -14,23 +14,26 @@ from tissue.vec3 import Vec3
 pytestmark = pytest.mark.kernel
 
 AHEAD = Vec3(0.0, 1.0, 0.0)
-UPRIGHT = np.array([[0.5, 0.2, 0.2], [0.5, 0.2, 0.5], [0.5, 0.2, 1.5]])
-"""An edge with its tip and middle in the unit cube, and its heel above."""
+
+
+def at(y: float) -> np.ndarray:
+    """Return an upright edge with its tip and middle in the unit cube, and its heel above."""
+    return np.array([[0.5, y, 0.2], [0.5, y, 0.5], [0.5, y, 1.5]])
 
 
 @pytest.fixture
 def begun():
     """A unit cube, its grid, and an edge that has not moved yet."""
     cut = cut_of(grid((2, 2, 2), (1.0, 1.0, 1.0)), n_samples=3)
-    begin_path(cut.path, UPRIGHT)
+    begin_path(cut.path, at(0.2))
     return cut, build_grid(cut.body, cut.body.rest, 0.0)
 
 
 def test_samples_go_where_they_are_told(begun):
     cut, cells = begun
-    there = UPRIGHT + [0.0, 0.1, 0.0]
+    there = at(0.3)
     prescribe_path(cut.path, cut.body, cells, there, AHEAD)
-    np.testing.assert_array_equal(cut.path.t0, UPRIGHT)
+    np.testing.assert_array_equal(cut.path.t0, at(0.2))
     np.testing.assert_array_equal(cut.path.t1, there)
     np.testing.assert_array_equal(cut.path.linked, [True, True, False])
 
@@ -38,13 +41,13 @@ def test_samples_go_where_they_are_told(begun):
 def test_a_sample_that_goes_back_waits_until_it_is_ahead_of_where_it_has_been(begun):
     cut, cells = begun
     for y in (0.3, 0.1, 0.25, 0.4):
-        prescribe_path(cut.path, cut.body, cells, UPRIGHT + [0.0, y - 0.2, 0.0], AHEAD)
+        prescribe_path(cut.path, cut.body, cells, at(y), AHEAD)
         assert cut.path.t1[0, 1] == pytest.approx(max(y, 0.3))
 
 
 def test_samples_inside_know_a_tetrahedron_that_holds_them(begun):
     cut, cells = begun
-    prescribe_path(cut.path, cut.body, cells, UPRIGHT + [0.0, 0.1, 0.0], AHEAD)
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
     for k in range(2):
         corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
         assert (corners.min(axis=0) <= cut.path.t1[k]).all()
@@ -54,7 +57,7 @@ def test_samples_inside_know_a_tetrahedron_that_holds_them(begun):
 
 def test_the_side_of_the_blade_is_across_its_edge_and_its_way(begun):
     cut, cells = begun
-    prescribe_path(cut.path, cut.body, cells, UPRIGHT + [0.0, 0.1, 0.0], AHEAD)
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
     np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)
 
 
