@@ -1,4 +1,4 @@
-"""Whether a cut body is a sound mesh: asked of its nodes and tetrahedra alone, then of its links."""
+"""Whether a cut body is a sound mesh: asked of its nodes and tetrahedra alone, or of links."""
 
 from typing import NamedTuple
 

@@ -3,6 +3,7 @@
 Cubes of 0.05 m, their elements of 10 mm; the blade moves at 0.1 m/s where nothing else is said.
 """
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, soundness, strokes
-from tests.strokes import Stroke, Y, pose
+from tests.strokes import Stroke, Y, Z, pose
 from tissue.shapes import grid
 from tissue.tissue import Tissue
 from tissue.types import BladeSegment, FloatArray, TetrahedralMesh
@@ -50,7 +51,7 @@ def mesh(request) -> TetrahedralMesh:
 def path(*corners: Sequence[float], travel: float = TRAVEL) -> FloatArray:
     """Return points from corner to corner, at most `travel` [m] apart, shape (n, 3)."""
     points = [np.array(corners[0], dtype=np.float64)]
-    for start, stop in zip(corners, corners[1:], strict=False):
+    for start, stop in itertools.pairwise(corners):
         a, b = np.array(start, dtype=np.float64), np.array(stop, dtype=np.float64)
         n = max(1, int(np.ceil(np.linalg.norm(b - a) / travel)))
         points += [a + (b - a) * i / n for i in range(1, n + 1)]
@@ -59,7 +60,7 @@ def path(*corners: Sequence[float], travel: float = TRAVEL) -> FloatArray:
 
 def upright(points: FloatArray, length: float = 0.08) -> Stroke:
     """Return the stroke of an upright blade, its tip at those points, facing along y."""
-    return [pose(tip, tip + [0.0, 0.0, length], Y) for tip in points]
+    return [pose(tip, tip + length * Z, Y) for tip in points]
 
 
 def along_y(*ys: float, x: float = X, low: float = -0.01, length: float = 0.08) -> Stroke:
@@ -197,7 +198,7 @@ def test_the_cut_opens_up_to_a_blade_that_rests(mesh):
 def along_x(stop: float) -> Stroke:
     """Return an upright blade that goes across the others' way, from x = -10 mm."""
     points = path((-0.01, X, -0.01), (stop, X, -0.01))
-    return [pose(tip, tip + [0.0, 0.0, 0.08], (1.0, 0.0, 0.0)) for tip in points]
+    return [pose(tip, tip + 0.08 * Z, (1.0, 0.0, 0.0)) for tip in points]
 
 
 APART = MESHES["Delaunay"]
