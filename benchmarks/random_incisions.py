@@ -7,11 +7,9 @@ are cut too where SCALPEL_SIM_TEST_MESHES names their folder. Run it from the re
 """
 
 import argparse
-import os
 import traceback
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -21,16 +19,8 @@ from rich.table import Table
 from tests import bodies, incisions, judged
 from tests.incisions import Incision
 from tests.judged import Verdict
-from tissue.mesh_io import read_mesh
 from tissue.types import TetrahedralMesh
-from tissue.validation import checked
 
-FILES = {  # and their unit of length, in metres: organs of about 0.1 m
-    "sofa_liver.msh": 0.01,
-    "sofa_truthcylinder1.msh": 0.005,
-    "bullet_banana.vtk": 1.0,
-    "sofaenv_tissue_volume.msh": 1.0,
-}
 KINDS = (*incisions.KINDS, "two that cross", "three planes")
 
 
@@ -41,10 +31,8 @@ def meshes() -> dict[str, Callable[[int], TetrahedralMesh]]:
         "Delaunay, 10 degrees": partial(bodies.body_centred, 4),
         "Delaunay, slivers": partial(bodies.with_slivers, 5),
     }
-    folder = os.environ.get("SCALPEL_SIM_TEST_MESHES")
-    for file, unit in FILES.items() if folder else ():
-        mesh = checked(read_mesh(Path(str(folder)) / file, scale=unit))[0]
-        made[file] = partial(lambda mesh, seed: mesh, mesh)
+    for file in bodies.FILES if bodies.FOLDER else ():
+        made[file] = partial(lambda mesh, seed: mesh, bodies.of_others(file))
     return made
 
 
@@ -63,7 +51,7 @@ def cuts_of(kind: str, mesh: TetrahedralMesh, seed: int) -> list[Incision]:
 
 def expected_pieces(mesh: str, kind: str) -> int | None:
     """Return into how many pieces the body falls, if that is known: a banana may fall into many."""
-    if mesh in FILES or kind == "two that cross":
+    if mesh in bodies.FILES or kind == "two that cross":
         return None
     if kind == "three planes":
         return 8

@@ -1,17 +1,36 @@
 """Bodies that can be drawn on paper, and small unstructured ones."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 from scipy.spatial import Delaunay
 
+from tissue.mesh_io import read_mesh
 from tissue.shapes import grid
 from tissue.types import BoolArray, FloatArray, TetrahedralMesh
-from tissue.validation import quality
+from tissue.validation import checked, quality
 
 FLAT = 1e-9
 """Quality of a tetrahedron that Delaunay makes of four points on the side of a box, at most."""
 
 WORST = 0.03
 """Quality below which a random mesh has slivers that no mesh generator would let pass."""
+
+FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
+"""Where the meshes of others are; tests of them are skipped where it is not given."""
+
+FILES = {  # and their unit of length, in metres: organs of about 0.1 m
+    "sofa_liver.msh": 0.01,
+    "sofa_truthcylinder1.msh": 0.005,
+    "bullet_banana.vtk": 1.0,
+    "sofaenv_tissue_volume.msh": 1.0,
+}
+
+
+def of_others(file: str) -> TetrahedralMesh:
+    """Return one of the meshes in `FOLDER`."""
+    return checked(read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])).mesh
 
 
 def unit_tetrahedron() -> TetrahedralMesh:

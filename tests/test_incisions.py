@@ -3,9 +3,7 @@
 Numbers in names of tests refer to the acceptance tests that the design was written with.
 """
 
-import os
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +13,8 @@ from hypothesis import strategies as st
 
 from tests import bodies, incisions, judged, soundness
 from tests.incisions import Incision
-from tissue.mesh_io import read_mesh
 from tissue.tissue import CutQuality, Tissue
 from tissue.types import TetrahedralMesh
-from tissue.validation import checked
 
 EXACT = CutQuality(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 """Every crossing gets its own node: what is cut can be counted."""
@@ -29,14 +25,6 @@ MADE = {
     "Delaunay, slivers": partial(bodies.with_slivers, 4),
 }
 GOOD = ("jittered grid", "Delaunay, 10 degrees")
-
-FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
-FILES = {  # and their unit of length, in metres: organs of about 0.1 m
-    "sofa_liver.msh": 0.01,
-    "sofa_truthcylinder1.msh": 0.005,
-    "bullet_banana.vtk": 1.0,
-    "sofaenv_tissue_volume.msh": 1.0,
-}
 
 
 def at_rest(mesh: TetrahedralMesh, quality: CutQuality | None = None) -> Tissue:
@@ -381,9 +369,9 @@ def test_any_sequence_of_incisions_leaves_a_sound_body(made, seed, sequence):
     assert verdict.n_pieces >= 1
 
 
-@pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
+@pytest.mark.skipif(not bodies.FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
 @pytest.mark.parametrize("kind", [*incisions.KINDS, "crossing"])
-@pytest.mark.parametrize("file", FILES)
+@pytest.mark.parametrize("file", bodies.FILES)
 def test_random_incisions_leave_a_mesh_of_others_sound(file, kind):
-    mesh = checked(read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])).mesh
+    mesh = bodies.of_others(file)
     assert judged.incised(mesh, cuts_of(mesh, kind, 3), 3).faults == []
