@@ -1,17 +1,36 @@
 """Bodies that can be drawn on paper, and small unstructured ones."""
 
+import os
+from pathlib import Path
+
 import numpy as np
 from scipy.spatial import Delaunay
 
+from tissue.mesh_io import read_mesh
 from tissue.shapes import grid
 from tissue.types import BoolArray, FloatArray, TetrahedralMesh
-from tissue.validation import quality
+from tissue.validation import checked, quality
 
 FLAT = 1e-9
 """Quality of a tetrahedron that Delaunay makes of four points on the side of a box, at most."""
 
 WORST = 0.03
 """Quality below which a random mesh has slivers that no mesh generator would let pass."""
+
+FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
+"""Where the meshes of others are; tests of them are skipped where it is not given."""
+
+FILES = {  # and their unit of length, in metres: organs of about 0.1 m
+    "sofa_liver.msh": 0.01,
+    "sofa_truthcylinder1.msh": 0.005,
+    "bullet_banana.vtk": 1.0,
+    "sofaenv_tissue_volume.msh": 1.0,
+}
+
+
+def of_others(file: str) -> TetrahedralMesh:
+    """Return one of the meshes in `FOLDER`."""
+    return checked(read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])).mesh
 
 
 def unit_tetrahedron() -> TetrahedralMesh:
@@ -60,3 +79,76 @@ def sides(mesh: TetrahedralMesh, axis: int = 0, share: float = 0.0) -> BoolArray
     extent = float(np.ptp(x))
     reach = share * extent + 1e-9 * extent
     return (x <= x.min() + reach) | (x >= x.max() - reach)
+
+
+def jittered_grid(n: int, seed: int, size: float = 0.04, shift: float = 0.15) -> TetrahedralMesh:
+    """Return a box of n x n x n cells of six tetrahedra, its inner nodes shifted at random.
+
+    Args:
+        n: Cells along each axis.
+        seed: Of the random shifts.
+        size: Edge of the box [m].
+        shift: Of each coordinate at most, in cells.
+    """
+    mesh = grid((n, n, n), (size, size, size))
+    x = mesh.positions
+    inner = ((x > 1e-6 * size) & (x < (1.0 - 1e-6) * size)).all(axis=1)
+    random = np.random.default_rng(seed)
+    shifts = random.uniform(-shift, shift, x.shape) * size / n
+    return mesh._replace(positions=x + np.where(inner[:, None], shifts, 0.0))
+
+
+def body_centred(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
+    """Return the Delaunay mesh of a box of corners and centres of n x n x n cells, shifted.
+
+    No dihedral angle is less than 10 degrees: what a mesh generator makes.
+    """
+    random = np.random.default_rng(seed)
+    corners = grid((n, n, n), (size, size, size)).positions
+    centres = (np.indices((n, n, n)).reshape(3, -1).T + 0.5) * size / n
+    points = np.vstack([corners, centres])
+    inner = ((points > 1e-6 * size) & (points < (1.0 - 1e-6) * size)).all(axis=1)
+    while True:
+        shifts = random.uniform(-0.12, 0.12, points.shape) * size / n
+        mesh = _delaunay(points + np.where(inner[:, None], shifts, 0.0))
+        if smallest_dihedral(mesh) >= 10.0:
+            return mesh
+
+
+def with_slivers(n: int, seed: int, size: float = 0.05) -> TetrahedralMesh:
+    """Return a Delaunay mesh of a box whose flattest dihedral angle is 2 to 4 degrees."""
+    random = np.random.default_rng(seed)
+    x = grid((n, n, n), (size, size, size)).positions
+    inside = (x > 1e-6 * size) & (x < (1.0 - 1e-6) * size)
+    while True:
+        shifts = random.uniform(-0.25, 0.25, x.shape) * size / n
+        mesh = _delaunay(x + np.where(inside, shifts, 0.0))
+        if 2.0 <= smallest_dihedral(mesh) <= 4.0:
+            return mesh
+
+
+def _delaunay(positions: FloatArray) -> TetrahedralMesh:
+    """Return the Delaunay mesh of a box, without the flat tetrahedra on its sides."""
+    tetrahedra = positively_turned(positions, Delaunay(positions).simplices.astype(np.int64))
+    return TetrahedralMesh(positions, tetrahedra[quality(positions, tetrahedra) > FLAT])
+
+
+def smallest_dihedral(mesh: TetrahedralMesh) -> float:
+    """Return the smallest angle between two faces of a tetrahedron [degrees]."""
+    x, tetrahedra = mesh.positions, mesh.tetrahedra
+    smallest = 180.0
+    for a, b, c, d in (
+        (0, 1, 2, 3),
+        (0, 2, 1, 3),
+        (0, 3, 1, 2),
+        (1, 2, 0, 3),
+        (1, 3, 0, 2),
+        (2, 3, 0, 1),
+    ):
+        p, q, r, s = (x[tetrahedra[:, k]] for k in (a, b, c, d))
+        m, n = np.cross(q - p, r - p), np.cross(q - p, s - p)
+        cosines = (
+            np.einsum("ij,ij->i", m, n) / np.linalg.norm(m, axis=1) / np.linalg.norm(n, axis=1)
+        )
+        smallest = min(smallest, float(np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0))).min()))
+    return smallest

@@ -1,9 +1,12 @@
-"""Whether a cut body is a sound mesh, asked of its nodes and tetrahedra alone."""
+"""Whether a cut body is a sound mesh: asked of its nodes and tetrahedra alone, or of links."""
 
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
+from tissue.body import NODES, TETRAHEDRA, Body
 from tissue.types import FloatArray, IntArray, Snapshot
 
 OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
@@ -54,20 +57,24 @@ def is_closed(triangles: IntArray) -> bool:
 
 def n_pieces(tetrahedra: IntArray) -> int:
     """Return into how many pieces the tetrahedra fall: they hang together through faces."""
-    faces = faces_of(tetrahedra)
-    return _n_groups(len(tetrahedra), _pairs(faces) // 4)
+    return _n_groups(len(tetrahedra), _pairs(faces_of(tetrahedra)) // 4)
 
 
-def n_split_stars(tetrahedra: IntArray) -> int:
-    """Return how many nodes hold together tetrahedra that share no face there."""
-    faces = faces_of(tetrahedra)
-    corner = {(n, t): i for i, (t, n) in enumerate(_corners(tetrahedra))}
-    links = [
-        (corner[n, a], corner[n, b])
-        for a, b in (_pairs(faces) // 4).tolist()
-        for n in set(tetrahedra[a].tolist()) & set(tetrahedra[b].tolist())
-    ]
-    return _n_groups(len(corner), np.array(links).reshape(-1, 2)) - len(np.unique(tetrahedra))
+def n_split_stars(tetrahedra: IntArray, pairs: IntArray | None = None) -> int:
+    """Return how many nodes hold together tetrahedra that share no face there.
+
+    Args:
+        tetrahedra: Nodes, shape (n_tets, 4).
+        pairs: The faces that are one, as 4 * tetrahedron + face, shape (n, 2); default those of the
+            same three nodes.
+    """
+    pairs = _pairs(faces_of(tetrahedra)) if pairs is None else pairs
+    order = np.argsort(tetrahedra, axis=1)
+    t, f = pairs // 4, pairs % 4
+    # The corners of a face in the order of their nodes are the same three in both tetrahedra.
+    corners = 4 * t[..., None] + order[t][order[t] != f[..., None]].reshape(len(pairs), 2, 3)
+    links = np.moveaxis(corners, 1, 2).reshape(-1, 2)
+    return _n_groups(tetrahedra.size, links) - len(np.unique(tetrahedra))
 
 
 def lone_area(body: Snapshot) -> float:
@@ -84,7 +91,11 @@ def lone_area(body: Snapshot) -> float:
 
 
 def faults(
-    before: Snapshot, after: Snapshot, volume: float = 1e-9, mass: float = 1e-12
+    before: Snapshot,
+    after: Snapshot,
+    volume: float = 1e-9,
+    mass: float = 1e-12,
+    lips_match: bool = True,
 ) -> list[str]:
     """Return what is wrong with the body after a cut; nothing if all is well.
 
@@ -93,6 +104,8 @@ def faults(
         after: The cut body.
         volume: Largest relative change of volume.
         mass: Largest relative change of mass.
+        lips_match: Whether both lips of a cut must be the same triangles: not where a later cut
+            crosses it, which goes through each lip by itself.
     """
     found = []
     rest, tetrahedra = after.rest_positions, after.tetrahedra
@@ -118,9 +131,38 @@ def faults(
     if n_split_stars(tetrahedra):
         found.append(f"{n_split_stars(tetrahedra)} nodes hold together what shares no face")
     skin = lone_area(before)
-    if abs(lone_area(after) / skin - 1.0) > 1e-9:
+    if lips_match and abs(lone_area(after) / skin - 1.0) > 1e-9:
         found.append(f"cut faces without a twin: {lone_area(after) - skin:.2e} m2")
     return found
+
+
+def link_faults(body: Body) -> list[str]:
+    """Return what is wrong with the links of a body, and with what names tetrahedra and twins."""
+    found = []
+    n_nodes, n = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    tetrahedra, links = body.tetrahedra[:n], body.links[:n].ravel()
+    nodes = np.sort(tetrahedra[:, OUTWARD].reshape(-1, 3), axis=1)
+    (here,) = np.nonzero(links >= 0)
+    there = links[here]
+    if (links[there] != here).any():
+        found.append(f"{(links[there] != here).sum()} links are not symmetric")
+    if (nodes[there] != nodes[here]).any():
+        found.append("a link joins faces of other nodes")
+    if not is_closed(tetrahedra[:, OUTWARD].reshape(-1, 3)[links < 0]):
+        found.append("the faces without a link do not close")
+    pairs = np.stack([here, there], axis=1)[here < there]
+    if n_split_stars(tetrahedra, pairs):
+        found.append(f"links leave {n_split_stars(tetrahedra, pairs)} stars in parts")
+    if (tetrahedra[body.node_tetrahedron[:n_nodes]] != np.arange(n_nodes)[:, None]).all(1).any():
+        found.append("a node names a tetrahedron that does not hold it")
+    if (body.rest[body.twin[:n_nodes]] != body.rest[:n_nodes]).any():
+        found.append("twins are apart at rest")
+    return found
+
+
+def momentum(body: Snapshot) -> FloatArray:
+    """Return the linear momentum of the body [kg m/s], shape (3,)."""
+    return body.masses @ body.velocities
 
 
 def cut_area(before: Snapshot, after: Snapshot) -> float:
@@ -133,10 +175,6 @@ def _boundary_area(body: Snapshot) -> float:
     return float(triangle_areas(body.rest_positions, boundary).sum())
 
 
-def _corners(tetrahedra: IntArray) -> list[tuple[int, int]]:
-    return [(t, n) for t, nodes in enumerate(tetrahedra.tolist()) for n in nodes]
-
-
 def _pairs(faces: Faces) -> IntArray:
     """Return the faces that two tetrahedra share, as places in `faces.nodes`; shape (n, 2)."""
     order = np.argsort(faces.same, kind="stable")
@@ -145,17 +183,9 @@ def _pairs(faces: Faces) -> IntArray:
 
 
 def _n_groups(n: int, pairs: IntArray) -> int:
-    parent = list(range(n))
-
-    def root(i: int) -> int:
-        while parent[i] != i:
-            parent[i] = parent[parent[i]]
-            i = parent[i]
-        return i
-
-    for a, b in pairs.tolist():
-        parent[root(a)] = root(b)
-    return sum(parent[i] == i for i in range(n))
+    """Return into how many groups `n` things fall, pairs of which belong together."""
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
+    return int(connected_components(graph, directed=False)[0])
 
 
 def smallest_altitude(rest: FloatArray, tetrahedra: IntArray) -> float:

@@ -44,6 +44,29 @@ def test_sides_are_exact_for_points_next_to_the_plane():
         assert orient3d(a, b, c, d) == naive.determinant(a, b, c, d)
 
 
+def adversarial(random: np.random.Generator) -> list[Point]:
+    """Return four points that nearly, or just, lie in one plane, on one line or in one point."""
+    reach = LATTICE_LIMIT // 8
+    a, u, v = random.integers(-reach, reach + 1, (3, 3))
+    if random.random() < 0.5:  # a thin or short triangle
+        u, v = u // 10 ** int(random.integers(0, 5)), u // int(random.integers(1, 9)) + v % 3
+    i, j = random.integers(-3, 4, 2)
+    off = random.integers(-1, 2, 3) * (random.random() < 0.7)
+    four = [a, a + u, a + v, a + i * u + j * v + off]
+    return [Point(*p.clip(-LATTICE_LIMIT, LATTICE_LIMIT).tolist()) for p in four]
+
+
+def test_sides_are_exact_in_10000_cases_made_to_fail():
+    random = np.random.default_rng(7)
+    zero = 0
+    for _ in range(10_000):
+        four = adversarial(random)
+        expected = naive.determinant(*four)
+        zero += expected == 0
+        assert orient3d(*four) == expected
+    assert 1_000 < zero < 9_000
+
+
 def test_no_points_of_the_lattice_overflow():
     ends = (-LATTICE_LIMIT, LATTICE_LIMIT)
     corners = [Point(*corner) for corner in itertools.product(ends, repeat=3)]

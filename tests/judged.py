@@ -1,0 +1,113 @@
+"""Cuts under the eyes of a judge: a body that moves and is out of shape, watched at every event."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from tests import incisions, soundness, strokes
+from tests.incisions import Incision
+from tissue.body import Body
+from tissue.path import Path
+from tissue.star import Visits
+from tissue.tissue import Tissue
+from tissue.types import FloatArray, Snapshot, TetrahedralMesh
+
+
+class WatchedTissue(Tissue):
+    """A tissue that remembers how much momentum its cuts made or lost.
+
+    Forces act between two cuts; in the instant of one, nothing may change.
+    """
+
+    momentum_jump = 0.0
+    """The largest of any cut step, relative to the sum of mass times speed."""
+
+    def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
+        before = self.snapshot()
+        super()._cut(one_pass)
+        scale = float(before.masses @ np.linalg.norm(before.velocities, axis=1))
+        if scale > 0.0:
+            jump = soundness.momentum(self.snapshot()) - soundness.momentum(before)
+            self.momentum_jump = max(self.momentum_jump, float(np.abs(jump).max()) / scale)
+
+
+class Verdict(NamedTuple):
+    """What was found after the cuts."""
+
+    faults: list[str]
+    n_pieces: int
+    growth: float
+    """Tetrahedra after over before."""
+    volume: float
+    """Relative change."""
+    mass: float
+    """Relative change."""
+    momentum: float
+    """Largest relative jump in a cut step."""
+
+
+def out_of_shape(mesh: TetrahedralMesh, seed: int) -> FloatArray:
+    """Return positions of a body that is sheared, stretched and bent by some 10 % [m]."""
+    random = np.random.default_rng(seed)
+    middle = mesh.positions.mean(axis=0)
+    x = mesh.positions - middle
+    bent = x @ (np.eye(3) + random.uniform(-0.1, 0.1, (3, 3))).T
+    waves = 2.0 * np.pi * random.uniform(0.5, 1.0, 3) / np.ptp(mesh.positions, axis=0).max()
+    return (
+        middle + bent + 0.05 * np.sin(x @ waves)[:, None] * np.abs(x).max() * random.normal(size=3)
+    )
+
+
+def moving(tissue: Tissue, seed: int) -> None:
+    """Let every node that can move at some 0.1 m/s."""
+    n = tissue.n_nodes
+    velocities = 0.1 * np.random.default_rng(seed).normal(size=(n, 3))
+    tissue._body.velocities[:n] = np.where(tissue._body.fixed[:n, None], 0.0, velocities)
+
+
+def judge(before: Snapshot, tissue: WatchedTissue, lips_match: bool) -> Verdict:
+    """Look at every invariant."""
+    after = tissue.snapshot()
+    found = soundness.faults(before, after, volume=1e-12, mass=1e-12, lips_match=lips_match)
+    found += soundness.link_faults(tissue._body)
+    if tissue.momentum_jump > 1e-12:
+        found.append(f"momentum jumped by {tissue.momentum_jump:.1e}")
+    v_before = soundness.volumes(before.rest_positions, before.tetrahedra).sum()
+    v_after = soundness.volumes(after.rest_positions, after.tetrahedra).sum()
+    return Verdict(
+        found,
+        soundness.n_pieces(after.tetrahedra),
+        len(after.tetrahedra) / len(before.tetrahedra),
+        abs(float(v_after / v_before) - 1.0),
+        abs(float(after.masses.sum() / before.masses.sum()) - 1.0),
+        tissue.momentum_jump,
+    )
+
+
+def incised(mesh: TetrahedralMesh, cuts: list[Incision], seed: int = 0, **options) -> Verdict:
+    """Return what becomes of a moving body, out of shape, that is cut along those surfaces."""
+    options = {"positions": out_of_shape(mesh, seed), "gravity": (0.0, 0.0, 0.0)} | options
+    tissue = WatchedTissue(mesh, **options)
+    moving(tissue, seed)
+    before = tissue.snapshot()
+    for cut in cuts:
+        tissue.incise(*cut)
+    return judge(before, tissue, lips_match=len(cuts) == 1)
+
+
+def cut_by_blade(mesh: TetrahedralMesh, cuts: list[Incision]) -> Verdict:
+    """Return what becomes of a body at rest, held on either side of the first cut, after strokes.
+
+    A blade follows the surfaces, and feels the tissue; for 3 ms at the end there is none.
+    """
+    sideways = np.cross(cuts[0].forward[0], cuts[0].edges[0, 1] - cuts[0].edges[0, 0])
+    across = mesh.positions @ sideways
+    share = (across - across.min()) / np.ptp(across)
+    tissue = WatchedTissue(mesh, fixed=(share < 0.15) | (share > 0.85), gravity=(0.0, 0.0, 0.0))
+    before = tissue.snapshot()
+    for cut in cuts:
+        strokes.make(tissue, incisions.blade_on(cut, 0.1 * tissue.node_size))
+        for _ in range(3):
+            tissue.step(None, strokes.DT)
+    return judge(before, tissue, lips_match=len(cuts) == 1)
