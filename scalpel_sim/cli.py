@@ -101,8 +101,7 @@ def view(
                 summary = _perform(ready, motion, talk, plotter, at_most_real_time=True)
                 show(viewer, simulation)
                 report(summary, ready.folder, talk)
-                say(f"{viewer.url} stays until Ctrl-C")
-                _wait_while(lambda: viewer.is_running)
+                _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
 
 
 @app.command
@@ -254,8 +253,9 @@ def _invite(url: str) -> None:
         say(f"live at {url}")
 
 
-def _wait_while(condition: Callable[[], bool]) -> None:
-    """Return when the condition fails, or on Ctrl-C."""
+def _stay_while(condition: Callable[[], bool], message: str) -> None:
+    """Say so, and return when the condition fails, or on Ctrl-C."""
     with StopSignals() as stop:
+        say(message)  # from now on Ctrl-C is heard
         while condition() and stop.reason is None:
             time.sleep(LOOK_AGAIN)
