@@ -510,7 +510,7 @@ class Tissue:
         self._is_open = False
         self._cut(self._scheme.end)
         self._scheme.forget()
-        self._contact.look_for_pieces(self._body)
+        self._contact.incision_ended(self._body)
         forget_path(self._path)
         self._incising = False
 

@@ -111,15 +111,22 @@ class SelfContact:
         )
 
     def mesh_changed(self, body: Body, change: Change) -> None:
-        """Take in the faces that a pass of a cut made."""
+        """Take in the faces that a pass of a cut made.
+
+        The lips of the first incision do not touch before it ends: the blade is between them.
+        """
         state, faces = self.arrays.state, self.arrays.faces
         faces = with_room(faces, 4 * int(change.counts[N_DIRTY]))
         renew_faces(faces, body, change)
         if faces is not self.arrays.faces:
             self.arrays = self.arrays.replaced(faces=faces)
-        state[IS_AWAKE] |= faces.counts[0] > 0
         state[IS_STALE] = 1
         self.arrays.contacts.count[0] = 0  # their nodes may be others now
+
+    def incision_ended(self, body: Body) -> None:
+        """Let its lips touch; and where the body is in pieces now, their skin too."""
+        self.arrays.state[IS_AWAKE] |= self.arrays.faces.counts[0] > 0
+        self.look_for_pieces(body)
 
     def look_for_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; its skin may touch then, too."""
