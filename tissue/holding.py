@@ -78,19 +78,17 @@ def seize(
     visits: Visits,
     edge: Edge,
     when: float,
-    reach: float,
     far: float,
     queue: IntArray,
 ) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
     The edge trails behind the blade by the same distance along its length: a sample is in the
-    tissue if the point that far behind it is. `reach` [m]: see `in_slit`. `far` [m]: from further
-    away no tissue is taken hold of.
+    tissue if the point that far behind it is. `far` [m]: from further away no tissue is taken
+    hold of.
     """
     n = len(anchors.state)
     rotation = mean_rotation(anchors, body)
-    along, forward, _ = edge_frame(edge, when)
     for sweep in range(2):
         for i in range(n):
             k = i if sweep == 0 else n - 1 - i
@@ -102,7 +100,7 @@ def seize(
             offset = offset_from(edge, rotation, when, n, k, beside)
             p = add(vec3(anchors.rest, beside), offset)
             place = find(body, visits, p, anchors.tetrahedron[beside], queue)
-            if not place.inside or in_slit(body, place.tetrahedron, p, along, forward, reach):
+            if not place.inside:
                 continue
             w = barycentric_in(p, body.rest, body.tetrahedra, place.tetrahedron)
             here = interpolate(w, body.positions, body.tetrahedra, place.tetrahedron)

@@ -432,10 +432,9 @@ class Tissue:
     def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
         clear_forces(anchors, self._body, self._stages.external)
-        reach = EXPLAINED * self._snap_floor
         let_go(anchors, self._body, self._visits, self._path, edge, when, self._around)
         far = FURTHEST_HOLD * self.node_size
-        seize(anchors, self._body, self._visits, edge, when, reach, far, self._around)
+        seize(anchors, self._body, self._visits, edge, when, far, self._around)
         self._meet(anchors, edge, when)
         if not is_engaged(anchors):
             self._end_incision()

@@ -278,6 +278,12 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
     assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
 
 
+@pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
+def test_the_arm_cuts_the_organ_in_two(tmp_path, stroke):
+    assert command_line(["run", "organ", "--stroke", stroke, "-q", "--out", str(tmp_path)]) == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["pieces"] == 2
+
+
 def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
     program = start("view", "grid2", "--seconds", "0.3", "--out", str(tmp_path))
     said = ""
