@@ -8,10 +8,10 @@ resolved.
 
 from tissue.cut import FULL, N_DIRTY, Cut, flag
 from tissue.jit import kernel
-from tissue.path import Path, Plane, plane_at
+from tissue.path import Path, Plane, nearest_on_edge, plane_at
 from tissue.sheet import on_sheet, see_side, side_of
 from tissue.snapping import insert_crossing, snap_distance
-from tissue.vec3 import Vec3, add, dot, lerp, scale, sub, vec3
+from tissue.vec3 import Vec3, dot, lerp, sub, vec3
 
 
 @kernel
@@ -99,22 +99,9 @@ def _height(plane: Plane, p: Vec3) -> float:
 @kernel
 def _nearest_segment(path: Path, p: Vec3) -> int:
     """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel: no cut there."""
-    best = -1
-    best_squared = 1e300
-    beyond = False
+    near = nearest_on_edge(path, p)
     last = len(path.linked) - 2
-    for k in range(last + 1):
-        if not path.linked[k]:
-            continue
-        start = vec3(path.t1, k)
-        along = sub(vec3(path.t1, k + 1), start)
-        squared = dot(along, along)
-        u = 0.0
-        if squared > 0.0:
-            u = min(1.0, max(0.0, dot(sub(p, start), along) / squared))
-        d = sub(p, add(start, scale(u, along)))
-        if dot(d, d) < best_squared:
-            best_squared = dot(d, d)
-            best = k
-            beyond = (k == 0 and u == 0.0) or (k == last and u == 1.0)
-    return -1 if beyond else best
+    beyond = (near.segment == 0 and near.along <= 0.0) or (
+        near.segment == last and near.along >= 1.0
+    )
+    return -1 if beyond else near.segment

@@ -49,6 +49,16 @@ def triangle_area(a: Vec3, b: Vec3, c: Vec3) -> float:
 
 
 @kernel
+def face_area(positions: FloatArray, tetrahedra: IntArray, t: int, f: int) -> float:
+    """Area of the face of tetrahedron `t` opposite its local node `f` [m2]."""
+    return triangle_area(
+        vec3(positions, tetrahedra[t, (f + 1) % 4]),
+        vec3(positions, tetrahedra[t, (f + 2) % 4]),
+        vec3(positions, tetrahedra[t, (f + 3) % 4]),
+    )
+
+
+@kernel
 def altitude(apex: Vec3, a: Vec3, b: Vec3, c: Vec3) -> float:
     """Distance of `apex` from the plane of abc [m]; 0 where abc is a line."""
     normal = cross(sub(b, a), sub(c, a))

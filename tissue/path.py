@@ -9,7 +9,7 @@ from tissue.geometry import nearest_on_segment, normalised
 from tissue.jit import kernel
 from tissue.predicates import Lattice, nearest
 from tissue.types import BoolArray, FloatArray, IntArray
-from tissue.vec3 import Vec3, cross, dot, norm, sub, vec3
+from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 
 SAME_WAY = 0.7
 """Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
@@ -77,21 +77,40 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
     return Plane(nearest_on_segment(tip, vec3(path.t1, k + 1), p), normal)
 
 
+class Nearest(NamedTuple):
+    """Where the edge is nearest to a point."""
+
+    segment: int
+    """-1 where the edge spans nothing."""
+    along: float
+    """Foot of the point on the segment's line: 0 at its first sample, 1 at its second. Outside of
+    that the point is beyond the segment's end."""
+
+
+@kernel
+def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
+    """Find the segment of the edge that is nearest to `p` [m] at the end of the step."""
+    best = np.inf
+    found = Nearest(-1, 0.0)
+    for k in range(len(path.linked) - 1):
+        if not path.linked[k]:
+            continue
+        start = vec3(path.t1, k)
+        way = sub(vec3(path.t1, k + 1), start)
+        squared = dot(way, way)
+        along = dot(sub(p, start), way) / squared if squared > 0.0 else 0.0
+        d = sub(p, axpy(min(1.0, max(0.0, along)), way, start))
+        if dot(d, d) < best:
+            best = dot(d, d)
+            found = Nearest(k, along)
+    return found
+
+
 @kernel
 def plane_near(path: Path, p: Vec3) -> Plane:
     """The sheet at the point of the edge that is nearest to `p` [m]."""
-    best = np.inf
-    nearest_segment = -1
-    for k in range(len(path.linked) - 1):
-        if path.linked[k]:
-            d = sub(p, nearest_on_segment(vec3(path.t1, k), vec3(path.t1, k + 1), p))
-            squared = dot(d, d)
-            if squared < best:
-                best = squared
-                nearest_segment = k
-    if nearest_segment < 0:
-        return Plane(p, Vec3(0.0, 0.0, 0.0))
-    return plane_at(path, nearest_segment, p)
+    segment = nearest_on_edge(path, p).segment
+    return plane_at(path, segment, p) if segment >= 0 else Plane(p, Vec3(0.0, 0.0, 0.0))
 
 
 @kernel

@@ -6,7 +6,7 @@ different sides of the sheet. A node whose tetrahedra then no longer hang togeth
 
 from tissue.body import CUT, NODES, Body, local_index
 from tissue.cut import FULL, N_DIRTY, N_FACES, N_FLAGGED, Cut, note_dirty
-from tissue.geometry import tetrahedron_volume, triangle_area
+from tissue.geometry import face_area, tetrahedron_volume
 from tissue.jit import kernel
 from tissue.path import plane_near
 from tissue.sheet import decide_side, decided_side, on_sheet, put_on_sheet, see_side, side_of
@@ -25,7 +25,9 @@ def open_sheet(cut: Cut) -> None:
     change = cut.change
     for i in range(change.counts[N_FACES]):
         if change.faces[i, 1] >= 0:
-            change.area[0] += _face_area(cut.body, change.faces[i, 0], change.faces[i, 1])
+            change.area[0] += face_area(
+                cut.body.rest, cut.body.tetrahedra, change.faces[i, 0], change.faces[i, 1]
+            )
             _unglue_face(cut, i)
     for i in range(change.counts[N_FLAGGED]):
         _unglue_fans(cut, change.flagged[i])
@@ -228,7 +230,7 @@ def _relink(cut: Cut, n: int) -> None:
     for row in range(change.counts[N_FACES]):
         outside = _outside_of_piece(cut, row, epoch)
         if outside >= 0:
-            area = _face_area(body, change.faces[row, 0], change.faces[row, 1])
+            area = face_area(body.rest, body.tetrahedra, change.faces[row, 0], change.faces[row, 1])
             if decided_side(sheet, outside) > 0:
                 area_plus += area
             else:
@@ -261,15 +263,6 @@ def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
     if first_in == second_in:
         return -1
     return faces[row, 2] if first_in else faces[row, 0]
-
-
-@kernel
-def _face_area(body: Body, t: int, f: int) -> float:
-    return triangle_area(
-        vec3(body.rest, body.tetrahedra[t, (f + 1) % 4]),
-        vec3(body.rest, body.tetrahedra[t, (f + 2) % 4]),
-        vec3(body.rest, body.tetrahedra[t, (f + 3) % 4]),
-    )
 
 
 @kernel

@@ -1,11 +1,11 @@
 """Whether a point of the blade is in a slit that is there already, where nothing is left to cut."""
 
 from tissue.body import CUT, Body
-from tissue.geometry import nearest_on_triangle, normalised
+from tissue.geometry import nearest_on_segment, nearest_on_triangle, normalised
 from tissue.jit import kernel
-from tissue.path import Path
+from tissue.path import Path, nearest_on_edge
 from tissue.rotation import to_material
-from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
+from tissue.vec3 import Vec3, cross, dot, norm, sub, vec3
 
 BESIDE = 0.7
 """Cosine of the angle between the flat's normal and the way to the nearest cut face, from which the
@@ -85,21 +85,12 @@ def _is_beside(body: Body, t: int, p: Vec3, flat: Vec3, reach: float) -> bool:
 @kernel
 def behind_edge(path: Path, p: Vec3) -> bool:
     """Whether rest point `p` [m] is where the edge has been: behind it, between tip and heel."""
-    best = 1e300
-    behind = False
-    for k in range(len(path.linked) - 1):
-        if not path.linked[k]:
-            continue
-        start = vec3(path.t1, k)
-        along = sub(vec3(path.t1, k + 1), start)
-        squared = dot(along, along)
-        u = dot(sub(p, start), along) / squared if squared > 0.0 else 0.0
-        at = axpy(min(max(u, 0.0), 1.0), along, start)
-        d = sub(p, at)
-        if dot(d, d) < best:
-            best = dot(d, d)
-            first = k == 0 or not path.linked[k - 1]
-            last = k + 2 == len(path.linked) or not path.linked[k + 1]
-            beyond = (first and u < 0.0) or (last and u > 1.0)
-            behind = not beyond and dot(d, vec3(path.forward, k)) <= 0.0
-    return behind
+    k, along = nearest_on_edge(path, p)
+    if k < 0:
+        return False
+    is_first = k == 0 or not path.linked[k - 1]
+    is_last = k + 2 == len(path.linked) or not path.linked[k + 1]
+    if (is_first and along < 0.0) or (is_last and along > 1.0):
+        return False
+    at = nearest_on_segment(vec3(path.t1, k), vec3(path.t1, k + 1), p)
+    return dot(sub(p, at), vec3(path.forward, k)) <= 0.0

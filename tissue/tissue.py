@@ -261,7 +261,9 @@ class Tissue:
             collision += collided - relaxed
             topology += perf_counter() - collided
         if self._incising and not self._is_open and sweep is not None and self._rests(sweep, dt):
+            started = perf_counter()
             self._open_up()
+            topology += perf_counter() - started
         return self._result(
             anchors, edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation)
         )

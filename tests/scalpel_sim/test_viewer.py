@@ -129,6 +129,7 @@ def test_closing_ends_the_process_and_frees_the_port(viewer):
 def test_the_process_ends_with_the_run_however_that_ended(viewer):
     viewer._pipe.close()  # as when the run was killed
     until(lambda: not viewer.is_running, "the process to end")
+    assert not viewer.is_running
 
 
 def test_pictures_are_due_at_most_thirty_times_a_second(viewer):

@@ -16,8 +16,8 @@ def cut_block(weight=0.0):
     """Return a block of 16 g, held at its left half, and cut clean across at 3/4 of its length."""
     tissue = Tissue(
         BLOCK,
-        # So sharp that the blade does not push the block aside, and slippery: what fell against the
-        # other piece before the blade was out is not to stay there.
+        # So sharp that the blade does not push the block aside; and slippery, for with friction the
+        # soft piece, turned by the blade, catches on the corners of the other and hangs there.
         Material(toughness=0.5, friction=0.0),
         fixed=BLOCK.positions[:, 0] <= 0.02,
         gravity=(0.0, 0.0, -weight),

@@ -1,8 +1,8 @@
 """Split one tetrahedron in seventeen, and open it along the triangles of its case (section 4.2)."""
 
-from tissue.body import CUT, NODES, OUTER, TETRAHEDRA, Body
+from tissue.body import CUT, NODES, OUTER, TETRAHEDRA
 from tissue.cut import FULL, note_dirty
-from tissue.geometry import tetrahedron_volume, triangle_area
+from tissue.geometry import face_area, tetrahedron_volume
 from tissue.hanging import HANGING, join_list, leave_list
 from tissue.jit import kernel
 from tissue.paper_scheme.operators import refer_to_nodes
@@ -10,7 +10,6 @@ from tissue.paper_scheme.placing import place_nodes
 from tissue.paper_scheme.presplit import N_CHILDREN
 from tissue.paper_scheme.records import Records, child_of, is_whole
 from tissue.paper_scheme.split import N_GUARDED, N_OF_CASE, N_OWN, Split
-from tissue.vec3 import vec3
 
 MOST_NEW_NODES = 20
 """Nodes that one split can make: two on each edge, two in each face."""
@@ -92,18 +91,9 @@ def _link_inside(s: Split, t: int, c: int, code: int) -> None:
         if triangle >= 0 and (table.opened[code] >> triangle) & 1 == 1:
             body.links[child, f] = CUT
             if link // 4 > c:
-                s.change.area[0] += _face_area(body, child, f)
+                s.change.area[0] += face_area(body.rest, body.tetrahedra, child, f)
         else:
             body.links[child, f] = 4 * child_of(s.records, t, link // 4) + link % 4
-
-
-@kernel
-def _face_area(body: Body, t: int, f: int) -> float:
-    return triangle_area(
-        vec3(body.rest, body.tetrahedra[t, (f + 1) % 4]),
-        vec3(body.rest, body.tetrahedra[t, (f + 2) % 4]),
-        vec3(body.rest, body.tetrahedra[t, (f + 3) % 4]),
-    )
 
 
 @kernel
