@@ -70,7 +70,7 @@ class Bridge:
         tissue = link.describe()
         self._broad_phase = BroadPhase(
             tissue.bounds,
-            math.sqrt(tissue.material.young_modulus / tissue.material.density),
+            tissue.material.wave_speed,
             map(frame.fixture_to_tissue, fixtures),
         )
         self._segment: BladeSegment | None = None

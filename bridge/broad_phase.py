@@ -51,8 +51,8 @@ class BroadPhase:
     The bounds of the tissue are those at the end of the last step. In the step to come a node may
     leave them, so the box is inflated by what a node can travel: `dt` times the sum of
 
-    - the speed of sound in the tissue, sqrt(E / density). A node of an elastic body moves at strain
-      times that speed, and tissue tears before its strain is 1;
+    - the speed of sound in the tissue, that of compression. A node of an elastic body moves at
+      strain times that speed, and tissue tears before its strain is 1;
     - the fastest that a side of the bounds moved in the last step, for a body (or a loose piece of
       it) that falls or swings as a whole.
 

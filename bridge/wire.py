@@ -17,7 +17,8 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-VERSION = 1
+VERSION = 2
+"""2: the material says its law and Poisson's ratio."""
 
 LARGEST_REQUEST = 1 << 20
 """[byte]. The largest request is a step of 152 bytes; a mebibyte leaves room for later ones."""

@@ -25,8 +25,12 @@ class Body:
     "Metres in one unit of the mesh file: 0.001 for millimetres."
     fix: str | None = None
     "What is held: sides (left, right, front, back, bottom, top), a box x0,y0,z0:x1,y1,z1, or none."
+    law: str | None = None
+    "How forces follow from deformation: springs, the paper's, or neo_hookean tetrahedra."
     young: float | None = None
     "Young's modulus [Pa]."
+    poisson_ratio: float | None = None
+    "Poisson's ratio: below 0.5; 0 or more for neo_hookean, 0.25 or more for springs."
     density: float | None = None
     "Density [kg/m3]."
     toughness: float | None = None

@@ -134,7 +134,9 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
     return changed(
         scene,
         fixed=body.fix,
+        law=body.law,
         young_modulus=body.young,
+        poisson_ratio=body.poisson_ratio,
         density=body.density,
         toughness=body.toughness,
         scheme=body.scheme,

@@ -1,7 +1,20 @@
 """What the tissue is made of, in quantities that one can measure."""
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Literal, get_args
+
+Law = Literal["springs", "neo_hookean"]
+"""How forces follow from deformation: `springs` along edges, as in the paper, or tetrahedra under a
+stable `neo_hookean` law."""
+
+CENTRAL_FORCE_RATIO = 0.25
+"""Poisson's ratio of an isotropic network of springs: forces along the lines between nodes make
+both of Lame's constants the same (Cauchy's relation), whatever the stiffnesses."""
+
+NEARLY_INCOMPRESSIBLE = 0.49
+"""Poisson's ratio above which the time step suffers: waves of compression are sqrt(1 / (1 - 2 nu))
+times as fast, 7 times at 0.49, and an explicit step must follow them."""
 
 
 @dataclass(frozen=True)
@@ -9,7 +22,7 @@ class Material:
     """An isotropic soft tissue.
 
     Raises:
-        ValueError: a quantity is not finite, or has the wrong sign.
+        ValueError: a quantity is not finite, has the wrong sign, or is none that the law can have.
     """
 
     young_modulus: float = 10e3
@@ -21,17 +34,146 @@ class Material:
     viscous_damping: float = 5.0
     """Drag on every node, as the rate at which its free motion dies away [1/s]."""
     retardation_time: float = 5e-5
-    """Penalty-based damping, along springs only: viscosity per stiffness [s] (Kelvin-Voigt)."""
+    """Penalty-based damping, along springs only: viscosity per stiffness [s] (Kelvin-Voigt). As a
+    continuum: viscosity in shear over the shear modulus `mu`, under either law."""
     friction: float = 0.3
     """Coulomb's coefficient of friction where cut faces, pieces and the floor touch. Fresh muscle
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
     more easily."""
+    law: Law = "springs"
+    """How forces follow from deformation."""
+    poisson_ratio: float = CENTRAL_FORCE_RATIO
+    """How much a pulled body narrows, per stretch. Springs alone have 1/4 at best; above it each
+    tetrahedron also resists a change of its volume, so springs need at least 1/4. Soft tissue is
+    mostly water and hardly compressible: 0.45 to 0.49."""
+    spring_calibration: float = 1.0
+    """Stiffness of the springs over what van Gelder's formula gives them. 1 unless a body was
+    measured on its own mesh: see `tissue.calibration.calibrated`. For the springs' law only."""
 
     def __post_init__(self) -> None:
+        if self.law not in get_args(Law):
+            raise ValueError(f"no law is called {self.law!r}. Known: {', '.join(get_args(Law))}")
         for field in fields(self):
             value = getattr(self, field.name)
-            if not math.isfinite(value) or value < 0.0:
+            if field.name != "law" and (not math.isfinite(value) or value < 0.0):
                 raise ValueError(f"{field.name} is {value}; it must be finite and not negative")
-        for name in ("young_modulus", "density"):
+        for name in ("young_modulus", "density", "spring_calibration"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} is 0; it must be positive")
+        self._check_ratio()
+        if self.law != "springs" and self.spring_calibration != 1.0:
+            raise ValueError(
+                f"spring_calibration is {self.spring_calibration} with law {self.law}, whose "
+                "stiffness is exact on any mesh: leave it at 1, or choose law springs"
+            )
+
+    def _check_ratio(self) -> None:
+        """Refuse a Poisson's ratio that this law cannot have."""
+        ratio = self.poisson_ratio
+        if ratio >= 0.5:
+            raise ValueError(
+                f"poisson_ratio is {ratio}; it must be below 0.5, where no force would change the "
+                "volume and no time step be short enough: soft tissue is simulated at 0.45 to 0.49"
+            )
+        if self.law == "springs" and ratio < CENTRAL_FORCE_RATIO:
+            raise ValueError(
+                f"poisson_ratio is {ratio}; springs pull along the lines between nodes, and such "
+                "a body has 0.25 or, with a resistance to change of volume, more. Use "
+                "law neo_hookean, which can have 0 to below 0.5"
+            )
+
+    @property
+    def mu(self) -> float:
+        """Lame's second constant, the shear modulus at small strain [Pa]."""
+        return self.young_modulus / (2.0 * (1.0 + self.poisson_ratio))
+
+    @property
+    def lam(self) -> float:
+        """Lame's first constant at small strain [Pa]."""
+        nu = self.poisson_ratio
+        return self.young_modulus * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
+
+    @property
+    def spring_modulus(self) -> float:
+        """Young's modulus E in van Gelder's formula k = E V / l^2 [Pa], of springs and of dampers.
+
+        Springs of that stiffness are, on average over all directions, a body with both of Lame's
+        constants 0.4 E. So 2.5 mu gives the body its shear modulus; at a Poisson's ratio of 1/4 it
+        is Young's modulus, and above that `volume_modulus` adds what is missing.
+        """
+        return 2.5 * self.mu * self.spring_calibration
+
+    @property
+    def volume_modulus(self) -> float:
+        """Stiffness against change of volume that springs leave to the tetrahedra [Pa]: lam - mu.
+
+        0 at a Poisson's ratio of 1/4. Negative below, where springs are not the law. Source: Golec
+        et al. 2020 (hybrid mass-spring system with a volume term).
+        """
+        nu = self.poisson_ratio  # exactly 0 at 1/4, which lam - mu would miss by rounding
+        return self.young_modulus * (4.0 * nu - 1.0) / (2.0 * (1.0 + nu) * (1.0 - 2.0 * nu))
+
+    @property
+    def wave_speed(self) -> float:
+        """Speed of waves of compression, the fastest there are at small strain [m/s]."""
+        return math.sqrt((self.lam + 2.0 * self.mu) / self.density)
+
+    def damping_ratio(self, frequency: float) -> float:
+        """Return the damping ratio of a bending or stretching mode of that frequency [Hz].
+
+        Half the loss tangent that a rheometer measures at that frequency. Drag does most at low
+        frequencies, viscosity at high ones.
+        """
+        omega = 2.0 * math.pi * frequency
+        return self.viscous_damping / (2.0 * omega) + omega * self._retardation_in_tension / 2.0
+
+    def with_damping(
+        self, ratio: float, frequency: float, up_to: float | None = None
+    ) -> "Material":
+        """Return this material with the damping ratio `ratio` at `frequency` [Hz], and at `up_to`.
+
+        1 is critical: the body creeps back without swinging. Choose the body's first bending mode
+        for `frequency`. The loss of soft tissue hardly depends on frequency, so that the damping
+        ratio is half its loss tangent at any; viscosity alone rises with frequency, drag falls, and
+        the two together are `ratio` at both ends of a band and less between them (Rayleigh).
+
+        Args:
+            ratio: Damping ratio of bending and stretching.
+            frequency: Where it holds [Hz], the lower end of the band.
+            up_to: The upper end of the band [Hz], or None to leave drag away: then the ratio is
+                proportional to frequency. A high one costs nothing; a low one, or None, makes fine
+                meshes stiff in viscosity, and the time step short.
+
+        Raises:
+            ValueError: the ratio is negative or not finite, a frequency is not positive, or the
+                band ends before it begins.
+        """
+        if not (math.isfinite(ratio) and ratio >= 0.0):
+            raise ValueError(f"damping ratio is {ratio}; it must be finite and not negative")
+        if not (math.isfinite(frequency) and frequency > 0.0):
+            raise ValueError(f"frequency is {frequency} Hz; it must be positive")
+        if up_to is not None and not (math.isfinite(up_to) and up_to > frequency):
+            raise ValueError(f"up_to is {up_to} Hz; it must be above frequency, {frequency} Hz")
+        low = 2.0 * math.pi * frequency
+        high = 0.0 if up_to is None else 2.0 * math.pi * up_to
+        in_tension = 2.0 * ratio / (low + high)
+        return replace(
+            self,
+            viscous_damping=in_tension * low * high,
+            retardation_time=in_tension * self._shear_per_tension,
+        )
+
+    @property
+    def _retardation_in_tension(self) -> float:
+        """Viscosity over stiffness of a bar that is pulled or bent [s]."""
+        return self.retardation_time / self._shear_per_tension
+
+    @property
+    def _shear_per_tension(self) -> float:
+        """Retardation time in shear over that of a bar that is pulled or bent.
+
+        Dampers along edges have one ratio of viscosity to stiffness in shear, mu, whatever the
+        Poisson's ratio; a pulled bar has the viscosity 2.5 mu per second of it, but Young's modulus
+        2 mu (1 + nu).
+        """
+        return 0.8 * (1.0 + self.poisson_ratio)

@@ -3,6 +3,7 @@
 import logging
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -34,7 +35,7 @@ from tissue.border import (
 from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.holding import let_go, meet, near_box, seize
-from tissue.material import Material
+from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.measures import lowest_altitude, path_error
 from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
@@ -188,6 +189,7 @@ class Tissue:
         self._build_rows(every_node, n_nodes)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
         self._warn_of_toughness()
+        self._warn_of_ratio()
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = float(quality.floor * self.node_size)
@@ -526,6 +528,21 @@ class Tissue:
                 length * 1e3,
                 length / self.node_size,
                 self.node_size * 1e3,
+            )
+
+    def _warn_of_ratio(self) -> None:
+        """Say so where the resistance to compression makes time steps very short."""
+        ratio = self.material.poisson_ratio
+        if ratio > NEARLY_INCOMPRESSIBLE:
+            slower = (
+                self.material.wave_speed / replace(self.material, poisson_ratio=0.45).wave_speed
+            )
+            log.warning(
+                "poisson_ratio is %g: time steps are %.1f times shorter than at 0.45, because "
+                "waves of compression are that much faster. 0.45 to 0.49 is as incompressible as a "
+                "soft body looks",
+                ratio,
+                slower,
             )
 
     def _n_increments(self, sweep: BladeSweep | None) -> int:

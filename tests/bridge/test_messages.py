@@ -113,7 +113,7 @@ def test_what_arrives_may_be_written_to():
 
 
 def test_a_description_arrives_with_every_property_of_the_material():
-    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4, 0.2)
+    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4, 0.2, "neo_hookean", 0.45)
     sent = TissueDescription("slab", material, np.array([[0.0, 0.1, 0.2], [1, 2, 3]]), 576, 175)
     received = messages.unpack_description(messages.pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)

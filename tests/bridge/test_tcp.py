@@ -17,7 +17,7 @@ from bridge.link import InProcessLink, LinkError
 from bridge.messages import pack_error, pack_step, unpack_error
 from bridge.server import MOST_CONNECTIONS, TissueServer
 from bridge.tcp import TcpLink, parse_address
-from bridge.wire import LARGEST_REPLY, LARGEST_REQUEST, FrameReader, Kind, pack_frame
+from bridge.wire import LARGEST_REPLY, LARGEST_REQUEST, VERSION, FrameReader, Kind, pack_frame
 from tests.bridge.bits import bits
 from tests.bridge.serve_block import block as make_block
 from tissue.types import BladeSegment, BladeSweep
@@ -294,7 +294,7 @@ def impostor():
     ("answer", "told"),
     [
         (b"HTTP/1.1 400 Bad Request\r\n\r\n", "this is not scalpel-sim"),
-        (HELLO[:4] + b"\x63\x00" + HELLO[6:], "speaks version 99 .* this one 1"),
+        (HELLO[:4] + b"\x63\x00" + HELLO[6:], f"speaks version 99 .* this one {VERSION}"),
         (pack_frame(Kind.HELLO, 0, b"\x00"), "description cannot be read"),
         (pack_frame(Kind.STEP, 0), "a reply of kind 2"),
         (pack_frame(Kind.ERROR, 0, pack_error("go away")), "refused: go away"),

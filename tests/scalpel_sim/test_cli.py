@@ -45,6 +45,15 @@ WRONG_USE = {
     ),
     "an unknown arm": (["run", "slab", "--arm", "tuch"], "Did you mean 'touch'"),
     "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
+    "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
+    "springs with the ratio of cork": (
+        ["run", "slab", "--poisson-ratio", "0"],
+        "Use law neo_hookean",
+    ),
+    "a ratio of what keeps its volume": (
+        ["run", "organ", "--law", "neo_hookean", "--poisson-ratio", "0.5"],
+        "below 0.5",
+    ),
     "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
     "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
     "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),

@@ -1,0 +1,90 @@
+import logging
+import math
+
+import numpy as np
+import pytest
+
+from tissue.material import Material
+from tissue.shapes import grid
+from tissue.tissue import Tissue
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"law": "spring"}, "no law is called 'spring'. Known: springs, neo_hookean"),
+        ({"poisson_ratio": np.nan}, "poisson_ratio is nan"),
+        ({"poisson_ratio": 0.2}, "springs pull along the lines .* Use law neo_hookean"),
+        ({"poisson_ratio": 0.5}, "below 0.5, where no force would change the volume"),
+        ({"poisson_ratio": -0.1, "law": "neo_hookean"}, "poisson_ratio is -0.1"),
+        ({"spring_calibration": 0.0}, "spring_calibration is 0"),
+        ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),
+    ],
+)
+def test_what_no_material_can_be_is_refused_and_the_error_says_what_can(changes, told):
+    with pytest.raises(ValueError, match=told):
+        Material(**changes)
+
+
+def test_lames_constants_are_those_of_the_text_book():
+    material = Material(young_modulus=3.0, poisson_ratio=0.45)
+    bulk = material.lam + 2.0 / 3.0 * material.mu
+    assert bulk == pytest.approx(material.young_modulus / (3.0 * (1.0 - 2.0 * 0.45)))
+    assert material.mu == pytest.approx(3.0 / 2.9)
+
+
+def test_at_a_quarter_springs_are_van_gelders_and_need_no_volume_term():
+    material = Material(young_modulus=10e3, poisson_ratio=0.25)
+    assert material.volume_modulus == 0.0
+    assert material.spring_modulus == pytest.approx(10e3, rel=1e-15)
+
+
+@pytest.mark.parametrize("nu", [0.25, 0.3, 0.45, 0.49])
+def test_springs_and_volume_term_add_up_to_lames_constants(nu):
+    """Springs of modulus E have lam = mu = 0.4 E; the volume term adds to lam alone."""
+    material = Material(poisson_ratio=nu)
+    assert 0.4 * material.spring_modulus == pytest.approx(material.mu)
+    assert 0.4 * material.spring_modulus + material.volume_modulus == pytest.approx(material.lam)
+
+
+def test_waves_of_compression_are_faster_the_less_compressible_the_tissue_is():
+    speeds = [Material(poisson_ratio=nu).wave_speed for nu in (0.25, 0.45, 0.49)]
+    assert speeds == sorted(speeds)
+    assert speeds[0] == pytest.approx(math.sqrt(1.2 * 10e3 / 1000.0))
+
+
+@pytest.mark.parametrize("nu", [0.25, 0.45])
+def test_the_damping_ratio_holds_at_both_ends_of_the_band_and_is_less_between(nu):
+    material = Material(poisson_ratio=nu).with_damping(0.1, 5.0, up_to=200.0)
+    assert material.damping_ratio(5.0) == pytest.approx(0.1)
+    assert material.damping_ratio(200.0) == pytest.approx(0.1)
+    assert 0.0 < material.damping_ratio(30.0) < 0.1
+
+
+def test_without_a_band_damping_is_viscosity_alone():
+    material = Material().with_damping(0.05, 10.0)
+    assert material.viscous_damping == 0.0
+    assert material.retardation_time == pytest.approx(2.0 * 0.05 / (2.0 * math.pi * 10.0))
+    assert material.damping_ratio(20.0) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        ((-0.1, 5.0), "damping ratio is -0.1"),
+        ((0.1, 0.0), "frequency is 0.0 Hz"),
+        ((0.1, 5.0, 5.0), "up_to is 5.0 Hz; it must be above frequency"),
+    ],
+)
+def test_a_damping_that_means_nothing_is_refused(arguments, told):
+    with pytest.raises(ValueError, match=told):
+        Material().with_damping(*arguments)
+
+
+def test_a_ratio_that_makes_time_steps_short_is_used_and_told(caplog):
+    caplog.set_level(logging.WARNING, logger="tissue")
+    mesh = grid((1, 1, 1), (0.03, 0.03, 0.03))
+    Tissue(mesh, Material(poisson_ratio=0.49))
+    assert not caplog.records
+    Tissue(mesh, Material(poisson_ratio=0.4999))
+    assert "time steps are 21.0 times shorter than at 0.45" in caplog.text
