@@ -56,7 +56,7 @@ def test_a_free_undamped_body_keeps_its_energy():
     def energy():
         body = tissue.snapshot()
         kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-        return kinetic + elastic_energy(tissue._springs, tissue._body)
+        return kinetic + elastic_energy(tissue._elasticity.arrays.springs, tissue._body)
 
     before = energy()
     for _ in range(500):
@@ -213,7 +213,7 @@ def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
     tissue, _, results = steady((6, 12, 3), toughness, 0.1)
     body = tissue.snapshot()
     stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-    stored += elastic_energy(tissue._springs, tissue._body)
+    stored += elastic_energy(tissue._elasticity.arrays.springs, tissue._body)
     last = results[-1]
     assert last.work_of_cutting > 0.0
     assert last.work_of_cutting <= last.work_of_blade
@@ -238,7 +238,7 @@ def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
     strokes.make(tissue, strokes.slanted(mesh))
     strokes.make(tissue, strokes.straight(mesh, 0.3))
     body, n = tissue._body, tissue.n_nodes
-    kept = [row(tissue._springs, i) for i in range(n)]
+    kept = [row(tissue._elasticity.arrays.springs, i) for i in range(n)]
     masses = body.masses[:n].copy()
     from_scratch = springs_of(body, tissue.material.young_modulus)
     assert kept == [row(from_scratch, i) for i in range(n)]

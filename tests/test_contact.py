@@ -231,7 +231,7 @@ def energy(tissue: Tissue, gravity: float = 0.0) -> float:
     body = tissue.snapshot()
     kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
     weight = gravity * float(body.masses @ body.positions[:, 2])
-    return kinetic + elastic_energy(tissue._springs, tissue._body) + weight
+    return kinetic + elastic_energy(tissue._elasticity.arrays.springs, tissue._body) + weight
 
 
 @pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])

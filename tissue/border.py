@@ -13,8 +13,8 @@ ALONG_EDGE = 1e-6
 """Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
 
 
-def checked_gravity(gravity: Sequence[float]) -> FloatArray:
-    """Return gravity as an array.
+def checked_gravity(gravity: Sequence[float]) -> Vec3:
+    """Return gravity as a vector.
 
     Raises:
         ValueError: it is not three finite numbers.
@@ -22,7 +22,7 @@ def checked_gravity(gravity: Sequence[float]) -> FloatArray:
     array = np.array(gravity, dtype=np.float64)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise ValueError(f"gravity is {gravity}; it is three finite numbers, in m/s2")
-    return array
+    return Vec3(*array.tolist())
 
 
 def checked_fixed(fixed: npt.ArrayLike | None, n_nodes: int) -> BoolArray:

@@ -218,3 +218,21 @@ def nearest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3:
         return axpy((d4 - d3) / ((d4 - d3) + (d5 - d6)), sub(c, b), b)
     total = va + vb + vc
     return axpy(vb / total, ab, axpy(vc / total, ac, a))
+
+
+@kernel
+def largest_eigenvalue(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> float:
+    """Largest eigenvalue of a symmetric 3x3 matrix, from the angle of its characteristic cubic."""
+    mean = (xx + yy + zz) / 3.0
+    xx -= mean
+    yy -= mean
+    zz -= mean
+    square = (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0
+    if square == 0.0:
+        return mean
+    radius = math.sqrt(square)
+    half_determinant = 0.5 * (
+        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    )
+    cosine = min(1.0, max(-1.0, half_determinant / (square * radius)))
+    return mean + 2.0 * radius * math.cos(math.acos(cosine) / 3.0)

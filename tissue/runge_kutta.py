@@ -20,9 +20,10 @@ from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
 from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
-from tissue.jit import kernel
+from tissue.elastic import Elastic, Surroundings, internal_force, viscous_force
+from tissue.jit import inlined, kernel
+from tissue.simd import Point, point, point_of, store_point, times
 from tissue.slipping import slip
-from tissue.springs import Springs, accelerations
 from tissue.star import Visits
 from tissue.types import FloatArray, IntArray
 
@@ -52,14 +53,17 @@ class Stages(Arrays):
     """Scratch of one step, each of shape (capacity, 3)."""
 
     positions: FloatArray
+    """Of the second and third stage [m]."""
+    positions_4: FloatArray
+    """Of the fourth [m]."""
     velocities: FloatArray
-    elastic: FloatArray
+    """Of the second stage, then of the fourth [m/s]."""
+    change: FloatArray
+    """Velocities of the third stage less those of the second [m/s]."""
     external: FloatArray
     """Forces of anchors on nodes [N]: zero everywhere but at the nodes that anchors hold."""
     a1: FloatArray
     a2: FloatArray
-    a3: FloatArray
-    a4: FloatArray
 
 
 def new_stages(n_nodes: int) -> Stages:
@@ -88,16 +92,14 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
 @kernel
 def relax(
     body: Body,
-    springs: Springs,
+    elastic: Elastic,
     anchors: Anchors,
     edge: Edge,
     visits: Visits,
     stages: Stages,
     contact: ContactState,
     queue: IntArray,
-    gravity: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
+    surroundings: Surroundings,
     toughness: float,
     reach: float,
     dt: float,
@@ -112,16 +114,14 @@ def relax(
 
     Args:
         body: Positions and velocities are written.
-        springs: The rows.
+        elastic: What the forces inside the body follow from.
         anchors: Slip after each step.
         edge: The cutting edge over the whole time step of length `dt` [s].
         visits: For searches.
         stages: Scratch.
         contact: What may touch; corrects positions and velocities after each step.
         queue: Scratch.
-        gravity: [m/s2], shape (3,).
-        retardation_time: Damping along springs [s].
-        viscous_damping: Drag [1/s].
+        surroundings: Gravity and damping.
         toughness: [J/m2].
         reach: See `slip` [m].
         dt: Length of the time step [s].
@@ -138,18 +138,7 @@ def relax(
             if is_awake:
                 prepare(contact, body)
             runge_kutta_nystroem(
-                body,
-                springs,
-                anchors,
-                edge,
-                stages,
-                gravity,
-                retardation_time,
-                viscous_damping,
-                toughness,
-                dt,
-                at,
-                share,
+                body, elastic, anchors, edge, stages, surroundings, toughness, dt, at, share
             )
         if is_awake:
             contact.state[IS_PENDING] = 1
@@ -164,13 +153,11 @@ def relax(
 @kernel
 def runge_kutta_nystroem(
     body: Body,
-    springs: Springs,
+    elastic: Elastic,
     anchors: Anchors,
     edge: Edge,
     stages: Stages,
-    gravity: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
+    surroundings: Surroundings,
     toughness: float,
     dt: float,
     at: float,
@@ -179,41 +166,146 @@ def runge_kutta_nystroem(
     """Advance positions and velocities from fraction `at` of the time step by `share` of it."""
     h = share * dt
     n = body.counts[NODES]
-    x = body.positions
-    v = body.velocities
-    xs = stages.positions
-    vs = stages.velocities
-    a1 = stages.a1
-    a2 = stages.a2
-    a3 = stages.a3
-    a4 = stages.a4
-    damping = (retardation_time, viscous_damping, gravity)
-    forces = (stages.external, True, stages.elastic)
+    external = stages.external
+    half, end = at + 0.5 * share, at + share
+    pull(anchors, body, edge, body.positions, at, share / 6.0, dt, toughness, external)
+    first_stage(body, elastic, stages, surroundings, h, 0, n)
+    x2 = stages.positions
+    pull(anchors, body, edge, x2, half, share * 2.0 / 3.0, dt, toughness, external)
+    second_stage(body, elastic, stages, surroundings, h, 0, n)
+    if surroundings.retardation_time > 0.0:
+        third_stage(body, elastic, stages, surroundings, h, 0, n)
+    x4 = stages.positions_4
+    pull(anchors, body, edge, x4, end, share / 6.0, dt, toughness, external)
+    fourth_stage(body, elastic, stages, surroundings, h, 0, n)
 
-    pull(anchors, body, edge, x, at, share / 6.0, dt, toughness, stages.external)
-    accelerations(springs, body, x, v, *damping, *forces, a1)
-    for i in range(n):
-        for c in range(3):
-            xs[i, c] = x[i, c] + 0.5 * h * v[i, c] + 0.125 * h * h * a1[i, c]
-            vs[i, c] = v[i, c] + 0.5 * h * a1[i, c]
 
-    pull(
-        anchors, body, edge, xs, at + 0.5 * share, share * 2.0 / 3.0, dt, toughness, stages.external
-    )
-    accelerations(springs, body, xs, vs, *damping, *forces, a2)
-    for i in range(n):
-        for c in range(3):
-            vs[i, c] = v[i, c] + 0.5 * h * a2[i, c]
+@inlined
+def acceleration(
+    body: Body,
+    elastic: Elastic,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    external: FloatArray,
+    surroundings: Surroundings,
+) -> Point:
+    """Acceleration of a node [m/s2]; of a fixed one zero."""
+    if body.fixed[node]:
+        return point_of(0.0, 0.0, 0.0)
+    time = surroundings.retardation_time
+    force = internal_force(elastic, node, positions, velocities, time) + point(external, node)
+    gravity = point_of(*surroundings.gravity)
+    free = gravity - times(surroundings.drag, point(velocities, node))
+    return free + times(1.0 / body.masses[node], force)
 
-    accelerations(springs, body, xs, vs, *damping, stages.external, False, stages.elastic, a3)
-    for i in range(n):
-        for c in range(3):
-            xs[i, c] = x[i, c] + h * v[i, c] + 0.5 * h * h * a3[i, c]
-            vs[i, c] = v[i, c] + h * a3[i, c]
 
-    pull(anchors, body, edge, xs, at + share, share / 6.0, dt, toughness, stages.external)
-    accelerations(springs, body, xs, vs, *damping, *forces, a4)
-    for i in range(n):
-        for c in range(3):
-            x[i, c] += h * v[i, c] + h * h / 6.0 * (a1[i, c] + a2[i, c] + a3[i, c])
-            v[i, c] += h / 6.0 * (a1[i, c] + 2.0 * a2[i, c] + 2.0 * a3[i, c] + a4[i, c])
+@kernel
+def first_stage(
+    body: Body,
+    elastic: Elastic,
+    stages: Stages,
+    surroundings: Surroundings,
+    h: float,
+    begin: int,
+    end: int,
+) -> None:
+    """a1 of the nodes from `begin` to `end`, and where the second stage finds them."""
+    x, v = body.positions, body.velocities
+    for i in range(begin, end):
+        a1 = acceleration(body, elastic, i, x, v, stages.external, surroundings)
+        store_point(stages.a1, i, a1)
+        x2 = point(x, i) + times(0.5 * h, point(v, i)) + times(0.125 * h * h, a1)
+        store_point(stages.positions, i, x2)
+        store_point(stages.velocities, i, point(v, i) + times(0.5 * h, a1))
+
+
+@kernel
+def second_stage(
+    body: Body,
+    elastic: Elastic,
+    stages: Stages,
+    surroundings: Surroundings,
+    h: float,
+    begin: int,
+    end: int,
+) -> None:
+    """a2, and how much the third stage's velocities differ; without dampers a3 as well."""
+    x2, v2 = stages.positions, stages.velocities
+    has_dampers = surroundings.retardation_time > 0.0
+    for i in range(begin, end):
+        a2 = acceleration(body, elastic, i, x2, v2, stages.external, surroundings)
+        change = times(0.5 * h, a2 - point(stages.a1, i))
+        if has_dampers:
+            store_point(stages.a2, i, a2)
+            store_point(stages.change, i, change)
+        else:
+            a3 = a2 if body.fixed[i] else a2 - times(surroundings.drag, change)
+            _positions_and_velocities(body, stages, i, a2, a3, h)
+
+
+@kernel
+def third_stage(
+    body: Body,
+    elastic: Elastic,
+    stages: Stages,
+    surroundings: Surroundings,
+    h: float,
+    begin: int,
+    end: int,
+) -> None:
+    """a3, which differs from a2 by damping alone, and damping is linear in the velocities."""
+    time = surroundings.retardation_time
+    for i in range(begin, end):
+        a2 = point(stages.a2, i)
+        a3 = a2
+        if not body.fixed[i]:
+            viscous = viscous_force(elastic, i, stages.positions, stages.change, time)
+            a3 = a2 + times(1.0 / body.masses[i], viscous)
+            a3 = a3 - times(surroundings.drag, point(stages.change, i))
+        _positions_and_velocities(body, stages, i, a2, a3, h)
+
+
+@inlined
+def _positions_and_velocities(
+    body: Body, stages: Stages, i: int, a2: Point, a3: Point, h: float
+) -> None:
+    """New positions, and new velocities but for what a4 adds."""
+    x, v, a1 = point(body.positions, i), point(body.velocities, i), point(stages.a1, i)
+    moved = x + times(h, v)
+    store_point(stages.positions_4, i, moved + times(0.5 * h * h, a3))
+    store_point(stages.velocities, i, v + times(h, a3))
+    both = a2 + a3
+    store_point(body.positions, i, moved + times(h * h / 6.0, a1 + both))
+    store_point(body.velocities, i, v + times(h / 6.0, a1 + both + both))
+
+
+@kernel
+def fourth_stage(
+    body: Body,
+    elastic: Elastic,
+    stages: Stages,
+    surroundings: Surroundings,
+    h: float,
+    begin: int,
+    end: int,
+) -> None:
+    """a4, and what the velocities lack."""
+    x4, v4 = stages.positions_4, stages.velocities
+    for i in range(begin, end):
+        a4 = acceleration(body, elastic, i, x4, v4, stages.external, surroundings)
+        store_point(body.velocities, i, point(body.velocities, i) + times(h / 6.0, a4))
+
+
+@kernel
+def accelerations(
+    body: Body,
+    elastic: Elastic,
+    external: FloatArray,
+    surroundings: Surroundings,
+    out: FloatArray,
+) -> None:
+    """Write the acceleration of every node as it is and moves now to `out` [m/s2]."""
+    x, v = body.positions, body.velocities
+    for i in range(body.counts[NODES]):
+        store_point(out, i, acceleration(body, elastic, i, x, v, external, surroundings))

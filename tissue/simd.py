@@ -1,11 +1,12 @@
 """Vectors of eight doubles (`Lanes`) inside kernels, for the loops that the 1 kHz rests on.
 
-LLVM does not vectorise a gather over the neighbours of a node by itself. Here the kernel says so: a
-vector holds two points of four lanes (x, y, z and nothing), or eight scalars. On a machine with
-narrower registers LLVM splits each operation in two or four; the bits are the same.
+LLVM does not vectorise a gather over the neighbours of a node by itself. Here the kernel says so:
+it reads as for one neighbour, but each value is a vector of eight. On a machine with narrower
+registers LLVM splits each operation in two or four. A `Point` is x, y, z of one node in a vector
+of four.
 
-Each function is also a plain Python function on NumPy arrays of eight, which runs when the JIT is
-off: the tests compare the two. `+ - * /` work on both.
+Each function is also a plain Python function on NumPy arrays, which runs when the JIT is off: the
+tests compare the two. `+ - * /` work on both.
 """
 
 import operator
@@ -18,34 +19,41 @@ from llvmlite import ir
 from numba.core import types
 from numba.extending import lower_builtin, models, register_model, type_callable
 
-from tissue.types import FloatArray, IntArray
+from tissue.types import FloatArray, SlotArray
 
 WIDTH = 8
 """Doubles in a vector: one cache line, and one AVX-512 register."""
 
 Lanes = np.ndarray
 """In Python eight doubles; in a kernel one vector."""
+Point = np.ndarray
+"""In Python x, y, z and a 0; in a kernel one vector of four."""
 
 
 class LanesType(types.Type):
-    """Numba's type of a vector of eight doubles."""
+    """Numba's type of a vector of doubles."""
 
-    def __init__(self) -> None:
-        super().__init__(name="Lanes")
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
 
 
-LANES = LanesType()
+LANES = LanesType(WIDTH)
+POINT = LanesType(4)
+_THREE = types.UniTuple(LANES, 3)
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _POINT = ir.VectorType(ir.DoubleType(), 4)
 _XYZ = ir.Constant(ir.VectorType(ir.IntType(1), 4), [1, 1, 1, 0])
 _I32 = ir.IntType(32)
+_EVEN, _ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
+_FIRST, _SECOND = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
 _I64 = ir.IntType(64)
 
 
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, fe_type: LanesType) -> None:
-        super().__init__(manager, fe_type, _VECTOR)
+        super().__init__(manager, fe_type, ir.VectorType(ir.DoubleType(), fe_type.width))
 
 
 def _compiled(
@@ -108,18 +116,19 @@ def _shuffled(builder: Any, a: Any, b: Any, order: Any) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_I32, len(lanes)), lanes))
 
 
-def _operator(function: Callable, instruction: str) -> None:
-    @_compiled(function, LANES, LANES)
+def _operator(function: Callable, instruction: str, kind: LanesType) -> None:
+    @_compiled(function, kind, kind, result=kind)
     def _build(builder: Any, a: Any, b: Any) -> Any:
         # A product and a sum may become one instruction that rounds once: faster, and no less
         # exact. Nothing is reordered.
         return getattr(builder, instruction)(a, b, flags=("contract",))
 
 
-_operator(operator.add, "fadd")
-_operator(operator.sub, "fsub")
-_operator(operator.mul, "fmul")
-_operator(operator.truediv, "fdiv")
+for _kind in (LANES, POINT):
+    _operator(operator.add, "fadd", _kind)
+    _operator(operator.sub, "fsub", _kind)
+    _operator(operator.mul, "fmul", _kind)
+    _operator(operator.truediv, "fdiv", _kind)
 
 
 def lanes(value: float) -> Lanes:
@@ -129,8 +138,12 @@ def lanes(value: float) -> Lanes:
 
 @_compiled(lanes, types.Float)
 def _lanes(builder: Any, value: Any) -> Any:
-    one = builder.insert_element(ir.Constant(_VECTOR, ir.Undefined), value, ir.Constant(_I32, 0))
-    return _shuffled(builder, one, one, [0] * WIDTH)
+    return _everywhere(builder, value, _VECTOR)
+
+
+def _everywhere(builder: Any, value: Any, kind: Any) -> Any:
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(_I32, 0))
+    return _shuffled(builder, one, one, [0] * kind.count)
 
 
 def load(array: FloatArray, i: int) -> Lanes:
@@ -164,28 +177,75 @@ def _square_root(builder: Any, a: Any) -> Any:
     return builder.call(function, [a])
 
 
-def twice(points: FloatArray, i: int) -> Lanes:
-    """Return row `i` of an array of shape (n, 3) with a 0 behind it, and the same again."""
-    return np.array([*points[i], 0.0] * 2)
+def times(value: float, a: Point) -> Point:
+    """Return a point times a number."""
+    return value * a
 
 
-@_compiled(twice, types.Array, types.Integer)
-def _twice(builder: Any, points: _Array, i: Any) -> Any:
-    row = _row(builder, points, i)
-    return _shuffled(builder, row, row, [*range(4)] * 2)
+@_compiled(times, types.Float, POINT, result=POINT)
+def _times(builder: Any, value: Any, a: Any) -> Any:
+    return builder.fmul(_everywhere(builder, value, _POINT), a, flags=("contract",))
 
 
-def two_points(points: FloatArray, of: IntArray, i: int) -> Lanes:
-    """Return rows `of[i]` and `of[i + 4]` of an array of shape (n, 3), each with a 0 behind it."""
-    return np.array([*points[of[i]], 0.0, *points[of[i + 4]], 0.0])
+def point(points: FloatArray, i: int) -> Point:
+    """Return row `i` of an array of shape (n, 3) with a 0 behind it."""
+    return np.array([*points[i], 0.0])
 
 
-@_compiled(two_points, types.Array, types.Array, types.Integer)
-def _two_points(builder: Any, points: _Array, of: _Array, i: Any) -> Any:
-    row, other = (
-        _row(builder, points, builder.load(of.at(builder.add(i, i.type(k))))) for k in (0, 4)
-    )
-    return _shuffled(builder, row, other, range(WIDTH))
+@_compiled(point, types.Array, types.Integer, result=POINT)
+def _load_point(builder: Any, points: _Array, i: Any) -> Any:
+    return _row(builder, points, i)
+
+
+def store_point(points: FloatArray, i: int, a: Point) -> None:
+    """Write x, y, z into row `i` of an array of shape (n, 3)."""
+    points[i] = a[:3]
+
+
+@_compiled(store_point, types.Array, types.Integer, POINT, result=types.void)
+def _store_point(builder: Any, points: _Array, i: Any, a: Any) -> None:
+    pointer = builder.bitcast(points.at(i, 3), _POINT.as_pointer())
+    arguments = [_POINT, _POINT.as_pointer(), _I32, _XYZ.type]
+    kind = ir.FunctionType(ir.VoidType(), arguments)
+    function = _declared(builder.module, "llvm.masked.store.v4f64.p0v4f64", kind)
+    builder.call(function, [a, pointer, ir.Constant(_I32, 8), _XYZ])
+
+
+def point_of(x: float, y: float, z: float) -> Point:
+    """Return a point of these coordinates."""
+    return np.array([x, y, z, 0.0])
+
+
+@_compiled(point_of, types.Float, types.Float, types.Float, result=POINT)
+def _point_of(builder: Any, *coordinates: Any) -> Any:
+    made = ir.Constant(_POINT, [0.0] * 4)
+    for c, value in enumerate(coordinates):
+        made = builder.insert_element(made, value, ir.Constant(_I32, c))
+    return made
+
+
+def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
+    """Return x, y and z of rows `of[i]` to `of[i + 7]` of an array of shape (n, 3)."""
+    rows = points[of[i : i + WIDTH]]
+    return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy()
+
+
+@_compiled(eight_points, types.Array, types.Array, types.Integer, result=_THREE)
+def _eight_points(builder: Any, points: _Array, of: _Array, i: Any) -> Any:
+    rows = [_row(builder, points, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(8)]
+    a, b, c, d = (_shuffled(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4))
+    ab, cd = (_shuffled(builder, *pair, _EVEN) for pair in ((a, b), (c, d)))
+    x = _shuffled(builder, ab, cd, _FIRST)
+    z = _shuffled(builder, ab, cd, _SECOND)
+    ab, cd = (_shuffled(builder, *pair, _ODD) for pair in ((a, b), (c, d)))
+    return _tuple_of(builder, [x, _shuffled(builder, ab, cd, _FIRST), z])
+
+
+def _tuple_of(builder: Any, values: list[Any]) -> Any:
+    made = ir.Constant(ir.ArrayType(values[0].type, len(values)), ir.Undefined)
+    for i, value in enumerate(values):
+        made = builder.insert_value(made, value, i)
+    return made
 
 
 def _row(builder: Any, points: _Array, i: Any) -> Any:
@@ -202,63 +262,20 @@ def _declared(module: Any, name: str, kind: Any) -> Any:
     return known if known is not None else ir.Function(module, kind, name)
 
 
-def paired(a: Lanes, b: Lanes, c: Lanes, d: Lanes) -> Lanes:
-    """Sum up the four lanes of each of eight points: first a's, b's, c's, d's first, then seconds.
-
-    a holds points 0 and 4, b 1 and 5, c 2 and 6, d 3 and 7.
-    """
-    ends = np.stack([a, b, c, d]).reshape(4, 2, 4)
-    first = ends[..., 0] + ends[..., 1]
-    return np.ascontiguousarray((first + (ends[..., 2] + ends[..., 3])).T).ravel()
+def summed(x: Lanes, y: Lanes, z: Lanes) -> Point:
+    """Return the point whose coordinates are the sums of eight: neighbours first, as in a tree."""
+    pairs = np.stack([x, y, z]).reshape(3, 4, 2).sum(axis=2)
+    halves = pairs[:, :2] + pairs[:, 2:]
+    return np.array([*(halves[:, 0] + halves[:, 1]), 0.0])
 
 
-@_compiled(paired, LANES, LANES, LANES, LANES)
-def _paired(builder: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
-    even, odd = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
+@_compiled(summed, LANES, LANES, LANES, result=POINT)
+def _summed(builder: Any, x: Any, y: Any, z: Any) -> Any:
+    def halves(a: Any, b: Any) -> Any:
+        pairs = builder.fadd(_shuffled(builder, a, b, _EVEN), _shuffled(builder, a, b, _ODD))
+        low = _shuffled(builder, pairs, pairs, range(4))
+        return builder.fadd(low, _shuffled(builder, pairs, pairs, range(4, WIDTH)))
 
-    def halves(one: Any, other: Any) -> Any:
-        low = _shuffled(builder, one, other, even)
-        return builder.fadd(low, _shuffled(builder, one, other, odd))
-
-    ab, cd = halves(a, b), halves(c, d)
-    low = _shuffled(builder, ab, cd, [0, 1, 8, 9, 4, 5, 12, 13])
-    return builder.fadd(low, _shuffled(builder, ab, cd, [2, 3, 10, 11, 6, 7, 14, 15]))
-
-
-def spread(values: Lanes, which: int) -> Lanes:
-    """Return value `which` of the first four in four lanes, and that of the last four."""
-    return np.repeat(values.reshape(2, 4)[:, which], 4)
-
-
-def _spread(which: int) -> Callable[[Lanes], Lanes]:
-    def function(values: Lanes) -> Lanes:
-        return spread(values, which)
-
-    @_compiled(function, LANES)
-    def _build(builder: Any, values: Any) -> Any:
-        return _shuffled(builder, values, values, [which] * 4 + [4 + which] * 4)
-
-    return function
-
-
-spread_0, spread_1, spread_2, spread_3 = (_spread(which) for which in range(4))
-"""`spread` of a place that is known when the kernel is compiled."""
-
-
-def folded(values: Lanes) -> tuple[float, float, float]:
-    """Return the sum of the two points in `values`."""
-    return (
-        float(values[0] + values[4]),
-        float(values[1] + values[5]),
-        float(values[2] + values[6]),
-    )
-
-
-@_compiled(folded, LANES, result=types.UniTuple(types.float64, 3))
-def _folded(builder: Any, values: Any) -> Any:
-    low = _shuffled(builder, values, values, range(4))
-    total = builder.fadd(low, _shuffled(builder, values, values, range(4, WIDTH)))
-    made = ir.Constant(ir.ArrayType(ir.DoubleType(), 3), ir.Undefined)
-    for c in range(3):
-        made = builder.insert_value(made, builder.extract_element(total, ir.Constant(_I32, c)), c)
-    return made
+    xy, z0 = halves(x, y), halves(z, ir.Constant(_VECTOR, [0.0] * WIDTH))
+    low = _shuffled(builder, xy, z0, [0, 1, 4, 5])
+    return builder.fadd(low, _shuffled(builder, xy, z0, [2, 3, 6, 7]))

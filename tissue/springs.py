@@ -3,25 +3,23 @@
 Each spring stands in the rows of both its ends, so that the force on a node is a gather: no
 scatter, no race, the same bits for any number of threads. The rows follow from the tetrahedra
 around the node alone; after a cut only the rows of the nodes that it touched are written anew.
+A row is filled up to a multiple of eight with springs of no stiffness from the node to itself, so
+that forces are evaluated eight at a time (`spring_forces`).
 
 Stiffness of an edge (van Gelder): k = E * (volume of the tetrahedra around it) / (rest length)^2.
 Pull of a spring on its ends: k (l - l0).
 """
 
-import math
-
 import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import NODES, TETRAHEDRA, Body, grown
-from tissue.geometry import tetrahedron_volume
+from tissue.geometry import largest_eigenvalue, tetrahedron_volume
 from tissue.jit import kernel
+from tissue.simd import WIDTH
 from tissue.star import Visits, star
-from tissue.types import FloatArray, IntArray
+from tissue.types import FloatArray, IntArray, SlotArray
 from tissue.vec3 import norm, sub, vec3
-
-ROW_QUANTUM = 8
-"""Rows have room for a multiple of this many springs, so that most can grow in place."""
 
 POOL_MARGIN = 1024
 """Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
@@ -36,12 +34,14 @@ class Springs(Arrays):
     """Slots that the row has, shape (capacity,)."""
     count: IntArray
     """Slots that it uses, shape (capacity,)."""
-    neighbour: IntArray
+    neighbour: SlotArray
     """Other end of the spring, shape (pool,)."""
     stiffness: FloatArray
     """k [N/m], shape (pool,)."""
     rest_pull: FloatArray
     """k times rest length [N], shape (pool,)."""
+    stiffness_per_mass: FloatArray
+    """Largest eigenvalue of the stiffness that holds the node in place, per mass [1/s2]."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (capacity,)."""
     used: IntArray
@@ -54,9 +54,10 @@ def no_springs(n_nodes: int, pool: int) -> Springs:
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
         count=np.zeros(n_nodes, dtype=np.int64),
-        neighbour=np.zeros(pool, dtype=np.int64),
+        neighbour=np.zeros(pool, dtype=np.int32),
         stiffness=np.zeros(pool),
         rest_pull=np.zeros(pool),
+        stiffness_per_mass=np.zeros(n_nodes),
         frequency_squared=np.zeros(n_nodes),
         used=np.zeros(1, dtype=np.int64),
     )
@@ -64,7 +65,7 @@ def no_springs(n_nodes: int, pool: int) -> Springs:
 
 def grown_springs(springs: Springs, n_nodes: int, pool: int) -> Springs:
     """Return the rows with room for that many nodes and springs."""
-    of_nodes = ("first", "room", "count", "frequency_squared")
+    of_nodes = ("first", "room", "count", "stiffness_per_mass", "frequency_squared")
     larger = {name: grown(getattr(springs, name), n_nodes) for name in of_nodes}
     of_pool = ("neighbour", "stiffness", "rest_pull")
     larger |= {name: grown(getattr(springs, name), pool) for name in of_pool}
@@ -119,7 +120,7 @@ def _build_row(
                 visits.place[other] = n
                 n += 1
     if n > springs.room[node]:
-        room = (n + ROW_QUANTUM - 1) // ROW_QUANTUM * ROW_QUANTUM
+        room = filled(n)
         springs.first[node] = springs.used[0]
         springs.room[node] = room
         springs.used[0] += room
@@ -145,7 +146,17 @@ def _build_row(
         k = young_modulus * springs.stiffness[slot] / (length * length)
         springs.stiffness[slot] = k
         springs.rest_pull[slot] = k * length
-    springs.frequency_squared[node] = _frequency_bound(body, springs, node)
+    for slot in range(first + n, first + filled(n)):
+        springs.neighbour[slot] = node
+        springs.stiffness[slot] = 0.0
+        springs.rest_pull[slot] = 0.0
+    springs.stiffness_per_mass[node] = _stiffness_per_mass(body, springs, node)
+
+
+@kernel
+def filled(n: int) -> int:
+    """Return the slots that `n` springs take: a multiple of `WIDTH`."""
+    return (n + WIDTH - 1) // WIDTH * WIDTH
 
 
 @kernel
@@ -161,112 +172,40 @@ def _sort(values: IntArray, n: int) -> None:
 
 
 @kernel
-def _frequency_bound(body: Body, springs: Springs, node: int) -> float:
-    """Gershgorin's bound on w^2 from the block row of this node in M^-1 K.
-
-    The diagonal block is S = sum k u u^T, the others add up to at most sum k; the norm of S is
-    at most its largest absolute row sum, and at most its trace, sum k.
-    """
+def _stiffness_per_mass(body: Body, springs: Springs, node: int) -> float:
+    """Largest eigenvalue of S = sum of k u u^T over the row, per mass of the node [1/s2]."""
     here = vec3(body.rest, node)
-    xx = yy = zz = xy = xz = yz = trace = 0.0
+    xx = yy = zz = xy = xz = yz = 0.0
     for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
         d = sub(vec3(body.rest, springs.neighbour[slot]), here)
-        k = springs.stiffness[slot]
-        c = k / (d.x * d.x + d.y * d.y + d.z * d.z)
+        c = springs.stiffness[slot] / (d.x * d.x + d.y * d.y + d.z * d.z)
         xx += c * d.x * d.x
         yy += c * d.y * d.y
         zz += c * d.z * d.z
         xy += c * d.x * d.y
         xz += c * d.x * d.z
         yz += c * d.y * d.z
-        trace += k
-    rows = max(xx + abs(xy) + abs(xz), max(abs(xy) + yy + abs(yz), abs(xz) + abs(yz) + zz))
-    return (min(rows, trace) + trace) / body.masses[node]
+    return largest_eigenvalue(xx, yy, zz, xy, xz, yz) / body.masses[node]
 
 
 @kernel
-def accelerations(
-    springs: Springs,
-    body: Body,
-    positions: FloatArray,
-    velocities: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
-    gravity: FloatArray,
-    external: FloatArray,
-    with_elastic: bool,
-    elastic: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Write the acceleration of every node to `out` [m/s2], shape (n_nodes, 3).
+def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> None:
+    """Write the bound on w^2 at the first `n` of `nodes`, whose rows are up to date.
 
-    Args:
-        springs: The rows.
-        body: For masses and fixed nodes.
-        positions: Where the nodes are [m].
-        velocities: How fast they move [m/s].
-        retardation_time: Damping along each spring, per stiffness [s].
-        viscous_damping: Drag on each node, per mass [1/s].
-        gravity: [m/s2], shape (3,).
-        external: Further forces on the nodes [N].
-        with_elastic: Whether to evaluate the elastic forces; if not they are read from `elastic`.
-        elastic: Elastic forces at `positions` [N], written or read.
-        out: The result. A fixed node gets zero.
+    Let every spring have a share of the mass of each end, in proportion to its stiffness: of node a
+    k / s_a, where s_a is the largest eigenvalue of S_a. Then the mass is more than used up in no
+    direction, and by Irons' theorem no mode of the body is faster than the fastest of the springs
+    alone, with its masses: w^2 = k (s_a / (k m_a) + s_b / (k m_b)) = s_a / m_a + s_b / m_b.
+    A fixed node is as one of infinite mass.
     """
-    for i in range(body.counts[NODES]):
-        if body.fixed[i]:
-            out[i, 0] = out[i, 1] = out[i, 2] = 0.0
-            continue
-        x = positions[i, 0]
-        y = positions[i, 1]
-        z = positions[i, 2]
-        vx = velocities[i, 0]
-        vy = velocities[i, 1]
-        vz = velocities[i, 2]
-        ex = ey = ez = 0.0
-        fx = fy = fz = 0.0
-        first = springs.first[i]
-        for slot in range(first, first + springs.count[i]):
-            j = springs.neighbour[slot]
-            dx = positions[j, 0] - x
-            dy = positions[j, 1] - y
-            dz = positions[j, 2] - z
-            inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-            if with_elastic:
-                pull = springs.stiffness[slot] - springs.rest_pull[slot] * inverse
-                ex += pull * dx
-                ey += pull * dy
-                ez += pull * dz
-            approach = (
-                (velocities[j, 0] - vx) * dx
-                + (velocities[j, 1] - vy) * dy
-                + (velocities[j, 2] - vz) * dz
-            )
-            pull = springs.stiffness[slot] * approach * inverse * inverse
-            fx += pull * dx
-            fy += pull * dy
-            fz += pull * dz
-        if with_elastic:
-            elastic[i, 0] = ex
-            elastic[i, 1] = ey
-            elastic[i, 2] = ez
-        else:
-            ex = elastic[i, 0]
-            ey = elastic[i, 1]
-            ez = elastic[i, 2]
-        fx = ex + retardation_time * fx
-        fy = ey + retardation_time * fy
-        fz = ez + retardation_time * fz
-        per_mass = 1.0 / body.masses[i]
-        out[i, 0] = (
-            (fx + external[i, 0]) * per_mass + gravity[0] - viscous_damping * velocities[i, 0]
-        )
-        out[i, 1] = (
-            (fy + external[i, 1]) * per_mass + gravity[1] - viscous_damping * velocities[i, 1]
-        )
-        out[i, 2] = (
-            (fz + external[i, 2]) * per_mass + gravity[2] - viscous_damping * velocities[i, 2]
-        )
+    for i in range(n):
+        node = nodes[i]
+        beside = 0.0
+        for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
+            other = springs.neighbour[slot]
+            if not body.fixed[other]:
+                beside = max(beside, springs.stiffness_per_mass[other])
+        springs.frequency_squared[node] = springs.stiffness_per_mass[node] + beside
 
 
 @kernel

@@ -34,6 +34,8 @@ from tissue.border import (
 )
 from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
+from tissue.elastic import Surroundings
+from tissue.elasticity import Elasticity
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.measures import lowest_altitude, path_error
@@ -41,17 +43,16 @@ from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.quality import CutQuality, Measures, QualityReport
-from tissue.runge_kutta import SAFETY, largest_stable_step, new_stages, relax
+from tissue.runge_kutta import SAFETY, accelerations, largest_stable_step, new_stages, relax
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
 from tissue.snapping import EXPLAINED
-from tissue.springs import build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
 from tissue.survey import survey
 from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
-from tissue.touched import largest_frequency, touched_nodes
+from tissue.touched import touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
     BladeSweep,
@@ -92,9 +93,6 @@ instant at each turn; to lay a crack front there each time would shred the mesh.
 
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
-
-ROOM_FOR_SPRINGS = 1 << 16
-"""Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
 
 GRID_MARGIN = 0.5
 """How far a node goes before it is listed for the search of contact again, per mean node size."""
@@ -161,7 +159,11 @@ class Tissue:
         expect_sound(mesh)
         checked_scheme(scheme)
         self.material = material or Material()
-        self._gravity = checked_gravity(gravity)
+        self._surroundings = Surroundings(
+            checked_gravity(gravity),
+            self.material.viscous_damping,
+            self.material.retardation_time,
+        )
         self._body = build_body(
             mesh,
             checked_positions(positions, mesh.positions),
@@ -174,7 +176,6 @@ class Tissue:
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
-        self._springs = no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS)
         self._stages = new_stages(n_nodes)
         self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
         self._edge_length = 0.0
@@ -184,9 +185,7 @@ class Tissue:
         self._is_open = False
         self._calm = 0.0
 
-        every_node = np.arange(n_nodes)
-        self._frequency_squared = 0.0
-        self._build_rows(every_node, n_nodes)
+        self._elasticity = Elasticity(self.material, self._body, self._visits)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
         self._warn_of_toughness()
         self._warn_of_ratio()
@@ -321,21 +320,26 @@ class Tissue:
         """
         anchors = self._anchors_of(None)
         n_each = 4
-        step = self._stable_step(self._frequency_squared)
+        step = self._stable_step(self._elasticity.frequency_squared)
         energy = 0.0
         for done in range(0, LONGEST_SETTLING, n_each):
             n = self.n_nodes
             velocities = self._body.velocities[:n]
             velocities_t0 = velocities.copy()
             self._relax_by(anchors, NOWHERE, n_each * step, 0.0, 1.0, n_each)
-            accelerations = self._stages.a4[:n]
-            if self._contact.is_awake:  # what holds a body on the floor is not in the springs
-                accelerations = (velocities - velocities_t0) / (n_each * step)
+            if self._contact.is_awake:  # what holds a body on the floor is not in its forces
+                largest = np.abs(velocities - velocities_t0).max() / (n_each * step)
+            else:
+                out, external = self._stages.a1, self._stages.external
+                accelerations(
+                    self._body, self._elasticity.arrays, external, self._surroundings, out
+                )
+                largest = np.abs(out[:n]).max()
             before, energy = energy, float((self._body.masses[:n, None] * velocities**2).sum())
             if energy < before:
                 velocities[:] = 0.0
                 energy = 0.0
-            if np.abs(accelerations).max() < SETTLED * 9.81:
+            if largest < SETTLED * 9.81:
                 velocities[:] = 0.0
                 return done + n_each
         return LONGEST_SETTLING
@@ -391,9 +395,9 @@ class Tissue:
     def _relax(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> int:
         """Advance the motion over a part of the step; return the Runge-Kutta steps taken."""
         frequency_squared = max(
-            self._frequency_squared,
+            self._elasticity.frequency_squared,
             frequency_with_anchors(
-                anchors, self._body, self._springs.frequency_squared, self._stages.external
+                anchors, self._body, self._elasticity.node_frequency_squared, self._stages.external
             ),
         )
         span = dt * (end - begin)
@@ -406,22 +410,19 @@ class Tissue:
     def _relax_by(
         self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float, n: int
     ) -> None:
-        material = self.material
         done = 0
         while True:
             done = relax(
                 self._body,
-                self._springs,
+                self._elasticity.arrays,
                 anchors,
                 edge,
                 self._visits,
                 self._stages,
                 self._contact.arrays,
                 self._around,
-                self._gravity,
-                material.retardation_time,
-                material.viscous_damping,
-                material.toughness,
+                self._surroundings,
+                self.material.toughness,
                 self.node_size,
                 dt,
                 begin,
@@ -495,7 +496,7 @@ class Tissue:
             one_pass(self._body, self._visits, self._path)
             n = touched_nodes(self._body, change, self._visits, self._nodes)
             if n:
-                self._build_rows(self._nodes, n)
+                self._elasticity.mesh_changed(self._body, self._visits, self._nodes, n)
                 relocate(self._anchors, self._body, self._visits, self._around)
                 self._contact.mesh_changed(self._body, change)
             full = bool(change.counts[FULL])
@@ -565,8 +566,8 @@ class Tissue:
         return Measures(
             n_tetrahedra=self.n_tetrahedra,
             altitude=lowest_altitude(self._body),
-            frequency=math.sqrt(self._frequency_squared),
-            time_step=self._stable_step(self._frequency_squared),
+            frequency=math.sqrt(self._elasticity.frequency_squared),
+            time_step=self._stable_step(self._elasticity.frequency_squared),
         )
 
     def _result(
@@ -622,28 +623,6 @@ class Tissue:
         self._path = new_path(n)
         return self._anchors
 
-    def _build_rows(self, nodes: np.ndarray, n: int) -> None:
-        """Write masses and springs of the first `n` of `nodes`, and update the frequency bound."""
-        material = self.material
-        done = 0
-        while True:
-            done += build_rows(
-                self._body,
-                self._visits,
-                self._springs,
-                nodes[done:n],
-                n - done,
-                material.density,
-                material.young_modulus,
-                self._around,
-            )
-            if done == n:
-                break
-            pool = 2 * len(self._springs.neighbour)
-            self._springs = grown_springs(self._springs, len(self._springs.first), pool)
-        largest = largest_frequency(self._body, self._springs.frequency_squared, nodes, n)
-        self._frequency_squared = max(self._frequency_squared, largest)
-
     def _grow(self) -> None:
         """Make room for the next pass of a cut step: arrays double when they are nearly full."""
         body = self._body
@@ -655,7 +634,7 @@ class Tissue:
         if (n_nodes, n_tetrahedra) == (len(body.rest), len(body.tetrahedra)):
             return
         self._body = grown_body(body, n_nodes, n_tetrahedra)
-        self._springs = grown_springs(self._springs, n_nodes, len(self._springs.neighbour))
+        self._elasticity.grow(n_nodes)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
         self._contact.grow(n_nodes, n_tetrahedra)

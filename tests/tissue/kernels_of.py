@@ -7,13 +7,15 @@ import numpy as np
 from tissue.anchors import Anchors, new_anchors
 from tissue.body import NODES, Body, build_body, grown_body
 from tissue.cut import SPARE_NODES, Cut, Quality, new_change, new_work
+from tissue.elastic import Elastic, Surroundings
 from tissue.path import new_path
-from tissue.runge_kutta import Stages, new_stages, runge_kutta_nystroem
+from tissue.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
 from tissue.sheet import new_sheet
-from tissue.springs import POOL_MARGIN, Springs, accelerations, build_rows, no_springs
+from tissue.springs import POOL_MARGIN, Springs, bound_frequencies, build_rows, no_springs
 from tissue.star import LARGEST_STAR, no_visits
 from tissue.tissue import NOWHERE
 from tissue.types import BoolArray, FloatArray, TetrahedralMesh
+from tissue.vec3 import Vec3
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 
@@ -48,6 +50,7 @@ def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
         np.zeros(LARGEST_STAR, dtype=np.int64),
     )
     assert written == n
+    bound_frequencies(body, springs, np.arange(n), n)
     return springs
 
 
@@ -83,44 +86,22 @@ class Network(NamedTuple):
     springs: Springs
     anchors: Anchors
     stages: Stages
-    retardation_time: float
-    viscous_damping: float
+    surroundings: Surroundings
 
     def forces(self) -> FloatArray:
         """Return the forces on the nodes as they are and move now [N]."""
-        stages = self.stages
-        accelerations(
-            self.springs,
-            self.body,
-            self.body.positions,
-            self.body.velocities,
-            self.retardation_time,
-            self.viscous_damping,
-            np.zeros(3),
-            stages.external,
-            True,
-            stages.elastic,
-            stages.a1,
-        )
-        return stages.a1 * self.body.masses[:, None]
+        out = np.zeros_like(self.body.positions)
+        elastic = Elastic(springs=self.springs)
+        accelerations(self.body, elastic, self.stages.external, self.surroundings, out)
+        return out * self.body.masses[:, None]
 
     def advance(self, h: float, n: int = 1) -> None:
         """Take `n` Runge-Kutta steps of `h` [s]."""
+        elastic = Elastic(springs=self.springs)
+        blade = (self.anchors, NOWHERE)
+        rest = (self.stages, self.surroundings, 0.0, h, 0.0, 1.0)
         for _ in range(n):
-            runge_kutta_nystroem(
-                self.body,
-                self.springs,
-                self.anchors,
-                NOWHERE,
-                self.stages,
-                np.zeros(3),
-                self.retardation_time,
-                self.viscous_damping,
-                0.0,
-                h,
-                0.0,
-                1.0,
-            )
+            runge_kutta_nystroem(self.body, elastic, *blade, *rest)
 
 
 def network_of(
@@ -134,7 +115,8 @@ def network_of(
     springs = springs_of(body)
     stages = new_stages(len(mesh.positions))
     anchors = new_anchors(2, 1.0, YOUNG_MODULUS)
-    return Network(body, springs, anchors, stages, retardation_time, viscous_damping)
+    surroundings = Surroundings(Vec3(0.0, 0.0, 0.0), viscous_damping, retardation_time)
+    return Network(body, springs, anchors, stages, surroundings)
 
 
 def oscillator(
@@ -151,6 +133,8 @@ def oscillator(
     springs = network.springs
     springs.count[:] = 0
     springs.count[1] = 1
+    springs.neighbour[:] = 1
+    springs.stiffness[:] = springs.rest_pull[:] = 0.0
     springs.neighbour[springs.first[1]] = 0
     springs.stiffness[springs.first[1]] = springs.rest_pull[springs.first[1]] = frequency**2
     network.body.masses[:] = 1.0

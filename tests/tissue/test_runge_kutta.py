@@ -153,11 +153,11 @@ def test_the_bound_on_frequency_holds_for_a_cut_body(seed):
     mesh = bodies.jittered(3, seed)
     tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.1 * seed))
     assert tissue.n_tetrahedra > len(mesh.tetrahedra)
-    body, springs = tissue._body, tissue._springs
+    body, springs = tissue._body, tissue._elasticity.arrays.springs
     true = np.linalg.eigvalsh(dense_modes(body, springs))[-1]
     n = tissue.n_nodes
     bound = springs.frequency_squared[:n][~body.fixed[:n]].max()
-    assert true <= bound <= tissue._frequency_squared
+    assert true <= bound <= tissue._elasticity.frequency_squared
 
 
 def test_every_mode_of_every_body_is_stable_at_the_step_that_is_taken():
