@@ -61,8 +61,8 @@ def print_presets(presets: Sequence[Preset]) -> None:
     console.print(
         f"{NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
         "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
-        f"stretching at {low:g} and {high:g} Hz, less between. J / E: how far a blade drags the tissue along "
-        "before it parts.",
+        f"stretching at {low:g} and {high:g} Hz, less between. J / E: how far a blade drags "
+        "the tissue along before it parts.",
         markup=False,
         highlight=False,
         soft_wrap=True,

@@ -217,11 +217,12 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("fixed", scene.fixed) != scene.fixed:
         given.setdefault("stretch", 0.0)
+    of_scene = {field.name for field in fields(scene)}
+    parts = {name: given.pop(name, getattr(scene, name)) for name in ("material", "quality")}
     if "snap" in given:
-        given["floor"] = given["snap"]
-    for name in ("material", "quality"):
-        part = given.pop(name, getattr(scene, name))
-        properties = [field.name for field in fields(part)]
-        own = {key: given.pop(key) for key in properties if key in given}
-        given[name] = replace(part, **own)
-    return replace(scene, **given)
+        snap = given.pop("snap")
+        parts["quality"] = replace(parts["quality"], snap=snap, floor=snap)
+    for name, part in parts.items():
+        properties = {field.name for field in fields(part)} - of_scene
+        parts[name] = replace(part, **{key: given.pop(key) for key in properties & given.keys()})
+    return replace(scene, **given, **parts)
