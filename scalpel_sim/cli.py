@@ -1,4 +1,4 @@
-"""The command line: `scalpel-sim run`, `view`, `serve`, `bench` and `figure`."""
+"""The command line: `scalpel-sim run`, `view`, `serve`, `bench`, `materials` and `figure`."""
 
 import json
 import sys
@@ -142,6 +142,23 @@ def serve(
 
 
 app.command(bench)
+
+
+@app.command
+def materials(name: str | None = None, /, *, talk: Talk = Talk()) -> None:
+    """Print the materials that --material knows, with the source of each figure.
+
+    Args:
+        name: One of them; all if not given.
+    """
+    with talking(talk):
+        from scalpel_sim.materials import as_json, chosen_presets, print_presets
+
+        presets = chosen_presets(name)
+        if talk.json:
+            print(as_json(presets))
+        else:
+            print_presets(presets)
 
 
 @app.command

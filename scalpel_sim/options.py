@@ -25,6 +25,8 @@ class Body:
     "Metres in one unit of the mesh file: 0.001 for millimetres."
     fix: str | None = None
     "What is held: sides (left, right, front, back, bottom, top), a box x0,y0,z0:x1,y1,z1, or none."
+    material: str | None = None
+    "A material by name: liver, kidney, skin, fat, muscle, gelatin, silicone; see `materials`."
     law: str | None = None
     "How forces follow from deformation: springs, the paper's, or neo_hookean tetrahedra."
     young: float | None = None

@@ -20,6 +20,7 @@ from scalpel_sim.scenes import (
     Scene,
     changed,
     check_motion,
+    material_called,
     mesh_scene,
     scene_called,
     scene_of,
@@ -134,6 +135,7 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
     return changed(
         scene,
         fixed=body.fix,
+        material=None if body.material is None else material_called(body.material),
         law=body.law,
         young_modulus=body.young,
         poisson_ratio=body.poisson_ratio,

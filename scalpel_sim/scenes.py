@@ -13,6 +13,7 @@ from scalpel_sim.planning import STROKES
 from scalpel_sim.stroke import Stroke, from_csv
 from tissue.material import Material
 from tissue.mesh_io import read_mesh
+from tissue.presets import PRESETS
 from tissue.quality import CutQuality
 from tissue.shapes import grid, organ
 from tissue.types import TetrahedralMesh
@@ -140,6 +141,17 @@ def scene_called(name: str) -> Scene:
     return SCENES[name]
 
 
+def material_called(name: str) -> Material:
+    """Return the material of that name.
+
+    Raises:
+        UsageError: there is none; the message says which there are.
+    """
+    if name not in PRESETS:
+        raise unknown("material", name, PRESETS)
+    return PRESETS[name].material
+
+
 def mesh_scene(path: Path, scale: float = 1.0) -> Scene:
     """Return a scene around a mesh from a file, named after it. The file is read once, here.
 
@@ -196,7 +208,8 @@ def read_stroke(scene: Scene) -> Stroke | None:
 
 def changed(scene: Scene, **changes: Any) -> Scene:
     """Return the scene with those fields, material properties and qualities replaced that are not
-    None. `snap` is the floor of snapping too: nodes of slivers snap as those of the mean element.
+    None. Properties change the `material` that is given beside them, else the scene's. `snap` is
+    the floor of snapping too: nodes of slivers snap as those of the mean element.
 
     A stretch that came with the scene is dropped where other sides are held; one that was asked
     for stays, and is refused later where nothing can be pulled.
@@ -204,9 +217,12 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("fixed", scene.fixed) != scene.fixed:
         given.setdefault("stretch", 0.0)
+    of_scene = {field.name for field in fields(scene)}
+    parts = {name: given.pop(name, getattr(scene, name)) for name in ("material", "quality")}
     if "snap" in given:
-        given["floor"] = given["snap"]
-    for part in (scene.material, scene.quality):
-        own = {name: given.pop(name) for name in list(given) if hasattr(part, name)}
-        given["material" if part is scene.material else "quality"] = replace(part, **own)
-    return replace(scene, **given)
+        snap = given.pop("snap")
+        parts["quality"] = replace(parts["quality"], snap=snap, floor=snap)
+    for name, part in parts.items():
+        properties = {field.name for field in fields(part)} - of_scene
+        parts[name] = replace(part, **{key: given.pop(key) for key in properties & given.keys()})
+    return replace(scene, **given, **parts)

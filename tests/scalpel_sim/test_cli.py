@@ -16,6 +16,7 @@ import pytest
 from scalpel_sim.cli import command_line
 from scalpel_sim.outputs import NAMES
 from scalpel_sim.recording import read_forces
+from tissue.presets import PRESETS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
 FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
@@ -45,6 +46,8 @@ WRONG_USE = {
     ),
     "an unknown arm": (["run", "slab", "--arm", "tuch"], "Did you mean 'touch'"),
     "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
+    "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
+    "a list of an unknown material": (["materials", "lung"], "Known: liver"),
     "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
     "springs with the ratio of cork": (
         ["run", "slab", "--poisson-ratio", "0"],
@@ -199,6 +202,25 @@ def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
     assert command_line(words) == 0
     material = json.loads(capsys.readouterr().out)["settings"]["material"]
     assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+def test_a_named_material_reaches_the_tissue_with_what_is_changed_about_it(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--material", "gelatin"]
+    assert command_line([*words, "--toughness", "7"]) == 0
+    material = json.loads(capsys.readouterr().out)["settings"]["material"]
+    assert material["young_modulus"] == PRESETS["gelatin"].young_modulus.value
+    assert (material["law"], material["toughness"]) == ("neo_hookean", 7.0)
+
+
+def test_materials_are_listed_with_their_sources(capsys):
+    assert command_line(["materials"]) == 0
+    told = capsys.readouterr().out
+    for preset in PRESETS.values():
+        assert preset.name in told
+    assert "Gokgol et al. 2012" in told
+    assert command_line(["materials", "liver", "--json"]) == 0
+    (liver,) = json.loads(capsys.readouterr().out)
+    assert liver["toughness"]["value"] == PRESETS["liver"].material.toughness
 
 
 def test_snap_and_guard_trade_the_path_of_the_cut_against_the_time_step(files, capsys):
