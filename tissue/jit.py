@@ -28,6 +28,11 @@ def cache_directory() -> Path:
     return Path(root) / "kernels" / _DIGEST
 
 
+def is_compiling() -> bool:
+    """Whether kernels are compiled: not where $NUMBA_DISABLE_JIT is 1."""
+    return not cast(Any, nb.config).DISABLE_JIT
+
+
 def kernel(function: F) -> F:
     """Compile `function` and keep the binary on disk.
 
@@ -55,7 +60,7 @@ def _compiled(function: F, flags: dict[str, Any]) -> F:
         compiled = cast(Any, nb.njit)(cache=True, **flags)(function)
     finally:
         config.CACHE_DIR = before
-    if not config.DISABLE_JIT:
+    if is_compiling():
         _compile_once(compiled)
     return cast(F, compiled)
 

@@ -148,16 +148,21 @@ def cut_body(mesh, stroke):
     return tissue
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_bound_on_frequency_holds_for_a_cut_body(seed):
+LOOSEST_BOUND = 1.6
+"""Bound on the frequency over the highest true one, at most. 1.04 to 1.35 were measured."""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_bound_on_frequency_of_a_cut_body_holds_and_is_not_far_off(seed):
     mesh = bodies.jittered(3, seed)
-    tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.1 * seed))
+    tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.02 * seed))
     assert tissue.n_tetrahedra > len(mesh.tetrahedra)
     body, springs = tissue._body, tissue._elasticity.arrays.springs
     true = np.linalg.eigvalsh(dense_modes(body, springs))[-1]
     n = tissue.n_nodes
     bound = springs.frequency_squared[:n][~body.fixed[:n]].max()
-    assert true <= bound <= tissue._elasticity.frequency_squared
+    assert true <= bound <= LOOSEST_BOUND**2 * true
+    assert bound <= tissue._elasticity.frequency_squared
 
 
 def test_every_mode_of_every_body_is_stable_at_the_step_that_is_taken():

@@ -1,0 +1,48 @@
+"""Both forms of the Runge-Kutta method, as they stand on paper: slow twins of the kernels."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from tissue.types import FloatArray
+
+Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
+"""Of positions and velocities."""
+
+
+def nystroem(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
+    """One step of Nystroem's form, with the correction terms in h^2 (Collatz, chapter 2)."""
+    a1 = a(x, v)
+    x2 = x + h / 2 * v + h**2 / 8 * a1
+    a2 = a(x2, v + h / 2 * a1)
+    a3 = a(x2, v + h / 2 * a2)
+    a4 = a(x + h * v + h**2 / 2 * a3, v + h * a3)
+    return x + h * v + h**2 / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+
+
+def classical(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
+    """One step of the classical method on the system x' = v, v' = a(x, v) of first order."""
+
+    def rates(state: FloatArray) -> FloatArray:
+        return np.array([state[1], a(state[0], state[1])])
+
+    y = np.array([x, v])
+    k1 = rates(y)
+    k2 = rates(y + h / 2 * k1)
+    k3 = rates(y + h / 2 * k2)
+    k4 = rates(y + h * k3)
+    x, v = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return x, v
+
+
+def two_levels(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
+    """The classical method with positions and velocities on two levels: four positions, not three.
+
+    What the stages of the positions are made of is put into those of the velocities; the terms in
+    h^2 are what the paper calls correction terms.
+    """
+    a1 = a(x, v)
+    a2 = a(x + h / 2 * v, v + h / 2 * a1)
+    a3 = a(x + h / 2 * v + h**2 / 4 * a1, v + h / 2 * a2)
+    a4 = a(x + h * v + h**2 / 2 * a2, v + h * a3)
+    return x + h * v + h**2 / 6 * (a1 + a2 + a3), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
