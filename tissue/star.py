@@ -116,3 +116,21 @@ def mean_node_size(body: Body, visits: Visits, out: IntArray) -> float:
     for node in range(body.counts[NODES]):
         total += node_size(body, visits, node, out)
     return total / body.counts[NODES]
+
+
+@kernel
+def sorted_star(body: Body, visits: Visits, node: int, out: IntArray) -> int:
+    """Write the tetrahedra around `node` to `out` in order of their numbers; return how many.
+
+    Sums over a star must not depend on where the search began, or action would not quite be
+    reaction.
+    """
+    n = star(body, visits, node, body.node_tetrahedron[node], out)
+    for i in range(1, n):  # insertion sort: stars are short
+        t = out[i]
+        j = i
+        while j > 0 and out[j - 1] > t:
+            out[j] = out[j - 1]
+            j -= 1
+        out[j] = t
+    return n
