@@ -7,9 +7,9 @@ import pytest
 
 from tests import bodies, strokes
 from tests.tissue.kernels_of import row, springs_of
+from tissue.elastic import elastic_energy
 from tissue.material import Material
 from tissue.shapes import grid
-from tissue.springs import elastic_energy
 from tissue.tissue import Tissue
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -56,7 +56,7 @@ def test_a_free_undamped_body_keeps_its_energy():
     def energy():
         body = tissue.snapshot()
         kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-        return kinetic + elastic_energy(tissue._elasticity.arrays.springs, tissue._body)
+        return kinetic + elastic_energy(tissue._elasticity.arrays, tissue._body)
 
     before = energy()
     for _ in range(500):
@@ -213,7 +213,7 @@ def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
     tissue, _, results = steady((6, 12, 3), toughness, 0.1)
     body = tissue.snapshot()
     stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-    stored += elastic_energy(tissue._elasticity.arrays.springs, tissue._body)
+    stored += elastic_energy(tissue._elasticity.arrays, tissue._body)
     last = results[-1]
     assert last.work_of_cutting > 0.0
     assert last.work_of_cutting <= last.work_of_blade

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
+from tissue.elastic import elastic_energy
 from tissue.material import Material
 from tissue.pieces import piece_of_tetrahedra, pieces_of
 from tissue.shapes import grid
-from tissue.springs import elastic_energy
 from tissue.surface import OUTWARD
 from tissue.tissue import Tissue
 from tissue.types import Snapshot, TetrahedralMesh
@@ -231,7 +231,7 @@ def energy(tissue: Tissue, gravity: float = 0.0) -> float:
     body = tissue.snapshot()
     kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
     weight = gravity * float(body.masses @ body.positions[:, 2])
-    return kinetic + elastic_energy(tissue._elasticity.arrays.springs, tissue._body) + weight
+    return kinetic + elastic_energy(tissue._elasticity.arrays, tissue._body) + weight
 
 
 @pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])

@@ -2,13 +2,25 @@
 
 import numpy as np
 
-from tissue.body import NODES, Body
-from tissue.elastic import Elastic
+from tissue.body import NODES, TETRAHEDRA, Body
+from tissue.cut import N_DIRTY, Change
+from tissue.elastic import Elastic, bound_both_frequencies
 from tissue.material import Material
+from tissue.solid import (
+    Law,
+    bound_solid_frequencies,
+    build_stars,
+    build_tetrahedra,
+    grown_solid,
+    neo_hookean,
+    no_solid,
+    room_for_stars,
+    volume_term,
+)
 from tissue.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits
 from tissue.touched import largest_frequency
-from tissue.types import FloatArray, IntArray
+from tissue.types import IntArray
 
 ROOM_FOR_SPRINGS = 1 << 16
 """Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
@@ -26,42 +38,82 @@ class Elasticity:
     def __init__(self, material: Material, body: Body, visits: Visits) -> None:
         self._material = material
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
-        n_nodes = len(body.rest)
-        self.arrays = Elastic(springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS))
+        n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+        has_springs = material.law == "springs"
+        law = _law_of(material)
+        room = (n_nodes, n_tetrahedra) if law else (0, 0)
+        self.arrays = Elastic(
+            springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
+            solid=no_solid(law or volume_term(0.0), *room, room_for_stars(*room)),
+            has=np.array([has_springs, law is not None]),
+            frequency_squared=np.zeros(n_nodes),
+        )
+        self._has_solid = law is not None
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]."""
-        n = int(body.counts[NODES])
-        self.mesh_changed(body, visits, np.arange(n), n)
+        n_nodes, n_tetrahedra = (int(body.counts[i]) for i in (NODES, TETRAHEDRA))
+        self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
 
-    def mesh_changed(self, body: Body, visits: Visits, nodes: IntArray, n: int) -> None:
-        """Write masses and rows of the first `n` of `nodes` anew: the mesh around them changed."""
-        done = 0
-        while True:
-            springs = self.arrays.springs
-            done += build_rows(
-                body,
-                visits,
-                springs,
-                nodes[done:n],
-                n - done,
-                self._material.density,
-                self._material.spring_modulus,
-                self._around,
-            )
-            if done == n:
-                break
-            pool = 2 * len(springs.neighbour)
-            self.arrays = Elastic(springs=grown_springs(springs, len(springs.first), pool))
-        bound_frequencies(body, springs, nodes, n)
-        largest = largest_frequency(body, springs.frequency_squared, nodes, n)
+    def mesh_changed(
+        self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
+    ) -> None:
+        """Write anew what the tetrahedra that changed, and their `n` nodes, enter into."""
+        self._write(body, visits, change.dirty[: change.counts[N_DIRTY]], nodes[:n])
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        arrays, solid = self.arrays, self.arrays.solid
+        if self._has_solid:
+            pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
+            solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
+        frequencies = np.zeros(n_nodes)
+        frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
+        self.arrays = arrays.replaced(
+            springs=grown_springs(arrays.springs, n_nodes, len(arrays.springs.neighbour)),
+            solid=solid,
+            frequency_squared=frequencies,
+        )
+
+    def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
+        self._write_springs(body, visits, nodes)
+        bound_frequencies(body, self.arrays.springs, nodes, len(nodes))
+        if self._has_solid:
+            build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
+            self._write_stars(body, visits, nodes)
+            bound_solid_frequencies(self.arrays.solid, nodes, len(nodes))
+        bound_both_frequencies(self.arrays, nodes, len(nodes))
+        largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
         self.frequency_squared = max(self.frequency_squared, largest)
 
-    def grow(self, n_nodes: int) -> None:
-        """Make room for that many nodes."""
-        springs = self.arrays.springs
-        self.arrays = Elastic(springs=grown_springs(springs, n_nodes, len(springs.neighbour)))
+    def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
+        density, modulus = self._material.density, self._material.spring_modulus
+        left = nodes
+        while True:
+            springs = self.arrays.springs
+            rows = (body, visits, springs, left, len(left), density, modulus, self._around)
+            left = left[build_rows(*rows) :]
+            if not len(left):
+                return
+            larger = grown_springs(springs, len(springs.first), 2 * len(springs.neighbour))
+            self.arrays = self.arrays.replaced(springs=larger)
 
-    @property
-    def node_frequency_squared(self) -> FloatArray:
-        """Bound on the square of the angular frequency at each node [1/s2]."""
-        return self.arrays.springs.frequency_squared
+    def _write_stars(self, body: Body, visits: Visits, nodes: IntArray) -> None:
+        left = nodes
+        while True:
+            solid = self.arrays.solid
+            left = left[build_stars(solid, body, visits, left, len(left), self._around) :]
+            if not len(left):
+                return
+            larger = grown_solid(
+                solid, len(solid.first), len(body.tetrahedra), 2 * len(solid.corner)
+            )
+            self.arrays = self.arrays.replaced(solid=larger)
+
+
+def _law_of(material: Material) -> Law | None:
+    """Return what the tetrahedra resist; None where the springs do it all."""
+    if material.law == "neo_hookean":
+        return neo_hookean(material.mu, material.lam)
+    if material.volume_modulus > 0.0:
+        return volume_term(material.volume_modulus)
+    return None

@@ -20,7 +20,7 @@ from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
 from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
-from tissue.elastic import Elastic, Surroundings, internal_force, viscous_force
+from tissue.elastic import Elastic, Surroundings, deform, internal_force, viscous_force
 from tissue.jit import inlined, kernel
 from tissue.simd import Point, point, point_of, store_point, times
 from tissue.slipping import slip
@@ -169,14 +169,17 @@ def runge_kutta_nystroem(
     external = stages.external
     half, end = at + 0.5 * share, at + share
     pull(anchors, body, edge, body.positions, at, share / 6.0, dt, toughness, external)
+    deform(elastic, body, body.positions)
     first_stage(body, elastic, stages, surroundings, h, 0, n)
     x2 = stages.positions
     pull(anchors, body, edge, x2, half, share * 2.0 / 3.0, dt, toughness, external)
+    deform(elastic, body, x2)
     second_stage(body, elastic, stages, surroundings, h, 0, n)
     if surroundings.retardation_time > 0.0:
         third_stage(body, elastic, stages, surroundings, h, 0, n)
     x4 = stages.positions_4
     pull(anchors, body, edge, x4, end, share / 6.0, dt, toughness, external)
+    deform(elastic, body, x4)
     fourth_stage(body, elastic, stages, surroundings, h, 0, n)
 
 
@@ -307,5 +310,6 @@ def accelerations(
 ) -> None:
     """Write the acceleration of every node as it is and moves now to `out` [m/s2]."""
     x, v = body.positions, body.velocities
+    deform(elastic, body, x)
     for i in range(body.counts[NODES]):
         store_point(out, i, acceleration(body, elastic, i, x, v, external, surroundings))

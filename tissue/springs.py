@@ -209,7 +209,7 @@ def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> 
 
 
 @kernel
-def elastic_energy(springs: Springs, body: Body) -> float:
+def spring_energy(springs: Springs, body: Body) -> float:
     """Energy stored in the springs [J]: sum of k (l - l0)^2 / 2, each spring once."""
     energy = 0.0
     for i in range(body.counts[NODES]):

@@ -397,7 +397,10 @@ class Tissue:
         frequency_squared = max(
             self._elasticity.frequency_squared,
             frequency_with_anchors(
-                anchors, self._body, self._elasticity.node_frequency_squared, self._stages.external
+                anchors,
+                self._body,
+                self._elasticity.arrays.frequency_squared,
+                self._stages.external,
             ),
         )
         span = dt * (end - begin)
@@ -496,7 +499,7 @@ class Tissue:
             one_pass(self._body, self._visits, self._path)
             n = touched_nodes(self._body, change, self._visits, self._nodes)
             if n:
-                self._elasticity.mesh_changed(self._body, self._visits, self._nodes, n)
+                self._elasticity.mesh_changed(self._body, self._visits, change, self._nodes, n)
                 relocate(self._anchors, self._body, self._visits, self._around)
                 self._contact.mesh_changed(self._body, change)
             full = bool(change.counts[FULL])
@@ -634,7 +637,7 @@ class Tissue:
         if (n_nodes, n_tetrahedra) == (len(body.rest), len(body.tetrahedra)):
             return
         self._body = grown_body(body, n_nodes, n_tetrahedra)
-        self._elasticity.grow(n_nodes)
+        self._elasticity.grow(n_nodes, n_tetrahedra)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
         self._contact.grow(n_nodes, n_tetrahedra)

@@ -11,6 +11,7 @@ from tissue.elastic import Elastic, Surroundings
 from tissue.path import new_path
 from tissue.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
 from tissue.sheet import new_sheet
+from tissue.solid import no_solid, room_for_stars, volume_term
 from tissue.springs import POOL_MARGIN, Springs, bound_frequencies, build_rows, no_springs
 from tissue.star import LARGEST_STAR, no_visits
 from tissue.tissue import NOWHERE
@@ -79,6 +80,13 @@ def dense_modes(body: Body, springs: Springs) -> FloatArray:
     return weights[:, None] * stiffness.reshape(3 * n, 3 * n)[np.ix_(free, free)] * weights
 
 
+def elastic_of(springs: Springs) -> Elastic:
+    """Return springs with no tetrahedra."""
+    solid = no_solid(volume_term(0.0), 0, 0, room_for_stars(0, 0))
+    has, frequencies = np.array([True, False]), np.zeros(len(springs.first))
+    return Elastic(springs=springs, solid=solid, has=has, frequency_squared=frequencies)
+
+
 class Network(NamedTuple):
     """A body that moves by itself: no blade."""
 
@@ -91,13 +99,13 @@ class Network(NamedTuple):
     def forces(self) -> FloatArray:
         """Return the forces on the nodes as they are and move now [N]."""
         out = np.zeros_like(self.body.positions)
-        elastic = Elastic(springs=self.springs)
+        elastic = elastic_of(self.springs)
         accelerations(self.body, elastic, self.stages.external, self.surroundings, out)
         return out * self.body.masses[:, None]
 
     def advance(self, h: float, n: int = 1) -> None:
         """Take `n` Runge-Kutta steps of `h` [s]."""
-        elastic = Elastic(springs=self.springs)
+        elastic = elastic_of(self.springs)
         blade = (self.anchors, NOWHERE)
         rest = (self.stages, self.surroundings, 0.0, h, 0.0, 1.0)
         for _ in range(n):

@@ -17,9 +17,9 @@ from tissue.shapes import grid
 from tissue.springs import (
     POOL_MARGIN,
     build_rows,
-    elastic_energy,
     grown_springs,
     no_springs,
+    spring_energy,
     total_volume,
 )
 from tissue.star import LARGEST_STAR, no_visits
@@ -89,11 +89,11 @@ def test_forces_are_the_sum_over_the_springs(mesh, retardation_time):
 
 def test_energy_is_the_sum_over_the_springs_and_zero_at_rest(mesh):
     network = network_of(mesh)
-    assert elastic_energy(network.springs, network.body) == pytest.approx(0.0, abs=1e-15)
+    assert spring_energy(network.springs, network.body) == pytest.approx(0.0, abs=1e-15)
     network.body.positions[:], _ = moved(mesh)
     springs = naive.stiffnesses(mesh.positions, mesh.tetrahedra, YOUNG_MODULUS)
     expected = naive.elastic_energy(springs, mesh.positions, network.body.positions)
-    assert elastic_energy(network.springs, network.body) == pytest.approx(expected, rel=1e-12)
+    assert spring_energy(network.springs, network.body) == pytest.approx(expected, rel=1e-12)
 
 
 def test_force_is_the_downhill_gradient_of_energy(mesh):
@@ -106,9 +106,9 @@ def test_force_is_the_downhill_gradient_of_energy(mesh):
     for node, axis in [(0, 0), (3, 1), (7, 2)]:
         here = x[node, axis]
         x[node, axis] = here + step
-        above = elastic_energy(network.springs, network.body)
+        above = spring_energy(network.springs, network.body)
         x[node, axis] = here - step
-        below = elastic_energy(network.springs, network.body)
+        below = spring_energy(network.springs, network.body)
         x[node, axis] = here
         slope = (above - below) / (2.0 * step)
         assert forces[node, axis] == pytest.approx(-slope, rel=1e-5, abs=1e-6)
