@@ -1,5 +1,6 @@
 """What the engine is given is checked here, once, and refused by name."""
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -162,3 +163,17 @@ def checked_floor(floor: float | None, lowest: float) -> None:
             f"the floor is at {floor:g} m and the body reaches down to {lowest:g} m: put the floor "
             "at that height or below, or lift the body's positions"
         )
+
+
+def checked_threads(threads: int) -> int:
+    """Return the number of threads.
+
+    Raises:
+        ValueError: it is not from 1 to the number of cores.
+    """
+    cores = os.cpu_count() or 1
+    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= cores:
+        raise ValueError(
+            f"threads is {threads!r}; it is a whole number from 1 to {cores}, the cores"
+        )
+    return threads

@@ -18,7 +18,7 @@ _SOURCES = sorted(Path(__file__).parent.rglob("*.py"))
 _DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).hexdigest()[:16]
 
 
-FLAGS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True}
+FLAGS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "nogil": True}
 """What every kernel is compiled with: see `kernel`."""
 
 
