@@ -14,6 +14,7 @@ class AllTogether:
     """See `tissue.relaxation.motion.Relaxation`; it remembers nothing."""
 
     moved = None
+    moving = None
 
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return the Runge-Kutta steps taken."""

@@ -47,6 +47,13 @@ class ByRings:
         return self._moved if self._is_far_frozen else None
 
     @property
+    def moving(self) -> tuple[IntArray, int] | None:
+        """Nodes that may have moved in the last call of `relax`, and how many; None where all."""
+        if not self._is_far_frozen:
+            return None
+        return self._rings.order, int(self._rings.state[N_FOUND])
+
+    @property
     def _is_far_frozen(self) -> bool:
         return self._options.far == "frozen"
 
