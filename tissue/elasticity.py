@@ -20,7 +20,7 @@ from tissue.solid import (
 from tissue.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits
 from tissue.touched import largest_frequency
-from tissue.types import IntArray
+from tissue.types import FloatArray, IntArray
 
 ROOM_FOR_SPRINGS = 1 << 16
 """Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
@@ -59,6 +59,11 @@ class Elasticity:
     ) -> None:
         """Write anew what the tetrahedra that changed, and their `n` nodes, enter into."""
         self._write(body, visits, change.dirty[: change.counts[N_DIRTY]], nodes[:n])
+
+    @property
+    def node_frequency_squared(self) -> FloatArray:
+        """Bound on the square of the angular frequency at each node [1/s2]."""
+        return self.arrays.frequency_squared
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""

@@ -1,0 +1,273 @@
+"""Local time stepping: small elements take substeps, their neighbours do not (heir of section 5.2).
+
+Leap-frog with steps of H for the whole body, and p substeps for the fine nodes: those whose
+frequency bound exceeds what H bears, and those in rings around the blade. It differs from the
+paper's hierarchy in that both ends of a spring see each other at the same times: linear momentum is
+kept to rounding, the equilibrium is that of all nodes moved together, the order is 2.
+
+    V <- V + 2 e_p / H,   x <- x + H V                       V: velocity half a step ago
+
+where e is found by the recursion of `chebyshev` for the fine nodes and those that share a force
+with one; for the others 2 e_p = H^2 r(0).
+
+Drag acts exactly, half before the kick and half after. Dampers between nodes that are not fine are
+evaluated once a step with the velocities of half a step ago; those at a fine node, where such a
+damper could be unstable, follow the kick one by one (Shardlow 2003): each takes from the relative
+velocity of its two ends what it would in that time if it were alone, by equal and opposite
+impulses.
+
+Within a step the blade is where it is at its begin: the recursion stands for a motion that runs to
+both sides of that instant alike, so that a steady motion of the blade cancels.
+"""
+
+import math
+
+import numpy as np
+
+from tissue.anchors import Anchors, Edge, clear_forces, pull
+from tissue.arrays import Arrays
+from tissue.body import Body, grown
+from tissue.elastic import Elastic, Surroundings, internal_force
+from tissue.jit import kernel
+from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
+from tissue.relaxation.breadth_first import (
+    N_FOUND,
+    UNREACHED,
+    Rings,
+    grown_rings,
+    new_rings,
+    ring_of,
+)
+from tissue.relaxation.chebyshev import Chebyshev
+from tissue.simd import Point, point, point_of, store_point, times
+from tissue.spring_forces import elastic_force
+from tissue.springs import Springs
+from tissue.types import FloatArray, IntArray
+from tissue.vec3 import axpy, dot, store, sub, vec3
+
+OVERLAP = 1
+"""Rings beyond the fine nodes that share a force with one: springs join neighbours."""
+
+
+class Zone(Arrays):
+    """The fine nodes and what they touch; scratch of shape (capacity, 3) each."""
+
+    rings: Rings
+    """Ring 0: fine nodes; ring 1: nodes that share a force with one."""
+    fine: IntArray
+    """Scratch for the list of fine nodes, shape (capacity,)."""
+    start: FloatArray
+    """Positions of the fine nodes at the begin of the step [m]."""
+    way: FloatArray
+    """e_m [m]."""
+    way_before: FloatArray
+    """e_{m-1} [m]."""
+    steady: FloatArray
+    """Share of the acceleration that is the same in all substeps [m/s2]."""
+    accelerations: FloatArray
+    """At the begin of the step [m/s2], of every listed node."""
+
+
+def new_zone(n_nodes: int) -> Zone:
+    """Return a zone without nodes, with room for that many."""
+    of_nodes = ("start", "way", "way_before", "steady", "accelerations")
+    return Zone(
+        rings=new_rings(n_nodes),
+        fine=np.zeros(n_nodes, np.int64),
+        **{name: np.zeros((n_nodes, 3)) for name in of_nodes},
+    )
+
+
+def grown_zone(zone: Zone, n_nodes: int) -> Zone:
+    """Return the zone with room for that many nodes."""
+    of_nodes = ("fine", "start", "way", "way_before", "steady", "accelerations")
+    larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
+    return zone.replaced(rings=grown_rings(zone.rings, n_nodes), **larger)
+
+
+@kernel
+def macro_step(
+    body: Body,
+    elastic: Elastic,
+    anchors: Anchors,
+    edge: Edge,
+    activity: Activity,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    surroundings: Surroundings,
+    toughness: float,
+    dt: float,
+    at: float,
+    share: float,
+    kick: float,
+) -> None:
+    """Advance the listed nodes from fraction `at` of the time step by `share` of it.
+
+    Args:
+        body: Positions and velocities are written.
+        elastic: What the forces inside the body follow from.
+        anchors: Pull in every substep; all nodes that they pull on should be fine.
+        edge: The cutting edge over the whole time step of length `dt` [s].
+        activity: Only awake nodes move.
+        zone: Of `find_zone`.
+        chebyshev: Coefficients for the substeps.
+        external: Scratch for the forces of the anchors [N], shape (capacity, 3).
+        surroundings: Gravity and damping.
+        toughness: [J/m2].
+        dt: Length of the time step [s].
+        at: Where in the time step the macro step begins.
+        share: Which share of it the macro step is.
+        kick: 1, or 0.5 where the velocities are those of this instant: the first step of all.
+    """
+    h = share * dt
+    springs = elastic.springs
+    _accelerate_coarse(body, elastic, activity, zone, surroundings)
+    _begin_fine(body, springs, zone, surroundings)
+    for m in range(len(chebyshev.push)):
+        part = kick * share * chebyshev.weight[m]
+        pull(anchors, body, edge, body.positions, at, part, dt, toughness, external)
+        _substep(body, springs, activity, zone, chebyshev, external, h, m)
+    clear_forces(anchors, body, external)
+    _kick(body, activity, zone, surroundings.drag, h, kick)
+    if surroundings.retardation_time > 0.0:
+        _damp_fine(body, springs, activity, zone.rings, surroundings.retardation_time * h)
+    _drift(body, activity, zone, h)
+
+
+@kernel
+def _accelerate_coarse(
+    body: Body, elastic: Elastic, activity: Activity, zone: Zone, surroundings: Surroundings
+) -> None:
+    gravity = point_of(*surroundings.gravity)
+    time = surroundings.retardation_time
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if body.fixed[node] or ring_of(zone.rings, node) != UNREACHED:
+            continue
+        force = internal_force(elastic, node, body.positions, body.velocities, time)
+        store_point(zone.accelerations, node, gravity + times(1.0 / body.masses[node], force))
+
+
+@kernel
+def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surroundings) -> None:
+    rings = zone.rings
+    nowhere = point_of(0.0, 0.0, 0.0)
+    time = surroundings.retardation_time
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        steady = point_of(*surroundings.gravity)
+        if rings.ring[node] == 0:
+            store_point(zone.start, node, point(body.positions, node))
+        elif time > 0.0:
+            force = _coarse_damping(springs, body, rings, node)
+            steady = steady + times(time / body.masses[node], force)
+        store_point(zone.steady, node, steady)
+        store_point(zone.way, node, nowhere)
+        store_point(zone.way_before, node, nowhere)
+
+
+@kernel
+def _substep(
+    body: Body,
+    springs: Springs,
+    activity: Activity,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    h: float,
+    m: int,
+) -> None:
+    """From e_m to e_{m+1}."""
+    rings, way, way_before = zone.rings, zone.way, zone.way_before
+    onward, back, push = chebyshev.onward[m], chebyshev.back[m], chebyshev.push[m] * h * h
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        if body.fixed[node]:
+            continue
+        force = elastic_force(springs, node, body.positions) + point(external, node)
+        r = point(zone.steady, node) + times(1.0 / body.masses[node], force)
+        if m == 0:
+            store_point(zone.accelerations, node, r)
+        if activity.state[node] != AWAKE:
+            continue
+        e = point(way, node)
+        moved = times(onward, e) - times(back, point(way_before, node)) + times(push, r)
+        store_point(way_before, node, e)
+        store_point(way, node, moved)
+    # Only now: until here the nodes saw each other at e_m.
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        if rings.ring[node] > 0:
+            break
+        store_point(body.positions, node, point(zone.start, node) + point(way, node))
+
+
+@kernel
+def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kick: float) -> None:
+    half = math.exp(-0.5 * drag * h)
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] != AWAKE:
+            continue
+        gain = times(kick * h, point(zone.accelerations, node))
+        if ring_of(zone.rings, node) != UNREACHED:
+            gain = times(2.0 * kick / h, point(zone.way, node))
+        v = times(half * half, point(body.velocities, node)) + times(half, gain)
+        store_point(body.velocities, node, v)
+
+
+@kernel
+def _damp_fine(
+    body: Body, springs: Springs, activity: Activity, rings: Rings, seconds: float
+) -> None:
+    """Let the dampers at fine nodes act one after the other; `seconds` is h times retardation."""
+    x, v = body.positions, body.velocities
+    for i in range(rings.state[N_FOUND]):
+        a = rings.order[i]
+        if rings.ring[a] > 0:
+            break
+        inverse_a = 1.0 / body.masses[a]
+        for slot in range(springs.first[a], springs.first[a] + springs.count[a]):
+            b = springs.neighbour[slot]
+            if b < a and ring_of(rings, b) == 0:
+                continue  # its turn was, or will be, in the row of b
+            is_free = activity.state[b] == AWAKE
+            inverse_b = 1.0 / body.masses[b] if is_free else 0.0
+            d = sub(vec3(x, b), vec3(x, a))
+            inverse = inverse_a + inverse_b
+            taken = -math.expm1(-seconds * springs.stiffness[slot] * inverse)
+            approach = dot(sub(vec3(v, b), vec3(v, a)), d)
+            impulse = taken * approach / (inverse * dot(d, d))
+            store(v, a, axpy(impulse * inverse_a, d, vec3(v, a)))
+            if is_free:
+                store(v, b, axpy(-impulse * inverse_b, d, vec3(v, b)))
+
+
+@kernel
+def _drift(body: Body, activity: Activity, zone: Zone, h: float) -> None:
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] == AWAKE:
+            is_fine = ring_of(zone.rings, node) == 0
+            x = point(zone.start, node) if is_fine else point(body.positions, node)
+            store_point(body.positions, node, x + times(h, point(body.velocities, node)))
+
+
+@kernel
+def _coarse_damping(springs: Springs, body: Body, rings: Rings, node: int) -> Point:
+    """Force per retardation time [N/s] of the dampers to nodes that are not fine."""
+    x, v = body.positions, body.velocities
+    here, speed = vec3(x, node), vec3(v, node)
+    fx = fy = fz = 0.0
+    first = springs.first[node]
+    for slot in range(first, first + springs.count[node]):
+        other = springs.neighbour[slot]
+        if ring_of(rings, other) == 0:
+            continue
+        d = sub(vec3(x, other), here)
+        along = springs.stiffness[slot] * dot(sub(vec3(v, other), speed), d) / dot(d, d)
+        fx += along * d.x
+        fy += along * d.y
+        fz += along * d.z
+    return point_of(fx, fy, fz)
