@@ -24,8 +24,9 @@ from tissue.types import FloatArray, SlotArray
 WIDTH = 8
 """Doubles in a vector: one cache line, and one AVX-512 register."""
 
-Lanes = np.ndarray
-"""In Python eight doubles; in a kernel one vector."""
+Lanes = Any
+"""In Python an array of eight doubles; in a kernel one vector. It stands in for a float, so that a
+`Vec3` of them is eight points, and the functions of `tissue.vec3` work on eight at a time."""
 Point = np.ndarray
 """In Python x, y, z and a 0; in a kernel one vector of four."""
 

@@ -96,7 +96,7 @@ def _store_pairs(builder: Any, rows: _Array, i: Any, x: Any, y: Any, z: Any, *uv
     u, v, w = uvw
     zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
 
-    def shuffled(pairs: list, orders: tuple) -> list:
+    def shuffled(pairs: list[tuple[Any, Any]], orders: tuple[Any, Any]) -> list[Any]:
         return [_shuffled(builder, *pair, order) for order in orders for pair in pairs]
 
     # The eight vectors as rows of a matrix of 8 x 8, transposed in three rounds of eight shuffles.

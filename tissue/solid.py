@@ -17,18 +17,21 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import Body
-from tissue.geometry import largest_eigenvalue
 from tissue.jit import kernel
 from tissue.simd import WIDTH
 from tissue.star import LARGEST_STAR, Visits, sorted_star
 from tissue.types import FloatArray, IntArray, SlotArray
-from tissue.vec3 import Vec3, add, cross, dot, scale, sub, vec3
+from tissue.vec3 import Vec3, cross, dot, sub, vec3
 
 VOLUME, PER_VOLUME = 6, 7
 """Places in a row of `Solid.shape`; before them grad products 11, 22, 33, 12, 13, 23."""
 
 POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_stars` asks for a larger pool; more than any one row needs."""
+
+
+LARGEST_RING = 3 * LARGEST_STAR + 1
+"""Nodes of the tetrahedra around one node at most, itself among them."""
 
 
 class Law(Arrays):
@@ -71,10 +74,18 @@ class Solid(Arrays):
     """Row of `forces` of each corner that the node is, in order of tetrahedra; shape (pool,)."""
     node_volume: FloatArray
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
-    stiffness_per_mass: FloatArray
-    """Largest eigenvalue of the stiffness that holds the node in place, per mass [1/s2]."""
+    weight: FloatArray
+    """Of each node in the bound on frequencies [1/kg^0.5]: see `solid_frequency`."""
+    dilatation: FloatArray
+    """Of each node, for that bound [N/m3/kg^0.5]: see `solid_frequency`."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
+    ring: FloatArray
+    """Scratch of `solid_frequency`, shape (LARGEST_RING, 3)."""
+    ring_nodes: IntArray
+    """Scratch of `solid_frequency`, shape (LARGEST_RING,)."""
+    listed: IntArray
+    """Scratch of `solid_frequency`, shape (nodes,)."""
     used: IntArray
     """Slots of the pool in use, shape (1,)."""
     every: IntArray
@@ -114,17 +125,25 @@ def _law(mu: float, lam: float, a: float, averaged: bool) -> Law:
 def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return empty rows for that many nodes and tetrahedra."""
     capacity = WIDTH * n_blocks(n_tetrahedra)
+    shape = _aligned(8 * capacity)
+    shape.reshape(-1, 8, WIDTH)[:, VOLUME] = (
+        1.0  # those not in use: without force, not without sense
+    )
     return Solid(
         law=law,
         nodes=_aligned(4 * capacity, np.int32),
-        shape=_aligned(8 * capacity),
+        shape=shape,
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
         count=np.zeros(n_nodes, dtype=np.int64),
         corner=np.zeros(pool, dtype=np.int32),
         node_volume=np.zeros(n_nodes),
-        stiffness_per_mass=np.zeros(n_nodes),
+        weight=np.zeros(n_nodes),
+        dilatation=np.zeros(n_nodes),
         frequency_squared=np.zeros(n_nodes),
+        ring=np.zeros((LARGEST_RING, 3)),
+        ring_nodes=np.zeros(LARGEST_RING, dtype=np.int64),
+        listed=np.zeros(n_nodes, dtype=np.int64),
         used=np.zeros(1, dtype=np.int64),
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=_aligned(WIDTH + capacity),
@@ -148,9 +167,9 @@ def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
 
 
 def _aligned(n: int, dtype: type = np.float64) -> np.ndarray:
-    """Return zeros that begin with a cache line: a vector that straddles two loads at half speed."""
+    """Return zeros from the start of a cache line: vectors across two load at half the speed."""
     line = 64 // np.dtype(dtype).itemsize
-    memory = np.zeros(n + line, dtype)
+    memory: np.ndarray = np.zeros(n + line, dtype)
     skip = -memory.ctypes.data % 64 // memory.itemsize
     return memory[skip : skip + n]
 
@@ -180,7 +199,7 @@ def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> 
         t = tetrahedra[i]
         for k in range(4):
             solid.nodes[node_place(t, k)] = body.tetrahedra[t, k]
-        n1, n2, n3, volume = _normals(body, t)
+        n1, n2, n3, volume = rest_normals(body, t)
         per = 1.0 / (36.0 * volume)
         solid.shape[shape_place(t, 0)] = per * dot(n1, n1)
         solid.shape[shape_place(t, 1)] = per * dot(n2, n2)
@@ -193,7 +212,7 @@ def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> 
 
 
 @kernel
-def _normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
+def rest_normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
     """6 V grad N of nodes 1, 2 and 3 of a tetrahedron at rest [m2], and V [m3]."""
     x0 = vec3(body.rest, body.tetrahedra[t, 0])
     d1 = sub(vec3(body.rest, body.tetrahedra[t, 1]), x0)
@@ -209,9 +228,8 @@ def build_stars(
 ) -> int:
     """Write the rows of the first `n` of `nodes` anew; return how many it wrote.
 
-    Fewer than `n` means that the pool is full: give it room and go on from there. The masses of the
-    nodes and the tetrahedra around them must be up to date. `around` is scratch of shape
-    (LARGEST_STAR,).
+    Fewer than `n` means that the pool is full: give it room and go on from there. The shapes of the
+    tetrahedra around them must be up to date. `around` is scratch of shape (LARGEST_STAR,).
     """
     for i in range(n):
         if solid.used[0] + POOL_MARGIN > len(solid.corner):
@@ -231,37 +249,15 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
     solid.count[node] = n
     for slot in range(first + n, first + filled(n)):
         solid.corner[slot] = 0
-    law = solid.law
-    mu, lam = _small_strain(law)
     volume = 0.0
-    isotropic = xx = yy = zz = xy = xz = yz = 0.0
     for i in range(n):
         t = around[i]
         k = 0
         while body.tetrahedra[t, k] != node:
             k += 1
         solid.corner[first + i] = 4 * (WIDTH + t) + k
-        n1, n2, n3, v = _normals(body, t)
-        volume += 0.25 * v
-        normal = scale(-1.0, add(n1, add(n2, n3)))
-        if k == 1:
-            normal = n1
-        elif k == 2:
-            normal = n2
-        elif k == 3:
-            normal = n3
-        per = 1.0 / (36.0 * v)
-        isotropic += mu * per * dot(normal, normal)
-        per *= mu + lam
-        xx += per * normal.x * normal.x
-        yy += per * normal.y * normal.y
-        zz += per * normal.z * normal.z
-        xy += per * normal.x * normal.y
-        xz += per * normal.x * normal.z
-        yz += per * normal.y * normal.z
+        volume += 0.25 * solid.shape[shape_place(t, VOLUME)]
     solid.node_volume[node] = volume
-    stiffness = isotropic + largest_eigenvalue(xx, yy, zz, xy, xz, yz)
-    solid.stiffness_per_mass[node] = 0.0 if body.fixed[node] else stiffness / body.masses[node]
 
 
 @kernel
@@ -271,40 +267,6 @@ def filled(n: int) -> int:
 
 
 @kernel
-def _small_strain(law: Law) -> tuple[float, float]:
-    """Lame's mu and lam of the law at rest [Pa]."""
-    mu = 0.75 * law.mu
-    return mu, law.lam_of_tetrahedra + law.lam_of_nodes - 5.0 / 6.0 * mu
-
-
-@kernel
-def bound_solid_frequencies(solid: Solid, nodes: IntArray, n: int) -> None:
-    """Write the bound on w^2 at the first `n` of `nodes`, whose rows are up to date.
-
-    Let S_a be the stiffness that holds node a in place while the others stay, s_a its largest
-    eigenvalue. The energy of each tetrahedron is a square |sum of L_a u_a|^2 over its nodes, and
-
-        |sum L_a u_a|^2 <= (sum s_a / m_a) (sum of |L_a u_a|^2 m_a / s_a)      (Cauchy and Schwarz)
-
-    Added up over the tetrahedra, the last factor is at most sum m_a |u_a|^2. So no mode is faster
-    than w^2 = sum of s_a / m_a over the nodes of that tetrahedron where it is largest. Averaged
-    volumes store less energy than those of each tetrahedron (Jensen), so it bounds both. A fixed
-    node does not move: it counts as one of infinite mass.
-
-    A sliver shares nodes, and so their mass, with larger neighbours, which is why this bound is
-    near the truth (above by 10 to 50 %) where that of each tetrahedron by itself,
-    4 c_p^2 sum of 1 / altitude^2, was measured 7 times too high.
-    """
-    for i in range(n):
-        solid.frequency_squared[nodes[i]] = 0.0
-    for i in range(n):
-        node = nodes[i]
-        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            t = (solid.corner[slot] >> 2) - WIDTH
-            total = 0.0
-            for k in range(4):
-                total += solid.stiffness_per_mass[solid.nodes[node_place(t, k)]]
-            # Nodes beside the touched ones are raised where need be, and never lowered.
-            for k in range(4):
-                other = solid.nodes[node_place(t, k)]
-                solid.frequency_squared[other] = max(solid.frequency_squared[other], total)
+def corner_tetrahedron(corner: int) -> int:
+    """Return the tetrahedron that a slot of a row names."""
+    return corner // 4 - WIDTH

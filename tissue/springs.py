@@ -17,7 +17,7 @@ from tissue.body import NODES, TETRAHEDRA, Body, grown
 from tissue.geometry import largest_eigenvalue, tetrahedron_volume
 from tissue.jit import kernel
 from tissue.simd import WIDTH
-from tissue.star import Visits, star
+from tissue.star import Visits, sorted_star
 from tissue.types import FloatArray, IntArray, SlotArray
 from tissue.vec3 import norm, sub, vec3
 
@@ -105,10 +105,9 @@ def _build_row(
     young_modulus: float,
     around: IntArray,
 ) -> None:
-    n_around = star(body, visits, node, body.node_tetrahedron[node], around)
     # Both ends of an edge must add the same volumes in the same order, or the two ends of a spring
-    # would differ in the last bit and action would not quite be reaction: hence the sorting.
-    _sort(around, n_around)
+    # would differ in the last bit and action would not quite be reaction: hence sorted.
+    n_around = sorted_star(body, visits, node, around)
     visits.epoch[0] += 1
     epoch = visits.epoch[0]
     n = 0
@@ -157,18 +156,6 @@ def _build_row(
 def filled(n: int) -> int:
     """Return the slots that `n` springs take: a multiple of `WIDTH`."""
     return (n + WIDTH - 1) // WIDTH * WIDTH
-
-
-@kernel
-def _sort(values: IntArray, n: int) -> None:
-    """Insertion sort of the first `n`; stars are short."""
-    for i in range(1, n):
-        value = values[i]
-        j = i
-        while j > 0 and values[j - 1] > value:
-            values[j] = values[j - 1]
-            j -= 1
-        values[j] = value
 
 
 @kernel

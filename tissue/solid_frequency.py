@@ -1,0 +1,158 @@
+"""A bound on the angular frequencies of a solid at rest, node by node: what limits the time step.
+
+Each energy is a square |sum of L_a u_a|^2 over the nodes a of a tetrahedron, or, where volumes are
+averaged, over those of all tetrahedra around a node. For any positive numbers r_a
+
+    |sum L_a u_a|^2 <= (sum r_a) (sum |L_a u_a|^2 / r_a)                     (Cauchy and Schwarz)
+
+Added up over all energies that leaves a 3 x 3 matrix N_b at each node b, and the energy is at most
+sum u_b . N_b u_b: no mode is faster than the largest w^2 = |N_b| / m_b. It is Irons' theorem for
+point masses, with the mass of a node shared among the elements around it.
+
+With r_a = |L_a| / sqrt(m_a) the bound is 10 to 45 % above the truth on meshes after cuts. That of
+each tetrahedron by itself with a quarter of its own mass, 2 c_p sqrt(sum of 1 / altitude^2), is up
+to 7 times above: a sliver has next to no mass, but it shares its nodes with tetrahedra that have.
+
+A fixed node does not move: it counts as infinitely heavy.
+"""
+
+import math
+
+from tissue.body import Body
+from tissue.geometry import largest_eigenvalue
+from tissue.jit import inlined, kernel
+from tissue.solid import Solid, corner_tetrahedron, node_place, rest_normals
+from tissue.star import Visits
+from tissue.types import IntArray
+from tissue.vec3 import Vec3, add, axpy, norm, scale, store, vec3
+
+
+@kernel
+def bound_solid_frequencies(
+    solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int
+) -> None:
+    """Write the bound on w^2 at the first `n` of `nodes` anew, and at their neighbours.
+
+    The rows and the masses of these nodes must be up to date.
+    """
+    for i in range(n):
+        node = nodes[i]
+        # Any number is right, and the root of its first mass is near the best for good; were it
+        # that of the mass now, the bound at neighbours of neighbours would change as well.
+        if solid.weight[node] == 0.0 and not body.fixed[node]:
+            solid.weight[node] = 1.0 / math.sqrt(body.masses[node])
+    averaged = solid.law.lam_of_nodes != 0.0
+    if averaged:
+        for i in range(n):
+            _measure_dilatation(solid, body, visits, nodes[i])
+        n = _with_neighbours(solid, visits, nodes, n)
+    for i in range(n):
+        node = solid.listed[i] if averaged else nodes[i]
+        solid.frequency_squared[node] = _bound(solid, body, visits, node)
+
+
+@kernel
+def _with_neighbours(solid: Solid, visits: Visits, nodes: IntArray, n: int) -> int:
+    """List these nodes and those next to them in `solid.listed`, each once; return how many."""
+    visits.epoch[0] += 1
+    n_listed = 0
+    for i in range(n):
+        node = nodes[i]
+        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+            t = corner_tetrahedron(solid.corner[slot])
+            for k in range(4):
+                other = solid.nodes[node_place(t, k)]
+                if visits.nodes[other] != visits.epoch[0]:
+                    visits.nodes[other] = visits.epoch[0]
+                    solid.listed[n_listed] = other
+                    n_listed += 1
+    return n_listed
+
+
+@kernel
+def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> None:
+    """Write the sum of r_b of the averaged volume of a node, per what |L_b| is without lam.
+
+    The averaged volume V_a J changes by the sum of C_b . u_b, C_b = sum of V grad N_b / 4 over the
+    tetrahedra around node a. Its energy is lam / (2 V_a) times the square of that.
+    """
+    visits.epoch[0] += 1
+    n = 0
+    for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+        t = corner_tetrahedron(solid.corner[slot])
+        n1, n2, n3, _ = rest_normals(body, t)
+        n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
+        n = _add_to_ring(solid, visits, n, t, 1, n1)
+        n = _add_to_ring(solid, visits, n, t, 2, n2)
+        n = _add_to_ring(solid, visits, n, t, 3, n3)
+    total = 0.0
+    for i in range(n):
+        total += solid.weight[solid.ring_nodes[i]] * norm(vec3(solid.ring, i))
+    solid.dilatation[node] = solid.law.lam_of_nodes / solid.node_volume[node] * total
+
+
+@inlined
+def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
+    """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
+    node = solid.nodes[node_place(t, k)]
+    if visits.nodes[node] != visits.epoch[0]:
+        visits.nodes[node] = visits.epoch[0]
+        visits.place[node] = n
+        solid.ring_nodes[n] = node
+        store(solid.ring, n, Vec3(0.0, 0.0, 0.0))
+        n += 1
+    at = visits.place[node]
+    store(solid.ring, at, axpy(1.0 / 24.0, normal, vec3(solid.ring, at)))
+    return n
+
+
+@kernel
+def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
+    """|N_b| / m_b of a node [1/s2]."""
+    weight = solid.weight[node]
+    if weight == 0.0:
+        return 0.0
+    mu = 0.75 * solid.law.mu
+    # What of lam is not averaged, at small strain. Where it is negative, less of it is still above.
+    lam = max(solid.law.lam_of_tetrahedra - 5.0 / 6.0 * mu, -2.0 / 3.0 * mu)
+    averaged = solid.law.lam_of_nodes != 0.0
+    isotropic = xx = yy = zz = xy = xz = yz = 0.0
+    visits.epoch[0] += 1
+    n = 0
+    for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+        t = corner_tetrahedron(solid.corner[slot])
+        n1, n2, n3, volume = rest_normals(body, t)
+        n0 = scale(-1.0, add(n1, add(n2, n3)))
+        ratios = (
+            solid.weight[solid.nodes[node_place(t, 0)]] * norm(n0)
+            + solid.weight[solid.nodes[node_place(t, 1)]] * norm(n1)
+            + solid.weight[solid.nodes[node_place(t, 2)]] * norm(n2)
+            + solid.weight[solid.nodes[node_place(t, 3)]] * norm(n3)
+        )
+        k = solid.corner[slot] % 4
+        normal = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
+        length = norm(normal)
+        share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
+        isotropic += mu * share * length
+        c = (mu + lam) * share / length
+        xx += c * normal.x * normal.x
+        yy += c * normal.y * normal.y
+        zz += c * normal.z * normal.z
+        xy += c * normal.x * normal.y
+        xz += c * normal.x * normal.z
+        yz += c * normal.y * normal.z
+        if averaged:
+            for other in range(4):
+                n = _add_to_ring(solid, visits, n, t, other, normal)
+    for i in range(n):
+        normal = vec3(solid.ring, i)
+        length = norm(normal)
+        if length > 0.0:
+            c = solid.dilatation[solid.ring_nodes[i]] / (weight * length)
+            xx += c * normal.x * normal.x
+            yy += c * normal.y * normal.y
+            zz += c * normal.z * normal.z
+            xy += c * normal.x * normal.y
+            xz += c * normal.x * normal.z
+            yz += c * normal.y * normal.z
+    return (isotropic + largest_eigenvalue(xx, yy, zz, xy, xz, yz)) / body.masses[node]
