@@ -8,7 +8,6 @@ from tissue.elastic import Elastic, bound_both_frequencies
 from tissue.material import Material
 from tissue.solid import (
     Law,
-    bound_solid_frequencies,
     build_stars,
     build_tetrahedra,
     grown_solid,
@@ -17,6 +16,7 @@ from tissue.solid import (
     room_for_stars,
     volume_term,
 )
+from tissue.solid_frequency import bound_solid_frequencies
 from tissue.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.star import LARGEST_STAR, Visits
 from tissue.touched import largest_frequency
@@ -85,7 +85,9 @@ class Elasticity:
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
-            bound_solid_frequencies(self.arrays.solid, nodes, len(nodes))
+            solid = self.arrays.solid
+            n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
+            nodes = solid.listed[:n]
         bound_both_frequencies(self.arrays, nodes, len(nodes))
         largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
         self.frequency_squared = max(self.frequency_squared, largest)

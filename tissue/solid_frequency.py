@@ -30,10 +30,11 @@ from tissue.vec3 import Vec3, add, axpy, norm, scale, store, vec3
 @kernel
 def bound_solid_frequencies(
     solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int
-) -> None:
-    """Write the bound on w^2 at the first `n` of `nodes` anew, and at their neighbours.
+) -> int:
+    """Write the bound on w^2 at the first `n` of `nodes` and their neighbours anew.
 
-    The rows and the masses of these nodes must be up to date.
+    Return at how many; they are listed in `solid.listed`. The rows and the masses of `nodes` must
+    be up to date.
     """
     for i in range(n):
         node = nodes[i]
@@ -45,10 +46,11 @@ def bound_solid_frequencies(
     if averaged:
         for i in range(n):
             _measure_dilatation(solid, body, visits, nodes[i])
-        n = _with_neighbours(solid, visits, nodes, n)
+    n = _with_neighbours(solid, visits, nodes, n)
     for i in range(n):
-        node = solid.listed[i] if averaged else nodes[i]
+        node = solid.listed[i]
         solid.frequency_squared[node] = _bound(solid, body, visits, node)
+    return n
 
 
 @kernel
