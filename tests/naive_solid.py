@@ -1,0 +1,69 @@
+"""Slow twins of the forces of tetrahedra, in plain NumPy: by deformation gradients and stresses."""
+
+import numpy as np
+
+from tissue.solid import Law
+from tissue.types import FloatArray, IntArray, TetrahedralMesh
+
+
+def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
+    """Columns x1 - x0, x2 - x0, x3 - x0 of each tetrahedron [m], shape (n_tets, 3, 3)."""
+    x = positions[tetrahedra]
+    return (x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
+
+
+def volumes(mesh: TetrahedralMesh) -> FloatArray:
+    """Volume of each tetrahedron at rest [m3]."""
+    return np.linalg.det(edges(*mesh)) / 6.0
+
+
+def gradients(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """Deformation gradient F of each tetrahedron, shape (n_tets, 3, 3)."""
+    return edges(positions, mesh.tetrahedra) @ np.linalg.inv(edges(*mesh))
+
+
+def around_nodes(mesh: TetrahedralMesh, values: FloatArray) -> FloatArray:
+    """A quarter of the value of each tetrahedron around each node."""
+    out = np.zeros(len(mesh.positions))
+    np.add.at(out, mesh.tetrahedra, 0.25 * values[:, None])
+    return out
+
+
+def averaged_j(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """J of each node: volume of the tetrahedra around it over that at rest."""
+    v = volumes(mesh)
+    j = np.linalg.det(gradients(mesh, positions))
+    return around_nodes(mesh, v * j) / around_nodes(mesh, v)
+
+
+def energy(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> float:
+    """Elastic energy less that at rest [J]."""
+    v, f = volumes(mesh), gradients(mesh, positions)
+    squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
+    shear = 0.5 * law.mu * (squared - 3.0 - np.log((squared + 1.0) / 4.0))
+    rest = (1.0 - law.a) ** 2
+    total = v @ (shear + 0.5 * law.lam_of_tetrahedra * ((j - law.a) ** 2 - rest))
+    of_nodes = 0.5 * law.lam_of_nodes * ((averaged_j(mesh, positions) - law.a) ** 2 - rest)
+    return float(total + around_nodes(mesh, v) @ of_nodes)
+
+
+def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> FloatArray:
+    """First Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
+    f = gradients(mesh, positions)
+    squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
+    cofactors = j[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
+    p = law.lam_of_tetrahedra * (j - law.a)
+    p = p + law.lam_of_nodes * (averaged_j(mesh, positions)[mesh.tetrahedra].mean(axis=1) - law.a)
+    shear = law.mu * (1.0 - 1.0 / (squared + 1.0))
+    return shear[:, None, None] * f + p[:, None, None] * cofactors
+
+
+def forces(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> FloatArray:
+    """Force on each node [N]: minus V P grad N of each corner."""
+    v, p = volumes(mesh), stresses(mesh, positions, law)
+    pulls = -v[:, None, None] * p @ np.linalg.inv(edges(*mesh)).transpose(0, 2, 1)
+    out = np.zeros_like(positions)
+    for k in range(3):
+        np.add.at(out, mesh.tetrahedra[:, k + 1], pulls[:, :, k])
+        np.add.at(out, mesh.tetrahedra[:, 0], -pulls[:, :, k])
+    return out

@@ -1,0 +1,158 @@
+"""A body of tetrahedra alone, no springs: its forces, its energy, and how it comes to rest."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tests.tissue.kernels_of import springs_of
+from tissue.body import NODES, TETRAHEDRA, Body, build_body
+from tissue.jit import kernel
+from tissue.neo_hookean import solid_energy, solid_force, solid_forces
+from tissue.simd import store_point
+from tissue.solid import (
+    Law,
+    Solid,
+    build_stars,
+    build_tetrahedra,
+    n_blocks,
+    neo_hookean,
+    no_solid,
+    room_for_stars,
+    volume_term,
+)
+from tissue.solid_frequency import bound_solid_frequencies
+from tissue.star import LARGEST_STAR, no_visits
+from tissue.types import BoolArray, FloatArray, TetrahedralMesh
+
+YOUNG_MODULUS = 10e3
+
+
+def law_of(poisson_ratio: float, averaged: bool = True) -> Law:
+    """Return the neo-Hookean law of `YOUNG_MODULUS`."""
+    return neo_hookean(*lame(poisson_ratio), averaged=averaged)
+
+
+def lame(poisson_ratio: float) -> tuple[float, float]:
+    """Return Lame's mu and lam of `YOUNG_MODULUS` [Pa]."""
+    mu = YOUNG_MODULUS / (2.0 * (1.0 + poisson_ratio))
+    return mu, 2.0 * mu * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
+
+
+LAWS = {
+    "averaged": law_of(0.45),
+    "plain": law_of(0.45, averaged=False),
+    "averaged volume": volume_term(20e3),
+    "plain volume": volume_term(20e3, averaged=False),
+    "half averaged": Law(mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15),
+}
+
+
+class SolidBody(NamedTuple):
+    """A body and its tetrahedra as a solid."""
+
+    body: Body
+    solid: Solid
+
+    def forces(self, positions: FloatArray) -> FloatArray:
+        """Return the forces on the nodes when they are at `positions` [N]."""
+        n, n_tetrahedra = self.body.counts
+        out = np.zeros((n, 3))
+        evaluate(self.solid, self.placed(positions), n_tetrahedra, n, out)
+        return out
+
+    def energy(self, positions: FloatArray) -> float:
+        """Return the elastic energy when they are at `positions`, less that at rest [J]."""
+        n, n_tetrahedra = self.body.counts
+        return solid_energy(self.solid, self.placed(positions), n_tetrahedra, n)
+
+    def placed(self, positions: FloatArray) -> FloatArray:
+        """Return the positions as an array of the capacity of the body."""
+        self.body.positions[: len(positions)] = positions
+        return self.body.positions
+
+    def frequency(self) -> float:
+        """Return the bound on the angular frequencies [1/s]."""
+        return float(np.sqrt(self.solid.frequency_squared[: self.body.counts[NODES]].max()))
+
+    def relaxed(
+        self, positions: FloatArray, seconds: float, drag: float, pull: FloatArray | None = None
+    ) -> FloatArray:
+        """Return the positions after that time under drag [1/s] and dead loads `pull` [N].
+
+        The step is a sixth of the stable one at rest: crushed tetrahedra are stiffer.
+        """
+        n, n_tetrahedra = self.body.counts
+        x = self.placed(positions).copy()
+        h = 2.0 / self.frequency() / 6.0
+        load = np.zeros((n, 3)) if pull is None else pull
+        scratch = np.zeros((2, n, 3))
+        swing(self.solid, self.body, x, load, scratch, h, drag, n_tetrahedra, int(seconds / h))
+        return x[:n]
+
+
+def solid_of(mesh: TetrahedralMesh, law: Law, fixed: BoolArray | None = None) -> SolidBody:
+    """Return the body of a mesh as a solid."""
+    body = build_body(mesh, None, fixed)
+    springs_of(body)
+    return built(body, law)
+
+
+def built(body: Body, law: Law) -> SolidBody:
+    """Return the solid of a body that has its masses."""
+    n, n_tetrahedra = (int(body.counts[i]) for i in (NODES, TETRAHEDRA))
+    room = (len(body.rest), len(body.tetrahedra))
+    solid = no_solid(law, *room, room_for_stars(*room))
+    visits = no_visits(*room)
+    build_tetrahedra(solid, body, solid.every, n_tetrahedra)
+    around = np.zeros(LARGEST_STAR, dtype=np.int64)
+    assert build_stars(solid, body, visits, solid.every, n, around) == n
+    assert bound_solid_frequencies(solid, body, visits, solid.every, n) == n
+    return SolidBody(body, solid)
+
+
+def moved(mesh: TetrahedralMesh, share: float = 0.1, seed: int = 0) -> FloatArray:
+    """Return positions at random around rest, by that share of the extent."""
+    noise = np.random.default_rng(seed).normal(size=mesh.positions.shape)
+    return mesh.positions + share * np.ptp(mesh.positions) * noise
+
+
+def j_of(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
+    """Return J of each tetrahedron."""
+    corners, rest = positions[mesh.tetrahedra], mesh.positions[mesh.tetrahedra]
+    return np.linalg.det(corners[:, 1:] - corners[:, :1]) / np.linalg.det(rest[:, 1:] - rest[:, :1])
+
+
+@kernel
+def evaluate(
+    solid: Solid, positions: FloatArray, n_tetrahedra: int, n: int, out: FloatArray
+) -> None:
+    """Write the forces on all nodes to `out`."""
+    blocks = n_blocks(n_tetrahedra)
+    solid_forces(solid, positions, solid.every, blocks, solid.every, n)
+    for i in range(n):
+        store_point(out, i, solid_force(solid, i))
+
+
+@kernel
+def swing(
+    solid: Solid,
+    body: Body,
+    x: FloatArray,
+    load: FloatArray,
+    scratch: FloatArray,
+    h: float,
+    drag: float,
+    n_tetrahedra: int,
+    n_steps: int,
+) -> None:
+    """Take steps of the simplest kind (symplectic Euler): a test of forces needs no better."""
+    v, f = scratch[0], scratch[1]
+    n = body.counts[NODES]
+    for _ in range(n_steps):
+        evaluate(solid, x, n_tetrahedra, n, f)
+        for i in range(n):
+            if not body.fixed[i]:
+                for c in range(3):
+                    rate = (f[i, c] + load[i, c]) / body.masses[i]
+                    v[i, c] = (v[i, c] + h * rate) / (1.0 + h * drag)
+                    x[i, c] += h * v[i, c]

@@ -1,0 +1,84 @@
+"""The bound on the frequencies of a solid against eigenvalues, on meshes as cuts leave them."""
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from tests import bodies, incisions
+from tests.tissue.solids import LAWS, SolidBody, lame, law_of, solid_of
+from tissue.shapes import grid
+from tissue.solid import volume_term
+from tissue.tissue import Tissue
+from tissue.types import TetrahedralMesh
+
+pytestmark = pytest.mark.kernel
+
+KINDS = list(incisions.KINDS)
+
+
+@functools.cache
+def cut_mesh(seed: int) -> TetrahedralMesh:
+    """Return a small body after two incisions at random, at rest."""
+    whole = grid((4, 3, 3), (0.04, 0.03, 0.03)) if seed % 2 else bodies.jittered(3, seed)
+    tissue = Tissue(whole)
+    for i in range(2):
+        tissue.incise(*incisions.incision(whole, KINDS[(seed + 3 * i) % len(KINDS)], seed + i))
+    snapshot = tissue.snapshot()
+    return TetrahedralMesh(snapshot.rest_positions, snapshot.tetrahedra)
+
+
+def fastest(solid: SolidBody) -> float:
+    """Return the largest angular frequency at rest [1/s], from differences of forces."""
+    rest = solid.body.rest[: solid.body.counts[0]].copy()
+    free = np.repeat(~solid.body.fixed[: len(rest)], 3)
+    roots = np.sqrt(np.repeat(solid.body.masses[: len(rest)], 3))
+    step = 1e-6 * np.ptp(rest)
+
+    def product(u):
+        way = np.where(free, u.ravel() / roots, 0.0).reshape(-1, 3)
+        way = way / np.abs(way).max() if (longest := np.abs(way).max()) else way
+        pull = solid.forces(rest - step * way) - solid.forces(rest + step * way)
+        return np.where(free, longest * pull.ravel() / (2.0 * step) / roots, 0.0)
+
+    n = len(roots)
+    start = np.random.default_rng(0).normal(size=n)
+    operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
+    return float(np.sqrt(eigsh(operator, k=1, which="LA", v0=start, tol=1e-4)[0][0]))
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("seed", range(20))
+def test_8_the_bound_on_cut_meshes_is_above_the_fastest_mode_by_little(seed, averaged):
+    solid = solid_of(cut_mesh(seed), law_of(0.45, averaged))
+    assert 1.0 <= solid.frequency() / fastest(solid) <= 1.6
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.25, 0.49])
+@pytest.mark.parametrize("averaged", [False, True])
+def test_8_the_bound_holds_at_any_poisson_s_ratio(poisson_ratio, averaged):
+    solid = solid_of(bodies.jittered(2, 3), law_of(poisson_ratio, averaged))
+    assert 1.0 <= solid.frequency() / fastest(solid) <= 1.6
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+def test_8_the_bound_holds_for_the_volume_term_of_springs(averaged):
+    mu, lam = lame(0.45)
+    solid = solid_of(cut_mesh(1), volume_term(lam - mu, averaged=averaged))
+    assert 1.0 <= solid.frequency() / fastest(solid) <= 1.6
+
+
+def test_the_bound_holds_where_nodes_are_fixed_and_is_no_higher_for_it():
+    mesh = bodies.jittered(2, 3)
+    held, loose = (solid_of(mesh, law_of(0.45), f) for f in (bodies.sides(mesh), None))
+    assert fastest(held) <= held.frequency() <= loose.frequency()
+    assert (held.solid.frequency_squared[bodies.sides(mesh)] == 0.0).all()
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_a_body_of_half_the_size_swings_twice_as_fast(law):
+    mesh = bodies.jittered(2, 3)
+    half = mesh._replace(positions=0.5 * mesh.positions)
+    expected = 2.0 * solid_of(mesh, law).frequency()
+    assert solid_of(half, law).frequency() == pytest.approx(expected, rel=1e-9)
