@@ -14,54 +14,79 @@ momentum drifts by parts in a thousand, the order is 2 without damping along spr
 At rest all that is gone: the equilibrium is that of all nodes moved together.
 """
 
-import math
-
 import numpy as np
 
 from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body, grown
-from tissue.jit import kernel
+from tissue.elastic import Surroundings
+from tissue.jit import inlined, kernel
 from tissue.relaxation.breadth_first import N_FOUND, Rings, ring_of
-from tissue.springs import Springs
+from tissue.simd import (
+    WIDTH,
+    Lanes,
+    Point,
+    eight_points,
+    lanes,
+    load,
+    point,
+    point_of,
+    square_root,
+    store,
+    store_point,
+    summed,
+    times,
+)
+from tissue.spring_forces import NO_LENGTH
+from tissue.springs import Springs, filled
+from tissue.star import LARGEST_STAR
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, add, axpy, store, vec3
-
-STATE = 8
-"""Numbers in a row of `Trails.states`: one cache line, which is all that a neighbour costs."""
-
-
-class Trails(Arrays):
-    """How a neighbour sees each node: on a straight line since the node was moved last."""
-
-    states: FloatArray
-    """Position that the line has at the begin of the frame [m], velocity [m/s], and two spare
-    numbers; shape (capacity, STATE)."""
-    clocks: FloatArray
-    """When the node was moved last, since the begin of the frame [s]; shape (capacity,)."""
-    frames: IntArray
-    """Number of the frame that moved it last, shape (capacity,)."""
-    counts: IntArray
-    """Number of the last frame, and of the nodes that there were; shape (2,)."""
-
 
 FRAME, N_KNOWN = 0, 1
 """Places in `Trails.counts`."""
 
 
+N_SEEN = 10
+"""Numbers in `Trails.seen` for each neighbour."""
+
+LARGEST_ROW = LARGEST_STAR
+"""Neighbours of a node at most: no more than tetrahedra around it, but for few."""
+
+
+class Trails(Arrays):
+    """How a neighbour sees each node: on a straight line since the node was moved last."""
+
+    origins: FloatArray
+    """Position that the line has at the begin of the frame [m], shape (capacity, 3). Its direction
+    is the velocity of the node."""
+    clocks: FloatArray
+    """When the node was moved last, since the begin of the frame [s]; shape (capacity,)."""
+    frames: IntArray
+    """Number of the frame that moved it last, shape (capacity,)."""
+    stage: FloatArray
+    """Where the node that is being moved is, and how fast, in this stage; shape (2, 3)."""
+    seen: FloatArray
+    """What the node that is being moved sees of its neighbours, eight after eight: origins and
+    velocities of their trails, ways to them [m], and stiffness by squared length [N/m3]."""
+    counts: IntArray
+    """Number of the last frame, and of the nodes that there were; shape (2,)."""
+
+
 def new_trails(n_nodes: int) -> Trails:
     """Return trails of that many nodes."""
     return Trails(
-        states=np.zeros((n_nodes, STATE)),
+        origins=np.zeros((n_nodes, 3)),
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
+        stage=np.zeros((2, 3)),
+        seen=np.zeros(N_SEEN * LARGEST_ROW),
         counts=np.zeros(2, np.int64),
     )
 
 
 def grown_trails(trails: Trails, n_nodes: int) -> Trails:
     """Return the trails with room for that many nodes."""
-    of_nodes = ("states", "clocks", "frames")
+    of_nodes = ("origins", "clocks", "frames")
     return trails.replaced(**{name: grown(getattr(trails, name), n_nodes) for name in of_nodes})
 
 
@@ -74,9 +99,7 @@ def hierarchical_frame(
     rings: Rings,
     trails: Trails,
     external: FloatArray,
-    gravity: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
+    surroundings: Surroundings,
     toughness: float,
     dt: float,
     at: float,
@@ -95,9 +118,7 @@ def hierarchical_frame(
         rings: Searched up to `last_ring + 1`: the ring beyond the last is seen, but not moved.
         trails: Scratch.
         external: Scratch for the forces of the anchors [N], shape (capacity, 3).
-        gravity: [m/s2], shape (3,).
-        retardation_time: Damping along springs [s].
-        viscous_damping: Drag [1/s].
+        surroundings: Gravity and damping.
         toughness: [J/m2].
         dt: Length of the time step [s].
         at: Where in the time step the frame begins.
@@ -108,13 +129,11 @@ def hierarchical_frame(
             else each is moved once.
     """
     _lay_trails(body, rings, trails, last_ring, is_far_frozen)
-    damping = (retardation_time, viscous_damping, gravity)
     span = share * dt
     for j in range(1, updates + 1):
         begin = at + share * (j - 1) / updates
-        pull(
-            anchors, body, edge, body.positions, begin, share / updates, dt, toughness, external
-        )
+        seconds_share = share / updates
+        pull(anchors, body, edge, body.positions, begin, seconds_share, dt, toughness, external)
         t1 = span * j / updates
         for k in range(rings.state[N_FOUND]):
             node = rings.order[k]
@@ -122,11 +141,11 @@ def hierarchical_frame(
             # The rings come in order, so that none further out is due either.
             if ring > last_ring or j % (1 << ring) != 0:
                 break
-            _move(body, springs, trails, external, *damping, node, t1)
+            _move(body, springs, trails, external, surroundings, node, t1)
     if not is_far_frozen:
         for node in range(body.counts[NODES]):
             if not 0 <= ring_of(rings, node) <= last_ring:
-                _move(body, springs, trails, external, *damping, node, span)
+                _move(body, springs, trails, external, surroundings, node, span)
     clear_forces(anchors, body, external)
 
 
@@ -141,28 +160,22 @@ def _lay_trails(
             node = rings.order[k]
             was_frozen = node < counts[N_KNOWN] and trails.frames[node] != counts[FRAME]
             if was_frozen or rings.ring[node] > last_ring:
-                for c in range(3):
-                    body.velocities[node, c] = 0.0
-            _lay_trail(trails, node, 0.0, vec3(body.positions, node), vec3(body.velocities, node))
+                store_point(body.velocities, node, point_of(0.0, 0.0, 0.0))
             if rings.ring[node] <= last_ring:
                 trails.frames[node] = counts[FRAME] + 1
+            _lay_trail(body, trails, node, 0.0)
     else:
         for node in range(body.counts[NODES]):
-            _lay_trail(trails, node, 0.0, vec3(body.positions, node), vec3(body.velocities, node))
+            _lay_trail(body, trails, node, 0.0)
     counts[FRAME] += 1
     counts[N_KNOWN] = body.counts[NODES]
 
 
-@kernel
-def _lay_trail(trails: Trails, node: int, clock: float, x: Vec3, v: Vec3) -> None:
-    states = trails.states
+@inlined
+def _lay_trail(body: Body, trails: Trails, node: int, clock: float) -> None:
     trails.clocks[node] = clock
-    states[node, 0] = x.x - clock * v.x
-    states[node, 1] = x.y - clock * v.y
-    states[node, 2] = x.z - clock * v.z
-    states[node, 3] = v.x
-    states[node, 4] = v.y
-    states[node, 5] = v.z
+    origin = point(body.positions, node) - times(clock, point(body.velocities, node))
+    store_point(trails.origins, node, origin)
 
 
 @kernel
@@ -171,78 +184,118 @@ def _move(
     springs: Springs,
     trails: Trails,
     external: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
-    gravity: FloatArray,
+    surroundings: Surroundings,
     node: int,
     t1: float,
 ) -> None:
     """Move one node alone, from its own clock to `t1` [s] since the begin of the frame."""
     if body.fixed[node]:
-        trails.clocks[node] = t1
         return
     t0 = trails.clocks[node]
     h = t1 - t0
-    x = vec3(body.positions, node)
-    v = vec3(body.velocities, node)
+    x, v = point(body.positions, node), point(body.velocities, node)
+    time, drag = surroundings.retardation_time, surroundings.drag
     per_mass = 1.0 / body.masses[node]
-    constant = Vec3(
-        external[node, 0] * per_mass + gravity[0],
-        external[node, 1] * per_mass + gravity[1],
-        external[node, 2] * per_mass + gravity[2],
-    )
-    forces = (springs, trails, node, per_mass, constant, retardation_time, viscous_damping)
+    constant = point_of(*surroundings.gravity) + times(per_mass, point(external, node))
+    net = (springs, trails, node)
+    _look(body, *net)
 
-    a1 = _acceleration(*forces, t0, x, v)
-    middle = axpy(0.125 * h * h, a1, axpy(0.5 * h, v, x))
-    a2 = _acceleration(*forces, t0 + 0.5 * h, middle, axpy(0.5 * h, a1, v))
-    a3 = _acceleration(*forces, t0 + 0.5 * h, middle, axpy(0.5 * h, a2, v))
-    ahead = axpy(0.5 * h * h, a3, axpy(h, v, x))
-    a4 = _acceleration(*forces, t1, ahead, axpy(h, a3, v))
+    a1 = constant - times(drag, v) + times(per_mass, _force(*net, t0, x, v, time))
+    middle, v2 = x + times(0.5 * h, v) + times(0.125 * h * h, a1), v + times(0.5 * h, a1)
+    a2 = constant - times(drag, v2) + times(per_mass, _force(*net, t0 + 0.5 * h, middle, v2, time))
+    change = times(0.5 * h, a2 - a1)
+    a3 = a2 - times(drag, change)
+    if time > 0.0:
+        a3 = a3 - times(per_mass * time, _resistance(*net, change))
+    ahead, v4 = x + times(h, v) + times(0.5 * h * h, a3), v + times(h, a3)
+    a4 = constant - times(drag, v4) + times(per_mass, _force(*net, t1, ahead, v4, time))
 
-    both = add(a2, a3)
-    x = axpy(h * h / 6.0, add(a1, both), axpy(h, v, x))
-    v = axpy(h / 6.0, axpy(2.0, both, add(a1, a4)), v)
-    store(body.positions, node, x)
-    store(body.velocities, node, v)
-    _lay_trail(trails, node, t1, x, v)
+    both = a2 + a3
+    store_point(body.positions, node, x + times(h, v) + times(h * h / 6.0, a1 + both))
+    store_point(body.velocities, node, v + times(h / 6.0, a1 + both + both + a4))
+    _lay_trail(body, trails, node, t1)
 
 
-@kernel
-def _acceleration(
+@inlined
+def _look(body: Body, springs: Springs, trails: Trails, node: int) -> None:
+    """Note the trails of the neighbours of a node, eight after eight."""
+    seen = trails.seen
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        at = N_SEEN * (slot - first)
+        x, y, z = eight_points(trails.origins, springs.neighbour, slot)
+        u, v, w = eight_points(body.velocities, springs.neighbour, slot)
+        store(seen, at, x)
+        store(seen, at + WIDTH, y)
+        store(seen, at + 2 * WIDTH, z)
+        store(seen, at + 3 * WIDTH, u)
+        store(seen, at + 4 * WIDTH, v)
+        store(seen, at + 5 * WIDTH, w)
+
+
+@inlined
+def _force(
     springs: Springs,
     trails: Trails,
     node: int,
-    per_mass: float,
-    constant: Vec3,
-    retardation_time: float,
-    viscous_damping: float,
     t: float,
-    x: Vec3,
-    v: Vec3,
-) -> Vec3:
-    """Acceleration [m/s2] of a node at `x`, moving at `v`, among its neighbours at time `t`."""
-    states = trails.states
-    fx = fy = fz = 0.0
+    position: Point,
+    velocity: Point,
+    retardation_time: float,
+) -> Point:
+    """Force [N] on a node at `position`, moving at `velocity`, among its neighbours at time `t`.
+
+    Notes what `_resistance` needs.
+    """
+    seen = trails.seen
+    x, y, z, u, v, w = _everywhere(trails.stage, position, velocity)
+    clock, time, one = lanes(t), lanes(retardation_time), lanes(1.0)
+    fx = fy = fz = lanes(0.0)
     first = springs.first[node]
-    for slot in range(first, first + springs.count[node]):
-        j = springs.neighbour[slot]
-        dx = states[j, 0] + t * states[j, 3] - x.x
-        dy = states[j, 1] + t * states[j, 4] - x.y
-        dz = states[j, 2] + t * states[j, 5] - x.z
-        inverse = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
-        k = springs.stiffness[slot]
-        approach = (states[j, 3] - v.x) * dx + (states[j, 4] - v.y) * dy + (states[j, 5] - v.z) * dz
-        along = k - springs.rest_pull[slot] * inverse
-        along += retardation_time * k * approach * inverse * inverse
-        fx += along * dx
-        fy += along * dy
-        fz += along * dz
-    return Vec3(
-        fx * per_mass + constant.x - viscous_damping * v.x,
-        fy * per_mass + constant.y - viscous_damping * v.y,
-        fz * per_mass + constant.z - viscous_damping * v.z,
-    )
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        at = N_SEEN * (slot - first)
+        du, dv, dw = load(seen, at + 3 * WIDTH), load(seen, at + 4 * WIDTH), load(seen, at + 5 * WIDTH)
+        dx = load(seen, at) + clock * du - x
+        dy = load(seen, at + WIDTH) + clock * dv - y
+        dz = load(seen, at + 2 * WIDTH) + clock * dw - z
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        inverse = one / square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        stiffness = load(springs.stiffness, slot)
+        viscous = stiffness * inverse * inverse
+        along = stiffness - load(springs.rest_pull, slot) * inverse + time * approach * viscous
+        fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
+        store(seen, at + 6 * WIDTH, dx)
+        store(seen, at + 7 * WIDTH, dy)
+        store(seen, at + 8 * WIDTH, dz)
+        store(seen, at + 9 * WIDTH, viscous)
+    return summed(fx, fy, fz)
+
+
+@inlined
+def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Point:
+    """Force per retardation time [N/s] by which the dampers resist a speed of the node alone.
+
+    At the position of the last `_force`.
+    """
+    seen = trails.seen
+    u, v, w, _, _, _ = _everywhere(trails.stage, speed, speed)
+    fx = fy = fz = lanes(0.0)
+    for at in range(0, N_SEEN * filled(springs.count[node]), N_SEEN * WIDTH):
+        dx, dy, dz = load(seen, at + 6 * WIDTH), load(seen, at + 7 * WIDTH), load(seen, at + 8 * WIDTH)
+        along = load(seen, at + 9 * WIDTH) * (u * dx + v * dy + w * dz)
+        fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
+    return summed(fx, fy, fz)
+
+
+@inlined
+def _everywhere(
+    stage: FloatArray, position: Point, speed: Point
+) -> tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]:
+    """Coordinates of a position and a speed, each in all lanes."""
+    store_point(stage, 0, position)
+    store_point(stage, 1, speed)
+    x, y, z = lanes(stage[0, 0]), lanes(stage[0, 1]), lanes(stage[0, 2])
+    return x, y, z, lanes(stage[1, 0]), lanes(stage[1, 1]), lanes(stage[1, 2])
 
 
 @kernel

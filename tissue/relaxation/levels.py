@@ -1,0 +1,137 @@
+"""Which nodes take substeps, and how many: from their stiffness, and from where the blade is."""
+
+import math
+
+import numpy as np
+
+from tissue.anchors import ANCHORED, Anchors
+from tissue.body import Body
+from tissue.jit import kernel
+from tissue.relaxation.activity import AWAKE, N_LISTED, Activity, wake
+from tissue.relaxation.breadth_first import N_FOUND, add_focus, begin_search, search
+from tissue.relaxation.local_time_stepping import OVERLAP, Zone
+from tissue.springs import Springs
+from tissue.types import FloatArray
+
+SAFETY = 0.8
+"""Share of the stable step that is used: that of the Runge-Kutta method, for the same reason."""
+
+OVERSAMPLING = 1.05
+"""Substeps more than stability of the fine nodes by themselves would need: what `STABILISATION`
+costs. With fewer the step is unstable."""
+
+MOST_STEPS = 64
+"""Divisions of a time step that are considered."""
+
+COST_OF_FINE = 3.0
+"""What a substep of a fine node costs, with the neighbours that take part, in steps of others."""
+
+
+@kernel
+def plan(
+    activity: Activity,
+    frequency_squared: FloatArray,
+    highest: float,
+    n_near: int,
+    span: float,
+    retardation_time: float,
+    limits: FloatArray,
+    n_above: FloatArray,
+) -> tuple[int, int, float]:
+    """Return how many macro steps to take, in how many substeps each, and what is fine.
+
+    Of all pairs that are stable, the one that costs least. The third is the bound on w^2 [1/s2]
+    above which a node is fine.
+
+    Args:
+        activity: The nodes.
+        frequency_squared: Bound on w^2 of each [1/s2].
+        highest: The highest of them, with what anchors add [1/s2].
+        n_near: Fine nodes anyway, around the blade.
+        span: What is to be divided [s].
+        retardation_time: Damping along springs [s].
+        limits: Scratch, shape (MOST_STEPS + 1,).
+        n_above: Scratch, shape (MOST_STEPS + 1,).
+    """
+    most = 1
+    while True:
+        limits[most] = coarse_limit(span / most, retardation_time)
+        n_above[most] = 0.0
+        if limits[most] >= highest or most == MOST_STEPS:
+            break
+        most += 1
+    for k in range(activity.counts[N_LISTED]):
+        w2 = frequency_squared[activity.listed[k]]
+        n = 1
+        while n <= most and w2 > limits[n]:
+            n_above[n] += 1.0
+            n += 1
+    best, best_substeps, best_cost = most, 1, np.inf
+    for n in range(1, most + 1):
+        p = n_substeps(highest, span / n)
+        cost = n * (activity.counts[N_LISTED] + p * COST_OF_FINE * (n_near + n_above[n]))
+        if cost < best_cost:
+            best, best_substeps, best_cost = n, p, cost
+    return best, best_substeps, limits[best]
+
+
+@kernel
+def coarse_limit(h: float, retardation_time: float) -> float:
+    """Highest bound on w^2 [1/s2] that a step of `h` [s] bears where dampers lag by half a step.
+
+    The exact limit of x'' = -w^2 (x + b x') is (w h)^2 / 4 + w^2 b h / 2 = 1.
+    """
+    return SAFETY * SAFETY / (0.25 * h * h + 0.5 * retardation_time * h)
+
+
+@kernel
+def n_substeps(frequency_squared: float, h: float) -> int:
+    """Substeps of a step of `h` [s] that bear frequencies up to that, w^2 [1/s2]."""
+    return max(1, math.ceil(OVERSAMPLING * math.sqrt(frequency_squared) * h / (2.0 * SAFETY)))
+
+
+@kernel
+def find_near(
+    body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_rings: int
+) -> int:
+    """Write the nodes that anchors pull on, and `n_rings` around, to `zone.fine`; return how many.
+
+    Their order follows from the anchors and the rows alone.
+    """
+    rings = zone.rings
+    begin_search(rings)
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            for q in range(4):
+                add_focus(rings, body.tetrahedra[anchors.tetrahedron[k], q])
+    search(rings, springs, n_rings)
+    for k in range(rings.state[N_FOUND]):
+        zone.fine[k] = rings.order[k]
+    return rings.state[N_FOUND]
+
+
+@kernel
+def find_zone(
+    body: Body,
+    springs: Springs,
+    activity: Activity,
+    zone: Zone,
+    n_near: int,
+    limit: float,
+) -> None:
+    """Make the nodes near the blade, and those above the limit [1/s2], the fine ones.
+
+    They are woken. `n_near` is what `find_near` returned.
+    """
+    rings = zone.rings
+    begin_search(rings)
+    for k in range(n_near):
+        if not body.fixed[zone.fine[k]]:
+            add_focus(rings, zone.fine[k])
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] == AWAKE and springs.frequency_squared[node] > limit:
+            add_focus(rings, node)
+    for k in range(rings.state[N_FOUND]):
+        wake(activity, body, springs, rings.order[k])
+    search(rings, springs, OVERLAP)
