@@ -224,6 +224,16 @@ def _point_of(builder: Any, *coordinates: Any) -> Any:
     return made
 
 
+def spread(a: Point) -> tuple[Lanes, Lanes, Lanes]:
+    """Return x, y and z of a point, each in all lanes."""
+    return lanes(a[0]), lanes(a[1]), lanes(a[2])
+
+
+@_compiled(spread, POINT, result=_THREE)
+def _spread(builder: Any, a: Any) -> Any:
+    return _tuple_of(builder, [_shuffled(builder, a, a, [c] * WIDTH) for c in range(3)])
+
+
 def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
     """Return x, y and z of rows `of[i]` to `of[i + 7]` of an array of shape (n, 3)."""
     rows = points[of[i : i + WIDTH]]

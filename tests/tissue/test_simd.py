@@ -11,6 +11,7 @@ from tissue.simd import (
     load,
     point,
     point_of,
+    spread,
     square_root,
     store,
     store_point,
@@ -35,6 +36,21 @@ def of_points(points, of, out):
     x, y, z = eight_points(points, of, 1)
     store_point(out, 0, summed(x, y, z))
     store_point(out, 1, times(2.0, point(points, 3)) + point_of(1.0, 2.0, 3.0))
+
+
+def spread_out(points, out):
+    x, y, z = spread(point(points, 2))
+    store(out, 0, x)
+    store(out, 8, y)
+    store(out, 16, z)
+
+
+def test_a_spread_point_has_its_coordinates_in_all_lanes():
+    out, expected = np.zeros((2, 24))
+    kernel(spread_out)(POINTS, out)
+    spread_out(POINTS, expected)
+    np.testing.assert_array_equal(out, expected)
+    np.testing.assert_array_equal(out, np.repeat(POINTS[2], 8))
 
 
 def test_arithmetic_is_that_of_each_lane():

@@ -24,13 +24,13 @@ from tissue.jit import inlined, kernel
 from tissue.relaxation.breadth_first import N_FOUND, Rings, ring_of
 from tissue.simd import (
     WIDTH,
-    Lanes,
     Point,
     eight_points,
     lanes,
     load,
     point,
     point_of,
+    spread,
     square_root,
     store,
     store_point,
@@ -63,8 +63,6 @@ class Trails(Arrays):
     """When the node was moved last, since the begin of the frame [s]; shape (capacity,)."""
     frames: IntArray
     """Number of the frame that moved it last, shape (capacity,)."""
-    stage: FloatArray
-    """Where the node that is being moved is, and how fast, in this stage; shape (2, 3)."""
     seen: FloatArray
     """What the node that is being moved sees of its neighbours, eight after eight: origins and
     velocities of their trails, ways to them [m], and stiffness by squared length [N/m3]."""
@@ -78,10 +76,16 @@ def new_trails(n_nodes: int) -> Trails:
         origins=np.zeros((n_nodes, 3)),
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
-        stage=np.zeros((2, 3)),
-        seen=np.zeros(N_SEEN * LARGEST_ROW),
+        seen=_aligned(N_SEEN * LARGEST_ROW),
         counts=np.zeros(2, np.int64),
     )
+
+
+def _aligned(n: int) -> FloatArray:
+    """Return zeros that begin with a cache line: vectors across two cost twice."""
+    memory = np.zeros(n + WIDTH)
+    skip = -memory.ctypes.data // 8 % WIDTH
+    return memory[skip : skip + n]
 
 
 def grown_trails(trails: Trails, n_nodes: int) -> Trails:
@@ -248,7 +252,8 @@ def _force(
     Notes what `_resistance` needs.
     """
     seen = trails.seen
-    x, y, z, u, v, w = _everywhere(trails.stage, position, velocity)
+    x, y, z = spread(position)
+    u, v, w = spread(velocity)
     clock, time, one = lanes(t), lanes(retardation_time), lanes(1.0)
     fx = fy = fz = lanes(0.0)
     first = springs.first[node]
@@ -278,24 +283,13 @@ def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Po
     At the position of the last `_force`.
     """
     seen = trails.seen
-    u, v, w, _, _, _ = _everywhere(trails.stage, speed, speed)
+    u, v, w = spread(speed)
     fx = fy = fz = lanes(0.0)
     for at in range(0, N_SEEN * filled(springs.count[node]), N_SEEN * WIDTH):
         dx, dy, dz = load(seen, at + 6 * WIDTH), load(seen, at + 7 * WIDTH), load(seen, at + 8 * WIDTH)
         along = load(seen, at + 9 * WIDTH) * (u * dx + v * dy + w * dz)
         fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
     return summed(fx, fy, fz)
-
-
-@inlined
-def _everywhere(
-    stage: FloatArray, position: Point, speed: Point
-) -> tuple[Lanes, Lanes, Lanes, Lanes, Lanes, Lanes]:
-    """Coordinates of a position and a speed, each in all lanes."""
-    store_point(stage, 0, position)
-    store_point(stage, 1, speed)
-    x, y, z = lanes(stage[0, 0]), lanes(stage[0, 1]), lanes(stage[0, 2])
-    return x, y, z, lanes(stage[1, 0]), lanes(stage[1, 1]), lanes(stage[1, 2])
 
 
 @kernel
