@@ -16,10 +16,6 @@ from tissue.types import FloatArray
 SAFETY = 0.8
 """Share of the stable step that is used: that of the Runge-Kutta method, for the same reason."""
 
-OVERSAMPLING = 1.05
-"""Substeps more than stability of the fine nodes by themselves would need: what `STABILISATION`
-costs. With fewer the step is unstable."""
-
 MOST_STEPS = 64
 """Divisions of a time step that are considered."""
 
@@ -35,6 +31,7 @@ def plan(
     n_near: int,
     span: float,
     retardation_time: float,
+    substep_limits: FloatArray,
     limits: FloatArray,
     n_above: FloatArray,
 ) -> tuple[int, int, float]:
@@ -50,6 +47,7 @@ def plan(
         n_near: Fine nodes anyway, around the blade.
         span: What is to be divided [s].
         retardation_time: Damping along springs [s].
+        substep_limits: Of `chebyshev`.
         limits: Scratch, shape (MOST_STEPS + 1,).
         n_above: Scratch, shape (MOST_STEPS + 1,).
     """
@@ -66,9 +64,11 @@ def plan(
         while n <= most and w2 > limits[n]:
             n_above[n] += 1.0
             n += 1
-    best, best_substeps, best_cost = most, 1, np.inf
+    best, best_substeps, best_cost = most, len(substep_limits) - 1, np.inf
     for n in range(1, most + 1):
-        p = n_substeps(highest, span / n)
+        p = n_substeps(highest, span / n, substep_limits)
+        if p == len(substep_limits):
+            continue
         cost = n * (activity.counts[N_LISTED] + p * COST_OF_FINE * (n_near + n_above[n]))
         if cost < best_cost:
             best, best_substeps, best_cost = n, p, cost
@@ -85,9 +85,16 @@ def coarse_limit(h: float, retardation_time: float) -> float:
 
 
 @kernel
-def n_substeps(frequency_squared: float, h: float) -> int:
-    """Substeps of a step of `h` [s] that bear frequencies up to that, w^2 [1/s2]."""
-    return max(1, math.ceil(OVERSAMPLING * math.sqrt(frequency_squared) * h / (2.0 * SAFETY)))
+def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -> int:
+    """Substeps of a step of `h` [s] that bear frequencies up to that, w^2 [1/s2]; see `chebyshev`.
+
+    One more than there may be where that many do not suffice.
+    """
+    p = 1
+    phase = math.sqrt(frequency_squared) * h
+    while p < len(substep_limits) and phase > SAFETY * substep_limits[p]:
+        p += 1
+    return p
 
 
 @kernel

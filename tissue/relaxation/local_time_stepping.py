@@ -24,28 +24,19 @@ import math
 
 import numpy as np
 
-from tissue.anchors import ANCHORED, Anchors, Edge, clear_forces, pull
+from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
-from tissue.body import Body, grown
+from tissue.body import Body
+from tissue.elastic import Elastic, Surroundings, internal_force
 from tissue.jit import kernel
-from tissue.relaxation.activity import AWAKE, N_LISTED, Activity, wake
-from tissue.relaxation.breadth_first import (
-    N_FOUND,
-    UNREACHED,
-    Rings,
-    add_focus,
-    begin_search,
-    new_rings,
-    ring_of,
-    search,
-)
+from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
+from tissue.relaxation.breadth_first import N_FOUND, UNREACHED, Rings, new_rings, ring_of
 from tissue.relaxation.chebyshev import Chebyshev
+from tissue.simd import Point, point, point_of, store_point, times
+from tissue.spring_forces import elastic_force
 from tissue.springs import Springs
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
-
-LEAP_FROG_LIMIT = 2.0
-"""Largest stable angular frequency times step, undamped."""
+from tissue.vec3 import axpy, dot, store, sub, vec3
 
 OVERLAP = 1
 """Rings beyond the fine nodes that share a force with one: springs join neighbours."""
@@ -83,16 +74,14 @@ def new_zone(n_nodes: int) -> Zone:
 @kernel
 def macro_step(
     body: Body,
-    springs: Springs,
+    elastic: Elastic,
     anchors: Anchors,
     edge: Edge,
     activity: Activity,
     zone: Zone,
     chebyshev: Chebyshev,
     external: FloatArray,
-    gravity: FloatArray,
-    retardation_time: float,
-    viscous_damping: float,
+    surroundings: Surroundings,
     toughness: float,
     dt: float,
     at: float,
@@ -103,16 +92,14 @@ def macro_step(
 
     Args:
         body: Positions and velocities are written.
-        springs: The rows.
+        elastic: What the forces inside the body follow from.
         anchors: Pull in every substep; all nodes that they pull on should be fine.
         edge: The cutting edge over the whole time step of length `dt` [s].
         activity: Only awake nodes move.
         zone: Of `find_zone`.
         chebyshev: Coefficients for the substeps.
         external: Scratch for the forces of the anchors [N], shape (capacity, 3).
-        gravity: [m/s2], shape (3,).
-        retardation_time: Damping along springs [s].
-        viscous_damping: Drag [1/s].
+        surroundings: Gravity and damping.
         toughness: [J/m2].
         dt: Length of the time step [s].
         at: Where in the time step the macro step begins.
@@ -120,58 +107,50 @@ def macro_step(
         kick: 1, or 0.5 where the velocities are those of this instant: the first step of all.
     """
     h = share * dt
-    _accelerate_coarse(body, springs, activity, zone, gravity, retardation_time)
-    _begin_fine(body, springs, zone, gravity, retardation_time)
+    springs = elastic.springs
+    _accelerate_coarse(body, elastic, activity, zone, surroundings)
+    _begin_fine(body, springs, zone, surroundings)
     for m in range(len(chebyshev.push)):
-        seconds_share = kick * share * chebyshev.weight[m]
-        pull(
-            anchors, body, edge, body.positions, at, seconds_share, dt, toughness, external
-        )
+        part = kick * share * chebyshev.weight[m]
+        pull(anchors, body, edge, body.positions, at, part, dt, toughness, external)
         _substep(body, springs, activity, zone, chebyshev, external, h, m)
     clear_forces(anchors, body, external)
-    _kick(body, activity, zone, viscous_damping, h, kick)
-    if retardation_time > 0.0:
-        _damp_fine(body, springs, activity, zone.rings, retardation_time * h)
+    _kick(body, activity, zone, surroundings.drag, h, kick)
+    if surroundings.retardation_time > 0.0:
+        _damp_fine(body, springs, activity, zone.rings, surroundings.retardation_time * h)
     _drift(body, activity, zone, h)
 
 
 @kernel
 def _accelerate_coarse(
-    body: Body,
-    springs: Springs,
-    activity: Activity,
-    zone: Zone,
-    gravity: FloatArray,
-    retardation_time: float,
+    body: Body, elastic: Elastic, activity: Activity, zone: Zone, surroundings: Surroundings
 ) -> None:
+    gravity = point_of(*surroundings.gravity)
+    time = surroundings.retardation_time
     for k in range(activity.counts[N_LISTED]):
         node = activity.listed[k]
         if body.fixed[node] or ring_of(zone.rings, node) != UNREACHED:
             continue
-        f = axpy(
-            retardation_time,
-            _damping(springs, body, zone.rings, node),
-            _elastic(springs, body.positions, node),
-        )
-        store(zone.accelerations, node, axpy(1.0 / body.masses[node], f, Vec3(gravity[0], gravity[1], gravity[2])))
+        force = internal_force(elastic, node, body.positions, body.velocities, time)
+        store_point(zone.accelerations, node, gravity + times(1.0 / body.masses[node], force))
 
 
 @kernel
-def _begin_fine(
-    body: Body, springs: Springs, zone: Zone, gravity: FloatArray, retardation_time: float
-) -> None:
+def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surroundings) -> None:
     rings = zone.rings
+    nowhere = point_of(0.0, 0.0, 0.0)
+    time = surroundings.retardation_time
     for k in range(rings.state[N_FOUND]):
         node = rings.order[k]
-        a = Vec3(gravity[0], gravity[1], gravity[2])
+        steady = point_of(*surroundings.gravity)
         if rings.ring[node] == 0:
-            store(zone.start, node, vec3(body.positions, node))
-        else:
-            f = _damping(springs, body, rings, node)
-            a = axpy(retardation_time / body.masses[node], f, a)
-        store(zone.steady, node, a)
-        for c in range(3):
-            zone.way[node, c] = zone.way_before[node, c] = 0.0
+            store_point(zone.start, node, point(body.positions, node))
+        elif time > 0.0:
+            force = _coarse_damping(springs, body, rings, node)
+            steady = steady + times(time / body.masses[node], force)
+        store_point(zone.steady, node, steady)
+        store_point(zone.way, node, nowhere)
+        store_point(zone.way_before, node, nowhere)
 
 
 @kernel
@@ -187,45 +166,41 @@ def _substep(
 ) -> None:
     """From e_m to e_{m+1}."""
     rings, way, way_before = zone.rings, zone.way, zone.way_before
+    onward, back, push = chebyshev.onward[m], chebyshev.back[m], chebyshev.push[m] * h * h
     for k in range(rings.state[N_FOUND]):
         node = rings.order[k]
         if body.fixed[node]:
             continue
-        per_mass = 1.0 / body.masses[node]
-        f = _elastic(springs, body.positions, node)
-        r = axpy(per_mass, add(f, vec3(external, node)), vec3(zone.steady, node))
+        force = elastic_force(springs, node, body.positions) + point(external, node)
+        r = point(zone.steady, node) + times(1.0 / body.masses[node], force)
         if m == 0:
-            store(zone.accelerations, node, r)
+            store_point(zone.accelerations, node, r)
         if activity.state[node] != AWAKE:
             continue
-        e = vec3(way, node)
-        before = vec3(way_before, node)
-        store(way_before, node, e)
-        onward = axpy(-chebyshev.back[m], before, scale(chebyshev.onward[m], e))
-        store(way, node, axpy(chebyshev.push[m] * h * h, r, onward))
+        e = point(way, node)
+        moved = times(onward, e) - times(back, point(way_before, node)) + times(push, r)
+        store_point(way_before, node, e)
+        store_point(way, node, moved)
     # Only now: until here the nodes saw each other at e_m.
     for k in range(rings.state[N_FOUND]):
         node = rings.order[k]
         if rings.ring[node] > 0:
             break
-        store(body.positions, node, add(vec3(zone.start, node), vec3(way, node)))
+        store_point(body.positions, node, point(zone.start, node) + point(way, node))
 
 
 @kernel
-def _kick(
-    body: Body, activity: Activity, zone: Zone, viscous_damping: float, h: float, kick: float
-) -> None:
-    half = math.exp(-0.5 * viscous_damping * h)
+def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kick: float) -> None:
+    half = math.exp(-0.5 * drag * h)
     for k in range(activity.counts[N_LISTED]):
         node = activity.listed[k]
         if activity.state[node] != AWAKE:
             continue
-        if ring_of(zone.rings, node) == UNREACHED:
-            gain = scale(kick * h, vec3(zone.accelerations, node))
-        else:
-            gain = scale(2.0 * kick / h, vec3(zone.way, node))
-        v = axpy(half, vec3(body.velocities, node), gain)
-        store(body.velocities, node, scale(half, v))
+        gain = times(kick * h, point(zone.accelerations, node))
+        if ring_of(zone.rings, node) != UNREACHED:
+            gain = times(2.0 * kick / h, point(zone.way, node))
+        v = times(half * half, point(body.velocities, node)) + times(half, gain)
+        store_point(body.velocities, node, v)
 
 
 @kernel
@@ -247,9 +222,9 @@ def _damp_fine(
             inverse_b = 1.0 / body.masses[b] if is_free else 0.0
             d = sub(vec3(x, b), vec3(x, a))
             inverse = inverse_a + inverse_b
-            decay = -math.expm1(-seconds * springs.stiffness[slot] * inverse)
+            taken = -math.expm1(-seconds * springs.stiffness[slot] * inverse)
             approach = dot(sub(vec3(v, b), vec3(v, a)), d)
-            impulse = decay * approach / (inverse * dot(d, d))
+            impulse = taken * approach / (inverse * dot(d, d))
             store(v, a, axpy(impulse * inverse_a, d, vec3(v, a)))
             if is_free:
                 store(v, b, axpy(-impulse * inverse_b, d, vec3(v, b)))
@@ -261,28 +236,13 @@ def _drift(body: Body, activity: Activity, zone: Zone, h: float) -> None:
         node = activity.listed[k]
         if activity.state[node] == AWAKE:
             is_fine = ring_of(zone.rings, node) == 0
-            x = vec3(zone.start, node) if is_fine else vec3(body.positions, node)
-            store(body.positions, node, axpy(h, vec3(body.velocities, node), x))
+            x = point(zone.start, node) if is_fine else point(body.positions, node)
+            store_point(body.positions, node, x + times(h, point(body.velocities, node)))
 
 
 @kernel
-def _elastic(springs: Springs, positions: FloatArray, node: int) -> Vec3:
-    """Pull of the springs on a node [N]."""
-    here = vec3(positions, node)
-    fx = fy = fz = 0.0
-    first = springs.first[node]
-    for slot in range(first, first + springs.count[node]):
-        d = sub(vec3(positions, springs.neighbour[slot]), here)
-        along = springs.stiffness[slot] - springs.rest_pull[slot] / math.sqrt(dot(d, d))
-        fx += along * d.x
-        fy += along * d.y
-        fz += along * d.z
-    return Vec3(fx, fy, fz)
-
-
-@kernel
-def _damping(springs: Springs, body: Body, rings: Rings, node: int) -> Vec3:
-    """Pull of the dampers on a node that is not fine, per retardation time [N/s]; see above."""
+def _coarse_damping(springs: Springs, body: Body, rings: Rings, node: int) -> Point:
+    """Force per retardation time [N/s] of the dampers to nodes that are not fine."""
     x, v = body.positions, body.velocities
     here, speed = vec3(x, node), vec3(v, node)
     fx = fy = fz = 0.0
@@ -296,4 +256,4 @@ def _damping(springs: Springs, body: Body, rings: Rings, node: int) -> Vec3:
         fx += along * d.x
         fy += along * d.y
         fz += along * d.z
-    return Vec3(fx, fy, fz)
+    return point_of(fx, fy, fz)
