@@ -27,7 +27,7 @@ from tissue.contact.point_triangle import Corners, is_within, point_triangle, un
 from tissue.geometry import Weights, tetrahedron_volume
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, add, dot, scale, vec3
+from tissue.vec3 import Vec3, add, dot, scale, store, vec3
 
 PASSES = 2
 """Times that positions are corrected and looked at again: a correction can push a node into a
@@ -83,8 +83,21 @@ def prepare(contact: ContactState, body: Body) -> None:
     """Before a Runge-Kutta step: note where the nodes are, and press what is pressed."""
     press(contact.contacts, body, contact.tangled, contact.state[EPOCH])
     for i in range(body.counts[NODES]):
-        for x in range(3):
-            contact.start[i, x] = body.positions[i, x]
+        store(contact.start, i, vec3(body.positions, i))
+
+
+@kernel
+def prepare_listed(contact: ContactState, body: Body, nodes: IntArray, n: int) -> None:
+    """`prepare` where only the first `n` of `nodes` have moved since the last step."""
+    press(contact.contacts, body, contact.tangled, contact.state[EPOCH])
+    note_positions(contact, body, nodes, n)
+
+
+@kernel
+def note_positions(contact: ContactState, body: Body, nodes: IntArray, n: int) -> None:
+    """Note where the first `n` of `nodes` are."""
+    for i in range(n):
+        store(contact.start, nodes[i], vec3(body.positions, nodes[i]))
 
 
 @kernel

@@ -14,6 +14,7 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body, grown
+from tissue.contact.impulses import Contacts
 from tissue.jit import kernel
 from tissue.relaxation.breadth_first import UNREACHED, Rings, ring_of
 from tissue.springs import Springs
@@ -120,6 +121,14 @@ def wake_pulled(
             a = vec3(accelerations, node)
             if dot(a, a) > WAKE_ACCELERATION * WAKE_ACCELERATION:
                 wake(activity, body, springs, node)
+
+
+@kernel
+def wake_touching(activity: Activity, body: Body, springs: Springs, contacts: Contacts) -> None:
+    """Wake every node that touches something."""
+    for k in range(contacts.count[0]):
+        for q in range(4):
+            wake(activity, body, springs, contacts.node[k, q])
 
 
 @kernel

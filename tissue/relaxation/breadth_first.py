@@ -3,6 +3,7 @@
 import numpy as np
 
 from tissue.arrays import Arrays
+from tissue.body import grown
 from tissue.jit import kernel
 from tissue.springs import Springs
 from tissue.types import IntArray
@@ -37,6 +38,12 @@ def new_rings(n_nodes: int) -> Rings:
     )
 
 
+def grown_rings(rings: Rings, n_nodes: int) -> Rings:
+    """Return the rings with room for that many nodes."""
+    of_nodes = ("order", "ring", "seen")
+    return rings.replaced(**{name: grown(getattr(rings, name), n_nodes) for name in of_nodes})
+
+
 @kernel
 def begin_search(rings: Rings) -> None:
     """Forget what was found."""
@@ -66,6 +73,15 @@ def search(rings: Rings, springs: Springs, last_ring: int) -> None:
             other = springs.neighbour[slot]
             if rings.seen[other] != rings.state[EPOCH]:
                 _take(rings, other, ring)
+
+
+@kernel
+def search_around(rings: Rings, focus: Rings, springs: Springs, last_ring: int) -> None:
+    """Find the rings around all nodes of `focus`."""
+    begin_search(rings)
+    for k in range(focus.state[N_FOUND]):
+        add_focus(rings, focus.order[k])
+    search(rings, springs, last_ring)
 
 
 @kernel

@@ -4,14 +4,15 @@ import math
 
 import numpy as np
 
-from tissue.anchors import ANCHORED, Anchors
+from tissue.anchors import Anchors
 from tissue.body import Body
 from tissue.jit import kernel
-from tissue.relaxation.activity import AWAKE, N_LISTED, Activity, wake
+from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
 from tissue.relaxation.breadth_first import N_FOUND, add_focus, begin_search, search
+from tissue.relaxation.focus import find_focus
 from tissue.relaxation.local_time_stepping import OVERLAP, Zone
 from tissue.springs import Springs
-from tissue.types import FloatArray
+from tissue.types import BoolArray, FloatArray
 
 SAFETY = 0.8
 """Share of the stable step that is used: that of the Runge-Kutta method, for the same reason."""
@@ -26,6 +27,7 @@ COST_OF_FINE = 3.0
 @kernel
 def plan(
     activity: Activity,
+    fixed: BoolArray,
     frequency_squared: FloatArray,
     highest: float,
     n_near: int,
@@ -42,8 +44,9 @@ def plan(
 
     Args:
         activity: The nodes.
+        fixed: Which nodes do not move.
         frequency_squared: Bound on w^2 of each [1/s2].
-        highest: The highest of them, with what anchors add [1/s2].
+        highest: Bound on w^2 of those that anchors pull on, with what they add [1/s2].
         n_near: Fine nodes anyway, around the blade.
         span: What is to be divided [s].
         retardation_time: Damping along springs [s].
@@ -51,6 +54,9 @@ def plan(
         limits: Scratch, shape (MOST_STEPS + 1,).
         n_above: Scratch, shape (MOST_STEPS + 1,).
     """
+    for k in range(activity.counts[N_LISTED]):
+        if not fixed[activity.listed[k]]:
+            highest = max(highest, frequency_squared[activity.listed[k]])
     most = 1
     while True:
         limits[most] = coarse_limit(span / most, retardation_time)
@@ -59,7 +65,8 @@ def plan(
             break
         most += 1
     for k in range(activity.counts[N_LISTED]):
-        w2 = frequency_squared[activity.listed[k]]
+        node = activity.listed[k]
+        w2 = 0.0 if fixed[node] else frequency_squared[node]
         n = 1
         while n <= most and w2 > limits[n]:
             n_above[n] += 1.0
@@ -98,29 +105,28 @@ def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -
 
 
 @kernel
-def find_near(
-    body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_rings: int
-) -> int:
+def find_near(body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_rings: int) -> int:
     """Write the nodes that anchors pull on, and `n_rings` around, to `zone.fine`; return how many.
 
-    Their order follows from the anchors and the rows alone.
+    Only those that can move.
     """
     rings = zone.rings
-    begin_search(rings)
-    for k in range(len(anchors.state)):
-        if anchors.state[k] == ANCHORED:
-            for q in range(4):
-                add_focus(rings, body.tetrahedra[anchors.tetrahedron[k], q])
+    if not find_focus(rings, body, anchors):
+        return 0
     search(rings, springs, n_rings)
+    n = 0
     for k in range(rings.state[N_FOUND]):
-        zone.fine[k] = rings.order[k]
-    return rings.state[N_FOUND]
+        if not body.fixed[rings.order[k]]:
+            zone.fine[n] = rings.order[k]
+            n += 1
+    return n
 
 
 @kernel
 def find_zone(
     body: Body,
     springs: Springs,
+    frequency_squared: FloatArray,
     activity: Activity,
     zone: Zone,
     n_near: int,
@@ -128,17 +134,14 @@ def find_zone(
 ) -> None:
     """Make the nodes near the blade, and those above the limit [1/s2], the fine ones.
 
-    They are woken. `n_near` is what `find_near` returned.
+    `n_near` is what `find_near` returned; those are awake.
     """
     rings = zone.rings
     begin_search(rings)
     for k in range(n_near):
-        if not body.fixed[zone.fine[k]]:
-            add_focus(rings, zone.fine[k])
+        add_focus(rings, zone.fine[k])
     for k in range(activity.counts[N_LISTED]):
         node = activity.listed[k]
-        if activity.state[node] == AWAKE and springs.frequency_squared[node] > limit:
+        if activity.state[node] == AWAKE and frequency_squared[node] > limit:
             add_focus(rings, node)
-    for k in range(rings.state[N_FOUND]):
-        wake(activity, body, springs, rings.order[k])
     search(rings, springs, OVERLAP)

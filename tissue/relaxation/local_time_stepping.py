@@ -26,11 +26,18 @@ import numpy as np
 
 from tissue.anchors import Anchors, Edge, clear_forces, pull
 from tissue.arrays import Arrays
-from tissue.body import Body
+from tissue.body import Body, grown
 from tissue.elastic import Elastic, Surroundings, internal_force
 from tissue.jit import kernel
 from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
-from tissue.relaxation.breadth_first import N_FOUND, UNREACHED, Rings, new_rings, ring_of
+from tissue.relaxation.breadth_first import (
+    N_FOUND,
+    UNREACHED,
+    Rings,
+    grown_rings,
+    new_rings,
+    ring_of,
+)
 from tissue.relaxation.chebyshev import Chebyshev
 from tissue.simd import Point, point, point_of, store_point, times
 from tissue.spring_forces import elastic_force
@@ -69,6 +76,13 @@ def new_zone(n_nodes: int) -> Zone:
         fine=np.zeros(n_nodes, np.int64),
         **{name: np.zeros((n_nodes, 3)) for name in of_nodes},
     )
+
+
+def grown_zone(zone: Zone, n_nodes: int) -> Zone:
+    """Return the zone with room for that many nodes."""
+    of_nodes = ("fine", "start", "way", "way_before", "steady", "accelerations")
+    larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
+    return zone.replaced(rings=grown_rings(zone.rings, n_nodes), **larger)
 
 
 @kernel

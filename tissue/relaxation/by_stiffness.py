@@ -1,0 +1,154 @@
+"""`ByStiffness`: owns the arrays of local time stepping, and which nodes are awake."""
+
+import numpy as np
+
+from tissue.anchors import frequency_with_anchors
+from tissue.body import Body
+from tissue.contact.resolve import note_positions, prepare, prepare_listed
+from tissue.elasticity import Elasticity
+from tissue.relaxation.activity import (
+    N_LISTED,
+    all_asleep,
+    doze,
+    grown_activity,
+    wake_all,
+    wake_each,
+    wake_pulled,
+    wake_touching,
+)
+from tissue.relaxation.chebyshev import chebyshev, substep_limits
+from tissue.relaxation.levels import MOST_STEPS, find_near, find_zone, plan
+from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zone
+from tissue.relaxation.motion import Motion, end_step
+from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
+from tissue.relaxation.options import LocalTimeStepping
+from tissue.types import FloatArray, IntArray
+
+
+class ByStiffness:
+    """Local time stepping; see `tissue.relaxation.motion.Relaxation`.
+
+    Args:
+        options: Its settings.
+        body: All its nodes are awake at first.
+        elasticity: What its forces follow from.
+    """
+
+    def __init__(self, options: LocalTimeStepping, body: Body, elasticity: Elasticity) -> None:
+        self._options = options
+        n_nodes = len(body.rest)
+        self._activity = all_asleep(n_nodes)
+        self._zone = new_zone(n_nodes)
+        self._moved = none_moved(n_nodes)
+        self._substep_limits = substep_limits(options.stabilisation)
+        self._limits, self._n_above = np.zeros((2, MOST_STEPS + 1))
+        self._starts = True
+        self._is_prepared = False
+        self.body_moved(body, elasticity)
+
+    @property
+    def moved(self) -> Moved:
+        """Nodes that moved since it was emptied."""
+        return self._moved
+
+    @property
+    def n_awake(self) -> int:
+        """Nodes that are awake, or watched beside one that is."""
+        return int(self._activity.counts[N_LISTED])
+
+    @property
+    def momentum_given_up(self) -> FloatArray:
+        """Sum of the momenta that nodes had when they fell asleep [kg m/s], shape (3,)."""
+        return self._activity.given_up.copy()
+
+    def relax(self, motion: Motion) -> int:
+        """Advance the motion; return how many steps the finest nodes took."""
+        body, activity, zone = motion.body, self._activity, self._zone
+        elastic, contact = motion.elasticity.arrays, motion.contact
+        n, p = self._divide(motion)
+        share = (motion.end - motion.begin) / n
+        coefficients = chebyshev(p, self._options.stabilisation)
+        for i in range(n):
+            at = motion.begin + i * share
+            self._prepare(motion)
+            macro_step(
+                body,
+                elastic,
+                motion.anchors,
+                motion.edge,
+                activity,
+                zone,
+                coefficients,
+                motion.stages.external,
+                motion.surroundings,
+                motion.toughness,
+                motion.dt,
+                at,
+                share,
+                0.5 if self._starts else 1.0,
+            )
+            self._starts = False
+            end_step(motion, share * motion.dt, at + share)
+            wake_pulled(activity, body, elastic.springs, zone.accelerations)
+            if contact.is_awake:
+                wake_touching(activity, body, elastic.springs, contact.arrays.contacts)
+        note_moved(self._moved, activity.listed, self.n_awake)
+        if self._options.sleep:
+            if contact.is_awake:
+                note_positions(contact.arrays, body, activity.listed, self.n_awake)
+            doze(
+                activity, body, elastic.springs, zone.accelerations, zone.rings, motion.span
+            )
+        return n * p
+
+    def _divide(self, motion: Motion) -> tuple[int, int]:
+        """Find the fine nodes; return the macro steps to take, and the substeps of each."""
+        body, activity, zone = motion.body, self._activity, self._zone
+        springs, anchors = motion.elasticity.arrays.springs, motion.anchors
+        by_node = motion.elasticity.node_frequency_squared
+        n_near = find_near(body, springs, anchors, zone, self._options.rings)
+        wake_each(activity, body, springs, zone.fine, n_near)
+        highest = frequency_with_anchors(anchors, body, by_node, motion.stages.external)
+        n, p, limit = plan(
+            activity,
+            body.fixed,
+            by_node,
+            highest,
+            n_near,
+            motion.span,
+            motion.surroundings.retardation_time,
+            self._substep_limits,
+            self._limits,
+            self._n_above,
+        )
+        find_zone(body, springs, by_node, activity, zone, n_near, limit)
+        return n, p
+
+    def _prepare(self, motion: Motion) -> None:
+        """Let contact note where the nodes are before the step."""
+        contact, body, activity = motion.contact, motion.body, self._activity
+        if not contact.is_awake:
+            self._is_prepared = False
+        elif self._is_prepared:  # those that sleep are where they were
+            prepare_listed(contact.arrays, body, activity.listed, self.n_awake)
+        else:
+            prepare(contact.arrays, body)
+            self._is_prepared = True
+
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
+        """Wake the first `n` of `nodes`."""
+        wake_each(self._activity, body, elasticity.arrays.springs, nodes, n)
+        note_moved(self._moved, nodes, n)
+
+    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
+        """Wake every node."""
+        wake_all(self._activity, body, elasticity.arrays.springs)
+        note_moved(self._moved, self._activity.listed, self.n_awake)
+        self._starts = True
+        self._is_prepared = False
+
+    def grow(self, n_nodes: int) -> None:
+        """Make room for that many nodes."""
+        self._activity = grown_activity(self._activity, n_nodes)
+        self._zone = grown_zone(self._zone, n_nodes)
+        self._moved = grown_moved(self._moved, n_nodes)

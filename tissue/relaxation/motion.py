@@ -1,0 +1,87 @@
+"""What advancing the motion needs, whichever way it is done, and what is done around each step."""
+
+from typing import NamedTuple, Protocol
+
+from tissue.anchors import Anchors, Edge, clear_forces
+from tissue.body import Body
+from tissue.contact.resolve import resolve
+from tissue.contact.self_contact import SelfContact
+from tissue.elastic import Surroundings
+from tissue.elasticity import Elasticity
+from tissue.relaxation.moved import Moved
+from tissue.runge_kutta import Stages
+from tissue.slipping import slip
+from tissue.star import Visits
+from tissue.types import IntArray
+
+
+class Motion(NamedTuple):
+    """A part of a time step, and all that takes part."""
+
+    body: Body
+    elasticity: Elasticity
+    contact: SelfContact
+    anchors: Anchors
+    edge: Edge
+    visits: Visits
+    stages: Stages
+    queue: IntArray
+    """Scratch for searches, shape (LARGEST_STAR,)."""
+    surroundings: Surroundings
+    toughness: float
+    """[J/m2]."""
+    reach: float
+    """See `slip` [m]."""
+    dt: float
+    """Length of the whole time step [s], which the edge's motion is over."""
+    begin: float
+    """Fraction of the time step at which to begin."""
+    end: float
+    """Fraction at which to end."""
+
+    @property
+    def span(self) -> float:
+        """What is to be advanced [s]."""
+        return self.dt * (self.end - self.begin)
+
+
+class Relaxation(Protocol):
+    """A way to advance the motion. It owns what it remembers from step to step."""
+
+    @property
+    def moved(self) -> Moved | None:
+        """Nodes that moved since it was emptied; None where all do."""
+        ...
+
+    def relax(self, motion: Motion) -> int:
+        """Advance the motion; return how many steps the finest nodes took."""
+        ...
+
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
+        """Take note that the mesh around the first `n` of `nodes` changed."""
+        ...
+
+    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
+        """Take note that every node moved by other means, and is at rest."""
+        ...
+
+    def grow(self, n_nodes: int) -> None:
+        """Make room for that many nodes."""
+        ...
+
+
+def end_step(motion: Motion, seconds: float, when: float) -> None:
+    """After a step: set right what went through what, and let the anchors slip.
+
+    Args:
+        motion: What takes part.
+        seconds: Length of the step [s].
+        when: Its end, as a fraction of the time step.
+    """
+    contact, body, anchors = motion.contact, motion.body, motion.anchors
+    if contact.is_awake:
+        while not resolve(contact.arrays, body, seconds):
+            contact.make_room()
+    clear_forces(anchors, body, motion.stages.external)  # before anchors go to other nodes
+    toughness, reach = motion.toughness, motion.reach
+    slip(anchors, body, motion.visits, motion.edge, when, toughness, reach, motion.queue)
