@@ -1,12 +1,14 @@
 """Where the body is."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from tissue.body import NODES, Body
-from tissue.jit import kernel
-from tissue.vec3 import Vec3
+from tissue.jit import inlined, kernel
+from tissue.types import IntArray
+from tissue.vec3 import Vec3, vec3
 
 
 class Survey(NamedTuple):
@@ -15,28 +17,37 @@ class Survey(NamedTuple):
     low: Vec3
     """Lowest corner of the body [m]."""
     high: Vec3
-    """Highest corner [m]; not finite where the motion became unstable."""
+    """Highest corner [m]."""
     is_finite: bool
-    """Whether all positions are."""
+    """Whether all positions are; where one is not, the motion became unstable."""
 
 
 @kernel
 def survey(body: Body) -> Survey:
     """Look at all nodes."""
+    box = Survey(Vec3(np.inf, np.inf, np.inf), Vec3(-np.inf, -np.inf, -np.inf), True)
     x = body.positions
-    n = body.counts[NODES]
-    low_x = low_y = low_z = np.inf
-    high_x = high_y = high_z = -np.inf
-    total = 0.0
+    for node in range(body.counts[NODES]):
+        box = _with(box, vec3(x, node))
+    return box
+
+
+@kernel
+def survey_of(body: Body, nodes: IntArray, n: int, before: Survey) -> Survey:
+    """Look at the first `n` of `nodes`, which are all that moved since the survey `before`.
+
+    The box may be larger than the body: what moved inwards may have left its corner.
+    """
+    now = before
     for i in range(n):
-        low_x = min(low_x, x[i, 0])
-        low_y = min(low_y, x[i, 1])
-        low_z = min(low_z, x[i, 2])
-        high_x = max(high_x, x[i, 0])
-        high_y = max(high_y, x[i, 1])
-        high_z = max(high_z, x[i, 2])
-        total += x[i, 0] + x[i, 1] + x[i, 2]
-    is_finite = np.isfinite(total)
-    if not is_finite:  # a comparison with nan is false: min and max would overlook it
-        high_x = total
-    return Survey(Vec3(low_x, low_y, low_z), Vec3(high_x, high_y, high_z), is_finite)
+        now = _with(now, vec3(body.positions, nodes[i]))
+    return now
+
+
+@inlined
+def _with(box: Survey, p: Vec3) -> Survey:
+    low = Vec3(min(box.low.x, p.x), min(box.low.y, p.y), min(box.low.z, p.z))
+    high = Vec3(max(box.high.x, p.x), max(box.high.y, p.y), max(box.high.z, p.z))
+    # A comparison with nan is false: min and max would overlook it.
+    is_finite = box.is_finite and math.isfinite(p.x + p.y + p.z)
+    return Survey(low, high, is_finite)

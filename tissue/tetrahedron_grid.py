@@ -3,7 +3,7 @@
 Each tetrahedron is listed in the cells that its box meets, widened by a margin. Where a node has
 gone further than the margin, the tetrahedra around it are listed again where they are now: what is
 listed in vain costs a look, never a wrong answer. So the cost of a step is that of the nodes that
-went far, and of one pass over all nodes to find them.
+went far, and of one pass over those that moved to find them.
 """
 
 import numpy as np
@@ -114,14 +114,18 @@ def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> b
 
 
 @kernel
-def list_moved(body: Body, visits: Visits, grid: TetrahedronGrid, around: IntArray) -> bool:
+def list_moved(
+    body: Body, visits: Visits, grid: TetrahedronGrid, nodes: IntArray, n_nodes: int, around: IntArray
+) -> bool:
     """List the tetrahedra around nodes that went far again; return whether there was room.
 
-    `around` is scratch of shape (LARGEST_STAR,).
+    The first `n_nodes` of `nodes` are all that moved since the last call. `around` is scratch of
+    shape (LARGEST_STAR,).
     """
     x = body.positions
     limit = grid.margin * grid.margin
-    for node in range(body.counts[NODES]):
+    for i in range(n_nodes):
+        node = nodes[i]
         dx = x[node, 0] - grid.listed_at[node, 0]
         dy = x[node, 1] - grid.listed_at[node, 1]
         dz = x[node, 2] - grid.listed_at[node, 2]
@@ -130,8 +134,8 @@ def list_moved(body: Body, visits: Visits, grid: TetrahedronGrid, around: IntArr
         for c in range(3):
             grid.listed_at[node, c] = x[node, c]
         n = star(body, visits, node, body.node_tetrahedron[node], around)
-        for i in range(n):
-            if not _list_tetrahedron(body, x, grid, around[i]):
+        for k in range(n):
+            if not _list_tetrahedron(body, x, grid, around[k]):
                 return False
     return True
 

@@ -19,7 +19,6 @@ from tissue.anchors import (
     Edge,
     anchored_length,
     clear_forces,
-    frequency_with_anchors,
     is_engaged,
     new_anchors,
 )
@@ -44,16 +43,19 @@ from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.quality import CutQuality, Measures, QualityReport
-from tissue.runge_kutta import SAFETY, accelerations, largest_stable_step, new_stages, relax
+from tissue.relaxation.all_together import AllTogether
+from tissue.relaxation.motion import Motion, Relaxation
+from tissue.relaxation.moved import N_MOVED, forget_moved
+from tissue.relaxation.options import Hierarchical, LocalTimeStepping, Relaxing, checked_relaxation
+from tissue.runge_kutta import SAFETY, accelerations, largest_stable_step, new_stages
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
 from tissue.snapping import EXPLAINED
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
-from tissue.survey import survey
+from tissue.survey import Survey, survey, survey_of
 from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
-from tissue.threads import Threads
 from tissue.touched import touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -143,6 +145,9 @@ class Tissue:
         threads: How many threads share the loops over the body. The result is the same to the
             last bit; more than one pays from about 20,000 tetrahedra on, and only where no other
             program needs the cores.
+        relaxation: How the motion is advanced: "global", all nodes together; "local", small
+            elements in substeps and what rests asleep; "hierarchical", the paper's; or
+            `LocalTimeStepping` or `Hierarchical` with settings (`tissue.relaxation.options`).
 
     Raises:
         MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
@@ -161,12 +166,14 @@ class Tissue:
         quality: CutQuality | None = None,
         scheme: str = "stellar",
         threads: int = 1,
+        relaxation: str | Relaxing = "global",
     ) -> None:
         expect_sound(mesh)
         checked_scheme(scheme)
         checked_threads(threads)
-        self._relax_on: Callable[..., int] = relax if threads == 1 else Threads(threads).relax
+        self._all_together = AllTogether(threads)
         self.material = material or Material()
+        relaxing = checked_relaxation(relaxation, self.material)
         self._surroundings = Surroundings(
             checked_gravity(gravity),
             self.material.viscous_damping,
@@ -217,6 +224,9 @@ class Tissue:
         self._contact = SelfContact(self._body, self.node_size, self.material.friction, floor)
         self._guard = 0.0 if scheme == "paper" else quality.guard * self.node_size
         self._at_first = self._measures()
+        self._relaxation = self._relaxation_of(relaxing)
+        self._every = np.arange(len(self._body.rest))
+        self._box = survey(self._body)
         self._grow()
 
     @property
@@ -324,9 +334,14 @@ class Tissue:
         """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
 
         Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
-        has passed a peak.
+        has passed a peak. All nodes are moved together, whatever the relaxation.
         """
-        anchors = self._anchors_of(None)
+        n_steps = self._settle(self._anchors_of(None))
+        self._relaxation.body_moved(self._body, self._elasticity)
+        self._box = survey(self._body)
+        return n_steps
+
+    def _settle(self, anchors: Anchors) -> int:
         n_each = 4
         step = self._stable_step(self._elasticity.frequency_squared)
         energy = 0.0
@@ -334,7 +349,8 @@ class Tissue:
             n = self.n_nodes
             velocities = self._body.velocities[:n]
             velocities_t0 = velocities.copy()
-            self._relax_by(anchors, NOWHERE, n_each * step, 0.0, 1.0, n_each)
+            motion = self._motion(anchors, NOWHERE, n_each * step, 0.0, 1.0)
+            self._all_together.relax_by(motion, n_each)
             if self._contact.is_awake:  # what holds a body on the floor is not in its forces
                 largest = np.abs(velocities - velocities_t0).max() / (n_each * step)
             else:
@@ -401,49 +417,52 @@ class Tissue:
     # stages of a step
 
     def _relax(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> int:
-        """Advance the motion over a part of the step; return the Runge-Kutta steps taken."""
-        frequency_squared = max(
-            self._elasticity.frequency_squared,
-            frequency_with_anchors(
-                anchors,
-                self._body,
-                self._elasticity.arrays.frequency_squared,
-                self._stages.external,
-            ),
-        )
-        span = dt * (end - begin)
-        if span == 0.0:
+        """Advance the motion over a part of the step; return the steps that it took."""
+        motion = self._motion(anchors, edge, dt, begin, end)
+        if motion.span == 0.0:
             return 0
-        n = max(1, math.ceil(span / self._stable_step(frequency_squared)))
-        self._relax_by(anchors, edge, dt, begin, end, n)
+        n = self._relaxation.relax(motion)
+        self._box = self._survey()
         return n
 
-    def _relax_by(
-        self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float, n: int
-    ) -> None:
-        done = 0
-        while True:
-            done = self._relax_on(
-                self._body,
-                self._elasticity.arrays,
-                anchors,
-                edge,
-                self._visits,
-                self._stages,
-                self._contact.arrays,
-                self._around,
-                self._surroundings,
-                self.material.toughness,
-                self.node_size,
-                dt,
-                begin,
-                end,
-                done,
-                n,
-            )
-            if done == n:
-                return
-            self._contact.make_room()
+    def _motion(
+        self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float
+    ) -> Motion:
+        return Motion(
+            body=self._body,
+            elasticity=self._elasticity,
+            contact=self._contact,
+            anchors=anchors,
+            edge=edge,
+            visits=self._visits,
+            stages=self._stages,
+            queue=self._around,
+            surroundings=self._surroundings,
+            toughness=self.material.toughness,
+            reach=self.node_size,
+            dt=dt,
+            begin=begin,
+            end=end,
+        )
+
+    def _relaxation_of(self, relaxing: Relaxing) -> Relaxation:
+        """Return what relaxes the body. Imported late: kernels that are not used cost no start."""
+        if isinstance(relaxing, Hierarchical):
+            from tissue.relaxation.by_rings import ByRings
+
+            return ByRings(relaxing, len(self._body.rest))
+        if isinstance(relaxing, LocalTimeStepping):
+            from tissue.relaxation.by_stiffness import ByStiffness
+
+            return ByStiffness(relaxing, self._body, self._elasticity)
+        return self._all_together
+
+    def _survey(self) -> Survey:
+        """Return where the body is, from what may have moved since the last survey."""
+        moving = self._relaxation.moving
+        if moving is None or 2 * moving[1] > self.n_nodes:
+            return survey(self._body)
+        return survey_of(self._body, *moving, self._box)
 
     def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
@@ -463,14 +482,20 @@ class Tissue:
         """Anchor the samples that have come into the tissue by themselves."""
         body = self._body
         if not self._incising:
-            low, high, is_finite = survey(body)
+            low, high, is_finite = self._box
             if not (is_finite and near_box(anchors, edge, when, low, high)):
                 return
+        moved = self._relaxation.moved
+        nodes, n = self._every, self.n_nodes
+        if moved is not None:
+            nodes, n = moved.nodes, int(moved.state[N_MOVED])
         has_room = (
             len(self._grid.listed_at) == len(body.positions)
-            and list_moved(body, self._visits, self._grid, self._around)
+            and list_moved(body, self._visits, self._grid, nodes, n, self._around)
             and list_appended(body, body.positions, self._grid)
         )
+        if moved is not None:
+            forget_moved(moved)
         if not has_room:
             self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
         meet(anchors, body, self._grid, edge, when, EXPLAINED * self._snap_floor)
@@ -510,6 +535,7 @@ class Tissue:
                 self._elasticity.mesh_changed(self._body, self._visits, change, self._nodes, n)
                 relocate(self._anchors, self._body, self._visits, self._around)
                 self._contact.mesh_changed(self._body, change)
+                self._relaxation.mesh_changed(self._body, self._elasticity, self._nodes, n)
             full = bool(change.counts[FULL])
             self._grow()
             if not full:
@@ -590,11 +616,11 @@ class Tissue:
         n_substeps: int,
         profile: Profile,
     ) -> StepResult:
-        bounds = self.bounds
-        if not np.isfinite(bounds).all():
+        low, high, is_finite = self._box
+        if not is_finite:
             raise TissueError(
-                f"the motion of the tissue became unstable: a node is at {bounds.tolist()} m. "
-                "Use a shorter time step, or a material that is softer or heavier"
+                "the motion of the tissue became unstable: the position of a node is no finite "
+                "number. Use a shorter time step, or a material that is softer or heavier"
             )
         totals = anchors.totals
         point = np.zeros(3) if sweep is None else np.array(edge.tip_t1)
@@ -604,7 +630,7 @@ class Tissue:
         return StepResult(
             wrench=Wrench(force, torque, point),
             force_on_tissue=totals[TISSUE_IMPULSE : TISSUE_IMPULSE + 3] * per_second,
-            bounds=bounds,
+            bounds=np.array([low, high]),
             n_tetrahedra=self.n_tetrahedra,
             n_nodes=self.n_nodes,
             n_active=self._scheme.n_active,
@@ -649,6 +675,8 @@ class Tissue:
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
         self._contact.grow(n_nodes, n_tetrahedra)
+        self._relaxation.grow(n_nodes)
+        self._every = np.arange(n_nodes)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
 

@@ -70,7 +70,7 @@ def test_points_are_found_when_nodes_that_went_far_are_listed_again(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
     n = int(cut.body.counts[NODES])
     cut.body.positions[:n] += [0.3, -0.2, 0.1]
-    assert list_moved(cut.body, cut.visits, cells, cut.work.around)
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.work.around)
     expect_found(cut.body, cells, seed=2)
 
 

@@ -16,7 +16,6 @@ from tissue.arrays import Arrays
 from tissue.body import NODES, Body, grown
 from tissue.contact.impulses import Contacts
 from tissue.jit import kernel
-from tissue.relaxation.breadth_first import UNREACHED, Rings, ring_of
 from tissue.springs import Springs
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, dot, vec3
@@ -76,7 +75,7 @@ def grown_activity(activity: Activity, n_nodes: int) -> Activity:
 
 @kernel
 def wake(activity: Activity, body: Body, springs: Springs, node: int) -> None:
-    """Wake a node, and watch its neighbours."""
+    """Wake a node, and watch its neighbours; it does not sleep before it has been calm anew."""
     activity.calm[node] = 0.0
     if activity.state[node] == AWAKE or body.fixed[node]:
         return
@@ -137,7 +136,6 @@ def doze(
     body: Body,
     springs: Springs,
     accelerations: FloatArray,
-    near: Rings,
     seconds: float,
 ) -> None:
     """Let nodes sleep that have been calm for `CALM`, and forget those that nothing awake is near.
@@ -147,7 +145,6 @@ def doze(
         body: Velocities of nodes that fall asleep are set to zero.
         springs: The rows.
         accelerations: Of the last step [m/s2], shape (capacity, 3).
-        near: Nodes that it found, around the blade and what is stiff, stay awake.
         seconds: Since the last call [s].
     """
     for k in range(activity.counts[N_LISTED]):
@@ -158,7 +155,7 @@ def doze(
         a = vec3(accelerations, node)
         is_slow = dot(v, v) <= SLEEP_SPEED * SLEEP_SPEED
         is_free = dot(a, a) <= SLEEP_ACCELERATION * SLEEP_ACCELERATION
-        if not (is_slow and is_free and ring_of(near, node) == UNREACHED):
+        if not (is_slow and is_free):
             activity.calm[node] = 0.0
             continue
         activity.calm[node] += seconds

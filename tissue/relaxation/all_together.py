@@ -1,34 +1,69 @@
 """All nodes together: the two-level Runge-Kutta method, in as many steps as stability needs."""
 
 import math
+from collections.abc import Callable
 
 from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.elasticity import Elasticity
 from tissue.relaxation.motion import Motion
 from tissue.runge_kutta import SAFETY, largest_stable_step, relax
+from tissue.threads import Threads
 from tissue.types import IntArray
 
 
 class AllTogether:
-    """See `tissue.relaxation.motion.Relaxation`; it remembers nothing."""
+    """See `tissue.relaxation.motion.Relaxation`; it remembers nothing.
+
+    Args:
+        threads: How many threads share the loops over the body.
+    """
 
     moved = None
+    moving = None
+
+    def __init__(self, threads: int = 1) -> None:
+        self._relax: Callable[..., int] = relax if threads == 1 else Threads(threads).relax
 
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return the Runge-Kutta steps taken."""
         elasticity = motion.elasticity
-        near = frequency_with_anchors(
-            motion.anchors, motion.body, elasticity.node_frequency_squared, motion.stages.external
-        )
+        by_node = elasticity.arrays.frequency_squared
+        near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
         frequency = math.sqrt(max(elasticity.frequency_squared, near))
         surroundings = motion.surroundings
         step = SAFETY * largest_stable_step(
             frequency, surroundings.retardation_time, surroundings.drag
         )
         n = max(1, math.ceil(motion.span / step))
-        relax_by(motion, n)
+        self.relax_by(motion, n)
         return n
+
+    def relax_by(self, motion: Motion, n: int) -> None:
+        """Advance the motion by `n` Runge-Kutta steps."""
+        done = 0
+        while True:
+            done = self._relax(
+                motion.body,
+                motion.elasticity.arrays,
+                motion.anchors,
+                motion.edge,
+                motion.visits,
+                motion.stages,
+                motion.contact.arrays,
+                motion.queue,
+                motion.surroundings,
+                motion.toughness,
+                motion.reach,
+                motion.dt,
+                motion.begin,
+                motion.end,
+                done,
+                n,
+            )
+            if done == n:
+                return
+            motion.contact.make_room()
 
     def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
         """Nothing is remembered."""
@@ -38,30 +73,3 @@ class AllTogether:
 
     def grow(self, n_nodes: int) -> None:
         """Nothing is remembered."""
-
-
-def relax_by(motion: Motion, n: int) -> None:
-    """Advance the motion by `n` Runge-Kutta steps."""
-    done = 0
-    while True:
-        done = relax(
-            motion.body,
-            motion.elasticity.arrays,
-            motion.anchors,
-            motion.edge,
-            motion.visits,
-            motion.stages,
-            motion.contact.arrays,
-            motion.queue,
-            motion.surroundings,
-            motion.toughness,
-            motion.reach,
-            motion.dt,
-            motion.begin,
-            motion.end,
-            done,
-            n,
-        )
-        if done == n:
-            return
-        motion.contact.make_room()

@@ -47,6 +47,13 @@ class ByRings:
         return self._moved if self._is_far_frozen else None
 
     @property
+    def moving(self) -> tuple[IntArray, int] | None:
+        """Nodes that may have moved in the last call of `relax`, and how many; None where all."""
+        if not self._is_far_frozen:
+            return None
+        return self._rings.order, int(self._rings.state[N_FOUND])
+
+    @property
     def _is_far_frozen(self) -> bool:
         return self._options.far == "frozen"
 
@@ -96,7 +103,7 @@ class ByRings:
         highest, options = self._highest, self._options
         springs = elasticity.arrays.springs
         ring_frequencies(body, springs, self._rings, options.rings, self._is_far_frozen, highest)
-        by_node = elasticity.node_frequency_squared
+        by_node = elasticity.arrays.frequency_squared
         near = frequency_with_anchors(motion.anchors, body, by_node, motion.stages.external)
         highest[0] = max(highest[0], near)
         return n_frames(motion, highest, options)

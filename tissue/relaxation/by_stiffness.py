@@ -61,6 +61,11 @@ class ByStiffness:
         """Sum of the momenta that nodes had when they fell asleep [kg m/s], shape (3,)."""
         return self._activity.given_up.copy()
 
+    @property
+    def moving(self) -> tuple[IntArray, int]:
+        """Nodes that may have moved in the last call of `relax`, and how many."""
+        return self._activity.listed, self.n_awake
+
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return how many steps the finest nodes took."""
         body, activity, zone = motion.body, self._activity, self._zone
@@ -96,16 +101,14 @@ class ByStiffness:
         if self._options.sleep:
             if contact.is_awake:
                 note_positions(contact.arrays, body, activity.listed, self.n_awake)
-            doze(
-                activity, body, elastic.springs, zone.accelerations, zone.rings, motion.span
-            )
+            doze(activity, body, elastic.springs, zone.accelerations, motion.span)
         return n * p
 
     def _divide(self, motion: Motion) -> tuple[int, int]:
         """Find the fine nodes; return the macro steps to take, and the substeps of each."""
         body, activity, zone = motion.body, self._activity, self._zone
         springs, anchors = motion.elasticity.arrays.springs, motion.anchors
-        by_node = motion.elasticity.node_frequency_squared
+        by_node = motion.elasticity.arrays.frequency_squared
         n_near = find_near(body, springs, anchors, zone, self._options.rings)
         wake_each(activity, body, springs, zone.fine, n_near)
         highest = frequency_with_anchors(anchors, body, by_node, motion.stages.external)

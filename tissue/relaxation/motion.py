@@ -53,6 +53,11 @@ class Relaxation(Protocol):
         """Nodes that moved since it was emptied; None where all do."""
         ...
 
+    @property
+    def moving(self) -> tuple[IntArray, int] | None:
+        """Nodes that may have moved in the last call of `relax`, and how many; None where all."""
+        ...
+
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return how many steps the finest nodes took."""
         ...

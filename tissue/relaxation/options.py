@@ -4,6 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from tissue.material import Material
+
 Far = Literal["moved", "frozen"]
 """What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen`, the paper's rule."""
 
@@ -77,11 +79,11 @@ BY_NAME: dict[str, Relaxing] = {
 """With the default settings."""
 
 
-def checked_relaxation(choice: str | Relaxing, law: str) -> Relaxing:
-    """Return the settings that a name stands for, or those given, for a body of that law.
+def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
+    """Return the settings that a name stands for, or those given, for a body of that material.
 
     Raises:
-        ValueError: there is no such way to relax, or it is not for that law.
+        ValueError: there is no such way to relax, or it is not for that material.
     """
     if isinstance(choice, str):
         if choice not in BY_NAME:
@@ -92,9 +94,12 @@ def checked_relaxation(choice: str | Relaxing, law: str) -> Relaxing:
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
             "or LocalTimeStepping with settings"
         )
-    if isinstance(choice, Hierarchical) and law != "springs":
-        raise ValueError(
-            f"hierarchical relaxation moves one node at a time on its springs, and the law is "
-            f"{law}: choose law springs, or relaxation local, its heir for every law"
-        )
+    if isinstance(choice, Hierarchical):
+        if material.law != "springs" or material.volume_modulus > 0.0:
+            raise ValueError(
+                "hierarchical relaxation moves one node at a time, on its springs alone; with law "
+                f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
+                "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for "
+                "every law"
+            )
     return choice
