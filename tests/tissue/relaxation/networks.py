@@ -1,0 +1,141 @@
+"""Networks of springs that are advanced by the kernels of the relaxations, without `Tissue`."""
+
+import numpy as np
+
+from tests import bodies
+from tests.tissue.kernels_of import Network, network_of
+from tissue.elastic import Elastic, Surroundings
+from tissue.relaxation.activity import all_asleep, wake_all
+from tissue.relaxation.breadth_first import (
+    N_FOUND,
+    Rings,
+    add_focus,
+    begin_search,
+    new_rings,
+    search,
+)
+from tissue.relaxation.chebyshev import STABILISATION, chebyshev
+from tissue.relaxation.hierarchical import hierarchical_frame, new_trails
+from tissue.relaxation.local_time_stepping import OVERLAP, macro_step, new_zone
+from tissue.tissue import NOWHERE
+from tissue.types import BoolArray, FloatArray
+from tissue.vec3 import Vec3
+
+FREE_FALL = Vec3(0.0, 0.0, -9.81)
+
+
+def block(
+    n: int,
+    *,
+    held: bool = True,
+    gravity: Vec3 = Vec3(0.0, 0.0, 0.0),
+    drag: float = 0.0,
+    retardation_time: float = 0.0,
+) -> Network:
+    """Return a box of n x n x n jittered cells, held at two sides or free."""
+    mesh = bodies.jittered_grid(n, 0)
+    network = network_of(mesh, bodies.sides(mesh) if held else None)
+    return network._replace(surroundings=Surroundings(gravity, drag, retardation_time))
+
+
+def nearest(network: Network, point: FloatArray) -> int:
+    """Return the node that is nearest to a point at rest [m]."""
+    return int(np.argmin(np.linalg.norm(network.body.rest - point, axis=1)))
+
+
+def rings_around(network: Network, node: int, last_ring: int) -> Rings:
+    """Return the rings around one node."""
+    rings = new_rings(len(network.body.rest))
+    begin_search(rings)
+    add_focus(rings, node)
+    search(rings, network.springs, last_ring)
+    return rings
+
+
+def found(rings: Rings) -> list[int]:
+    """Return the nodes that were found, in order."""
+    return rings.order[: rings.state[N_FOUND]].tolist()
+
+
+def frames(
+    network: Network, focus: int, span: float, n: int, updates: int, last_ring: int, frozen: bool
+) -> None:
+    """Advance by `n` frames of `span` [s] of the hierarchical relaxation."""
+    n_nodes = len(network.body.rest)
+    rings, trails = rings_around(network, focus, last_ring + 1), new_trails(n_nodes)
+    external = np.zeros((n_nodes, 3))
+    settings = (0.0, span, 0.0, 1.0, updates, last_ring, frozen)
+    for _ in range(n):
+        hierarchical_frame(
+            network.body,
+            network.springs,
+            network.anchors,
+            NOWHERE,
+            rings,
+            trails,
+            external,
+            network.surroundings,
+            *settings,
+        )
+
+
+def leaps(
+    network: Network,
+    fine: list[int],
+    span: float,
+    n: int,
+    n_substeps: int,
+    stabilisation: float = STABILISATION,
+) -> None:
+    """Advance by `n` macro steps of `span` [s], every node awake, from velocities of this instant."""
+    body, elastic = network.body, Elastic(springs=network.springs)
+    n_nodes = len(body.rest)
+    zone, activity = new_zone(n_nodes), all_asleep(n_nodes)
+    wake_all(activity, body, network.springs)
+    begin_search(zone.rings)
+    for node in fine:
+        if not body.fixed[node]:
+            add_focus(zone.rings, node)
+    search(zone.rings, network.springs, OVERLAP)
+    for i in range(n):
+        macro_step(
+            body,
+            elastic,
+            network.anchors,
+            NOWHERE,
+            activity,
+            zone,
+            chebyshev(n_substeps, stabilisation),
+            np.zeros((n_nodes, 3)),
+            network.surroundings,
+            0.0,
+            span,
+            0.0,
+            1.0,
+            0.5 if i == 0 else 1.0,
+        )
+
+
+def highest_frequency(network: Network) -> float:
+    """Return the bound on the angular frequency [1/s] of the nodes that can move."""
+    free = ~network.body.fixed
+    return float(np.sqrt(network.springs.frequency_squared[free].max()))
+
+
+def stiffen(network: Network, nodes: list[int], factor: float) -> None:
+    """Make the springs between these nodes that many times as stiff."""
+    springs, among = network.springs, set(nodes)
+    for node in nodes:
+        first = springs.first[node]
+        for slot in range(first, first + springs.count[node]):
+            if int(springs.neighbour[slot]) in among:
+                springs.stiffness[slot] *= factor
+                springs.rest_pull[slot] *= factor
+
+
+def shake(network: Network, size: float) -> None:
+    """Bend the body by waves of that size [m], at rest where it is fixed."""
+    body = network.body
+    free: BoolArray = ~body.fixed
+    body.positions[:] = body.rest + size * np.sin(200.0 * body.rest)[:, [1, 2, 0]] * free[:, None]
+    body.velocities[:] = 0.0
