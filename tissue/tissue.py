@@ -675,7 +675,7 @@ class Tissue:
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
         self._contact.grow(n_nodes, n_tetrahedra)
-        self._relaxation.grow(n_nodes)
+        self._relaxation.grow(n_nodes, n_tetrahedra)
         self._every = np.arange(n_nodes)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)

@@ -71,5 +71,5 @@ class AllTogether:
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
         """Nothing is remembered."""
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Nothing is remembered."""

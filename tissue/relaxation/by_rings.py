@@ -115,7 +115,7 @@ class ByRings:
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
         """Nothing is remembered that this would change."""
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""
         self._rings = grown_rings(self._rings, n_nodes)
         self._focus = grown_rings(self._focus, n_nodes)
