@@ -37,7 +37,7 @@ CALM = 0.05
 """How long a node must be slow before it sleeps [s]. A swing passes through slow and unaccelerated
 instants; tissue swings at 5 to 50 Hz, so that this is a good part of a period."""
 
-N_LISTED, N_AWAKE = 0, 1
+N_LISTED, N_AWAKE, VERSION = 0, 1, 2
 """Places in `Activity.counts`."""
 
 
@@ -51,7 +51,8 @@ class Activity(Arrays):
     calm: FloatArray
     """How long each has been calm [s], shape (capacity,)."""
     counts: IntArray
-    """How many are listed, and how many of them are awake; shape (2,)."""
+    """How many are listed, how many of them are awake, and how often the list has changed; shape
+    (3,)."""
     given_up: FloatArray
     """Sum of the momenta that nodes had when they fell asleep [kg m/s], shape (3,)."""
 
@@ -62,7 +63,7 @@ def all_asleep(n_nodes: int) -> Activity:
         listed=np.zeros(n_nodes, np.int64),
         state=np.zeros(n_nodes, np.int64),
         calm=np.zeros(n_nodes),
-        counts=np.zeros(2, np.int64),
+        counts=np.zeros(3, np.int64),
         given_up=np.zeros(3),
     )
 
@@ -107,6 +108,7 @@ def _list(activity: Activity, node: int) -> None:
         activity.state[node] = WATCHED
         activity.listed[activity.counts[N_LISTED]] = node
         activity.counts[N_LISTED] += 1
+        activity.counts[VERSION] += 1
 
 
 @kernel
@@ -169,7 +171,9 @@ def doze(
             continue
         activity.listed[kept] = node
         kept += 1
-    activity.counts[N_LISTED] = kept
+    if kept < activity.counts[N_LISTED]:
+        activity.counts[N_LISTED] = kept
+        activity.counts[VERSION] += 1
 
 
 @kernel

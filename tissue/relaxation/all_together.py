@@ -16,29 +16,54 @@ class AllTogether:
     """See `tissue.relaxation.motion.Relaxation`; it remembers nothing.
 
     Args:
-        threads: How many share the loops over the body.
+        threads: How many threads share the loops over the body.
     """
-
-    def __init__(self, threads: int) -> None:
-        self._relax = relax if threads == 1 else Threads(threads).relax
 
     moved = None
     moving = None
 
+    def __init__(self, threads: int = 1) -> None:
+        self._relax: Callable[..., int] = relax if threads == 1 else Threads(threads).relax
+
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return the Runge-Kutta steps taken."""
         elasticity = motion.elasticity
-        near = frequency_with_anchors(
-            motion.anchors, motion.body, elasticity.node_frequency_squared, motion.stages.external
-        )
+        by_node = elasticity.arrays.frequency_squared
+        near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
         frequency = math.sqrt(max(elasticity.frequency_squared, near))
         surroundings = motion.surroundings
         step = SAFETY * largest_stable_step(
             frequency, surroundings.retardation_time, surroundings.drag
         )
         n = max(1, math.ceil(motion.span / step))
-        relax_by(motion, n, self._relax)
+        self.relax_by(motion, n)
         return n
+
+    def relax_by(self, motion: Motion, n: int) -> None:
+        """Advance the motion by `n` Runge-Kutta steps."""
+        done = 0
+        while True:
+            done = self._relax(
+                motion.body,
+                motion.elasticity.arrays,
+                motion.anchors,
+                motion.edge,
+                motion.visits,
+                motion.stages,
+                motion.contact.arrays,
+                motion.queue,
+                motion.surroundings,
+                motion.toughness,
+                motion.reach,
+                motion.dt,
+                motion.begin,
+                motion.end,
+                done,
+                n,
+            )
+            if done == n:
+                return
+            motion.contact.make_room()
 
     def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
         """Nothing is remembered."""
@@ -46,32 +71,5 @@ class AllTogether:
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
         """Nothing is remembered."""
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Nothing is remembered."""
-
-
-def relax_by(motion: Motion, n: int, steps: Callable[..., int] = relax) -> None:
-    """Advance the motion by `n` Runge-Kutta steps."""
-    done = 0
-    while True:
-        done = steps(
-            motion.body,
-            motion.elasticity.arrays,
-            motion.anchors,
-            motion.edge,
-            motion.visits,
-            motion.stages,
-            motion.contact.arrays,
-            motion.queue,
-            motion.surroundings,
-            motion.toughness,
-            motion.reach,
-            motion.dt,
-            motion.begin,
-            motion.end,
-            done,
-            n,
-        )
-        if done == n:
-            return
-        motion.contact.make_room()

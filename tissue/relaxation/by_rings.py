@@ -103,7 +103,7 @@ class ByRings:
         highest, options = self._highest, self._options
         springs = elasticity.arrays.springs
         ring_frequencies(body, springs, self._rings, options.rings, self._is_far_frozen, highest)
-        by_node = elasticity.node_frequency_squared
+        by_node = elasticity.arrays.frequency_squared
         near = frequency_with_anchors(motion.anchors, body, by_node, motion.stages.external)
         highest[0] = max(highest[0], near)
         return n_frames(motion, highest, options)
@@ -115,7 +115,7 @@ class ByRings:
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
         """Nothing is remembered that this would change."""
 
-    def grow(self, n_nodes: int) -> None:
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""
         self._rings = grown_rings(self._rings, n_nodes)
         self._focus = grown_rings(self._focus, n_nodes)

@@ -8,6 +8,7 @@ from tissue.contact.resolve import note_positions, prepare, prepare_listed
 from tissue.elasticity import Elasticity
 from tissue.relaxation.activity import (
     N_LISTED,
+    VERSION,
     all_asleep,
     doze,
     grown_activity,
@@ -16,11 +17,19 @@ from tissue.relaxation.activity import (
     wake_pulled,
     wake_touching,
 )
+from tissue.relaxation.breadth_first import new_rings
 from tissue.relaxation.chebyshev import chebyshev, substep_limits
-from tissue.relaxation.levels import MOST_STEPS, find_near, find_zone, plan
+from tissue.relaxation.levels import (
+    MOST_STEPS,
+    find_listed_patch,
+    find_near,
+    find_zone,
+    plan,
+)
 from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zone
 from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
+from tissue.relaxation.patches import new_patch
 from tissue.relaxation.options import LocalTimeStepping
 from tissue.types import FloatArray, IntArray
 
@@ -38,7 +47,10 @@ class ByStiffness:
         self._options = options
         n_nodes = len(body.rest)
         self._activity = all_asleep(n_nodes)
-        self._zone = new_zone(n_nodes)
+        self._zone = new_zone(n_nodes, len(body.tetrahedra))
+        self._listed = new_patch(n_nodes, len(body.tetrahedra))
+        self._around_listed = new_rings(n_nodes)
+        self._listed_version = -1
         self._moved = none_moved(n_nodes)
         self._substep_limits = substep_limits(options.stabilisation)
         self._limits, self._n_above = np.zeros((2, MOST_STEPS + 1))
@@ -76,12 +88,14 @@ class ByStiffness:
         for i in range(n):
             at = motion.begin + i * share
             self._prepare(motion)
+            self._renew_patch(motion)
             macro_step(
                 body,
                 elastic,
                 motion.anchors,
                 motion.edge,
                 activity,
+                self._listed,
                 zone,
                 coefficients,
                 motion.stages.external,
@@ -108,7 +122,7 @@ class ByStiffness:
         """Find the fine nodes; return the macro steps to take, and the substeps of each."""
         body, activity, zone = motion.body, self._activity, self._zone
         springs, anchors = motion.elasticity.arrays.springs, motion.anchors
-        by_node = motion.elasticity.node_frequency_squared
+        by_node = motion.elasticity.arrays.frequency_squared
         n_near = find_near(body, springs, anchors, zone, self._options.rings)
         wake_each(activity, body, springs, zone.fine, n_near)
         highest = frequency_with_anchors(anchors, body, by_node, motion.stages.external)
@@ -124,8 +138,16 @@ class ByStiffness:
             self._limits,
             self._n_above,
         )
-        find_zone(body, springs, by_node, activity, zone, n_near, limit)
+        find_zone(motion.elasticity.arrays, activity, zone, n_near, limit)
         return n, p
+
+    def _renew_patch(self, motion: Motion) -> None:
+        """Find what the listed nodes feel, where the list or the mesh has changed."""
+        version = int(self._activity.counts[VERSION])
+        if version != self._listed_version:
+            self._listed_version = version
+            elastic = motion.elasticity.arrays
+            find_listed_patch(self._listed, elastic, self._activity, self._around_listed)
 
     def _prepare(self, motion: Motion) -> None:
         """Let contact note where the nodes are before the step."""
@@ -142,6 +164,7 @@ class ByStiffness:
         """Wake the first `n` of `nodes`."""
         wake_each(self._activity, body, elasticity.arrays.springs, nodes, n)
         note_moved(self._moved, nodes, n)
+        self._listed_version = -1
 
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
         """Wake every node."""
@@ -150,8 +173,11 @@ class ByStiffness:
         self._starts = True
         self._is_prepared = False
 
-    def grow(self, n_nodes: int) -> None:
-        """Make room for that many nodes."""
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
         self._activity = grown_activity(self._activity, n_nodes)
-        self._zone = grown_zone(self._zone, n_nodes)
+        self._zone = grown_zone(self._zone, n_nodes, n_tetrahedra)
         self._moved = grown_moved(self._moved, n_nodes)
+        self._listed = new_patch(n_nodes, n_tetrahedra)
+        self._around_listed = new_rings(n_nodes)
+        self._listed_version = -1

@@ -6,11 +6,13 @@ import numpy as np
 
 from tissue.anchors import Anchors
 from tissue.body import Body
+from tissue.elastic import TETRAHEDRA_TOO, Elastic
 from tissue.jit import kernel
 from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
-from tissue.relaxation.breadth_first import N_FOUND, add_focus, begin_search, search
+from tissue.relaxation.breadth_first import N_FOUND, Rings, add_focus, begin_search, search
 from tissue.relaxation.focus import find_focus
-from tissue.relaxation.local_time_stepping import OVERLAP, Zone
+from tissue.relaxation.local_time_stepping import Zone
+from tissue.relaxation.patches import Patch, find_patch, reach_of
 from tissue.springs import Springs
 from tissue.types import BoolArray, FloatArray
 
@@ -123,15 +125,7 @@ def find_near(body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_ring
 
 
 @kernel
-def find_zone(
-    body: Body,
-    springs: Springs,
-    frequency_squared: FloatArray,
-    activity: Activity,
-    zone: Zone,
-    n_near: int,
-    limit: float,
-) -> None:
+def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, limit: float) -> None:
     """Make the nodes near the blade, and those above the limit [1/s2], the fine ones.
 
     `n_near` is what `find_near` returned; those are awake.
@@ -142,6 +136,23 @@ def find_zone(
         add_focus(rings, zone.fine[k])
     for k in range(activity.counts[N_LISTED]):
         node = activity.listed[k]
-        if activity.state[node] == AWAKE and frequency_squared[node] > limit:
+        if activity.state[node] == AWAKE and elastic.frequency_squared[node] > limit:
             add_focus(rings, node)
-    search(rings, springs, OVERLAP)
+    reach = reach_of(elastic)
+    search(rings, elastic.springs, reach)
+    find_patch(zone.patch, elastic, rings, 0, reach - 1)
+
+
+@kernel
+def find_listed_patch(patch: Patch, elastic: Elastic, activity: Activity, around: Rings) -> None:
+    """List what to evaluate for the forces on all listed nodes; `around` is scratch.
+
+    One ring beyond them takes part: what sleeps there has a pressure that they feel.
+    """
+    if not elastic.has[TETRAHEDRA_TOO]:
+        return
+    begin_search(around)
+    for k in range(activity.counts[N_LISTED]):
+        add_focus(around, activity.listed[k])
+    search(around, elastic.springs, 1)
+    find_patch(patch, elastic, around, 1, 0)

@@ -39,21 +39,20 @@ from tissue.relaxation.breadth_first import (
     ring_of,
 )
 from tissue.relaxation.chebyshev import Chebyshev
+from tissue.relaxation.patches import Patch, deform_patch, new_patch
 from tissue.simd import Point, point, point_of, store_point, times
-from tissue.spring_forces import elastic_force
 from tissue.springs import Springs
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import axpy, dot, store, sub, vec3
-
-OVERLAP = 1
-"""Rings beyond the fine nodes that share a force with one: springs join neighbours."""
 
 
 class Zone(Arrays):
     """The fine nodes and what they touch; scratch of shape (capacity, 3) each."""
 
     rings: Rings
-    """Ring 0: fine nodes; ring 1: nodes that share a force with one."""
+    """Ring 0: fine nodes; further out, up to `reach_of`: nodes that feel one move."""
+    patch: Patch
+    """What the nodes in the rings feel of the fine ones."""
     fine: IntArray
     """Scratch for the list of fine nodes, shape (capacity,)."""
     start: FloatArray
@@ -68,21 +67,23 @@ class Zone(Arrays):
     """At the begin of the step [m/s2], of every listed node."""
 
 
-def new_zone(n_nodes: int) -> Zone:
-    """Return a zone without nodes, with room for that many."""
+def new_zone(n_nodes: int, n_tetrahedra: int) -> Zone:
+    """Return a zone without nodes, with room for that many nodes and tetrahedra."""
     of_nodes = ("start", "way", "way_before", "steady", "accelerations")
     return Zone(
         rings=new_rings(n_nodes),
+        patch=new_patch(n_nodes, n_tetrahedra),
         fine=np.zeros(n_nodes, np.int64),
         **{name: np.zeros((n_nodes, 3)) for name in of_nodes},
     )
 
 
-def grown_zone(zone: Zone, n_nodes: int) -> Zone:
-    """Return the zone with room for that many nodes."""
+def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
+    """Return the zone with room for that many nodes and tetrahedra, its patch empty."""
     of_nodes = ("fine", "start", "way", "way_before", "steady", "accelerations")
     larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
-    return zone.replaced(rings=grown_rings(zone.rings, n_nodes), **larger)
+    patch = new_patch(n_nodes, n_tetrahedra)
+    return zone.replaced(rings=grown_rings(zone.rings, n_nodes), patch=patch, **larger)
 
 
 @kernel
@@ -92,6 +93,7 @@ def macro_step(
     anchors: Anchors,
     edge: Edge,
     activity: Activity,
+    listed: Patch,
     zone: Zone,
     chebyshev: Chebyshev,
     external: FloatArray,
@@ -110,6 +112,7 @@ def macro_step(
         anchors: Pull in every substep; all nodes that they pull on should be fine.
         edge: The cutting edge over the whole time step of length `dt` [s].
         activity: Only awake nodes move.
+        listed: What the listed nodes feel.
         zone: Of `find_zone`.
         chebyshev: Coefficients for the substeps.
         external: Scratch for the forces of the anchors [N], shape (capacity, 3).
@@ -122,12 +125,15 @@ def macro_step(
     """
     h = share * dt
     springs = elastic.springs
+    deform_patch(listed, elastic, body.positions)
     _accelerate_coarse(body, elastic, activity, zone, surroundings)
     _begin_fine(body, springs, zone, surroundings)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
         pull(anchors, body, edge, body.positions, at, part, dt, toughness, external)
-        _substep(body, springs, activity, zone, chebyshev, external, h, m)
+        if m > 0:
+            deform_patch(zone.patch, elastic, body.positions)
+        _substep(body, elastic, activity, zone, chebyshev, external, h, m)
     clear_forces(anchors, body, external)
     _kick(body, activity, zone, surroundings.drag, h, kick)
     if surroundings.retardation_time > 0.0:
@@ -170,7 +176,7 @@ def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surround
 @kernel
 def _substep(
     body: Body,
-    springs: Springs,
+    elastic: Elastic,
     activity: Activity,
     zone: Zone,
     chebyshev: Chebyshev,
@@ -185,7 +191,8 @@ def _substep(
         node = rings.order[k]
         if body.fixed[node]:
             continue
-        force = elastic_force(springs, node, body.positions) + point(external, node)
+        force = internal_force(elastic, node, body.positions, body.velocities, 0.0)
+        force = force + point(external, node)
         r = point(zone.steady, node) + times(1.0 / body.masses[node], force)
         if m == 0:
             store_point(zone.accelerations, node, r)

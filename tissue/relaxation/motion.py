@@ -70,8 +70,8 @@ class Relaxation(Protocol):
         """Take note that every node moved by other means, and is at rest."""
         ...
 
-    def grow(self, n_nodes: int) -> None:
-        """Make room for that many nodes."""
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
         ...
 
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from tissue.border import checked_threads
+from tissue.material import Material
 
 Far = Literal["moved", "frozen"]
 """What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen`, the paper's rule."""
@@ -12,19 +12,7 @@ Far = Literal["moved", "frozen"]
 
 @dataclass(frozen=True)
 class Global:
-    """All nodes together, by the two-level Runge-Kutta method.
-
-    Raises:
-        ValueError: a setting is none that it can have.
-    """
-
-    threads: int = 1
-    """How many threads share the loops over the body. The result is the same to the last bit; more
-    than one pays from about 20,000 tetrahedra on, and only where no other program needs the cores.
-    """
-
-    def __post_init__(self) -> None:
-        checked_threads(self.threads)
+    """All nodes together, by the two-level Runge-Kutta method."""
 
 
 @dataclass(frozen=True)
@@ -91,11 +79,11 @@ BY_NAME: dict[str, Relaxing] = {
 """With the default settings."""
 
 
-def checked_relaxation(choice: str | Relaxing, law: str) -> Relaxing:
-    """Return the settings that a name stands for, or those given, for a body of that law.
+def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
+    """Return the settings that a name stands for, or those given, for a body of that material.
 
     Raises:
-        ValueError: there is no such way to relax, or it is not for that law.
+        ValueError: there is no such way to relax, or it is not for that material.
     """
     if isinstance(choice, str):
         if choice not in BY_NAME:
@@ -106,9 +94,12 @@ def checked_relaxation(choice: str | Relaxing, law: str) -> Relaxing:
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
             "or LocalTimeStepping with settings"
         )
-    if isinstance(choice, Hierarchical) and law != "springs":
-        raise ValueError(
-            f"hierarchical relaxation moves one node at a time on its springs, and the law is "
-            f"{law}: choose law springs, or relaxation local, its heir for every law"
-        )
+    if isinstance(choice, Hierarchical):
+        if material.law != "springs" or material.volume_modulus > 0.0:
+            raise ValueError(
+                "hierarchical relaxation moves one node at a time, on its springs alone; with law "
+                f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
+                "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for "
+                "every law"
+            )
     return choice
