@@ -64,6 +64,17 @@ def models() -> list[Model]:
     return found
 
 
+class Mode(NamedTuple):
+    """How the bar swings by itself."""
+
+    kind: str
+    """bending, torsion or stretching."""
+    frequency: float
+    """[Hz]."""
+    motion: FloatArray
+    """Displacements of the nodes, the largest component 1; shape (n_nodes, 3)."""
+
+
 class Bar:
     """A clamped bar of n cells through its thickness."""
 
@@ -105,19 +116,28 @@ class Bar:
         bent = 1e-6 * self.length**3 / (3.0 * self.bending_stiffness)
         return self.deflection(forces) / (bent + 1e-6 * self.length / self.shear_stiffness)
 
-    def frequencies(self) -> dict[str, float]:
-        """Return the frequencies of `MODES` [Hz]."""
+    @cached_property
+    def modes(self) -> list[Mode]:
+        """The lowest modes, in order of frequency."""
         root = diags_array(1.0 / np.sqrt(np.repeat(self.masses, 3)[self.is_free]))
         squares, vectors = _lowest(root @ self.stiffness @ root, N_MODES)
-        found: dict[str, list[float]] = {"bending": [], "torsion": [], "stretching": []}
-        for i in range(N_MODES):
-            motion = np.zeros(self.is_free.size)
-            motion[self.is_free] = root @ vectors[:, i]
-            frequency = math.sqrt(squares[i]) / (2.0 * math.pi)
-            found[self._kind(motion.reshape(-1, 3))].append(frequency)
-        # Bending in y and in z are a pair, which a mesh with diagonals may split.
-        pairs = np.reshape(found["bending"][: len(found["bending"]) // 2 * 2], (-1, 2)).mean(axis=1)
-        values = (pairs[0], pairs[1], found["torsion"][0], found["stretching"][0])
+        found = []
+        for square, vector in zip(squares, vectors.T, strict=True):
+            flat = np.zeros(self.is_free.size)
+            flat[self.is_free] = root @ vector
+            motion = flat.reshape(-1, 3) / np.abs(flat).max()
+            found.append(Mode(self._kind(motion), math.sqrt(square) / (2.0 * math.pi), motion))
+        return found
+
+    def frequencies(self) -> dict[str, float]:
+        """Return the frequencies of `MODES` [Hz]."""
+
+        def of(kind: str) -> list[float]:
+            return [mode.frequency for mode in self.modes if mode.kind == kind]
+
+        # Bending in y and in z are a pair, which a mesh with diagonals splits.
+        first, second = np.reshape(of("bending")[:4], (2, 2)).mean(axis=1)
+        values = (first, second, of("torsion")[0], of("stretching")[0])
         return dict(zip(MODES, map(float, values), strict=True))
 
     def _kind(self, motion: FloatArray) -> str:

@@ -73,17 +73,14 @@ def test_22_a_rod_that_is_pulled_pulls_back_with_youngs_modulus():
 # 23
 
 DEFLECTION = {
-    # nu, cells through the thickness: plain, averaged; tip over Timoshenko's (table 4.4)
-    (0.3, 1): (0.22, 0.35),
-    (0.3, 2): (0.50, 0.66),
-    (0.3, 4): (0.79, 0.875),
-    (0.45, 1): (0.11, 0.31),
-    (0.45, 2): (0.30, 0.61),
-    (0.45, 4): (0.60, 0.84),
-    (0.49, 1): (0.04, 0.23),
-    (0.49, 2): (0.11, 0.57),
-    (0.49, 4): (0.29, 0.82),
+    # nu: plain and averaged, for 1, 2 and 4 cells through the thickness; tip over Timoshenko's
+    0.3: ((0.222, 0.504, 0.786), (0.351, 0.664, 0.875)),
+    0.45: ((0.113, 0.300, 0.595), (0.314, 0.613, 0.843)),
+    0.49: ((0.041, 0.108, 0.288), (0.228, 0.570, 0.822)),
 }
+"""Linear tetrahedra, and those that average the bulk modulus over nodes. The law of Smith, de Goes
+and Kim averages a sixth of the shear modulus more, and is softer by up to 0.02."""
+
 OF_SPRINGS = (0.39, 0.67, 0.86)
 
 
@@ -92,8 +89,7 @@ OF_SPRINGS = (0.39, 0.67, 0.86)
 def test_23_a_cantilever_bends_the_more_like_a_beam_the_finer_it_is(nu, averaged):
     model = Model("", replace(SOLID, poisson_ratio=nu), averaged)
     found = [Bar(n, model).end_load_ratio() for n in (1, 2, 4)]
-    wanted = [DEFLECTION[nu, n][averaged] for n in (1, 2, 4)]
-    assert found == pytest.approx(wanted, abs=0.02)
+    assert found == pytest.approx(DEFLECTION[nu][averaged], abs=0.02)
     assert sorted(found) == found
 
 
@@ -114,16 +110,15 @@ def test_23_where_nothing_narrows_sag_and_frequencies_converge_to_beam_theory():
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
 def test_23_the_engine_sags_as_the_matrix_says(material):
-    """Under a hundredth of gravity, for a sag that is small."""
+    """So stiff that the sag is small: 1 % of the thickness."""
+    material = replace(material, young_modulus=2e6)
     bar = Bar(2, Model("", material))
-    tissue = Tissue(
-        bar.mesh, material, fixed=bar.mesh.positions[:, 0] < 1e-9, gravity=(0.0, 0.0, -0.01)
-    )
+    tissue = Tissue(bar.mesh, material, fixed=bar.mesh.positions[:, 0] < 1e-9)
     tissue.settle()
     after = tissue.snapshot()
     sag = -(after.positions - after.rest_positions)[bar.is_end, 2].mean()
     weight = np.zeros((len(bar.masses), 3))
-    weight[:, 2] = -0.01 * bar.masses
+    weight[:, 2] = -9.81 * bar.masses
     assert sag == pytest.approx(bar.deflection(weight), rel=0.01)
 
 
@@ -139,35 +134,23 @@ def test_24_four_cells_through_the_thickness_bend_8_and_stretch_3_percent_too_fa
 
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
-@pytest.mark.parametrize(("mode", "axis"), [("bending 1", 2), ("stretching 1", 0)])
-def test_24_the_engine_swings_at_the_frequencies_of_the_matrix(material, mode, axis):
+@pytest.mark.parametrize("kind", ["bending", "torsion", "stretching"])
+def test_24_the_engine_swings_at_the_frequencies_of_the_matrix(material, kind):
     bar = Bar(1, Model("", material))
+    mode = next(mode for mode in bar.modes if mode.kind == kind)
     rest = bar.mesh.positions
-    shape = np.zeros_like(rest)
-    along = rest[:, 0] / bar.length
-    # What a static end load does, which is nearly the mode; the rest of it is small and fast.
-    shape[:, axis] = along**2 * (3.0 - along) / 2.0 if axis == 2 else np.sin(0.5 * np.pi * along)
-    small = 1e-3 * bar.thickness * shape
-    if axis == 2:
-        small[:, 0] = (
-            -1e-3
-            * bar.thickness
-            * (rest[:, 2] - bar.thickness / 2.0)
-            / bar.length
-            * (3.0 * along - 1.5 * along**2)
-        )
     tissue = Tissue(
-        bar.mesh, material, fixed=rest[:, 0] < 1e-9, positions=rest + small, gravity=NO_GRAVITY
+        bar.mesh,
+        material,
+        fixed=rest[:, 0] < 1e-9,
+        positions=rest + 1e-3 * bar.thickness * mode.motion,
+        gravity=NO_GRAVITY,
     )
-    period = 1.0 / bar.frequencies()[mode]
-    dt, tip = period / 200.0, []
-    for _ in range(1200):
-        tissue.step(None, dt)
-        after = tissue.snapshot()
-        tip.append((after.positions - rest)[bar.is_end, axis].mean())
-    spectrum = np.abs(np.fft.rfft(np.array(tip) * np.hanning(len(tip)), n=1 << 16))
-    found = np.fft.rfftfreq(1 << 16, dt)[spectrum.argmax()]
-    assert found == pytest.approx(1.0 / period, rel=0.01)
+    turns = 0.3  # of the mode: the body stands where the cosine of that says
+    tissue.step(None, turns / mode.frequency)
+    now = (tissue.snapshot().positions - rest).ravel() @ mode.motion.ravel()
+    share = now / (1e-3 * bar.thickness * np.sum(mode.motion**2))
+    assert np.arccos(share) / (2.0 * np.pi) == pytest.approx(turns, rel=0.01)
 
 
 # 25
@@ -202,32 +185,25 @@ def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(seed):
 
 
 def slit_compliance(n):
-    """How far the lips of a slit in a cube give way to a pressure between them, per pressure."""
+    """How far a cube with a slit half through it gives way to a pull across, per pull [m/N].
+
+    Held on the left, pulled to the right; the slit is cut by the engine, from above.
+    """
     size = 0.04
-    mesh = grid((n, n, n), (size, size, size))
-    tissue = Tissue(mesh, SOLID, gravity=NO_GRAVITY)
-    tips = [(size / 2.0, share * size, size / 2.0) for share in (0.25, 0.75)]
-    tissue.incise([[tip, (tip[0], tip[1], 1.1 * size)] for tip in tips], (0.0, 1.0, 0.0))
-    cut, surface = tissue.snapshot(), tissue.surface()
-    assert tissue.n_pieces() == 1
-    lips = surface.rest_positions[surface.triangles[surface.is_cut]]
-    normals = np.cross(lips[:, 1] - lips[:, 0], lips[:, 2] - lips[:, 0]) / 2.0
-    assert np.abs(normals).sum() == pytest.approx(2.0 * size**2 / 4.0, rel=1e-9)
-    # A triangle of the surface has the nodes of the body in the same places on the same side.
-    forces = np.zeros_like(cut.positions)
-    centres = cut.rest_positions[cut.tetrahedra].mean(axis=1)
-    side = np.zeros(len(cut.positions))
-    side[cut.tetrahedra] = np.sign(centres[:, 0] - size / 2.0)[:, None]
-    for triangle, normal in zip(lips, normals, strict=True):
-        for corner in triangle:
-            at = np.all(np.abs(cut.rest_positions - corner) < 1e-9, axis=1)
-            own = at & ((side == -np.sign(normal[0])) | (at.sum() == 1))
-            forces[own] -= normal / 3.0
+    tissue = Tissue(grid((n, n, n), (size, size, size)), SOLID, gravity=NO_GRAVITY)
+    tips = [(size / 2.0, y, size / 2.0) for y in (-0.1 * size, 1.1 * size)]
+    area = tissue.incise([[tip, (tip[0], tip[1], 1.1 * size)] for tip in tips], (0.0, 1.0, 0.0))
+    assert area == pytest.approx(size**2 / 2.0, rel=1e-9)
+    cut = tissue.snapshot()
     body = TetrahedralMesh(cut.rest_positions, cut.tetrahedra)
-    free = np.repeat(cut.rest_positions[:, 2] > 1e-9, 3)
+    x, y, z = cut.rest_positions.T
+    free = np.repeat(x > 1e-9, 3)
+    load = np.zeros((len(x), 3))
+    share = np.where((y < 1e-9) | (y > size - 1e-9), 0.5, 1.0)
+    share *= np.where((z < 1e-9) | (z > size - 1e-9), 0.5, 1.0)
+    load[:, 0] = np.where(x > size - 1e-9, share / n**2, 0.0)
     matrix = stiffness_matrix(body, SOLID)[free][:, free].tocsc()
-    load = forces.ravel()[free]
-    return float(load @ splu(matrix).solve(load))
+    return float(load.ravel()[free] @ splu(matrix).solve(load.ravel()[free]))
 
 
 def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
