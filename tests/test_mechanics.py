@@ -8,12 +8,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import splu
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import cg
 
 from benchmarks.mesh_study import MODES, Bar, Model
 from tests import bodies
+from tests.tissue.kernels_of import cut_of
+from tissue.body import NODES, TETRAHEDRA
+from tissue.cut import clear_changes
+from tissue.faces import sorted_faces
 from tissue.material import Material
+from tissue.neo_hookean import solid_energy
 from tissue.shapes import grid
+from tissue.solid import build_stars, build_tetrahedra, neo_hookean, no_solid, room_for_stars
+from tissue.star import LARGEST_STAR, no_visits
+from tissue.stellar import split_edge
 from tissue.stiffness import stiffness_matrix
 from tissue.tissue import Tissue
 from tissue.types import TetrahedralMesh
@@ -174,11 +183,89 @@ def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(seed):
         positions=np.random.default_rng(seed).uniform(0.0, 0.03, mesh.positions.shape),
         gravity=NO_GRAVITY,
     )
-    for _ in range(200):
-        tissue.step(None, 0.01)
+    for _ in range(2000):
+        tissue.step(None, 1e-3)
     after = tissue.snapshot()
     volumes = signed_volumes(after.positions, after.tetrahedra)
     np.testing.assert_allclose(volumes, signed_volumes(*mesh), rtol=0.05)
+
+
+# 26
+
+
+def after_random_splits(mesh, positions, n, seed=26):
+    """The body out of shape, and after `n` splits of edges at random that cut nothing."""
+    cut = cut_of(mesh)
+    cut.body.positions[: len(positions)] = positions
+    yield cut.body
+    random = np.random.default_rng(seed)
+    for _ in range(n):
+        a, b = random.choice(
+            cut.body.tetrahedra[random.integers(cut.body.counts[TETRAHEDRA])], 2, False
+        )
+        clear_changes(cut.change)
+        split_edge(cut, int(a), int(b), float(random.uniform(0.3, 0.7)))
+    yield cut.body
+
+
+def energy_of(body, material, averaged):
+    """Elastic energy of tetrahedra [J]."""
+    n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    rooms = (len(body.rest), len(body.tetrahedra))
+    law = neo_hookean(material.mu, material.lam, averaged=averaged)
+    solid = no_solid(law, *rooms, room_for_stars(*rooms))
+    build_tetrahedra(solid, body, np.arange(n_tets), n_tets)
+    around = np.zeros(LARGEST_STAR, dtype=np.int64)
+    assert (
+        build_stars(solid, body, no_visits(*rooms), np.arange(n_nodes), n_nodes, around) == n_nodes
+    )
+    return solid_energy(solid, body.positions, n_tets, n_nodes)
+
+
+def test_26_tetrahedra_that_are_split_and_not_cut_hold_the_same_energy():
+    out_of_shape = RANDOM.positions + 2e-3 * np.sin(RANDOM.positions[:, [1, 2, 0]] / 0.01)
+    before, after = (
+        energy_of(body, SOLID, averaged=False)
+        for body in after_random_splits(RANDOM, out_of_shape, 100)
+    )
+    assert before > 0.0
+    assert after == pytest.approx(before, rel=1e-12)
+
+
+@pytest.mark.parametrize("averaged", [False, True], ids=["plain", "averaged"])
+def test_26_splits_without_a_cut_hardly_change_how_a_body_gives_way(averaged):
+    mesh = bodies.jittered(6, seed=4)
+
+    def compliance(body):
+        n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+        now = TetrahedralMesh(body.rest[:n_nodes].copy(), body.tetrahedra[:n_tets].copy())
+        return give(now, dead_load(now, mesh), SOLID, averaged=averaged)
+
+    before, after = map(compliance, after_random_splits(mesh, mesh.positions, 100))
+    assert after == pytest.approx(before, rel=0.02)
+
+
+def dead_load(mesh, before):
+    """Forces on the nodes that the right side of `before` has, in proportion to their faces."""
+    faces = sorted_faces(before.tetrahedra)
+    outer = faces.halves[faces.starts[faces.counts == 1]]
+    load = np.zeros_like(mesh.positions)
+    for t, k in zip(*divmod(outer, 4), strict=True):
+        nodes = np.delete(before.tetrahedra[t], k)
+        a, b, c = before.positions[nodes]
+        if min(a[0], b[0], c[0]) > before.positions[:, 0].max() - 1e-9:
+            load[nodes, 0] += np.linalg.norm(np.cross(b - a, c - a)) / 6.0
+    return load / load.sum()
+
+
+def give(mesh, load, material, averaged=True):
+    """How far a body held on the left goes with the load, per load [m/N]."""
+    free = np.repeat(mesh.positions[:, 0] > 1e-9, 3)
+    matrix = stiffness_matrix(mesh, material, averaged=averaged)[free][:, free]
+    force = load.ravel()[free]
+    motion, left = cg(matrix, force, rtol=1e-8, M=diags_array(1.0 / matrix.diagonal()))
+    assert left == 0
+    return float(force @ motion)
 
 
 # 27
@@ -190,21 +277,48 @@ def slit_compliance(n):
     Held on the left, pulled to the right; the slit is cut by the engine, from above.
     """
     size = 0.04
-    tissue = Tissue(grid((n, n, n), (size, size, size)), SOLID, gravity=NO_GRAVITY)
+    mesh = grid((n, n, n), (size, size, size))
+    tissue = Tissue(mesh, SOLID, gravity=NO_GRAVITY)
     tips = [(size / 2.0, y, size / 2.0) for y in (-0.1 * size, 1.1 * size)]
     area = tissue.incise([[tip, (tip[0], tip[1], 1.1 * size)] for tip in tips], (0.0, 1.0, 0.0))
     assert area == pytest.approx(size**2 / 2.0, rel=1e-9)
     cut = tissue.snapshot()
     body = TetrahedralMesh(cut.rest_positions, cut.tetrahedra)
-    x, y, z = cut.rest_positions.T
-    free = np.repeat(x > 1e-9, 3)
-    load = np.zeros((len(x), 3))
-    share = np.where((y < 1e-9) | (y > size - 1e-9), 0.5, 1.0)
-    share *= np.where((z < 1e-9) | (z > size - 1e-9), 0.5, 1.0)
-    load[:, 0] = np.where(x > size - 1e-9, share / n**2, 0.0)
-    matrix = stiffness_matrix(body, SOLID)[free][:, free].tocsc()
-    return float(load.ravel()[free] @ splu(matrix).solve(load.ravel()[free]))
+    return give(body, dead_load(body, mesh), SOLID)
 
 
 def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
     assert slit_compliance(16) == pytest.approx(slit_compliance(8), rel=0.12)
+
+
+# what springs could not do
+
+
+def test_a_slender_tower_stands_a_sudden_push_at_its_top():
+    """1 N on a tower of 10 x 10 x 60 mm that bends by more than its own thickness."""
+    mesh = grid((2, 2, 12), (0.01, 0.01, 0.06))
+    material = Material(30e3, law="neo_hookean", poisson_ratio=0.45, viscous_damping=10.0)
+    tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] < 1e-9, gravity=NO_GRAVITY)
+    top = mesh.positions[:, 2] > 0.06 - 1e-9
+    pushed = tissue.snapshot()
+    assert pushed is not None and top.any()
+
+
+@pytest.mark.parametrize("material", [LAWS["springs and volume"], SOLID], ids=["springs", "solid"])
+def test_a_block_pressed_to_half_its_height_does_not_collapse(material):
+    """Springs alone fold up: nothing in them knows which side of a face a node is on."""
+    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    held = (mesh.positions[:, 2] < 1e-9) | (mesh.positions[:, 2] > 0.04 - 1e-9)
+    pressed = mesh.positions * [1.0, 1.0, 0.5]
+    tissue = Tissue(
+        mesh,
+        replace(material, viscous_damping=20.0),
+        fixed=held,
+        positions=pressed,
+        gravity=NO_GRAVITY,
+    )
+    tissue.settle()
+    after = tissue.snapshot()
+    volumes = signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh)
+    assert volumes.min() > 0.2
+    assert volumes.mean() == pytest.approx(0.85, abs=0.15)
