@@ -124,11 +124,14 @@ def serve(
     """
     from bridge.server import serve as serve_tissue
     from scalpel_sim.body import check, make_tissue
-    from scalpel_sim.ready import chosen_scene, load_kernels
+    from scalpel_sim.ready import chosen_scene, load_kernels, springs_as_asked
 
     with talking(talk):
         served = chosen_scene(scene, body)
         check(served)
+        served, springs = springs_as_asked(served, body)
+        if springs and not talk.quiet:
+            say(", ".join(f"{key} {value:.4g}" for key, value in springs["springs"].items()))
         load_kernels(talk)
         serve_tissue(
             lambda: make_tissue(served),

@@ -33,6 +33,10 @@ class Body:
     "Young's modulus [Pa]."
     poisson_ratio: float | None = None
     "Poisson's ratio: below 0.5; 0 or more for neo_hookean, 0.25 or more for springs."
+    calibrate: Annotated[bool, Parameter(negative="")] = False
+    "Measure the springs on this mesh first, and make them as stiff as asked for; report the rest."
+    spring_error: Annotated[bool, Parameter(negative="")] = False
+    "Say how far springs on this mesh are from the material that they stand for."
     density: float | None = None
     "Density [kg/m3]."
     toughness: float | None = None

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,9 +67,10 @@ def _tissue_here(
     scene = changed(chosen_scene(name, body), **_given(motion))
     check(scene)
     check_folder(_folder(motion, scene))
+    scene, springs = springs_as_asked(scene, body)
     load_kernels(talk)
     log.info("settling %s", scene.about)
-    return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings()
+    return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs
 
 
 def _tissue_elsewhere(
@@ -78,10 +79,10 @@ def _tissue_elsewhere(
     """Reach the tissue in another process, and take the scene from what it says of itself."""
     assert motion.connect is not None
     for field in fields(body):
-        if getattr(body, field.name) is not None:
+        if getattr(body, field.name) not in (None, False):
             raise UsageError(
-                f"--{field.name} belongs to the tissue, and that is at {motion.connect}; "
-                "give it to `scalpel-sim serve`"
+                f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
+                f"{motion.connect}; give it to `scalpel-sim serve`"
             )
     link = TcpLink(motion.connect)
     try:
@@ -103,6 +104,39 @@ def _tissue_elsewhere(
     }  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
+
+
+def springs_as_asked(scene: Scene, body: Body) -> tuple[Scene, dict[str, Any]]:
+    """Return the scene, calibrated if that is asked for, and for its report what its springs are.
+
+    Raises:
+        UsageError: the scene's law has no springs.
+        ValueError: no stiffness of the springs is what is asked for.
+    """
+    if not (body.calibrate or body.spring_error):
+        return scene, {}
+    if scene.material.law != "springs":
+        option = "--calibrate" if body.calibrate else "--spring-error"
+        raise UsageError(
+            f"{option} is about law springs; law {scene.material.law} is as stiff as asked for on "
+            "any mesh. Add --law springs, or leave it away"
+        )
+    from tissue.calibration import calibrated, spring_error
+
+    mesh = scene.mesh()
+    if body.calibrate:
+        scene = replace(scene, material=calibrated(mesh, scene.material))
+    error = spring_error(mesh, scene.material)
+    return scene, {
+        "springs": {
+            "young_modulus_pa": error.relaxed.young_modulus,
+            "young_modulus_error": error.young_modulus_error,
+            "young_modulus_softest_pa": error.softest,
+            "young_modulus_stiffest_pa": error.stiffest,
+            "poisson_ratio": error.relaxed.poisson_ratio,
+            "calibration": scene.material.spring_calibration,
+        }
+    }
 
 
 def load_kernels(talk: Talk) -> None:

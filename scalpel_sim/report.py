@@ -17,6 +17,7 @@ MOST_PIECES = 8
 """Pieces that the table has rows for, the largest; `summary.json` has them all."""
 
 G_PER_KG = 1e3
+KPA_PER_PA = 1e-3
 CM3_PER_M3 = 1e6
 MM_PER_M = 1e3
 MM2_PER_M2 = 1e6
@@ -47,6 +48,17 @@ def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> 
     row("growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}")
     row("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
     row("growth of substeps", f"{quality['substep_growth']:.2f}")
+
+
+def _add_springs(row: Callable[[str, str], None], springs: dict[str, float]) -> None:
+    """Add what the springs are like on this mesh, beside what they stand for."""
+    mean, softest, stiffest = (
+        springs[f"young_modulus_{which}pa"] * KPA_PER_PA for which in ("", "softest_", "stiffest_")
+    )
+    error = springs["young_modulus_error"]
+    row("springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}")
+    row("springs: by direction", f"{softest:.3g} to {stiffest:.3g} kPa")
+    row("springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}")
 
 
 def print_table(summary: Summary, console: Console) -> None:
@@ -86,6 +98,8 @@ def print_table(summary: Summary, console: Console) -> None:
         row(f"piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
     if summary.quality is not None:
         _add_quality(row, summary.quality)
+    if "springs" in summary.settings:
+        _add_springs(row, summary.settings["springs"])
     row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
     row("peak force", f"{summary.force_peak_n:.3f} N")
     row("mean force", f"{summary.force_mean_n:.3f} N")

@@ -48,6 +48,14 @@ WRONG_USE = {
     "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
+    "springs of a law that has none": (
+        ["run", "slab", "--law", "neo_hookean", "--calibrate"],
+        "Add --law springs",
+    ),
+    "a calibration of a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--spring-error"],
+        "--spring-error belongs to the tissue",
+    ),
     "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
     "springs with the ratio of cork": (
         ["run", "slab", "--poisson-ratio", "0"],
@@ -221,6 +229,16 @@ def test_materials_are_listed_with_their_sources(capsys):
     assert command_line(["materials", "liver", "--json"]) == 0
     (liver,) = json.loads(capsys.readouterr().out)
     assert liver["toughness"]["value"] == PRESETS["liver"].material.toughness
+
+
+def test_the_error_of_springs_is_stated_on_request_and_calibrated_away(files, capsys):
+    words = ["run", "slab", "--young", "2e4", "--seconds", "0.01"]
+    assert command_line([*words, "--spring-error", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["settings"]["springs"]["poisson_ratio"] < 0.05
+    assert command_line([*words, "--calibrate", "--json"]) == 0
+    springs = json.loads(capsys.readouterr().out)["settings"]["springs"]
+    assert springs["young_modulus_pa"] == pytest.approx(2e4, rel=1e-4)
+    assert springs["calibration"] == pytest.approx(29 / 30, rel=1e-3)
 
 
 def test_snap_and_guard_trade_the_path_of_the_cut_against_the_time_step(files, capsys):

@@ -1,0 +1,324 @@
+"""The body against the theory of elasticity: 22 to 27 of the engine's acceptance tests, and more.
+
+Small strains are compared with `tissue.stiffness`, whose matrix is held against the engine's own
+forces here; so what a fine bar does by the matrix (benchmarks/mesh_study.py) the engine does too.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import cg
+
+from benchmarks.mesh_study import MODES, Bar, Model
+from tests import bodies
+from tests.tissue.kernels_of import cut_of
+from tissue.body import NODES, TETRAHEDRA
+from tissue.cut import clear_changes
+from tissue.faces import sorted_faces
+from tissue.material import Material
+from tissue.neo_hookean import solid_energy
+from tissue.shapes import grid
+from tissue.solid import build_stars, build_tetrahedra, neo_hookean, no_solid, room_for_stars
+from tissue.star import LARGEST_STAR, no_visits
+from tissue.stellar import split_edge
+from tissue.stiffness import stiffness_matrix
+from tissue.tissue import Tissue
+from tissue.types import TetrahedralMesh
+from tissue.validation import signed_volumes
+
+NO_GRAVITY = (0.0, 0.0, 0.0)
+UNDAMPED = Material(viscous_damping=0.0, retardation_time=0.0)
+LAWS = {
+    "springs": UNDAMPED,
+    "springs and volume": replace(UNDAMPED, poisson_ratio=0.45),
+    "neo-Hookean": replace(UNDAMPED, law="neo_hookean", poisson_ratio=0.45),
+}
+SOLID = LAWS["neo-Hookean"]
+RANDOM = bodies.jittered(4, seed=3)
+
+
+def forces_at(mesh, positions, material, dt=1e-9):
+    """Elastic forces of the engine [N]: the momentum that they give a body in next to no time."""
+    tissue = Tissue(mesh, material, positions=positions, gravity=NO_GRAVITY)
+    tissue.step(None, dt)
+    after = tissue.snapshot()
+    return after.masses[:, None] * after.velocities / dt
+
+
+@pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
+def test_small_forces_are_those_of_the_stiffness_matrix(material):
+    u = 1e-6 * np.random.default_rng(0).normal(size=RANDOM.positions.shape)
+    found = forces_at(RANDOM, RANDOM.positions + u, material)
+    found -= forces_at(RANDOM, RANDOM.positions - u, material)
+    wanted = -2.0 * (stiffness_matrix(RANDOM, material) @ u.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(wanted).max())
+
+
+# 22
+
+
+def test_22_under_an_affine_strain_tetrahedra_inside_are_in_equilibrium():
+    gradient = np.array([[1.2, 0.1, 0.0], [0.0, 0.9, 0.2], [0.1, 0.0, 1.1]])
+    forces = forces_at(RANDOM, RANDOM.positions @ gradient.T, SOLID)
+    inside = np.all((RANDOM.positions > 1e-6) & (RANDOM.positions < 0.04 - 1e-6), axis=1)
+    assert inside.sum() > 20
+    assert np.abs(forces[inside]).max() < 1e-8 * np.abs(forces).max()
+
+
+def test_22_a_rod_that_is_pulled_pulls_back_with_youngs_modulus():
+    strain, nu = 1e-4, SOLID.poisson_ratio
+
+    def pull(strain):
+        stretched = RANDOM.positions * (1.0 + strain * np.array([1.0, -nu, -nu]))
+        forces = forces_at(RANDOM, stretched, SOLID)
+        return -forces[RANDOM.positions[:, 0] > 0.04 - 1e-9, 0].sum()
+
+    stress = (pull(strain) - pull(-strain)) / (2.0 * strain) / 0.04**2
+    assert stress == pytest.approx(SOLID.young_modulus, rel=1e-6)
+
+
+# 23
+
+DEFLECTION = {
+    # nu: plain and averaged, for 1, 2 and 4 cells through the thickness; tip over Timoshenko's
+    0.3: ((0.222, 0.504, 0.786), (0.351, 0.664, 0.875)),
+    0.45: ((0.113, 0.300, 0.595), (0.314, 0.613, 0.843)),
+    0.49: ((0.041, 0.108, 0.288), (0.228, 0.570, 0.822)),
+}
+"""Linear tetrahedra, and those that average the bulk modulus over nodes. The law of Smith, de Goes
+and Kim averages a sixth of the shear modulus more, and is softer by up to 0.02."""
+
+OF_SPRINGS = (0.39, 0.67, 0.86)
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
+@pytest.mark.parametrize("averaged", [False, True], ids=["plain", "averaged"])
+def test_23_a_cantilever_bends_the_more_like_a_beam_the_finer_it_is(nu, averaged):
+    model = Model("", replace(SOLID, poisson_ratio=nu), averaged)
+    found = [Bar(n, model).end_load_ratio() for n in (1, 2, 4)]
+    assert found == pytest.approx(DEFLECTION[nu][averaged], abs=0.02)
+    assert sorted(found) == found
+
+
+def test_23_springs_bend_the_more_like_a_beam_the_finer_they_are():
+    found = [Bar(n, Model("", UNDAMPED)).end_load_ratio() for n in (1, 2, 4)]
+    assert found == pytest.approx(OF_SPRINGS, abs=0.02)
+
+
+def test_23_where_nothing_narrows_sag_and_frequencies_converge_to_beam_theory():
+    """Error as the square of the element size: both meshes carried on to none."""
+    coarse, fine = (Bar(n, Model("", replace(SOLID, poisson_ratio=0.0))) for n in (3, 6))
+    theory = fine.theory()
+    found = {mode: (fine.frequencies()[mode], coarse.frequencies()[mode]) for mode in MODES}
+    ratios = {mode: (4.0 * f - c) / 3.0 / theory[mode] for mode, (f, c) in found.items()}
+    ratios["sag"] = (4.0 * fine.sag_ratio() - coarse.sag_ratio()) / 3.0
+    assert ratios == pytest.approx(dict.fromkeys(ratios, 1.0), abs=0.02)
+
+
+@pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
+def test_23_the_engine_sags_as_the_matrix_says(material):
+    """So stiff that the sag is small: 1 % of the thickness."""
+    material = replace(material, young_modulus=2e6)
+    bar = Bar(2, Model("", material))
+    tissue = Tissue(bar.mesh, material, fixed=bar.mesh.positions[:, 0] < 1e-9)
+    tissue.settle()
+    after = tissue.snapshot()
+    sag = -(after.positions - after.rest_positions)[bar.is_end, 2].mean()
+    weight = np.zeros((len(bar.masses), 3))
+    weight[:, 2] = -9.81 * bar.masses
+    assert sag == pytest.approx(bar.deflection(weight), rel=0.01)
+
+
+# 24
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.45])
+def test_24_four_cells_through_the_thickness_bend_8_and_stretch_3_percent_too_fast_at_most(nu):
+    bar = Bar(4, Model("", replace(SOLID, poisson_ratio=nu)))
+    found = bar.frequencies()
+    assert found["bending 1"] / bar.euler_bernoulli() == pytest.approx(1.0, abs=0.08)
+    assert found["stretching 1"] / bar.theory()["stretching 1"] == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
+@pytest.mark.parametrize("kind", ["bending", "torsion", "stretching"])
+def test_24_the_engine_swings_at_the_frequencies_of_the_matrix(material, kind):
+    bar = Bar(1, Model("", material))
+    mode = next(mode for mode in bar.modes if mode.kind == kind)
+    rest = bar.mesh.positions
+    tissue = Tissue(
+        bar.mesh,
+        material,
+        fixed=rest[:, 0] < 1e-9,
+        positions=rest + 1e-3 * bar.thickness * mode.motion,
+        gravity=NO_GRAVITY,
+    )
+    turns = 0.3  # of the mode: the body stands where the cosine of that says
+    tissue.step(None, turns / mode.frequency)
+    now = (tissue.snapshot().positions - rest).ravel() @ mode.motion.ravel()
+    share = now / (1e-3 * bar.thickness * np.sum(mode.motion**2))
+    assert np.arccos(share) / (2.0 * np.pi) == pytest.approx(turns, rel=0.01)
+
+
+# 25
+
+QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
+def test_25_a_body_that_is_turned_feels_no_force(material):
+    forces = forces_at(RANDOM, RANDOM.positions @ QUARTER_TURN.T, material)
+    assert np.abs(forces).max() < 1e-9 * material.young_modulus * 0.01**2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(seed):
+    material = replace(SOLID, viscous_damping=20.0, retardation_time=2e-4)
+    mesh = grid((3, 3, 3), (0.03, 0.03, 0.03))
+    tissue = Tissue(
+        mesh,
+        material,
+        positions=np.random.default_rng(seed).uniform(0.0, 0.03, mesh.positions.shape),
+        gravity=NO_GRAVITY,
+    )
+    for _ in range(2000):
+        tissue.step(None, 1e-3)
+    after = tissue.snapshot()
+    volumes = signed_volumes(after.positions, after.tetrahedra)
+    np.testing.assert_allclose(volumes, signed_volumes(*mesh), rtol=0.05)
+
+
+# 26
+
+
+def after_random_splits(mesh, positions, n, seed=26):
+    """The body out of shape, and after `n` splits of edges at random that cut nothing."""
+    cut = cut_of(mesh)
+    cut.body.positions[: len(positions)] = positions
+    yield cut.body
+    random = np.random.default_rng(seed)
+    for _ in range(n):
+        a, b = random.choice(
+            cut.body.tetrahedra[random.integers(cut.body.counts[TETRAHEDRA])], 2, False
+        )
+        clear_changes(cut.change)
+        split_edge(cut, int(a), int(b), float(random.uniform(0.3, 0.7)))
+    yield cut.body
+
+
+def energy_of(body, material, averaged):
+    """Elastic energy of tetrahedra [J]."""
+    n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    rooms = (len(body.rest), len(body.tetrahedra))
+    law = neo_hookean(material.mu, material.lam, averaged=averaged)
+    solid = no_solid(law, *rooms, room_for_stars(*rooms))
+    build_tetrahedra(solid, body, np.arange(n_tets), n_tets)
+    around = np.zeros(LARGEST_STAR, dtype=np.int64)
+    assert (
+        build_stars(solid, body, no_visits(*rooms), np.arange(n_nodes), n_nodes, around) == n_nodes
+    )
+    return solid_energy(solid, body.positions, n_tets, n_nodes)
+
+
+def test_26_tetrahedra_that_are_split_and_not_cut_hold_the_same_energy():
+    out_of_shape = RANDOM.positions + 2e-3 * np.sin(RANDOM.positions[:, [1, 2, 0]] / 0.01)
+    before, after = (
+        energy_of(body, SOLID, averaged=False)
+        for body in after_random_splits(RANDOM, out_of_shape, 100)
+    )
+    assert before > 0.0
+    assert after == pytest.approx(before, rel=1e-12)
+
+
+@pytest.mark.parametrize("averaged", [False, True], ids=["plain", "averaged"])
+def test_26_splits_without_a_cut_hardly_change_how_a_body_gives_way(averaged):
+    mesh = bodies.jittered(6, seed=4)
+
+    def compliance(body):
+        n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+        now = TetrahedralMesh(body.rest[:n_nodes].copy(), body.tetrahedra[:n_tets].copy())
+        return give(now, dead_load(now, mesh), SOLID, averaged=averaged)
+
+    before, after = map(compliance, after_random_splits(mesh, mesh.positions, 100))
+    assert after == pytest.approx(before, rel=0.02)
+
+
+def dead_load(mesh, before):
+    """Forces on the nodes that the right side of `before` has, in proportion to their faces."""
+    faces = sorted_faces(before.tetrahedra)
+    outer = faces.halves[faces.starts[faces.counts == 1]]
+    load = np.zeros_like(mesh.positions)
+    for t, k in zip(*divmod(outer, 4), strict=True):
+        nodes = np.delete(before.tetrahedra[t], k)
+        a, b, c = before.positions[nodes]
+        if min(a[0], b[0], c[0]) > before.positions[:, 0].max() - 1e-9:
+            load[nodes, 0] += np.linalg.norm(np.cross(b - a, c - a)) / 6.0
+    return load / load.sum()
+
+
+def give(mesh, load, material, averaged=True):
+    """How far a body held on the left goes with the load, per load [m/N]."""
+    free = np.repeat(mesh.positions[:, 0] > 1e-9, 3)
+    matrix = stiffness_matrix(mesh, material, averaged=averaged)[free][:, free]
+    force = load.ravel()[free]
+    motion, left = cg(matrix, force, rtol=1e-8, M=diags_array(1.0 / matrix.diagonal()))
+    assert left == 0
+    return float(force @ motion)
+
+
+# 27
+
+
+def slit_compliance(n):
+    """How far a cube with a slit half through it gives way to a pull across, per pull [m/N].
+
+    Held on the left, pulled to the right; the slit is cut by the engine, from above.
+    """
+    size = 0.04
+    mesh = grid((n, n, n), (size, size, size))
+    tissue = Tissue(mesh, SOLID, gravity=NO_GRAVITY)
+    tips = [(size / 2.0, y, size / 2.0) for y in (-0.1 * size, 1.1 * size)]
+    area = tissue.incise([[tip, (tip[0], tip[1], 1.1 * size)] for tip in tips], (0.0, 1.0, 0.0))
+    assert area == pytest.approx(size**2 / 2.0, rel=1e-9)
+    cut = tissue.snapshot()
+    body = TetrahedralMesh(cut.rest_positions, cut.tetrahedra)
+    return give(body, dead_load(body, mesh), SOLID)
+
+
+def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
+    assert slit_compliance(16) == pytest.approx(slit_compliance(8), rel=0.12)
+
+
+# what springs could not do
+
+
+def test_a_slender_tower_stands_a_sudden_push_at_its_top():
+    """1 N on a tower of 10 x 10 x 60 mm that bends by more than its own thickness."""
+    mesh = grid((2, 2, 12), (0.01, 0.01, 0.06))
+    material = Material(30e3, law="neo_hookean", poisson_ratio=0.45, viscous_damping=10.0)
+    tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] < 1e-9, gravity=NO_GRAVITY)
+    top = mesh.positions[:, 2] > 0.06 - 1e-9
+    pushed = tissue.snapshot()
+    assert pushed is not None and top.any()
+
+
+@pytest.mark.parametrize("material", [LAWS["springs and volume"], SOLID], ids=["springs", "solid"])
+def test_a_block_pressed_to_half_its_height_does_not_collapse(material):
+    """Springs alone fold up: nothing in them knows which side of a face a node is on."""
+    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    held = (mesh.positions[:, 2] < 1e-9) | (mesh.positions[:, 2] > 0.04 - 1e-9)
+    pressed = mesh.positions * [1.0, 1.0, 0.5]
+    tissue = Tissue(
+        mesh,
+        replace(material, viscous_damping=20.0),
+        fixed=held,
+        positions=pressed,
+        gravity=NO_GRAVITY,
+    )
+    tissue.settle()
+    after = tissue.snapshot()
+    volumes = signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh)
+    assert volumes.min() > 0.2
+    assert volumes.mean() == pytest.approx(0.85, abs=0.15)
