@@ -37,6 +37,8 @@ def make_tissue(scene: Scene) -> Tissue:
         floor=scene.floor,
         quality=scene.quality,
         scheme=scene.scheme,
+        relaxation=scene.relaxation,
+        threads=scene.threads,
     )
     if fixed.any():
         tissue.settle()

@@ -43,6 +43,11 @@ class Body:
     "Fracture toughness: what a square metre of cut costs [J/m2]."
     scheme: str | None = None
     "How the mesh is cut: stellar [default], or paper: the paper's own scheme, with its limits."
+    relaxation: str | None = None
+    """How the motion is advanced: global, all nodes together; local, small elements in substeps and
+    what rests asleep; or hierarchical, the paper's, for springs."""
+    threads: int | None = None
+    "Threads that share a global relaxation; pays from about 20,000 tetrahedra on [default: 1]."
     snap: float | None = None
     """Where the blade passes nearer to a node than this share of the node's size, the cut goes
     through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""

@@ -101,6 +101,8 @@ def _tissue_elsewhere(
         "floor",
         "quality",
         "scheme",
+        "relaxation",
+        "threads",
     }  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
@@ -176,6 +178,8 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         density=body.density,
         toughness=body.toughness,
         scheme=body.scheme,
+        relaxation=body.relaxation,
+        threads=body.threads,
         snap=body.snap,
         guard=body.guard,
         stretch=body.stretch,

@@ -11,10 +11,12 @@ from bridge.link import TissueLink
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.planning import STROKES
 from scalpel_sim.stroke import Stroke, from_csv
+from tissue.border import checked_threads
 from tissue.material import Material
 from tissue.mesh_io import read_mesh
 from tissue.presets import PRESETS
 from tissue.quality import CutQuality
+from tissue.relaxation.options import BY_NAME
 from tissue.shapes import grid, organ
 from tissue.types import TetrahedralMesh
 
@@ -49,6 +51,19 @@ def check_scheme(name: str) -> None:
         raise unknown("scheme", name, SCHEMES)
 
 
+def check_relaxation(name: str, threads: int) -> None:
+    """Refuse a way to relax that there is not, and threads where they would do nothing.
+
+    Raises:
+        UsageError: the message says which there are.
+    """
+    if name not in BY_NAME:
+        raise unknown("relaxation", name, tuple(BY_NAME))
+    if threads != 1 and name != "global":
+        raise UsageError(f"--threads {threads} is for --relaxation global; {name} runs on one")
+    checked_threads(threads)
+
+
 @dataclass(frozen=True)
 class Scene:
     """A body and what is to be done to it. Lengths in metres, tissue frame."""
@@ -64,6 +79,10 @@ class Scene:
     """How closely cuts follow the blade, against how small the elements get."""
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
+    relaxation: str = "global"
+    """How the motion is advanced: `global`, `local` or `hierarchical`."""
+    threads: int = 1
+    """Threads that share a global relaxation."""
     stretch: float = 0.05
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""
@@ -82,9 +101,11 @@ class Scene:
         """Refuse numbers that mean nothing.
 
         Raises:
-            UsageError: stretch, gravity or speed is out of range; there is no such scheme.
+            UsageError: stretch, gravity or speed is out of range; there is no such scheme or
+                relaxation.
         """
         check_scheme(self.scheme)
+        check_relaxation(self.relaxation, self.threads)
         if not -0.5 <= self.stretch <= 1.0:
             raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")
         if not 0.0 <= self.gravity <= 100.0:
