@@ -31,9 +31,7 @@ MESHES = {
     "jittered": bodies.jittered(2, 3),
 }
 
-needs_speed = pytest.mark.skipif(
-    not is_compiling(), reason="thousands of steps: compiled only"
-)
+needs_speed = pytest.mark.skipif(not is_compiling(), reason="thousands of steps: compiled only")
 
 
 @pytest.fixture(params=MESHES)
