@@ -17,8 +17,16 @@ import math
 
 from tissue.jit import inlined, kernel
 from tissue.simd import WIDTH, Lanes, Point, eight_points, lanes, load, point_of, store
-from tissue.simd_blocks import gathered, store_pairs, sum_of_quarters, sum_of_rows
-from tissue.solid import PER_VOLUME, VOLUME, Solid, n_blocks, node_place, shape_place
+from tissue.simd_blocks import gathered, sum_of_eight, sum_of_eight_points
+from tissue.solid import (
+    PER_VOLUME,
+    VOLUME,
+    Solid,
+    corner_place,
+    n_blocks,
+    node_place,
+    shape_place,
+)
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, add, axpy, cross, dot, scale, sub, vec3
 
@@ -50,7 +58,7 @@ def solid_force(solid: Solid, node: int) -> Point:
     total = point_of(0.0, 0.0, 0.0)
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
-        total = total + sum_of_rows(solid.forces, solid.corner, slot)
+        total = total + sum_of_eight_points(solid.forces, solid.corner, slot)
     return total
 
 
@@ -102,9 +110,19 @@ def corner_forces(
             s = lanes(-law.mu) * squared / (squared + _shape(solid, block, VOLUME))
             f1, f2, f3 = axpy(s, e1, f1), axpy(s, e2, f2), axpy(s, e3, f3)
         f0 = scale(lanes(-1.0), add(f1, add(f2, f3)))
-        row = 4 * WIDTH * (1 + block)
-        store_pairs(solid.forces, row, f0.x, f0.y, f0.z, f1.x, f1.y, f1.z)
-        store_pairs(solid.forces, row + 2, f2.x, f2.y, f2.z, f3.x, f3.y, f3.z)
+        _store(solid, block, 0, f0)
+        _store(solid, block, 1, f1)
+        _store(solid, block, 2, f2)
+        _store(solid, block, 3, f3)
+
+
+@inlined
+def _store(solid: Solid, block: int, k: int, force: Vec3) -> None:
+    """Write the forces on corners `k` of eight tetrahedra."""
+    place = corner_place(WIDTH * block, k)
+    store(solid.forces, place, force.x)
+    store(solid.forces, place + WIDTH, force.y)
+    store(solid.forces, place + 2 * WIDTH, force.z)
 
 
 @inlined
@@ -157,7 +175,7 @@ def _volume_around(solid: Solid, node: int) -> float:
     total = 0.0
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
-        total += sum_of_quarters(solid.volume, solid.corner, slot)
+        total += sum_of_eight(solid.volume, solid.around, slot)
     return 0.25 * total
 
 

@@ -68,10 +68,12 @@ class Solid(Arrays):
     room: IntArray
     """Slots that the row has, shape (nodes,)."""
     count: IntArray
-    """Tetrahedra around the node, shape (nodes,). A row is filled up to a multiple of eight
-    slots with row 0."""
+    """Tetrahedra around the node, shape (nodes,). A row is filled up to a multiple of eight slots
+    with places where there is always 0."""
+    around: SlotArray
+    """Place in `volume` of each tetrahedron around the node, in order; shape (pool,)."""
     corner: SlotArray
-    """Row of `forces` of each corner that the node is, in order of tetrahedra; shape (pool,)."""
+    """Place in `forces` of the force on that corner of it that is the node, shape (pool,)."""
     node_volume: FloatArray
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray
@@ -95,8 +97,8 @@ class Solid(Arrays):
     pressure: FloatArray
     """Scratch: lam (J - a) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
-    """Scratch: force on corner k of tetrahedron t [N] and a 0 in row 4 (8 + t) + k, shape (n, 4).
-    The first 32 rows are 0: those of no corner."""
+    """Scratch: force on each corner of each tetrahedron [N], in blocks of four times three rows of
+    eight, x, y and z (`corner_place`); the first block is 0."""
 
 
 def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> Law:
@@ -136,6 +138,7 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
         count=np.zeros(n_nodes, dtype=np.int64),
+        around=np.zeros(pool, dtype=np.int32),
         corner=np.zeros(pool, dtype=np.int32),
         node_volume=np.zeros(n_nodes),
         weight=np.zeros(n_nodes),
@@ -148,7 +151,7 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=_aligned(WIDTH + capacity),
         pressure=np.zeros(n_nodes),
-        forces=_aligned(4 * 4 * (WIDTH + capacity)).reshape(-1, 4),
+        forces=_aligned(4 * 3 * (WIDTH + capacity)),
     )
 
 
@@ -190,6 +193,12 @@ def node_place(t: int, k: int) -> int:
 def shape_place(t: int, which: int) -> int:
     """Return where quantity `which` of tetrahedron `t` is in `shape`."""
     return WIDTH * (8 * (t // WIDTH) + which) + t % WIDTH
+
+
+@kernel
+def corner_place(t: int, k: int) -> int:
+    """Return where x of the force on corner `k` of tetrahedron `t` is in `forces`."""
+    return 3 * WIDTH * (4 * (1 + t // WIDTH) + k) + t % WIDTH
 
 
 @kernel
@@ -248,14 +257,15 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
     first = solid.first[node]
     solid.count[node] = n
     for slot in range(first + n, first + filled(n)):
-        solid.corner[slot] = 0
+        solid.around[slot] = solid.corner[slot] = 0
     volume = 0.0
     for i in range(n):
         t = around[i]
         k = 0
         while body.tetrahedra[t, k] != node:
             k += 1
-        solid.corner[first + i] = 4 * (WIDTH + t) + k
+        solid.around[first + i] = WIDTH + t
+        solid.corner[first + i] = corner_place(t, k)
         volume += 0.25 * solid.shape[shape_place(t, VOLUME)]
     solid.node_volume[node] = volume
 
@@ -267,6 +277,12 @@ def filled(n: int) -> int:
 
 
 @kernel
-def corner_tetrahedron(corner: int) -> int:
+def tetrahedron_at(solid: Solid, slot: int) -> int:
     """Return the tetrahedron that a slot of a row names."""
-    return corner // 4 - WIDTH
+    return solid.around[slot] - WIDTH
+
+
+@kernel
+def corner_at(solid: Solid, slot: int) -> int:
+    """Return which of its four nodes the node is."""
+    return solid.corner[slot] // (3 * WIDTH) % 4

@@ -21,7 +21,7 @@ import math
 from tissue.body import Body
 from tissue.geometry import largest_eigenvalue
 from tissue.jit import inlined, kernel
-from tissue.solid import Solid, corner_tetrahedron, node_place, rest_normals
+from tissue.solid import Solid, corner_at, node_place, rest_normals, tetrahedron_at
 from tissue.star import Visits
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, axpy, norm, scale, store, vec3
@@ -61,7 +61,7 @@ def _with_neighbours(solid: Solid, visits: Visits, nodes: IntArray, n: int) -> i
     for i in range(n):
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            t = corner_tetrahedron(solid.corner[slot])
+            t = tetrahedron_at(solid, slot)
             for k in range(4):
                 other = solid.nodes[node_place(t, k)]
                 if visits.nodes[other] != visits.epoch[0]:
@@ -81,7 +81,7 @@ def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> 
     visits.epoch[0] += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-        t = corner_tetrahedron(solid.corner[slot])
+        t = tetrahedron_at(solid, slot)
         n1, n2, n3, _ = rest_normals(body, t)
         n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
         n = _add_to_ring(solid, visits, n, t, 1, n1)
@@ -122,7 +122,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     visits.epoch[0] += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-        t = corner_tetrahedron(solid.corner[slot])
+        t = tetrahedron_at(solid, slot)
         n1, n2, n3, volume = rest_normals(body, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
         ratios = (
@@ -131,7 +131,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
             + solid.weight[solid.nodes[node_place(t, 2)]] * norm(n2)
             + solid.weight[solid.nodes[node_place(t, 3)]] * norm(n3)
         )
-        k = solid.corner[slot] % 4
+        k = corner_at(solid, slot)
         normal = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
         length = norm(normal)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)

@@ -1,6 +1,5 @@
 """Forces of tetrahedra against their slow twin, against the energy, and against theory."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -19,6 +18,7 @@ from tests.tissue.solids import (
 )
 from tests.tissue.test_stellar import split_all
 from tissue.body import NODES, TETRAHEDRA
+from tissue.jit import is_compiling
 from tissue.shapes import grid
 from tissue.types import TetrahedralMesh
 
@@ -31,9 +31,7 @@ MESHES = {
     "jittered": bodies.jittered(2, 3),
 }
 
-needs_speed = pytest.mark.skipif(
-    bool(numba.config.DISABLE_JIT), reason="a thousand steps: compiled only"
-)
+needs_speed = pytest.mark.skipif(not is_compiling(), reason="thousands of steps: compiled only")
 
 
 @pytest.fixture(params=MESHES)

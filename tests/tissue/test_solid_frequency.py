@@ -8,6 +8,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tests import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, lame, law_of, solid_of
+from tissue.jit import is_compiling
 from tissue.shapes import grid
 from tissue.solid import volume_term
 from tissue.tissue import Tissue
@@ -48,6 +49,7 @@ def fastest(solid: SolidBody) -> float:
     return float(np.sqrt(eigsh(operator, k=1, which="LA", v0=start, tol=1e-4)[0][0]))
 
 
+@pytest.mark.skipif(not is_compiling(), reason="forty cuts: compiled only")
 @pytest.mark.parametrize("averaged", [False, True])
 @pytest.mark.parametrize("seed", range(20))
 def test_8_the_bound_on_cut_meshes_is_above_the_fastest_mode_by_little(seed, averaged):

@@ -11,7 +11,8 @@ from tissue.elastic import TETRAHEDRA_TOO, Elastic
 from tissue.jit import kernel
 from tissue.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.relaxation.breadth_first import N_FOUND, Rings
-from tissue.solid import Solid, n_blocks
+from tissue.simd import WIDTH
+from tissue.solid import Solid, n_blocks, tetrahedron_at
 from tissue.types import FloatArray, IntArray
 
 N_VOLUMES, N_PRESSURES, N_FORCES, EPOCH = 0, 1, 2, 3
@@ -89,7 +90,7 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
             break
         first = solid.first[node]
         for slot in range(first, first + solid.count[node]):
-            block = (solid.corner[slot] >> 5) - 1
+            block = tetrahedron_at(solid, slot) // WIDTH
             if patch.seen[block] != patch.state[EPOCH]:
                 patch.seen[block] = patch.state[EPOCH]
                 out[n] = block
