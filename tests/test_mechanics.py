@@ -114,7 +114,7 @@ def test_23_where_nothing_narrows_sag_and_frequencies_converge_to_beam_theory():
     found = {mode: (fine.frequencies()[mode], coarse.frequencies()[mode]) for mode in MODES}
     ratios = {mode: (4.0 * f - c) / 3.0 / theory[mode] for mode, (f, c) in found.items()}
     ratios["sag"] = (4.0 * fine.sag_ratio() - coarse.sag_ratio()) / 3.0
-    assert ratios == pytest.approx(dict.fromkeys(ratios, 1.0), abs=0.02)
+    assert ratios == pytest.approx(dict.fromkeys(ratios, 1.0), abs=0.025)
 
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
@@ -294,31 +294,56 @@ def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
 # what springs could not do
 
 
-def test_a_slender_tower_stands_a_sudden_push_at_its_top():
-    """1 N on a tower of 10 x 10 x 60 mm that bends by more than its own thickness."""
+@pytest.mark.parametrize("law", ["springs and volume", "neo-Hookean"])
+def test_a_slender_tower_bows_to_a_sudden_newton_and_stands_still_in_the_end(law):
+    """10 x 10 x 60 mm: it bows by its own length, and swings. All of the newton is there at once,
+    from one side, on its mass. Springs alone turn inside out."""
     mesh = grid((2, 2, 12), (0.01, 0.01, 0.06))
-    material = Material(30e3, law="neo_hookean", poisson_ratio=0.45, viscous_damping=10.0)
-    tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] < 1e-9, gravity=NO_GRAVITY)
+    material = replace(LAWS[law], young_modulus=300e3, viscous_damping=20.0)
+    tissue = Tissue(
+        mesh,
+        material,
+        fixed=mesh.positions[:, 2] < 1e-9,
+        gravity=(1.0 / (material.density * 0.01 * 0.01 * 0.06), 0.0, 0.0),
+    )
     top = mesh.positions[:, 2] > 0.06 - 1e-9
-    pushed = tissue.snapshot()
-    assert pushed is not None and top.any()
+    swing = []
+    for _ in range(1000):
+        tissue.step(None, 1e-3)
+        now = tissue.snapshot()
+        swing.append(now.positions[top, 0].mean() - 0.005)
+        assert (signed_volumes(now.positions, now.tetrahedra) > 0.3 * 0.005**3 / 6.0).all()
+    assert max(swing) > 0.05
+    assert np.ptp(swing[-100:]) < 1e-3
 
 
-@pytest.mark.parametrize("material", [LAWS["springs and volume"], SOLID], ids=["springs", "solid"])
-def test_a_block_pressed_to_half_its_height_does_not_collapse(material):
-    """Springs alone fold up: nothing in them knows which side of a face a node is on."""
-    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
-    held = (mesh.positions[:, 2] < 1e-9) | (mesh.positions[:, 2] > 0.04 - 1e-9)
-    pressed = mesh.positions * [1.0, 1.0, 0.5]
+@pytest.mark.parametrize(("nu", "height"), [(0.35, 0.7), (0.45, 0.5)])
+@pytest.mark.parametrize("made", [lambda: grid((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+def test_springs_with_a_volume_term_do_not_collapse_in_a_block_that_is_pressed(made, nu, height):
+    volumes = volumes_in_a_press(made(), replace(UNDAMPED, poisson_ratio=nu), height)
+    assert volumes.min() > 0.0
+
+
+def test_springs_alone_do():
+    """Nothing in them knows on which side of a face a node is."""
+    assert volumes_in_a_press(RANDOM, UNDAMPED, 0.7).min() < 0.0
+
+
+@pytest.mark.parametrize("made", [lambda: grid((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+def test_nor_do_tetrahedra(made):
+    assert volumes_in_a_press(made(), SOLID, 0.6).min() > 0.0
+
+
+def volumes_in_a_press(mesh, material, height):
+    """Volumes of the tetrahedra of a block between two plates, over those at rest."""
+    z = mesh.positions[:, 2]
     tissue = Tissue(
         mesh,
         replace(material, viscous_damping=20.0),
-        fixed=held,
-        positions=pressed,
+        fixed=(z < 1e-9) | (z > z.max() - 1e-9),
+        positions=mesh.positions * [1.0, 1.0, height],
         gravity=NO_GRAVITY,
     )
     tissue.settle()
     after = tissue.snapshot()
-    volumes = signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh)
-    assert volumes.min() > 0.2
-    assert volumes.mean() == pytest.approx(0.85, abs=0.15)
+    return signed_volumes(after.positions, after.tetrahedra) / signed_volumes(*mesh)

@@ -23,6 +23,12 @@ from tissue.star import LARGEST_STAR, Visits, sorted_star
 from tissue.types import FloatArray, IntArray, SlotArray
 from tissue.vec3 import Vec3, cross, dot, sub, vec3
 
+OWN_SHARE = 0.2
+"""Share of the volume term beside springs that acts on each tetrahedron by itself. Averaged volumes
+do not see one tetrahedron fold while its neighbours swell, and springs do not mind: without it some
+4 % were inside out in a block at half its height, with it none; springs alone fold at 0.8 of the
+height. Bending locks a little: a bar of four cells deflects 0.68 of theory, not 0.73."""
+
 VOLUME, PER_VOLUME = 6, 7
 """Places in a row of `Solid.shape`; before them grad products 11, 22, 33, 12, 13, 23."""
 
@@ -115,13 +121,18 @@ def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> Law:
 
 
 def volume_term(modulus: float, *, averaged: bool = True) -> Law:
-    """Return the law that only resists changes of volume, by that modulus [Pa]: beside springs."""
-    return _law(0.0, modulus, 1.0, averaged)
+    """Return the law that only resists changes of volume, by that modulus [Pa]: beside springs.
+
+    Args:
+        modulus: What springs leave to it, lam - mu.
+        averaged: Whether all but `OWN_SHARE` of it acts on averaged volumes; if not, nothing does.
+    """
+    return _law(0.0, modulus, 1.0, averaged, OWN_SHARE)
 
 
-def _law(mu: float, lam: float, a: float, averaged: bool) -> Law:
-    of_nodes = lam if averaged else 0.0
-    return Law(mu=mu, lam_of_tetrahedra=lam - of_nodes, lam_of_nodes=of_nodes, a=a)
+def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0) -> Law:
+    own = own_share * lam if averaged else lam
+    return Law(mu=mu, lam_of_tetrahedra=own, lam_of_nodes=lam - own, a=a)
 
 
 def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:

@@ -5,8 +5,9 @@ rest, assembled with NumPy: force = -K displacement, exactly that of the engine'
 order (a test compares the two).
 
 Springs: K = sum of k u u^T, k by van Gelder. Change of volume: each node has the mean dilatation of
-the tetrahedra around it, by volume. Neo-Hookean law: shear of each tetrahedron by itself, and
-dilatation averaged over nodes (Smith, de Goes and Kim 2018; see `tissue.neo_hookean`).
+the tetrahedra around it, by volume; beside springs, a share acts on each tetrahedron by itself
+(`OWN_SHARE`). Neo-Hookean law: shear of each tetrahedron by itself, and dilatation averaged over
+nodes (Smith, de Goes and Kim 2018; see `tissue.neo_hookean`).
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.material import Material
+from tissue.solid import OWN_SHARE
 from tissue.types import FloatArray, IntArray, TetrahedralMesh
 
 if TYPE_CHECKING:  # imported where it is used: half a second that no cut has to wait for
@@ -80,15 +82,17 @@ def stiffness_matrix(
     Args:
         mesh: The body at rest.
         material: What it is made of, and under which law.
-        averaged: Whether dilatation is averaged over nodes, as the engine does; False for plain
+        averaged: Whether dilatation is averaged over nodes, as in the engine; False for plain
             linear tetrahedra, which lock (for comparison).
     """
-    dilatation = _mean_dilatation if averaged else _own_dilatation
     if material.law == "springs":
         springs = _of_springs(mesh, edge_springs(mesh, material.spring_modulus))
         if material.volume_modulus == 0.0:
             return springs
-        return springs + material.volume_modulus * dilatation(mesh)
+        own = OWN_SHARE if averaged else 1.0
+        mixed = own * _own_dilatation(mesh) + (1.0 - own) * _mean_dilatation(mesh)
+        return springs + material.volume_modulus * mixed
+    dilatation = _mean_dilatation if averaged else _own_dilatation
     taken = LOCAL_DILATATION * material.mu
     return (
         _of_shear(mesh, material.mu)
