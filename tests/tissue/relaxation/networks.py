@@ -3,8 +3,8 @@
 import numpy as np
 
 from tests import bodies
-from tests.tissue.kernels_of import Network, network_of
-from tissue.elastic import Elastic, Surroundings
+from tests.tissue.kernels_of import Network, elastic_of, network_of
+from tissue.elastic import Surroundings
 from tissue.relaxation.activity import all_asleep, wake_all
 from tissue.relaxation.breadth_first import (
     N_FOUND,
@@ -15,8 +15,10 @@ from tissue.relaxation.breadth_first import (
     search,
 )
 from tissue.relaxation.chebyshev import STABILISATION, chebyshev
-from tissue.relaxation.hierarchical import hierarchical_frame, new_trails
-from tissue.relaxation.local_time_stepping import OVERLAP, macro_step, new_zone
+from tissue.relaxation.hierarchical import Trails, hierarchical_frame, new_trails
+from tissue.relaxation.levels import find_listed_patch
+from tissue.relaxation.local_time_stepping import macro_step, new_zone
+from tissue.relaxation.patches import find_patch, new_patch, reach_of
 from tissue.tissue import NOWHERE
 from tissue.types import BoolArray, FloatArray
 from tissue.vec3 import Vec3
@@ -58,11 +60,19 @@ def found(rings: Rings) -> list[int]:
 
 
 def frames(
-    network: Network, focus: int, span: float, n: int, updates: int, last_ring: int, frozen: bool
+    network: Network,
+    focus: int,
+    span: float,
+    n: int,
+    updates: int,
+    last_ring: int,
+    frozen: bool,
+    trails: Trails | None = None,
 ) -> None:
     """Advance by `n` frames of `span` [s] of the hierarchical relaxation."""
     n_nodes = len(network.body.rest)
-    rings, trails = rings_around(network, focus, last_ring + 1), new_trails(n_nodes)
+    rings = rings_around(network, focus, last_ring + 1)
+    trails = trails or new_trails(n_nodes)
     external = np.zeros((n_nodes, 3))
     settings = (0.0, span, 0.0, 1.0, updates, last_ring, frozen)
     for _ in range(n):
@@ -88,15 +98,18 @@ def leaps(
     stabilisation: float = STABILISATION,
 ) -> None:
     """Advance by `n` macro steps of `span` [s], every node awake, from velocities of this instant."""
-    body, elastic = network.body, Elastic(springs=network.springs)
-    n_nodes = len(body.rest)
-    zone, activity = new_zone(n_nodes), all_asleep(n_nodes)
+    body, elastic = network.body, elastic_of(network.springs)
+    n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+    zone, activity = new_zone(n_nodes, n_tetrahedra), all_asleep(n_nodes)
+    listed = new_patch(n_nodes, n_tetrahedra)
     wake_all(activity, body, network.springs)
     begin_search(zone.rings)
     for node in fine:
         if not body.fixed[node]:
             add_focus(zone.rings, node)
-    search(zone.rings, network.springs, OVERLAP)
+    search(zone.rings, network.springs, reach_of(elastic))
+    find_patch(zone.patch, elastic, zone.rings, 0, reach_of(elastic) - 1)
+    find_listed_patch(listed, elastic, activity, new_rings(n_nodes))
     for i in range(n):
         macro_step(
             body,
@@ -104,6 +117,7 @@ def leaps(
             network.anchors,
             NOWHERE,
             activity,
+            listed,
             zone,
             chebyshev(n_substeps, stabilisation),
             np.zeros((n_nodes, 3)),
