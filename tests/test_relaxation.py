@@ -1,0 +1,172 @@
+"""Whichever way a body is relaxed it comes to the same rest, keeps what it must, and feels real."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tests.test_conservation import NO_GRAVITY, SLAB, momentum
+from tests.test_determinism import fingerprint
+from tissue.material import Material
+from tissue.relaxation.activity import WAKE_ACCELERATION
+from tissue.relaxation.options import Hierarchical, LocalTimeStepping
+from tissue.shapes import grid
+from tissue.tissue import Tissue
+
+LOCAL, HIERARCHICAL = LocalTimeStepping(), Hierarchical(updates=16, rings=3)
+NEVER_ASLEEP = LocalTimeStepping(sleep=False)
+
+LAWS = {
+    "springs": Material(viscous_damping=60.0),
+    "springs and volumes": Material(viscous_damping=60.0, poisson_ratio=0.4),
+    "tetrahedra": Material(viscous_damping=60.0, law="neo_hookean", poisson_ratio=0.4),
+}
+"""In thick oil, so that a second brings them to rest."""
+
+
+def waited(mesh, material, relaxation, seconds=1.0):
+    """Return a body held at two sides that has sagged for that long."""
+    tissue = Tissue(mesh, material, fixed=bodies.sides(mesh), relaxation=relaxation)
+    for _ in range(round(seconds / strokes.DT)):
+        tissue.step(None, strokes.DT)
+    return tissue
+
+
+@pytest.mark.parametrize(
+    ("relaxation", "law"),
+    [*((NEVER_ASLEEP, law) for law in LAWS), (HIERARCHICAL, "springs")],
+    ids=str,
+)
+def test_the_rest_is_that_of_all_nodes_together(relaxation, law):
+    mesh = bodies.jittered(3, 0)
+    expected, found = (waited(mesh, LAWS[law], how) for how in ("global", relaxation))
+    apart = np.abs(found.snapshot().positions - expected.snapshot().positions).max()
+    sag = np.abs(expected.snapshot().positions - mesh.positions).max()
+    assert sag > 1e-4
+    assert apart < 1e-6 * 0.04
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_body_that_fell_asleep_hangs_where_it_would_awake(law):
+    """Short of equilibrium by the share of the weight that wakes a node, of the sag, at most."""
+    mesh = bodies.jittered(3, 0)
+    awake, asleep = (waited(mesh, LAWS[law], how) for how in (NEVER_ASLEEP, LOCAL))
+    assert asleep._relaxation.n_awake == 0
+    apart = np.abs(asleep.snapshot().positions - awake.snapshot().positions).max()
+    sag = np.abs(awake.snapshot().positions - mesh.positions).max()
+    assert apart <= WAKE_ACCELERATION / 9.81 * sag
+
+
+def test_a_body_asleep_does_not_change_at_all():
+    tissue = waited(bodies.jittered(3, 0), LAWS["springs"], LOCAL)
+    before = tissue.snapshot()
+    result = tissue.step(None, strokes.DT)
+    for now, then in zip(tissue.snapshot(), before, strict=True):
+        np.testing.assert_array_equal(now, then)
+    np.testing.assert_array_less(result.bounds[0] - 1e-12, before.positions.min(axis=0))
+    np.testing.assert_array_less(before.positions.max(axis=0), result.bounds[1] + 1e-12)
+
+
+POKE = {"low": -0.01, "high": 0.05, "speed": 0.05}
+
+
+def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
+    mesh = grid((6, 6, 6), (0.04, 0.04, 0.04))
+    pushed = []
+    for how in (LOCAL, NEVER_ASLEEP):
+        tissue = waited(mesh, LAWS["springs"], how)
+        results = strokes.make(tissue, strokes.upright(0.02, -0.002, 0.003, **POKE))
+        pushed.append((tissue, np.array([r.wrench.force for r in results])))
+    (slept, force), (awake, expected) = pushed
+    assert np.abs(expected).max() > 0.05
+    np.testing.assert_allclose(force, expected, atol=0.02 * np.abs(expected).max())
+    moved = np.abs(awake.snapshot().positions - mesh.positions).max()
+    apart = np.abs(slept.snapshot().positions - awake.snapshot().positions).max()
+    assert apart < 0.02 * moved
+
+
+def test_far_from_a_small_poke_a_large_body_sleeps_on():
+    mesh = grid((20, 6, 6), (0.4, 0.12, 0.12))
+    tissue = Tissue(mesh, Material(viscous_damping=100.0), gravity=NO_GRAVITY, relaxation=LOCAL)
+    for _ in range(100):
+        tissue.step(None, strokes.DT)
+    assert tissue._relaxation.n_awake == 0
+    press = strokes.upright(0.2, -0.001, 0.0002, low=0.05, high=0.15, speed=0.02)
+    strokes.make(tissue, press)
+    assert 0 < tissue._relaxation.n_awake < 0.5 * tissue.n_nodes
+
+
+@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+def test_the_cutting_force_is_toughness_times_length(relaxation):
+    mesh = grid((6, 12, 3), SLAB)
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, relaxation=relaxation)
+    stroke = strokes.upright(0.0213, -0.004, 0.06, -0.005, 0.025, 0.1)
+    results = strokes.make(tissue, stroke)
+    middle = [r for r, at in zip(results, stroke[1:], strict=True) if 0.035 < at.tip[1] < 0.055]
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    length = np.mean([r.anchored_length for r in middle])
+    assert length == pytest.approx(SLAB[2], rel=0.05)
+    assert force == pytest.approx(20.0 * length, rel=0.02)
+    apart = [r.wrench.force + r.force_on_tissue for r in results]
+    assert np.abs(apart).max() < 1e-12
+
+
+@pytest.mark.parametrize("law", ["springs", "neo_hookean"])
+def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law):
+    """Frame by frame, through splits and substeps; drag, which slows it, is off."""
+    mesh = bodies.jittered(4, 0)
+    material = Material(law=law, poisson_ratio=0.3, viscous_damping=0.0, toughness=5.0)
+    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, relaxation=LOCAL)
+    scale = float(tissue.snapshot().masses.sum())
+    n_cut = 0
+    for sweep in strokes.sweeps(strokes.slanted(mesh)):
+        before = momentum(tissue)[0]
+        result = tissue.step(sweep, strokes.DT)
+        gained = momentum(tissue)[0] - before
+        np.testing.assert_allclose(gained, -result.wrench.force * strokes.DT, atol=1e-12 * scale)
+        n_cut = result.n_tetrahedra
+    assert n_cut > len(mesh.tetrahedra)
+
+
+@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
+    mesh = bodies.jittered(4, 0)
+    prints = []
+    for _ in range(2):
+        tissue = Tissue(mesh, fixed=bodies.sides(mesh), relaxation=relaxation)
+        results = strokes.make(tissue, strokes.slanted(mesh))
+        assert results[-1].cut_area > 0.0
+        prints.append(fingerprint(tissue, results))
+    assert prints[0] == prints[1]
+
+
+@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+def test_arrays_that_grow_change_nothing(relaxation):
+    """Room that is there from the start, and room made in the middle of the cut."""
+    mesh = bodies.jittered(4, 0)
+    prints = []
+    for n_doubled in (0, 2):
+        tissue = Tissue(mesh, fixed=bodies.sides(mesh), relaxation=relaxation)
+        for _ in range(n_doubled):
+            counts = tissue._body.counts.copy()
+            tissue._body.counts[:] = len(tissue._body.rest), len(tissue._body.tetrahedra)
+            tissue._grow()
+            tissue._body.counts[:] = counts
+        prints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
+    assert prints[0] == prints[1]
+
+
+def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
+    """Cut through, held at one side: the loose piece falls on the floor and comes to rest."""
+    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    held = mesh.positions[:, 0] < 1e-6
+    material = Material(viscous_damping=20.0, toughness=2.0)
+    tissue = Tissue(mesh, material, fixed=held, floor=-0.004, relaxation=LOCAL)
+    strokes.make(tissue, strokes.straight(mesh, 0.6))
+    assert tissue.n_pieces() == 2
+    for _ in range(800):
+        result = tissue.step(None, strokes.DT)
+    loose = tissue.snapshot().positions[tissue.snapshot().rest_positions[:, 0] > 0.03]
+    assert loose[:, 2].min() == pytest.approx(-0.004, abs=2e-4)
+    assert result.touch.force_of_floor[2] > 0.0
+    weight = 9.81 * min(piece.mass for piece in tissue.pieces())
+    assert result.touch.force_of_floor[2] == pytest.approx(weight, rel=0.3)
