@@ -1,0 +1,105 @@
+"""Fifty random strokes on the organ: PYTHONPATH=. python benchmarks/random_strokes.py [options].
+
+Each stroke crosses the organ at a random place, way, lean, depth and speed, at steps of 1 ms, with
+nothing about time steps said by anybody; loose pieces land on a floor. The table says what becomes
+of the body and of its motion. The last line says whether the run stayed stable: every number
+finite, no node faster than the blade by far, and at rest again within a second of the last stroke.
+"""
+
+import argparse
+import sys
+from dataclasses import replace
+from time import thread_time
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from scalpel_sim.body import make_tissue
+from scalpel_sim.scenes import SCENES
+from tissue.relaxation.options import BY_NAME
+from tissue.tissue import Tissue, TissueError
+from tissue.types import BladeSegment, BladeSweep
+
+DT = 1e-3
+"""[s]."""
+FASTEST = 5.0
+"""Speed of a node above which the motion counts as unstable [m/s]; the blade goes at 0.12."""
+AT_REST = 0.02
+"""Speed below which the body counts as at rest [m/s]."""
+
+
+def stroke(tissue: Tissue, random: np.random.Generator) -> list[BladeSegment]:
+    """Return a random way of the edge across the body, one pose a step."""
+    low, high = tissue.bounds
+    centre, extent = (low + high) / 2.0, high - low
+    yaw, lean = random.uniform(0.0, 2.0 * np.pi), random.uniform(-0.5, 0.5)
+    way = np.array([np.cos(yaw), np.sin(yaw), 0.0])
+    side = np.array([-way[1], way[0], 0.0])
+    up = np.cos(lean) * np.array([0.0, 0.0, 1.0]) + np.sin(lean) * side
+    middle = centre + side * random.uniform(-0.35, 0.35) * extent[:2].min()
+    middle[2] = high[2] - random.uniform(0.2, 1.1) * extent[2]
+    half = 0.5 * float(np.linalg.norm(extent[:2])) + 0.01
+    speed = random.uniform(0.04, 0.12)
+    along = np.arange(-half, half, speed * DT)
+    return [
+        BladeSegment(tip, tip + (extent[2] + 0.02) * up, way)
+        for tip in (middle + s * way for s in along)
+    ]
+
+
+def fastest(tissue: Tissue) -> float:
+    """Return the largest speed of a node [m/s]."""
+    return float(np.linalg.norm(tissue.snapshot().velocities, axis=1).max())
+
+
+def main() -> int:
+    """Cut, and say how it went; return 1 where the run was not stable."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--strokes", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--relaxation", choices=tuple(BY_NAME), default=None)
+    parser.add_argument("--law", choices=("springs", "neo_hookean"), default=None)
+    options = parser.parse_args()
+    scene = SCENES["organ"]
+    material = scene.material
+    if options.law:
+        ratio = 0.45 if options.law == "neo_hookean" else 0.25
+        material = replace(material, law=options.law, poisson_ratio=ratio)
+    relaxation = options.relaxation or scene.relaxation
+    tissue = make_tissue(replace(scene, material=material, relaxation=relaxation, floor=-0.02))
+    random = np.random.default_rng(options.seed)
+    table = Table(title=f"organ, law {material.law}, relaxation {relaxation}")
+    for name in ("stroke", "tetrahedra", "pieces", "substeps/ms", "CPU ms/ms", "fastest [m/s]"):
+        table.add_column(name, justify="right")
+    console = Console()
+    is_stable, swiftest = True, 0.0
+    try:
+        for i in range(options.strokes):
+            substeps, began, n = 0, thread_time(), 0
+            edges = stroke(tissue, random)
+            for before, after in zip(edges[:-1], edges[1:], strict=True):
+                result = tissue.step(BladeSweep(before, after), DT)
+                substeps, n = max(substeps, result.n_substeps), n + 1
+                if n % 20 == 0:
+                    swiftest = max(swiftest, fastest(tissue))
+            for _ in range(100):
+                tissue.step(None, DT)
+            row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps)
+            spent = (thread_time() - began) / (n + 100) / DT
+            table.add_row(*map(str, row), f"{spent:.2f}", f"{swiftest:.2f}")
+            print(*row, f"{spent:.2f} {swiftest:.2f}", file=sys.stderr)
+        for _ in range(1000):
+            tissue.step(None, DT)
+        is_stable = swiftest < FASTEST and fastest(tissue) < AT_REST
+    except TissueError as error:
+        console.print(f"[red]{error}[/red]")
+        is_stable = False
+    console.print(table)
+    at_last = fastest(tissue)
+    console.print(f"{'stable' if is_stable else 'NOT STABLE'}; at last {at_last:.4f} m/s")
+    return 0 if is_stable else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
