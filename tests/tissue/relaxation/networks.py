@@ -97,7 +97,7 @@ def leaps(
     n_substeps: int,
     stabilisation: float = STABILISATION,
 ) -> None:
-    """Advance by `n` macro steps of `span` [s], every node awake, from velocities of this instant."""
+    """Advance by `n` macro steps of `span` [s], all nodes awake, velocities of this instant."""
     body, elastic = network.body, elastic_of(network.springs)
     n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
     zone, activity = new_zone(n_nodes, n_tetrahedra), all_asleep(n_nodes)
