@@ -157,11 +157,18 @@ def test_a_press_that_does_not_cut_springs_back():
     np.testing.assert_allclose(tissue.snapshot().positions, mesh.positions, atol=1e-5)
 
 
-def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02):
+SOLID = {"law": "neo_hookean", "poisson_ratio": 0.45}
+
+
+def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02, relaxation="global", **law):
     """Cut a block held at both sides; return the frames in the middle of the cut."""
     mesh = grid(cells, SLAB)
     tissue = Tissue(
-        mesh, Material(toughness=toughness), fixed=bodies.sides(mesh), gravity=NO_GRAVITY
+        mesh,
+        Material(toughness=toughness, **law),
+        fixed=bodies.sides(mesh),
+        gravity=NO_GRAVITY,
+        relaxation=relaxation,
     )
     low = -0.005 if depth == SLAB[2] else SLAB[2] - depth
     stroke = strokes.upright(0.0213, -0.004, 0.06, low, 0.025, speed * dt / strokes.DT)
@@ -183,6 +190,31 @@ def test_steady_cutting_force_is_toughness_times_anchored_length(cells, toughnes
     anchored = np.mean([r.anchored_length for r in middle])
     assert anchored == pytest.approx(SLAB[2], rel=0.05)
     assert force == pytest.approx(toughness * anchored, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("law", "relaxation"), [({}, "local"), (SOLID, "global"), (SOLID, "local")]
+)
+@pytest.mark.parametrize(
+    ("cells", "toughness"), [(COARSE, 5.0), (FINE, 5.0), (FINE, 20.0), (COARSE, 60.0)]
+)
+def test_it_is_so_under_either_law_and_however_the_body_is_relaxed(
+    cells, toughness, relaxation, law
+):
+    _, middle, _ = steady(cells, toughness, 0.1, relaxation=relaxation, **law)
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    anchored = np.mean([r.anchored_length for r in middle])
+    assert anchored == pytest.approx(SLAB[2], rel=0.05)
+    assert force == pytest.approx(toughness * anchored, rel=0.05)
+
+
+@pytest.mark.parametrize("relaxation", ["global", "local"])
+def test_tetrahedra_bear_a_toughness_that_strains_springs_too_far(relaxation):
+    """Toughness over Young's modulus is 6 mm here, 1.27 times the mean node size."""
+    _, middle, _ = steady(FINE, 60.0, 0.1, relaxation=relaxation, **SOLID)
+    force = -np.mean([r.wrench.force[1] for r in middle])
+    anchored = np.mean([r.anchored_length for r in middle])
+    assert force == pytest.approx(60.0 * anchored, rel=0.05)
 
 
 def test_a_toughness_that_strains_springs_too_far_reads_low_and_is_warned_of(caplog):
