@@ -1,9 +1,7 @@
 """A tetrahedral body that a blade can cut: `Tissue` owns every array, `step` lists the stages."""
 
-import logging
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
@@ -32,12 +30,13 @@ from tissue.border import (
     checked_positions,
     checked_threads,
 )
+from tissue.caveats import warn_of_ratio, warn_of_toughness
 from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.elastic import Surroundings
 from tissue.elasticity import Elasticity
 from tissue.holding import let_go, meet, near_box, seize
-from tissue.material import NEARLY_INCOMPRESSIBLE, Material
+from tissue.material import Material
 from tissue.measures import lowest_altitude, path_error
 from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
 from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
@@ -115,14 +114,6 @@ SETTLED = 1e-3
 """Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
 LONGEST_SETTLING = 20_000
 """Runge-Kutta steps after which `settle` gives up waiting."""
-
-
-TOUGHEST = {"springs": 1.0, "neo_hookean": 2.0}
-"""Toughness over Young's modulus, in mean node sizes, up to which the cutting force is within 6 % of
-that of the toughness. Springs were measured 1 % low at 0.84 and 6 to 12 % at 1.27; tetrahedra 3 % at
-1.27, 5 % at 2.0 and 16 % at 2.5."""
-
-log = logging.getLogger("tissue")
 
 
 class TissueError(RuntimeError):
@@ -203,8 +194,8 @@ class Tissue:
 
         self._elasticity = Elasticity(self.material, self._body, self._visits)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
-        self._warn_of_toughness()
-        self._warn_of_ratio()
+        warn_of_toughness(self.material, self.node_size)
+        warn_of_ratio(self.material)
         quality = quality or CutQuality()
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = float(quality.floor * self.node_size)
@@ -553,21 +544,6 @@ class Tissue:
         self._contact.incision_ended(self._body)
         forget_path(self._path)
         self._incising = False
-
-    def _warn_of_toughness(self) -> None:
-        """Say so where the blade strains tetrahedra more than their law can bear."""
-        length = self.material.toughness / self.material.young_modulus
-        if length > TOUGHEST[self.material.law] * self.node_size:
-            log.warning(
-                "toughness / young_modulus is %.1f mm, %.1f times the mean node size of %.1f mm: "
-                "tetrahedra ahead of the blade are strained beyond what law %s bears, and the "
-                "cutting force reads up to 15 %% low. Use a lower toughness, a stiffer material%s",
-                length * 1e3,
-                length / self.node_size,
-                self.node_size * 1e3,
-                self.material.law,
-                ", or law neo_hookean" if self.material.law == "springs" else ", or larger cells",
-            )
 
     def _n_increments(self, sweep: BladeSweep | None) -> int:
         """Return in how many parts the step is taken, so that the edge moves little in each."""
