@@ -72,7 +72,7 @@ def test_8_the_bound_that_followed_cuts_is_above_the_fastest_mode_by_little(seed
     tissue = cut_tissue(seed)
     solid = solid_that_followed(tissue)
     assert 1.0 <= solid.frequency() / fastest(solid) <= LOOSEST_BOUND
-    assert tissue._elasticity.frequency_squared >= solid.frequency() ** 2
+    assert solid.frequency() <= np.sqrt(tissue._elasticity.frequency_squared)
 
 
 @needs_speed
