@@ -26,49 +26,87 @@ from tissue.star import Visits
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, axpy, norm, scale, store, vec3
 
+STALE = 2.0
+"""Mass over the one that its weight is of, or the inverse, at which a node gets another weight. Any
+weight is right, that of the mass now is near the best; but another weight changes the bound two
+rings further. Nodes that were split again and again made the bound twice too high without."""
+
 
 @kernel
 def bound_solid_frequencies(
     solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int
 ) -> int:
-    """Write the bound on w^2 at the first `n` of `nodes` and their neighbours anew.
+    """Write the bound on w^2 at the first `n` of `nodes`, and at others that feel them, anew.
 
     Return at how many; they are listed in `solid.listed`. The rows and the masses of `nodes` must
     be up to date.
     """
+    n_listed = 0
     for i in range(n):
-        node = nodes[i]
-        # Any number is right, and the root of its first mass is near the best for good; were it
-        # that of the mass now, the bound at neighbours of neighbours would change as well.
-        if solid.weight[node] == 0.0 and not body.fixed[node]:
-            solid.weight[node] = 1.0 / math.sqrt(body.masses[node])
-    averaged = solid.law.lam_of_nodes != 0.0
-    if averaged:
-        for i in range(n):
-            _measure_dilatation(solid, body, visits, nodes[i])
-    n = _with_neighbours(solid, visits, nodes, n)
-    for i in range(n):
+        if _reweighted(solid, body, nodes[i]):
+            solid.listed[n_listed] = nodes[i]
+            n_listed += 1
+    n_listed = _with_neighbours(solid, visits, n_listed)
+    n_listed = _with(solid, visits, n_listed, nodes, n)
+    if solid.law.lam_of_nodes != 0.0:
+        for i in range(n_listed):
+            _measure_dilatation(solid, body, visits, solid.listed[i])
+    n_listed = _with_neighbours(solid, visits, n_listed)
+    for i in range(n_listed):
         node = solid.listed[i]
         solid.frequency_squared[node] = _bound(solid, body, visits, node)
-    return n
+    return n_listed
 
 
 @kernel
-def _with_neighbours(solid: Solid, visits: Visits, nodes: IntArray, n: int) -> int:
-    """List these nodes and those next to them in `solid.listed`, each once; return how many."""
-    visits.epoch[0] += 1
-    n_listed = 0
+def _reweighted(solid: Solid, body: Body, node: int) -> bool:
+    """Whether the node got another weight."""
+    if body.fixed[node]:
+        return False
+    of_weight = body.masses[node] * solid.weight[node] ** 2
+    if 1.0 / STALE <= of_weight <= STALE:
+        return False
+    solid.weight[node] = 1.0 / math.sqrt(body.masses[node])
+    return True
+
+
+@kernel
+def _with(solid: Solid, visits: Visits, n_listed: int, nodes: IntArray, n: int) -> int:
+    """Add these nodes to the list unless they are there; return how many it has."""
+    _mark_listed(solid, visits, n_listed)
     for i in range(n):
-        node = nodes[i]
+        n_listed = _list(solid, visits, n_listed, nodes[i])
+    return n_listed
+
+
+@kernel
+def _with_neighbours(solid: Solid, visits: Visits, n_listed: int) -> int:
+    """Add the neighbours of the nodes in the list; return how many it has."""
+    _mark_listed(solid, visits, n_listed)
+    for i in range(n_listed):
+        node = solid.listed[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             t = tetrahedron_at(solid, slot)
             for k in range(4):
-                other = solid.nodes[node_place(t, k)]
-                if visits.nodes[other] != visits.epoch[0]:
-                    visits.nodes[other] = visits.epoch[0]
-                    solid.listed[n_listed] = other
-                    n_listed += 1
+                n_listed = _list(solid, visits, n_listed, solid.nodes[node_place(t, k)])
     return n_listed
+
+
+@kernel
+def _mark_listed(solid: Solid, visits: Visits, n_listed: int) -> None:
+    visits.epoch[0] += 1
+    for i in range(n_listed):
+        visits.nodes[solid.listed[i]] = visits.epoch[0]
+
+
+@kernel
+def _list(solid: Solid, visits: Visits, n_listed: int, node: int) -> int:
+    """Add a node to the list unless it is marked; return how many the list has."""
+    if visits.nodes[node] == visits.epoch[0]:
+        return n_listed
+    visits.nodes[node] = visits.epoch[0]
+    solid.listed[n_listed] = node
+    return n_listed + 1
 
 
 @kernel
