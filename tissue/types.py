@@ -79,8 +79,8 @@ class StepResult(NamedTuple):
     force_on_tissue: FloatArray
     """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
     bounds: FloatArray
-    """Lowest and highest corner of the tissue at t1 [m], shape (2, 3). Where parts of it sleep or are
-    frozen, of a box that holds it and may be a little larger."""
+    """Lowest and highest corner of the tissue at t1 [m], shape (2, 3). Where parts of it sleep or
+    are frozen, of a box that holds it and may be a little larger."""
     n_tetrahedra: int
     n_nodes: int
     n_active: int

@@ -1,4 +1,4 @@
-"""Rings of nodes around a focus, found breadth-first along edges (paper, section 5.2 and Fig. 9)."""
+"""Rings of nodes around a focus, breadth-first along edges (paper, section 5.2 and Fig. 9)."""
 
 import numpy as np
 

@@ -98,7 +98,7 @@ class ByRings:
         search_around(self._rings, self._focus, springs, self._options.rings + 1)
 
     def _n_frames(self, motion: Motion) -> int:
-        """Return in how many frames the motion is stable: none of its rings takes too long steps."""
+        """Return in how many frames the steps of all rings are stable."""
         elasticity, body = motion.elasticity, motion.body
         highest, options = self._highest, self._options
         springs = elasticity.arrays.springs

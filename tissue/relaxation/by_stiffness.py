@@ -29,8 +29,8 @@ from tissue.relaxation.levels import (
 from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zone
 from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
-from tissue.relaxation.patches import new_patch
 from tissue.relaxation.options import LocalTimeStepping
+from tissue.relaxation.patches import new_patch
 from tissue.types import FloatArray, IntArray
 
 

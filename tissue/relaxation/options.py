@@ -7,7 +7,7 @@ from typing import Literal, get_args
 from tissue.material import Material
 
 Far = Literal["moved", "frozen"]
-"""What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen`, the paper's rule."""
+"""What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +94,12 @@ def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
             "or LocalTimeStepping with settings"
         )
-    if isinstance(choice, Hierarchical):
-        if material.law != "springs" or material.volume_modulus > 0.0:
-            raise ValueError(
-                "hierarchical relaxation moves one node at a time, on its springs alone; with law "
-                f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
-                "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for "
-                "every law"
-            )
+    has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
+    if isinstance(choice, Hierarchical) and has_tetrahedra:
+        raise ValueError(
+            "hierarchical relaxation moves one node at a time, on its springs alone; with law "
+            f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
+            "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for every "
+            "law"
+        )
     return choice
