@@ -213,9 +213,7 @@ def print_peers(
             table.add_column(heading, justify="right")
         for each in (one for one in ran if one.tetrahedra == size):
             step = times[each.name, size, "time"]
-            ratios = (
-                times.get((each.name, size, ratio_to(o))) for o in (OURS_SPRINGS, OURS_SOLID)
-            )
+            ratios = (times.get((each.name, size, ratio_to(o))) for o in (OURS_SPRINGS, OURS_SOLID))
             table.add_row(
                 each.name if each.entry.engine != "ours" else f"ours: {each.name}",
                 f"{each.entry.law}; {each.entry.differs}",
