@@ -46,7 +46,7 @@ def test_every_file_that_a_run_writes_is_explained():
 def test_the_options_of_the_readme_are_those_of_the_program(capsys):
     named = set(re.findall(r"`(--[a-z]+)", README))
     known = ""
-    for command in ("run", "view", "serve", "figure", "bench cut", "bench table1"):
+    for command in ("run", "view", "serve", "figure", "bench", "bench kernels", "bench peers"):
         assert command_line([*command.split(), "--help"]) == 0
         known += capsys.readouterr().out
     assert named and {option for option in named if option not in known} == set()

@@ -1,25 +1,28 @@
-"""The commands `scalpel-sim bench ...`: measure, print a table, keep the figures."""
+"""The commands `scalpel-sim bench ...`: measure, print a table, keep and compare the figures."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 
+from scalpel_sim.bench.watch import Watch, watching
 from scalpel_sim.console import talking
 from scalpel_sim.errors import UsageError
 from scalpel_sim.options import Talk
 
 if TYPE_CHECKING:  # `--help` should not wait for it
-    from rich.console import Console
+    from scalpel_sim.bench.results import Findings, Results
 
-MOST_RUNS = 1000
+MOST_ROUNDS = 1000
 """More is a slip of the keyboard."""
+SHORT = 20_250
+"""Largest body of the short set [tetrahedra]."""
 
 bench = App(
     name="bench",
-    help="Measure the program on this machine: kernels warm, medians over several runs.",
+    help="Measure the program on this machine: warm, in rounds in which cases take turns.",
 )
 
 
@@ -29,9 +32,101 @@ class Measuring:
     """How it is measured."""
 
     runs: int = 5
-    "Runs; figures are their medians."
+    "Rounds; in each of them every case has a turn."
     save: Path | None = None
     "Also write the figures as JSON to this file."
+    compare: Path | None = None
+    "Compare with the figures in this file, which --save wrote."
+
+
+Largest = Annotated[int | None, Parameter(help="Leave out bodies of more tetrahedra than this.")]
+
+Measure = Callable[[Watch], "Findings"]
+
+
+@bench.default
+def short(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+    """A short set: the kernels in small bodies, a scene, and what the machine could do at best."""
+    from scalpel_sim.bench import kernels, roofline, scenes
+
+    _run(
+        [
+            lambda watch: kernels.measure(measuring.runs, SHORT, watch),
+            lambda watch: scenes.measure(measuring.runs, ["slab"], watch),
+            lambda watch: roofline.measure(measuring.runs, SHORT, watch),
+        ],
+        measuring,
+        talk,
+    )
+
+
+@bench.command
+def scenes(*names: str, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+    """Whole runs of the scenes: time of a frame, and of each stage of it.
+
+    Args:
+        names: organ, slab, grid2, grid7; all of them if not given.
+    """
+    from scalpel_sim.bench import scenes as benchmark
+
+    chosen = benchmark.check_names(names)
+    _run([lambda watch: benchmark.measure(measuring.runs, chosen, watch)], measuring, talk)
+
+
+@bench.command
+def kernels(
+    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+) -> None:
+    """Forces, steps, a cut step and the search for contact, in 576 to 60,000 tetrahedra."""
+    from scalpel_sim.bench import kernels as benchmark
+
+    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, talk)
+
+
+@bench.command
+def scaling(
+    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+) -> None:
+    """What a step, and a local frame, cost in bodies of 576 to 1,000,000 tetrahedra."""
+    from scalpel_sim.bench import local_frame
+    from scalpel_sim.bench import scaling as benchmark
+
+    _run(
+        [
+            lambda watch: benchmark.measure(measuring.runs, largest, watch),
+            lambda watch: local_frame.measure(measuring.runs, largest, watch),
+        ],
+        measuring,
+        talk,
+    )
+
+
+@bench.command
+def roofline(
+    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+) -> None:
+    """Bandwidth and arithmetic of this machine, and the share of them that a step uses."""
+    from scalpel_sim.bench import roofline as benchmark
+
+    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, talk)
+
+
+@bench.command
+def peers(
+    *,
+    largest: Largest = None,
+    python: Path | None = None,
+    measuring: Measuring = Measuring(),
+    talk: Talk = Talk(),
+) -> None:
+    """MuJoCo flex, Newton and Rapier in the same rounds as ours, as far as they are installed.
+
+    Args:
+        python: The Python of an environment that has them, where this one has not.
+    """
+    from scalpel_sim.bench import peers as benchmark
+
+    _run([lambda watch: benchmark.measure(measuring.runs, largest, python, watch)], measuring, talk)
 
 
 @bench.command
@@ -39,10 +134,7 @@ def table1(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
     """The three grids of the paper's Table 1, with its own scheme and ours, beside its figures."""
     from scalpel_sim.bench import table1 as benchmark
 
-    def measure() -> list[benchmark.Row]:
-        return benchmark.measure(measuring.runs)
-
-    _run("table1", measure, benchmark.print_rows, measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, talk)
 
 
 @bench.command
@@ -50,37 +142,49 @@ def cut(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
     """The cost of a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
     from scalpel_sim.bench import cut as benchmark
 
-    def measure() -> list[benchmark.CutCost]:
-        return benchmark.measure(measuring.runs)
-
-    _run("cut", measure, benchmark.print_costs, measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, talk)
 
 
-def _run(
-    name: str,
-    measure: Callable[[], list[Any]],
-    print_table: Callable[[list[Any], "Console"], None],
-    measuring: Measuring,
-    talk: Talk,
-) -> None:
-    """Measure, and say and keep what was found; rows are NamedTuples."""
-    from rich.console import Console
-
-    from scalpel_sim.bench.results import results_json, save
+def _run(benchmarks: Sequence[Measure], measuring: Measuring, talk: Talk) -> None:
+    """Measure, and say, keep and compare what was found."""
+    from scalpel_sim.bench.machine import load as machine_load
+    from scalpel_sim.bench.results import as_json, load, results_of, save
     from scalpel_sim.outputs import check_file
     from scalpel_sim.ready import load_kernels
 
-    if not 1 <= measuring.runs <= MOST_RUNS:
-        raise UsageError(f"--runs is {measuring.runs}; it must be from 1 to {MOST_RUNS}")
+    if not 1 <= measuring.runs <= MOST_ROUNDS:
+        raise UsageError(f"--runs is {measuring.runs}; it must be from 1 to {MOST_ROUNDS}")
+    before = None if measuring.compare is None else load(measuring.compare)
     if measuring.save is not None:
         check_file(measuring.save, ".json", "--save")
-    with talking(talk):
+    load_at_start = machine_load()
+    with talking(talk), watching(talk) as watch:
         load_kernels(talk)
-        rows = measure()
-    text = results_json(name, measuring.runs, [row._asdict() for row in rows])
+        found = [measure(watch) for measure in benchmarks]
+    results = results_of(found, load_at_start)
+    text = as_json(results)
     if measuring.save is not None:
         save(measuring.save, text)
     if talk.json:
         print(text)
     elif not talk.quiet:
-        print_table(rows, Console())
+        _print(found, results, before)
+
+
+def _print(found: Sequence["Findings"], results: "Results", before: "Results | None") -> None:
+    """Print what was found, and how it compares."""
+    from rich.console import Console
+
+    from scalpel_sim.bench.compare import is_busy, show
+
+    console = Console()
+    for each in found:
+        each.show(console)
+    if is_busy(results):
+        console.print(
+            f"The machine was busy: load {results.load:.1f} at the start. Wall times are too long, "
+            "and CPU times too, as caches are shared.",
+            style="dim",
+        )
+    if before is not None:
+        show(before, results, console)

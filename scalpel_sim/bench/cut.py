@@ -8,17 +8,22 @@ is no part of it.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
+from scalpel_sim.bench.results import Figure, Findings, of_times
+from scalpel_sim.bench.timing import WALL
+from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
 from tissue.material import Material
 from tissue.shapes import grid
 from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep
+from tissue.types import BladeSegment, BladeSweep, FloatArray
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Cells = tuple[int, int, int]
 
@@ -43,36 +48,90 @@ SHARP = Material(toughness=1.0)
 US_PER_S = 1e6
 
 
+class Slit(NamedTuple):
+    """What cutting one block cost, step by step."""
+
+    n_tetrahedra: int
+    """Before the cut."""
+    steps: FloatArray
+    """Wall time of each step in which the mesh changed [s]."""
+    splits: FloatArray
+    """Tetrahedra split in each of them: each split leaves one more than there were."""
+    idle: FloatArray
+    """Wall time of each step with the blade in the tissue in which nothing was split [s]."""
+
+
 class CutCost(NamedTuple):
     """Cost of cutting one block, medians over runs; times in seconds of wall time."""
 
     n_tetrahedra: int
     """Before the cut."""
     n_split: int
-    """Tetrahedra that were split: each split leaves one more than there were."""
+    """Tetrahedra that were split."""
     n_steps: int
     """Steps in which the mesh changed."""
     step_mean: float
     """Mean of those steps [s], the occasional growth of arrays included."""
-    step_median: float
-    """Median of those steps [s]."""
     step_longest: float
     """[s]."""
     idle_median: float
-    """Median of the steps with the blade in the tissue in which nothing was split [s]."""
+    """Median of the steps in which nothing was split [s]."""
     per_split: float
-    """Time of those steps for each split tetrahedron [s]."""
+    """Time of the steps that split, for each split tetrahedron [s]."""
 
 
-def measure(n_runs: int, blocks: Sequence[Cells] = CELLS) -> list[CutCost]:
-    """Return the cost for each block, medians over so many runs, in which blocks take turns."""
+def measure(n_rounds: int, blocks: Sequence[Cells] = CELLS, watch: Watch = SILENT) -> Findings:
+    """Return the cost for each block, over so many rounds, in which blocks take turns."""
+    slits = slits_of(n_rounds, blocks, watch)
+    return Findings(_figures(slits), [], partial(print_costs, list(map(cost_of, slits))))
+
+
+def slits_of(
+    n_rounds: int, blocks: Sequence[Cells] = CELLS, watch: Watch = SILENT
+) -> list[list[Slit]]:
+    """Return what each round cost, for each block."""
     _run(blocks[0])  # the kernels are loaded, and the processor is awake
-    rounds = [[_run(cells) for cells in blocks] for _ in range(n_runs)]
-    return [_median(runs) for runs in zip(*rounds, strict=True)]
+    watch.begin(n_rounds * len(blocks))
+    rounds = [[_turn(cells, watch) for cells in blocks] for _ in range(n_rounds)]
+    return [list(slits) for slits in zip(*rounds, strict=True)]
 
 
-def print_costs(costs: Sequence[CutCost], console: Console) -> None:
+def cost_of(slits: Sequence[Slit]) -> CutCost:
+    """Return the median of each figure over the rounds; counts are the same in all."""
+    first = slits[0]
+    return CutCost(
+        n_tetrahedra=first.n_tetrahedra,
+        n_split=int(first.splits.sum()),
+        n_steps=len(first.steps),
+        step_mean=float(np.median([slit.steps.mean() for slit in slits])),
+        step_longest=float(np.median([slit.steps.max() for slit in slits])),
+        idle_median=float(np.median([np.median(slit.idle) for slit in slits])),
+        per_split=float(np.median([slit.steps.sum() / slit.splits.sum() for slit in slits])),
+    )
+
+
+def _figures(blocks: Sequence[Sequence[Slit]]) -> list[Figure]:
+    """Return what a cut step, a split, and a step without a split cost: every step is a sample."""
+    figures = []
+    for slits in blocks:
+        for case, samples in (
+            ("cut step", [s.steps for s in slits]),
+            ("split tetrahedron", [s.steps / s.splits for s in slits]),
+            ("blade moves, nothing split", [s.idle for s in slits]),
+        ):
+            figures.append(
+                of_times(
+                    "cut", case, slits[0].n_tetrahedra, "time", "µs", samples,
+                    clock=WALL.name, convert=lambda s: US_PER_S * s,
+                )
+            )  # fmt: skip
+    return figures
+
+
+def print_costs(costs: Sequence[CutCost], console: "Console") -> None:
     """Print the costs as a table."""
+    from rich.table import Table
+
     table = Table(title="cost of a cut step, wall time in µs", title_justify="left")
     for heading in ("tetrahedra", "split", "cut steps", "a step", "share", "a split", "idle step"):
         table.add_column(heading, justify="right")
@@ -97,34 +156,30 @@ def print_costs(costs: Sequence[CutCost], console: Console) -> None:
     )
 
 
-def _run(cells: Cells) -> CutCost:
+def _turn(cells: Cells, watch: Watch) -> Slit:
+    """Cut one fresh block, and say so."""
+    slit = _run(cells)
+    watch.tick(f"cut in {slit.n_tetrahedra:,} tetrahedra")
+    return slit
+
+
+def _run(cells: Cells) -> Slit:
     """Cut one fresh block."""
     mesh = grid(cells, [CELL * n for n in cells])
     held = np.ones(len(mesh.positions), dtype=bool)
     tissue = Tissue(mesh, SHARP, fixed=held, gravity=(0.0, 0.0, 0.0))
     before = _edge(cells, 0.0)
-    n_before = tissue.n_tetrahedra
-    busy: list[float] = []
-    idle: list[float] = []
+    taken: list[float] = []
+    sizes = [tissue.n_tetrahedra]
     with no_garbage_collection():
         for i in range(1, round(SLIT * CELL / STEP) + 1):
-            n = tissue.n_tetrahedra
             after = _edge(cells, i * STEP)
             result = tissue.step(BladeSweep(before, after), DT)
-            spent = result.profile.collision + result.profile.topology
-            (busy if result.n_tetrahedra > n else idle).append(spent)
+            taken.append(result.profile.collision + result.profile.topology)
+            sizes.append(result.n_tetrahedra)
             before = after
-    n_split = tissue.n_tetrahedra - n_before
-    return CutCost(
-        n_tetrahedra=n_before,
-        n_split=n_split,
-        n_steps=len(busy),
-        step_mean=float(np.mean(busy)),
-        step_median=float(np.median(busy)),
-        step_longest=max(busy),
-        idle_median=float(np.median(idle)),
-        per_split=sum(busy) / n_split,
-    )
+    seconds, splits = np.array(taken), np.diff(np.array(sizes, dtype=np.float64))
+    return Slit(sizes[0], seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
 
 
 def _edge(cells: Cells, way: float) -> BladeSegment:
@@ -137,9 +192,3 @@ def _edge(cells: Cells, way: float) -> BladeSegment:
         np.array([x, y, top + ABOVE * CELL]),
         np.array([0.0, 1.0, 0.0]),
     )
-
-
-def _median(runs: Sequence[CutCost]) -> CutCost:
-    """Return the median of each figure; counts are the same in every run."""
-    columns = zip(*runs, strict=True)
-    return CutCost(*(type(column[0])(np.median(column)) for column in columns))

@@ -5,14 +5,23 @@ as the live view has it. Frames count while the blade is in the tissue.
 """
 
 from collections.abc import Sequence
+from functools import partial
 from time import perf_counter
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
 
+from scalpel_sim.bench.results import (
+    COUNTED,
+    HIGHER,
+    LOWER,
+    NEITHER,
+    Figure,
+    Findings,
+    of_values,
+)
+from scalpel_sim.bench.timing import WALL
+from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.body import make_tissue
 from scalpel_sim.cuts import Cut, prepare_cut
 from scalpel_sim.model_shapes import body_poses, shapes_of
@@ -25,6 +34,9 @@ from scalpel_sim.summary import STAGES
 from scalpel_sim.table_1 import MACHINE, TABLE_1
 from scalpel_sim.viewer_messages import UPDATES_PER_SECOND
 from tissue.shapes import grid
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 Cells = tuple[int, int, int]
 
@@ -53,17 +65,50 @@ class Row(NamedTuple):
     """What one picture costs [ms], median: the surface, and the message that shows it."""
 
 
-def measure(n_runs: int, schemes: Sequence[str] = SCHEMES) -> list[Row]:
-    """Return a row for each grid and scheme, medians over so many runs; schemes take turns."""
+def measure(n_rounds: int, schemes: Sequence[str] = SCHEMES, watch: Watch = SILENT) -> Findings:
+    """Return what each grid and scheme costs, over so many rounds, in which they take turns."""
     cases = [(cells, scheme) for cells in TABLE_1 for scheme in schemes]
     for scheme in schemes:
         _run(next(iter(TABLE_1)), scheme)  # every kernel is loaded
-    rounds = [[_run(*case) for case in cases] for _ in range(n_runs)]
-    return [_median(runs) for runs in zip(*rounds, strict=True)]
+    watch.begin(n_rounds * len(cases))
+    rounds = [[_turn(case, watch) for case in cases] for _ in range(n_rounds)]
+    runs = list(zip(*rounds, strict=True))
+    figures = [figure for each in runs for figure in _figures(each)]
+    return Findings(figures, [], partial(print_rows, [_median(each) for each in runs]))
 
 
-def print_rows(rows: Sequence[Row], console: Console) -> None:
+def _turn(case: tuple[Cells, str], watch: Watch) -> Row:
+    """Do one cut, and say so."""
+    row = _run(*case)
+    watch.tick(f"{'x'.join(map(str, row.cells))} cells, {row.scheme}")
+    return row
+
+
+def _figures(runs: Sequence[Row]) -> list[Figure]:
+    """Return the figures of one grid and scheme."""
+    first = runs[0]
+    case = f"{'x'.join(map(str, first.cells))} cells, {first.scheme}"
+
+    def figure(quantity: str, unit: str, values: list[float], clock: str, better: str) -> Figure:
+        size = first.tetrahedra_initial
+        return of_values("table1", case, size, quantity, unit, values, clock=clock, better=better)
+
+    return [
+        figure("frames", "1/s", [r.frame_rate for r in runs], WALL.name, HIGHER),
+        figure("a picture", "ms", [r.picture_ms for r in runs], WALL.name, LOWER),
+        *(
+            figure(f"share of {stage}", "%", [r.percent[stage] for r in runs], WALL.name, NEITHER)
+            for stage in first.percent
+        ),
+        figure("after the cut", "tetrahedra", [r.tetrahedra_final for r in runs], COUNTED, NEITHER),
+    ]
+
+
+def print_rows(rows: Sequence[Row], console: "Console") -> None:
     """Print the rows below the paper's."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
     table = Table(
         title="Table 1 of Bielser, Maiwald, Gross (1998); RX to other in % of the time",
         title_justify="left",

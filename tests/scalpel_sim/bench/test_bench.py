@@ -1,16 +1,38 @@
 """The benchmarks: that they do the work they say, and say what they found."""
 
 import json
+import math
+import re
 
 import pytest
 
-from scalpel_sim.bench import cut, table1
+from scalpel_sim.bench import cut, kernels, local_frame, roofline, scaling, scenes, table1
+from scalpel_sim.bench.results import HIGHER, LOWER, NEITHER, load
 from scalpel_sim.cli import command_line
 from scalpel_sim.table_1 import TABLE_1
 
 
+def is_sane(figure):
+    """Whether a figure has a unit, a clock, samples, and percentiles on the bad side."""
+    assert figure.unit and figure.clock and figure.n >= figure.rounds >= 1
+    assert all(map(math.isfinite, (figure.median, figure.p95, figure.p99)))
+    assert figure.lowest <= figure.highest
+    if figure.better == LOWER:
+        assert 0.0 <= figure.median <= figure.p95 <= figure.p99
+    if figure.better == HIGHER:
+        assert figure.median >= figure.p95 >= figure.p99 > 0.0
+    return True
+
+
+def printed(findings, capsys):
+    from rich.console import Console
+
+    findings.show(Console(width=200))
+    return capsys.readouterr().out
+
+
 def test_the_blade_does_the_same_to_a_body_however_large_it_is():
-    small, large = cut.measure(1, cut.CELLS[:2])
+    small, large = map(cut.cost_of, cut.slits_of(1, cut.CELLS[:2]))
     assert large.n_tetrahedra > 9 * small.n_tetrahedra
     assert large.n_split == pytest.approx(small.n_split, rel=0.05)
     assert large.n_steps == pytest.approx(small.n_steps, abs=1)
@@ -20,28 +42,111 @@ def test_the_blade_does_the_same_to_a_body_however_large_it_is():
         assert cost.per_split * cost.n_split == pytest.approx(cost.step_mean * cost.n_steps)
 
 
+def test_every_step_of_a_cut_is_a_sample():
+    found = cut.measure(2, cut.CELLS[:1])
+    assert all(map(is_sane, found.figures))
+    of = {figure.case: figure for figure in found.figures}
+    assert of["cut step"].n == of["split tetrahedron"].n > 10
+    assert of["split tetrahedron"].median < of["cut step"].median  # some are split in each
+
+
 def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
     file = tmp_path / "table1.json"
     assert command_line(["bench", "table1", "--runs", "1", "--save", str(file)]) == 0
-    printed = capsys.readouterr().out
+    out = capsys.readouterr().out
     for words in ("SGI Indigo 2", "3.78", "92.2", "2,446", "stellar", "354", "pictures"):
-        assert words in printed
-    found = json.loads(file.read_text())
-    assert (found["benchmark"], found["runs"]) == ("table1", 1)
-    assert found["machine"]["processor"] and found["versions"]["numba"]
-    rows = found["rows"]
-    assert len(rows) == len(TABLE_1) * len(table1.SCHEMES)
-    for row in rows:
-        paper = TABLE_1[tuple(row["cells"])]
-        assert row["tetrahedra_initial"] == paper.tetrahedra_initial < row["tetrahedra_final"]
-        assert row["frame_rate"] > 10.0 * paper.frame_rate
-        assert set(row["percent"]) == {"RX", "RD", "GC", "CD", "other"}
-        assert all(share > 0.0 for share in row["percent"].values())
-        assert sum(row["percent"].values()) == pytest.approx(100.0)
-    final = {(tuple(row["cells"]), row["scheme"]): row["tetrahedra_final"] for row in rows}
-    assert final[(2, 2, 2), "paper"] == 354  # as printed
-    assert final[(2, 4, 3), "paper"] == 960  # as printed
-    assert final[(4, 6, 4), "paper"] == 576 + 17 * 108  # the paper: 110
+        assert words in out
+    figures = load(file).figures
+    assert all(map(is_sane, figures))
+    assert len({figure.case for figure in figures}) == len(TABLE_1) * len(table1.SCHEMES)
+    of = {(figure.case, figure.quantity): figure.median for figure in figures}
+    for cells, paper in TABLE_1.items():
+        for scheme in table1.SCHEMES:
+            case = f"{'x'.join(map(str, cells))} cells, {scheme}"
+            assert of[case, "frames"] > 10.0 * paper.frame_rate
+            assert of[case, "after the cut"] > paper.tetrahedra_initial
+            shares = [of[case, f"share of {s}"] for s in ("RX", "RD", "GC", "CD", "other")]
+            assert min(shares) > 0.0 and sum(shares) == pytest.approx(100.0)
+    assert of["2x2x2 cells, paper", "after the cut"] == 354  # as printed
+    assert of["2x4x3 cells, paper", "after the cut"] == 960  # as printed
+    assert of["4x6x4 cells, paper", "after the cut"] == 576 + 17 * 108  # the paper: 110
+
+
+def test_a_longer_loop_takes_longer_and_a_larger_body_takes_more_time(capsys):
+    found = kernels.measure(1, 5_400)
+    assert all(map(is_sane, found.figures))
+    of = {(figure.case, figure.tetrahedra): figure.median for figure in found.figures}
+    for law in ("springs", "neo-Hookean"):
+        for size in (576, 5_400):
+            assert of[f"{law}: forces", size] < of[f"{law}: Runge-Kutta step", size]
+            assert of[f"{law}: forces", size] < 100.0  # ns per tetrahedron
+        step = f"{law}: Runge-Kutta step"
+        assert 5_400 * of[step, 5_400] > 3 * 576 * of[step, 576]
+    assert of["contact: search", 10_800] > of["contact: check of a step", 10_800] > 0.0
+    text = printed(found, capsys)
+    assert "ns/tet" in text and "CPU" in text and "wall" in text and "p99" in text
+
+
+def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
+    found = scaling.measure(1, sizes=(576, 6_000))
+    assert all(map(is_sane, found.figures))
+    of = {(f.case, f.quantity, f.tetrahedra): f.median for f in found.figures}
+    for law in ("springs", "neo-Hookean"):
+        step = f"{law}: Runge-Kutta step"
+        for size in (576, 6_000):
+            each, whole = of[step, "time per tetrahedron", size], of[step, "time", size]
+            assert each == pytest.approx(1e6 * whole / size)
+    assert "6,000" in printed(found, capsys)
+
+
+def test_a_local_frame_splits_a_dozen_and_does_not_depend_on_the_body_around(capsys):
+    found = local_frame.measure(1, sizes=(6_000, 20_250))
+    assert all(map(is_sane, found.figures))
+    of = {(figure.case, figure.tetrahedra): figure for figure in found.figures}
+    for way in local_frame.WAYS:
+        small, large = (of[f"{way}: cut frame", size] for size in (6_000, 20_250))
+        splits = [float(figure.note.split()[0]) for figure in (small, large)]
+        assert all(6.0 < n < 24.0 for n in splits)
+        assert large.median < 2.0 * small.median  # 3.4 times the tetrahedra
+        assert of[f"{way}: blade moves, nothing split", 6_000].median < small.median
+    text = printed(found, capsys)
+    assert "share" in text and "µs" in text
+
+
+def test_a_roofline_tells_the_limits_what_a_step_needs_and_its_share(capsys):
+    found = roofline.measure(1, 576)
+    assert all(map(is_sane, found.figures))
+    of = {figure.case: figure for figure in found.figures}
+    shares = [figure for case, figure in of.items() if case.startswith("share")]
+    assert len(shares) == 3 and all(0.0 < share.median <= 100.0 for share in shares)
+    (whole,) = [share for share in shares if share.case.startswith("share of the limit")]
+    assert whole.median == max(share.median for share in shares)
+    text = printed(found, capsys)
+    assert "GB/s" in text and "GFLOP/s" in text
+    assert "bytes and" in text and "operations for each of" in text
+
+
+def test_a_scene_tells_its_frames_and_its_stages(capsys):
+    found = scenes.measure(1, ["grid2"], seconds=0.6)
+    assert all(map(is_sane, found.figures))
+    of = {figure.case: figure for figure in found.figures}
+    assert of["grid2: frame"].n == 600 > of["grid2: frame, blade in the tissue"].n > 0
+    stages = sum(of[f"grid2: {stage}"].median for stage in ("RX", "GC", "CD"))
+    assert stages < of["grid2: frame"].median
+    assert 0.0 <= of["grid2: late frames"].median <= 100.0
+    assert of["grid2: real-time factor"].better == HIGHER
+    assert "wall" in printed(found, capsys)
+
+
+def test_a_run_is_saved_and_compared_with_itself(capsys, tmp_path):
+    file = tmp_path / "before.json"
+    words = ["bench", "scenes", "grid2", "--runs", "1"]
+    assert command_line([*words, "--json", "--save", str(file)]) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(file.read_text())
+    assert command_line([*words, "--compare", str(file)]) == 0
+    out = capsys.readouterr().out
+    assert "Ratio: above 1 is faster now" in out and "real-time" in out
+    assert {figure.better for figure in load(file).figures} <= {LOWER, HIGHER, NEITHER}
 
 
 @pytest.mark.parametrize(
@@ -50,8 +155,15 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
         (["speed"], "speed"),
         (["cut", "--runs", "0"], "--runs is 0"),
         (["table1", "--save", "figures.txt"], "must end in .json"),
+        (["scenes", "slap"], "Did you mean 'slab'"),
+        (["kernels", "--largest", "5"], "--largest is 5.*576"),
+        (["kernels", "--compare", "nothing.json"], "nothing.json: cannot be read"),
+        (["peers", "--python", "nowhere"], "--python is nowhere"),
     ],
 )
-def test_a_benchmark_that_makes_no_sense_is_refused(words, expected, capsys):
+def test_a_benchmark_that_makes_no_sense_is_refused_before_it_begins(words, expected, capsys):
     assert command_line(["bench", *words]) == 2
-    assert expected in capsys.readouterr().err
+    out, err = capsys.readouterr()
+    assert out == ""
+    (line,) = (x for x in err.splitlines() if not x.startswith("compiling"))
+    assert re.search(expected, line)

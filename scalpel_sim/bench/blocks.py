@@ -1,0 +1,98 @@
+"""The blocks of cells that kernels, scaling and peers are measured on, from small to large."""
+
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.errors import UsageError
+from tissue.shapes import grid
+from tissue.types import BoolArray, FloatArray, IntArray, TetrahedralMesh
+
+Cells = tuple[int, int, int]
+
+CELL = 0.01
+"""Side of a cell [m]."""
+JITTER = 0.1
+"""How far inner nodes are off the grid, in cells: no two tetrahedra are alike, as in an organ."""
+SEED = 1998
+"""Of the jitter: the same blocks for everybody."""
+
+BLOCKS: dict[int, Cells] = {
+    576: (4, 4, 6),
+    5_400: (9, 10, 10),
+    6_000: (10, 10, 10),
+    20_250: (15, 15, 15),
+    60_000: (20, 20, 25),
+    199_800: (30, 30, 37),
+    600_000: (40, 50, 50),
+    1_000_188: (49, 54, 63),
+}
+"""Cells along x, y and z by the number of tetrahedra."""
+
+
+def block(n_tetrahedra: int) -> TetrahedralMesh:
+    """Return the block of so many tetrahedra, one of `BLOCKS`."""
+    cells = BLOCKS[n_tetrahedra]
+    mesh = grid(cells, [CELL * n for n in cells])
+    off = np.random.default_rng(SEED).uniform(-JITTER, JITTER, mesh.positions.shape) * CELL
+    on_skin = on_sides(mesh.positions, (0, 1, 2))
+    return TetrahedralMesh(mesh.positions + np.where(on_skin[:, None], 0.0, off), mesh.tetrahedra)
+
+
+def held(mesh: TetrahedralMesh) -> BoolArray:
+    """Return the nodes on the sides across x and y: the body sags between them."""
+    return on_sides(mesh.positions, (0, 1))
+
+
+def on_sides(positions: FloatArray, axes: tuple[int, ...]) -> BoolArray:
+    """Return the nodes on the sides across these axes."""
+    along = positions[:, axes]
+    near = 0.5 * JITTER * CELL
+    low, high = along < along.min(axis=0) + near, along > along.max(axis=0) - near
+    return np.asarray(np.any(low | high, axis=1))
+
+
+class Edges(NamedTuple):
+    """The edges of a mesh, and what springs along them and masses at their ends follow from."""
+
+    nodes: IntArray
+    """The two of each edge, shape (n_edges, 2)."""
+    lengths: FloatArray
+    """[m], shape (n_edges,)."""
+    volumes: FloatArray
+    """Of the tetrahedra around each edge together [m3], shape (n_edges,)."""
+    node_volumes: FloatArray
+    """A quarter of each tetrahedron around a node [m3], shape (n_nodes,)."""
+
+
+def edges_of(mesh: TetrahedralMesh) -> Edges:
+    """Return the edges of a mesh."""
+    corners = mesh.positions[mesh.tetrahedra]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
+    pairs = [mesh.tetrahedra[:, list(pair)] for pair in combinations(range(4), 2)]
+    nodes, edge = np.unique(np.sort(np.vstack(pairs), axis=1), axis=0, return_inverse=True)
+    ends = mesh.positions[nodes]
+    return Edges(
+        nodes,
+        np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1),
+        np.bincount(edge.ravel(), np.tile(volumes, len(pairs))).astype(np.float64),
+        np.bincount(mesh.tetrahedra.ravel(), np.repeat(volumes / 4.0, 4)).astype(np.float64),
+    )
+
+
+def up_to(sizes: tuple[int, ...], largest: int | None) -> tuple[int, ...]:
+    """Return those sizes that are not larger.
+
+    Raises:
+        UsageError: none is left.
+    """
+    if largest is None:
+        return sizes
+    left = tuple(n for n in sizes if n <= largest)
+    if not left:
+        raise UsageError(
+            f"--largest is {largest}; the smallest body of this benchmark has {min(sizes)} "
+            "tetrahedra"
+        )
+    return left

@@ -1,0 +1,148 @@
+"""The engine's inner loops, one at a time: the only file here that knows how they are called."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from scalpel_sim.bench.blocks import block, held
+from scalpel_sim.bench.traffic import Traffic, traffic
+from tissue.body import NODES, Body
+from tissue.contact.resolve import IS_STALE, N_TOUCHING, prepare, resolve
+from tissue.jit import kernel
+from tissue.material import Law, Material
+from tissue.relaxation.all_together import AllTogether
+from tissue.runge_kutta import accelerations
+from tissue.tissue import NOWHERE, Tissue
+from tissue.types import FloatArray, TetrahedralMesh
+
+DT = 1e-3
+"""Time step [s]: that of a haptic loop."""
+
+STIFFNESS = 3e3
+"""Young's modulus of the blocks [Pa]: so soft that in cells of 10 mm a step of 1 ms is stable under
+every explicit scheme that is measured here, those of the peers too."""
+POISSON_RATIO: dict[Law, float] = {"springs": 0.25, "neo_hookean": 0.3}
+"""What springs have without a volume term; what peers are given under their law of tetrahedra."""
+DENSITY = 1e3
+"""[kg/m3]."""
+TOUGHNESS = 5.0
+"""[J/m2]: for an engine that warns of tissue too tough for its mesh. Nothing is cut here."""
+LAWS: tuple[Law, ...] = ("springs", "neo_hookean")
+"""Each is measured."""
+
+
+def material(law: Law, *, is_damped: bool = True) -> Material:
+    """Return what the blocks are made of, damped as by default or not along edges."""
+    made = Material(
+        young_modulus=STIFFNESS,
+        density=DENSITY,
+        toughness=TOUGHNESS,
+        law=law,
+        poisson_ratio=POISSON_RATIO[law],
+    )
+    return made if is_damped else replace(made, retardation_time=0.0)
+
+
+class Loops:
+    """A block of so many tetrahedra, and the loops that make it move.
+
+    Each method does its loop `n` times, as `timing.Case` wants it.
+    """
+
+    def __init__(self, n_tetrahedra: int, law: Law = "springs", *, is_damped: bool = True) -> None:
+        mesh = block(n_tetrahedra)
+        self._is_damped = is_damped
+        self._all_together = AllTogether()
+        self._tissue = Tissue(
+            mesh, material(law, is_damped=is_damped), fixed=held(mesh), relaxation="global"
+        )
+
+    def forces(self, n: int) -> None:
+        """Evaluate the forces on all nodes, and what they accelerate them by."""
+        tissue = self._tissue
+        elastic, external = tissue._elasticity.arrays, tissue._stages.external
+        for _ in range(n):
+            accelerations(tissue._body, elastic, external, tissue._surroundings, tissue._stages.a1)
+
+    def euler_steps(self, n: int) -> None:
+        """Take steps of the symplectic Euler method: one evaluation of the forces each.
+
+        The engine has better; this is what peers do, for a comparison of like with like.
+        """
+        body = self._tissue._body
+        for _ in range(n):
+            self.forces(1)
+            _kick_and_drift(body, self._tissue._stages.a1, DT)
+
+    def runge_kutta_steps(self, n: int) -> None:
+        """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
+        tissue = self._tissue
+        self._all_together.relax_by(tissue._motion(tissue._anchors, NOWHERE, n * DT, 0.0, 1.0), n)
+
+    def frames(self, n: int) -> None:
+        """Let the body live through time steps, all included but a blade."""
+        for _ in range(n):
+            self._tissue.step(None, DT)
+
+    @property
+    def n_substeps(self) -> int:
+        """Runge-Kutta steps that stability needs in one time step."""
+        return self._tissue.step(None, DT).n_substeps
+
+    @property
+    def traffic(self) -> Traffic:
+        """What a Runge-Kutta step of the springs must move and compute."""
+        lengths = self._tissue._elasticity.arrays.springs.count[: self._tissue.n_nodes]
+        return traffic(lengths.tolist(), is_damped=self._is_damped)
+
+    @property
+    def positions(self) -> FloatArray:
+        """Where the nodes are [m], shape (n_nodes, 3)."""
+        return self._tissue.snapshot().positions
+
+
+class Touching:
+    """Two blocks of which one lies on the other, and the search for what touches."""
+
+    FALL = 100
+    """Time steps that the upper one has to come to rest."""
+
+    def __init__(self, n_tetrahedra: int) -> None:
+        lower = block(n_tetrahedra)
+        height = float(np.ptp(lower.positions[:, 2]))
+        upper = lower.positions + np.array([0.0, 0.0, height])
+        mesh = TetrahedralMesh(
+            np.vstack([lower.positions, upper]),
+            np.vstack([lower.tetrahedra, lower.tetrahedra + len(upper)]),
+        )
+        fixed = np.zeros(len(mesh.positions), dtype=bool)
+        fixed[: len(upper)] = held(lower)
+        self._tissue = Tissue(mesh, material("springs"), fixed=fixed)
+        for _ in range(self.FALL):
+            self._tissue.step(None, DT)
+
+    @property
+    def n_contacts(self) -> int:
+        """Contacts that press."""
+        return int(self._tissue._contact.arrays.totals[N_TOUCHING])
+
+    def searches(self, n: int) -> None:
+        """Look for all pairs that may touch, as where faces have moved by the margin."""
+        for _ in range(n):
+            self._tissue._contact.arrays.state[IS_STALE] = 1
+            self.checks(1)
+
+    def checks(self, n: int) -> None:
+        """Look at the pairs that were found, and keep them apart, as in every Runge-Kutta step."""
+        contact, body = self._tissue._contact.arrays, self._tissue._body
+        for _ in range(n):
+            prepare(contact, body)
+            resolve(contact, body, DT)
+
+
+@kernel
+def _kick_and_drift(body: Body, accelerations: FloatArray, dt: float) -> None:
+    for i in range(body.counts[NODES]):
+        for c in range(3):
+            body.velocities[i, c] += dt * accelerations[i, c]
+            body.positions[i, c] += dt * body.velocities[i, c]

@@ -1,0 +1,36 @@
+"""Which bodies fit into the memory of this machine."""
+
+from collections.abc import Sequence
+
+from scalpel_sim.bench.results import Skipped
+
+BYTES_PER_TETRAHEDRON = 2_000
+"""Memory that a body takes while it is made; measured, and rounded up."""
+SHARE_OF_MEMORY = 0.6
+"""Of what is free, that all bodies together may take: others need some too."""
+
+
+def that_fit(
+    sizes: Sequence[int], available: int | None, benchmark: str, n_of_each: int = 1
+) -> tuple[tuple[int, ...], list[Skipped]]:
+    """Return the sizes that fit together into the free memory, and why others do not.
+
+    Args:
+        sizes: Of the bodies, from small to large.
+        available: Free memory [bytes]; None where the system does not tell: then all fit.
+        benchmark: That wants them.
+        n_of_each: Bodies of each size.
+    """
+    fit: list[int] = []
+    skipped: list[Skipped] = []
+    for size in sizes:
+        needed = BYTES_PER_TETRAHEDRON * n_of_each * (sum(fit) + size)
+        if available is None or needed <= SHARE_OF_MEMORY * available:
+            fit.append(size)
+        else:
+            reason = (
+                f"with the smaller bodies it needs {needed / 1e9:.1f} GB, and of the "
+                f"{available / 1e9:.1f} GB that are free {SHARE_OF_MEMORY:.0%} may be used"
+            )
+            skipped.append(Skipped(benchmark, benchmark, size, reason))
+    return tuple(fit), skipped
