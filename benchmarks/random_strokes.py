@@ -7,6 +7,7 @@ finite, no node faster than the blade by far, and at rest again within a second 
 """
 
 import argparse
+import itertools
 import sys
 from dataclasses import replace
 from time import thread_time
@@ -78,7 +79,7 @@ def main() -> int:
         for i in range(options.strokes):
             substeps, began, n = 0, thread_time(), 0
             edges = stroke(tissue, random)
-            for before, after in zip(edges[:-1], edges[1:], strict=True):
+            for before, after in itertools.pairwise(edges):
                 result = tissue.step(BladeSweep(before, after), DT)
                 substeps, n = max(substeps, result.n_substeps), n + 1
                 if n % 20 == 0:
