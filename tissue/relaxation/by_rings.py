@@ -1,6 +1,7 @@
 """`ByRings`: owns the arrays of the hierarchical relaxation, and finds frames that are stable."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
 from tissue.relaxation.options import Hierarchical
 from tissue.runge_kutta import SAFETY, largest_stable_step
-from tissue.types import FloatArray, IntArray
+from tissue.types import IntArray
 
 
 class ByRings:
@@ -62,34 +63,30 @@ class ByRings:
         options, body = self._options, motion.body
         springs = motion.elasticity.arrays.springs
         self._find_rings(motion)
-        n = self._n_frames(motion)
-        share = (motion.end - motion.begin) / n
-        for i in range(n):
-            if i > 0:
-                self._find_rings(motion)  # the anchors may have gone to other nodes
-            if motion.contact.is_awake:
-                prepare(motion.contact.arrays, body)
-            at = motion.begin + i * share
-            hierarchical_frame(
-                body,
-                springs,
-                motion.anchors,
-                motion.edge,
-                self._rings,
-                self._trails,
-                motion.stages.external,
-                motion.surroundings,
-                motion.toughness,
-                motion.dt,
-                at,
-                share,
-                options.updates,
-                options.rings,
-                self._is_far_frozen,
-            )
-            end_step(motion, share * motion.dt, at + share)
-            note_moved(self._moved, self._rings.order, int(self._rings.state[N_FOUND]))
-        return n * options.updates
+        n, every = self._divide(motion)
+        if motion.contact.is_awake:
+            prepare(motion.contact.arrays, body)
+        hierarchical_frame(
+            body,
+            springs,
+            motion.anchors,
+            motion.edge,
+            self._rings,
+            self._trails,
+            motion.stages.external,
+            motion.surroundings,
+            motion.toughness,
+            motion.dt,
+            motion.begin,
+            motion.end - motion.begin,
+            n,
+            every,
+            options.rings,
+            self._is_far_frozen,
+        )
+        end_step(motion, motion.span, motion.end)
+        note_moved(self._moved, self._rings.order, int(self._rings.state[N_FOUND]))
+        return n
 
     def _find_rings(self, motion: Motion) -> None:
         """Find the rings around what the blade holds."""
@@ -97,16 +94,20 @@ class ByRings:
         find_focus(self._focus, motion.body, motion.anchors)
         search_around(self._rings, self._focus, springs, self._options.rings + 1)
 
-    def _n_frames(self, motion: Motion) -> int:
-        """Return in how many frames the steps of all rings are stable."""
+    def _divide(self, motion: Motion) -> tuple[int, IntArray]:
+        """Return how many micro steps to take, and after how many each ring is moved."""
         elasticity, body = motion.elasticity, motion.body
         highest, options = self._highest, self._options
-        springs = elasticity.arrays.springs
-        ring_frequencies(body, springs, self._rings, options.rings, self._is_far_frozen, highest)
         by_node = elasticity.arrays.frequency_squared
+        ring_frequencies(body, by_node, self._rings, options.rings, self._is_far_frozen, highest)
         near = frequency_with_anchors(motion.anchors, body, by_node, motion.stages.external)
         highest[0] = max(highest[0], near)
-        return n_frames(motion, highest, options)
+        around = motion.surroundings
+        needed = []
+        for squared in highest:
+            step = largest_stable_step(math.sqrt(squared), around.retardation_time, around.drag)
+            needed.append(motion.span / (SAFETY * step))
+        return ring_steps(options, needed)
 
     def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
         """Nodes that are new may have moved as others did."""
@@ -123,20 +124,20 @@ class ByRings:
         self._moved = grown_moved(self._moved, n_nodes)
 
 
-def n_frames(motion: Motion, highest: FloatArray, options: Hierarchical) -> int:
-    """Return the frames that it takes for each ring's steps to be stable.
+def ring_steps(options: Hierarchical, needed: Sequence[float]) -> tuple[int, IntArray]:
+    """Return how many micro steps a frame has, and after how many each ring is moved.
 
     Args:
-        motion: What is to be divided.
-        highest: Bound on w^2 of the nodes of each ring, and last of all beyond [1/s2].
-        options: Steps of each ring.
+        options: I and s_max.
+        needed: Steps in a frame for which the nodes of each ring, and last those beyond, are
+            stable.
     """
-    n = 1
-    surroundings = motion.surroundings
-    for ring, frequency_squared in enumerate(highest):
-        updates = options.updates >> ring if ring <= options.rings else 1
-        step = largest_stable_step(
-            math.sqrt(frequency_squared), surroundings.retardation_time, surroundings.drag
-        )
-        n = max(n, math.ceil(motion.span / (updates * SAFETY * step)))
-    return n
+    last = options.rings
+    steps = [options.updates >> ring for ring in range(last + 1)] + [1]
+    for ring in range(last + 1, -1, -1):
+        while steps[ring] < needed[ring]:
+            steps[ring] *= 2
+        if ring <= last:  # no fewer than further out, where blade and old cuts are stiff alike
+            while steps[ring] < steps[ring + 1]:
+                steps[ring] *= 2
+    return steps[0], steps[0] // np.array(steps)

@@ -1,6 +1,7 @@
 """The paper's hierarchical relaxation (section 5.2): near the blade nodes are moved more often.
 
-In a frame of length T a node of ring s takes i(s) = I 2^-s steps of T / i(s) (equations 7 and 8).
+In a frame of length T a node of ring s takes i(s) = I 2^-s steps of T / i(s) (equations 7 and 8);
+in rings that would be unstable so, twice as many, or four times (`ring_steps`).
 Each step moves one node alone, in place, by the two-level Runge-Kutta method; its neighbours are
 seen where their own last position and velocity put them at that instant.
 
@@ -108,7 +109,8 @@ def hierarchical_frame(
     dt: float,
     at: float,
     share: float,
-    updates: int,
+    n: int,
+    every: IntArray,
     last_ring: int,
     is_far_frozen: bool,
 ) -> None:
@@ -127,29 +129,30 @@ def hierarchical_frame(
         dt: Length of the time step [s].
         at: Where in the time step the frame begins.
         share: Which share of it the frame is.
-        updates: I, steps of the focus; a multiple of 2^last_ring.
+        n: Micro steps.
+        every: Micro steps between two moves of a node of each ring, and last of those beyond; each
+            divides the next. The nodes of ring 0 are moved in each micro step.
         last_ring: s_max.
-        is_far_frozen: Whether nodes beyond the last ring stay where they are (the paper's rule);
-            else each is moved once.
+        is_far_frozen: Whether nodes beyond the last ring stay where they are (the paper's rule).
     """
     _lay_trails(body, rings, trails, last_ring, is_far_frozen)
     span = share * dt
-    for j in range(1, updates + 1):
-        begin = at + share * (j - 1) / updates
-        seconds_share = share / updates
-        pull(anchors, body, edge, body.positions, begin, seconds_share, dt, toughness, external)
-        t1 = span * j / updates
+    n_far = every[last_ring + 1]
+    for j in range(1, n + 1):
+        begin = at + share * (j - 1) / n
+        pull(anchors, body, edge, body.positions, begin, share / n, dt, toughness, external)
+        t1 = span * j / n
         for k in range(rings.state[N_FOUND]):
             node = rings.order[k]
             ring = rings.ring[node]
             # The rings come in order, so that none further out is due either.
-            if ring > last_ring or j % (1 << ring) != 0:
+            if ring > last_ring or j % every[ring] != 0:
                 break
             _move(body, springs, trails, external, surroundings, node, t1)
-    if not is_far_frozen:
-        for node in range(body.counts[NODES]):
-            if not 0 <= ring_of(rings, node) <= last_ring:
-                _move(body, springs, trails, external, surroundings, node, span)
+        if j % n_far == 0 and not is_far_frozen:
+            for node in range(body.counts[NODES]):
+                if not 0 <= ring_of(rings, node) <= last_ring:
+                    _move(body, springs, trails, external, surroundings, node, t1)
     clear_forces(anchors, body, external)
 
 
@@ -302,7 +305,12 @@ def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Po
 
 @kernel
 def ring_frequencies(
-    body: Body, springs: Springs, rings: Rings, last_ring: int, is_far_frozen: bool, out: FloatArray
+    body: Body,
+    frequency_squared: FloatArray,
+    rings: Rings,
+    last_ring: int,
+    is_far_frozen: bool,
+    out: FloatArray,
 ) -> None:
     """Write the largest bound on w^2 [1/s2] of the nodes in each ring to `out`.
 
@@ -314,9 +322,9 @@ def ring_frequencies(
         node = rings.order[k]
         ring = rings.ring[node]
         if ring <= last_ring and not body.fixed[node]:
-            out[ring] = max(out[ring], springs.frequency_squared[node])
+            out[ring] = max(out[ring], frequency_squared[node])
     if is_far_frozen:
         return
     for node in range(body.counts[NODES]):
         if not (0 <= ring_of(rings, node) <= last_ring or body.fixed[node]):
-            out[last_ring + 1] = max(out[last_ring + 1], springs.frequency_squared[node])
+            out[last_ring + 1] = max(out[last_ring + 1], frequency_squared[node])

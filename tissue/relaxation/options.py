@@ -24,7 +24,8 @@ class Hierarchical:
     """
 
     updates: int = 64
-    """I: steps that the nodes at the blade take in a frame."""
+    """I: steps that the nodes at the blade take in a frame, one part of a time step. Rings whose
+    stiffest node that would not be stable for take twice as many, or four times, and so on."""
     rings: int = 6
     """s_max: the ring of nodes, counted in edges from the blade, up to which nodes take I 2^-s."""
     far: Far = "moved"

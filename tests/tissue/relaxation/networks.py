@@ -14,10 +14,12 @@ from tissue.relaxation.breadth_first import (
     new_rings,
     search,
 )
+from tissue.relaxation.by_rings import ring_steps
 from tissue.relaxation.chebyshev import STABILISATION, chebyshev
 from tissue.relaxation.hierarchical import Trails, hierarchical_frame, new_trails
 from tissue.relaxation.levels import find_listed_patch
 from tissue.relaxation.local_time_stepping import macro_step, new_zone
+from tissue.relaxation.options import Hierarchical
 from tissue.relaxation.patches import find_patch, new_patch, reach_of
 from tissue.tissue import NOWHERE
 from tissue.types import BoolArray, FloatArray
@@ -74,7 +76,8 @@ def frames(
     rings = rings_around(network, focus, last_ring + 1)
     trails = trails or new_trails(n_nodes)
     external = np.zeros((n_nodes, 3))
-    settings = (0.0, span, 0.0, 1.0, updates, last_ring, frozen)
+    n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
+    settings = (0.0, span, 0.0, 1.0, n_micro, every, last_ring, frozen)
     for _ in range(n):
         hierarchical_frame(
             network.body,
