@@ -1,5 +1,6 @@
 """What the engine is given is checked here, once, and refused by name."""
 
+import math
 import os
 from collections.abc import Sequence
 
@@ -69,23 +70,27 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     points = []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
         parts = [np.asarray(part, dtype=np.float64) for part in segment]
-        if any(part.shape != (3,) or not np.isfinite(part).all() for part in parts):
+        if any(part.shape != (3,) or not all(map(math.isfinite, part.tolist())) for part in parts):
             raise ValueError(
                 f"the blade at the {when} of the step is {[part.tolist() for part in parts]}; tip, "
                 "heel and forward are three finite numbers each"
             )
-        rows = np.array(parts)
-        along = rows[1] - rows[0]
-        length = np.linalg.norm(along)
+        # Plain floats: with arrays of three these checks cost more than a step of a small body.
+        tip, heel, forward = (Vec3(*part.tolist()) for part in parts)
+        x, y, z = heel.x - tip.x, heel.y - tip.y, heel.z - tip.z
+        u, v, w = forward
+        length = math.hypot(x, y, z)
         if not length > 0.0:
-            raise ValueError(f"the blade at the {when} of the step has no length: {rows.tolist()}")
-        across = np.linalg.norm(np.cross(along, rows[2]))
-        if not across > ALONG_EDGE * length * np.linalg.norm(rows[2]):
+            raise ValueError(
+                f"the blade at the {when} of the step has no length: {[[*tip], [*heel]]}"
+            )
+        across = math.hypot(y * w - z * v, z * u - x * w, x * v - y * u)
+        if not across > ALONG_EDGE * length * math.hypot(u, v, w):
             raise ValueError(
                 f"the blade at the {when} of the step cuts along its own edge: forward is "
-                f"{rows[2].tolist()}, from tip to heel is {along.tolist()}"
+                f"{[*forward]}, from tip to heel is {[x, y, z]}"
             )
-        points += [Vec3(*row) for row in rows.tolist()]
+        points += [tip, heel, forward]
     edge = Edge(*points)
     expect_small_turn(
         np.array([np.subtract(edge.heel_t0, edge.tip_t0), np.subtract(edge.heel_t1, edge.tip_t1)]),

@@ -76,15 +76,6 @@ def search(rings: Rings, springs: Springs, last_ring: int) -> None:
 
 
 @kernel
-def search_around(rings: Rings, focus: Rings, springs: Springs, last_ring: int) -> None:
-    """Find the rings around all nodes of `focus`."""
-    begin_search(rings)
-    for k in range(focus.state[N_FOUND]):
-        add_focus(rings, focus.order[k])
-    search(rings, springs, last_ring)
-
-
-@kernel
 def ring_of(rings: Rings, node: int) -> int:
     """Ring of a node, or UNREACHED."""
     return rings.ring[node] if rings.seen[node] == rings.state[EPOCH] else UNREACHED

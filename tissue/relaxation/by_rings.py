@@ -9,8 +9,8 @@ from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.contact.resolve import prepare
 from tissue.elasticity import Elasticity
-from tissue.relaxation.breadth_first import N_FOUND, grown_rings, new_rings, search_around
-from tissue.relaxation.focus import find_focus
+from tissue.relaxation.breadth_first import N_FOUND, grown_rings, new_rings
+from tissue.relaxation.focus import find_held, find_rings
 from tissue.relaxation.hierarchical import (
     grown_trails,
     hierarchical_frame,
@@ -27,7 +27,8 @@ from tissue.types import IntArray
 class ByRings:
     """The paper's hierarchical relaxation; see `tissue.relaxation.motion.Relaxation`.
 
-    The focus is the nodes that the blade holds; when it has let go, those that it held last.
+    The focus is the tetrahedron that the blade holds nearest to its tip; when it has let go, the
+    one that it held last.
 
     Args:
         options: Its settings.
@@ -37,8 +38,9 @@ class ByRings:
     def __init__(self, options: Hierarchical, n_nodes: int) -> None:
         self._options = options
         self._rings = new_rings(n_nodes)
-        self._focus = new_rings(n_nodes)
+        self._held = new_rings(n_nodes)
         self._trails = new_trails(n_nodes)
+        self._scratch = np.zeros(n_nodes, np.int64)
         self._moved = none_moved(n_nodes)
         self._highest = np.zeros(options.rings + 2)
 
@@ -91,8 +93,9 @@ class ByRings:
     def _find_rings(self, motion: Motion) -> None:
         """Find the rings around what the blade holds."""
         springs = motion.elasticity.arrays.springs
-        find_focus(self._focus, motion.body, motion.anchors)
-        search_around(self._rings, self._focus, springs, self._options.rings + 1)
+        find_held(self._held, motion.body, motion.anchors)
+        last = self._options.rings + 1
+        find_rings(self._rings, self._held, springs, last, self._scratch)
 
     def _divide(self, motion: Motion) -> tuple[int, IntArray]:
         """Return how many micro steps to take, and after how many each ring is moved."""
@@ -119,7 +122,8 @@ class ByRings:
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""
         self._rings = grown_rings(self._rings, n_nodes)
-        self._focus = grown_rings(self._focus, n_nodes)
+        self._held = grown_rings(self._held, n_nodes)
+        self._scratch = np.zeros(n_nodes, np.int64)
         self._trails = grown_trails(self._trails, n_nodes)
         self._moved = grown_moved(self._moved, n_nodes)
 

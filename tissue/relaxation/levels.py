@@ -10,7 +10,7 @@ from tissue.elastic import TETRAHEDRA_TOO, Elastic
 from tissue.jit import kernel
 from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
 from tissue.relaxation.breadth_first import N_FOUND, Rings, add_focus, begin_search, search
-from tissue.relaxation.focus import find_focus
+from tissue.relaxation.focus import find_held
 from tissue.relaxation.local_time_stepping import Zone
 from tissue.relaxation.patches import Patch, find_patch, reach_of
 from tissue.springs import Springs
@@ -113,7 +113,7 @@ def find_near(body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_ring
     Only those that can move.
     """
     rings = zone.rings
-    if not find_focus(rings, body, anchors):
+    if not find_held(rings, body, anchors):
         return 0
     search(rings, springs, n_rings)
     n = 0

@@ -24,10 +24,11 @@ class Hierarchical:
     """
 
     updates: int = 64
-    """I: steps that the nodes at the blade take in a frame, one part of a time step. Rings whose
-    stiffest node that would not be stable for take twice as many, or four times, and so on."""
+    """I: steps that the nodes at the tip of the blade, and those along its edge that it holds, take
+    in a frame. Where the steps of a ring would be too long for its stiffest node, it takes twice as
+    many, or four times, and so on."""
     rings: int = 6
-    """s_max: the ring of nodes, counted in edges from the blade, up to which nodes take I 2^-s."""
+    """s_max: up to which ring s, counted in edges from the tip, nodes take I 2^-s steps."""
     far: Far = "moved"
     """Nodes beyond. Where they are frozen, as the paper prints it, a frame costs what the rings
     cost, however large the body; but what is frozen does not come to equilibrium."""
