@@ -73,7 +73,7 @@ def volumes(solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, e
     """Write the signed volumes in `blocks[begin:end]` at `positions` [m] to `solid.volume`."""
     for i in range(begin, end):
         block = blocks[i]
-        d1, d2, d3 = _edges(solid, positions, block)
+        d1, d2, d3 = edges(solid, positions, block)
         store(solid.volume, WIDTH * (1 + block), lanes(1.0 / 6.0) * dot(d1, cross(d2, d3)))
 
 
@@ -94,20 +94,20 @@ def corner_forces(
     law = solid.law
     for i in range(begin, end):
         block = blocks[i]
-        d1, d2, d3 = _edges(solid, positions, block)
+        d1, d2, d3 = edges(solid, positions, block)
         n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
         p = lanes(0.0)
         if law.lam_of_nodes != 0.0:
             p = lanes(0.25) * _pressure_of_nodes(solid, block)
         if law.lam_of_tetrahedra != 0.0:
-            dilatation = lanes(1.0 / 6.0) * dot(d1, n1) * _shape(solid, block, PER_VOLUME)
+            dilatation = lanes(1.0 / 6.0) * dot(d1, n1) * shape_of(solid, block, PER_VOLUME)
             p = p + lanes(law.lam_of_tetrahedra) * (dilatation - lanes(law.a))
         p = lanes(-1.0 / 6.0) * p
         f1, f2, f3 = scale(p, n1), scale(p, n2), scale(p, n3)
         if law.mu != 0.0:
             e1, e2, e3 = _weighted(solid, block, d1, d2, d3)
             squared = dot(d1, e1) + dot(d2, e2) + dot(d3, e3)  # V |F|^2
-            s = lanes(-law.mu) * squared / (squared + _shape(solid, block, VOLUME))
+            s = lanes(-law.mu) * squared / (squared + shape_of(solid, block, VOLUME))
             f1, f2, f3 = axpy(s, e1, f1), axpy(s, e2, f2), axpy(s, e3, f3)
         f0 = scale(lanes(-1.0), add(f1, add(f2, f3)))
         _store(solid, block, 0, f0)
@@ -126,7 +126,7 @@ def _store(solid: Solid, block: int, k: int, force: Vec3) -> None:
 
 
 @inlined
-def _edges(solid: Solid, positions: FloatArray, block: int) -> tuple[Vec3, Vec3, Vec3]:
+def edges(solid: Solid, positions: FloatArray, block: int) -> tuple[Vec3, Vec3, Vec3]:
     """From node 0 to nodes 1, 2 and 3 of eight tetrahedra: each coordinate is `Lanes`."""
     x0 = _corners(solid, positions, block, 0)
     return (
@@ -143,15 +143,16 @@ def _corners(solid: Solid, positions: FloatArray, block: int, k: int) -> Vec3:
 
 
 @inlined
-def _shape(solid: Solid, block: int, which: int) -> Lanes:
+def shape_of(solid: Solid, block: int, which: int) -> Lanes:
+    """A quantity of `Solid.shape` for eight tetrahedra."""
     return load(solid.shape, WIDTH * (WIDTH * block + which))
 
 
 @inlined
 def _weighted(solid: Solid, block: int, d1: Vec3, d2: Vec3, d3: Vec3) -> tuple[Vec3, Vec3, Vec3]:
     """e_i = sum over j of (V grad N_i . grad N_j) d_j [m2]."""
-    k11, k22, k33 = _shape(solid, block, 0), _shape(solid, block, 1), _shape(solid, block, 2)
-    k12, k13, k23 = _shape(solid, block, 3), _shape(solid, block, 4), _shape(solid, block, 5)
+    k11, k22, k33 = shape_of(solid, block, 0), shape_of(solid, block, 1), shape_of(solid, block, 2)
+    k12, k13, k23 = shape_of(solid, block, 3), shape_of(solid, block, 4), shape_of(solid, block, 5)
     return (
         axpy(k11, d1, axpy(k12, d2, scale(k13, d3))),
         axpy(k12, d1, axpy(k22, d2, scale(k23, d3))),

@@ -1,4 +1,4 @@
-"""Gathers between nodes and blocks of eight tetrahedra.
+"""Gathers between nodes and blocks of eight tetrahedra, and the largest of what is gathered.
 
 As in `tissue.simd` each is also a plain Python function, which runs when the JIT is off.
 """
@@ -14,6 +14,7 @@ from tissue.simd import (
     _I32,
     _POINT,
     _VECTOR,
+    LANES,
     POINT,
     WIDTH,
     Lanes,
@@ -67,8 +68,29 @@ def _sum_of_eight_points(builder: Any, values: _Array, of: _Array, i: Any) -> An
     return made
 
 
+def larger(a: Lanes, b: Lanes) -> Lanes:
+    """Return the larger of each two; `b` where there is none."""
+    return np.where(a > b, a, b)
+
+
+@_compiled(larger, LANES, LANES)
+def _larger(builder: Any, a: Any, b: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+
+def largest(a: Lanes) -> float:
+    """Return the largest of eight."""
+    return float(a.max())
+
+
+@_compiled(largest, LANES, result=types.float64)
+def _largest(builder: Any, a: Any) -> Any:
+    values = [builder.extract_element(a, _I32(k)) for k in range(WIDTH)]
+    return _tree(values, lambda b, c: builder.select(builder.fcmp_ordered(">", b, c), b, c))
+
+
 def _tree(terms: list[Any], add: Any = operator.add) -> Any:
-    """Sum of eight, neighbours first: the additions need not wait for each other."""
+    """Sum of eight, or another fold, neighbours first: operations need not wait for each other."""
     while len(terms) > 1:
         terms = [add(a, b) for a, b in zip(terms[::2], terms[1::2], strict=True)]
     return terms[0]

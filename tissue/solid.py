@@ -139,9 +139,7 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return empty rows for that many nodes and tetrahedra."""
     capacity = WIDTH * n_blocks(n_tetrahedra)
     shape = _aligned(8 * capacity)
-    shape.reshape(-1, 8, WIDTH)[:, VOLUME] = (
-        1.0  # those not in use: without force, not without sense
-    )
+    shape[:] = 1.0  # of tetrahedra not in use: any, so that nothing is divided by 0
     return Solid(
         law=law,
         nodes=_aligned(4 * capacity, np.int32),

@@ -335,10 +335,12 @@ class Tissue:
 
     def _settle(self, anchors: Anchors) -> int:
         n_each = 4
-        step = self._stable_step(self._elasticity.frequency_squared)
         energy = 0.0
+        self._elasticity.look_again()
         for done in range(0, LONGEST_SETTLING, n_each):
             n = self.n_nodes
+            strained = self._elasticity.strained_frequency_squared(self._body, anchors)
+            step = self._stable_step(max(self._elasticity.frequency_squared, strained))
             velocities = self._body.velocities[:n]
             velocities_t0 = velocities.copy()
             motion = self._motion(anchors, NOWHERE, n_each * step, 0.0, 1.0)

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tests.tissue.kernels_of import springs_of
 from tissue.body import NODES, TETRAHEDRA, Body, build_body
@@ -120,6 +121,25 @@ def j_of(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
     """Return J of each tetrahedron."""
     corners, rest = positions[mesh.tetrahedra], mesh.positions[mesh.tetrahedra]
     return np.linalg.det(corners[:, 1:] - corners[:, :1]) / np.linalg.det(rest[:, 1:] - rest[:, :1])
+
+
+def fastest(solid: SolidBody, positions: FloatArray | None = None) -> float:
+    """Return the largest angular frequency at rest or elsewhere [1/s], by differences of forces."""
+    here = solid.body.rest[: solid.body.counts[NODES]].copy() if positions is None else positions
+    free = np.repeat(~solid.body.fixed[: len(here)], 3)
+    roots = np.sqrt(np.repeat(solid.body.masses[: len(here)], 3))
+    step = 1e-6 * np.ptp(here)
+
+    def product(u):
+        way = np.where(free, u.ravel() / roots, 0.0).reshape(-1, 3)
+        way = way / np.abs(way).max() if (longest := np.abs(way).max()) else way
+        pull = solid.forces(here - step * way) - solid.forces(here + step * way)
+        return np.where(free, longest * pull.ravel() / (2.0 * step) / roots, 0.0)
+
+    n = len(roots)
+    start = np.random.default_rng(0).normal(size=n)
+    operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
+    return float(np.sqrt(eigsh(operator, k=1, which="LA", v0=start, tol=1e-4)[0][0]))
 
 
 @kernel

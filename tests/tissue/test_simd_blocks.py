@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tissue.jit import kernel
-from tissue.simd import store, store_point
-from tissue.simd_blocks import gathered, sum_of_eight, sum_of_eight_points
+from tissue.simd import load, store, store_point
+from tissue.simd_blocks import gathered, larger, largest, sum_of_eight, sum_of_eight_points
 
 pytestmark = pytest.mark.kernel
 
@@ -29,3 +29,17 @@ def test_values_and_points_are_gathered_and_summed_up():
     assert out[8] == pytest.approx(VALUES[OF[2:10]].sum(), rel=1e-15)
     rows = [VALUES[OF[1:9] + c * 8].sum() for c in range(3)]
     np.testing.assert_allclose(points[0], rows, rtol=1e-14)
+
+
+def compare(values, out):
+    store(out, 0, larger(load(values, 0), load(values, 8)))
+    out[8] = largest(load(values, 16))
+
+
+def test_the_larger_of_two_and_the_largest_of_eight():
+    out, expected = np.zeros((2, 9))
+    kernel(compare)(VALUES, out)
+    compare(VALUES, expected)
+    np.testing.assert_array_equal(out, expected)
+    np.testing.assert_array_equal(out[:8], np.maximum(VALUES[:8], VALUES[8:16]))
+    assert out[8] == VALUES[16:24].max()

@@ -4,11 +4,9 @@ import functools
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tests import bodies, incisions
-from tests.tissue.solids import LAWS, SolidBody, lame, law_of, moved, solid_of
-from tissue.body import NODES
+from tests.tissue.solids import LAWS, SolidBody, fastest, lame, law_of, moved, solid_of
 from tissue.jit import is_compiling
 from tissue.material import Material
 from tissue.shapes import grid
@@ -45,25 +43,6 @@ def cut_mesh(seed: int) -> TetrahedralMesh:
 def solid_that_followed(tissue: Tissue) -> SolidBody:
     """Return the solid that was renewed where the cuts touched."""
     return SolidBody(tissue._body, tissue._elasticity.arrays.solid)
-
-
-def fastest(solid: SolidBody) -> float:
-    """Return the largest angular frequency at rest [1/s], from differences of forces."""
-    rest = solid.body.rest[: solid.body.counts[NODES]].copy()
-    free = np.repeat(~solid.body.fixed[: len(rest)], 3)
-    roots = np.sqrt(np.repeat(solid.body.masses[: len(rest)], 3))
-    step = 1e-6 * np.ptp(rest)
-
-    def product(u):
-        way = np.where(free, u.ravel() / roots, 0.0).reshape(-1, 3)
-        way = way / np.abs(way).max() if (longest := np.abs(way).max()) else way
-        pull = solid.forces(rest - step * way) - solid.forces(rest + step * way)
-        return np.where(free, longest * pull.ravel() / (2.0 * step) / roots, 0.0)
-
-    n = len(roots)
-    start = np.random.default_rng(0).normal(size=n)
-    operator = LinearOperator((n, n), matvec=product, dtype=np.float64)
-    return float(np.sqrt(eigsh(operator, k=1, which="LA", v0=start, tol=1e-4)[0][0]))
 
 
 @needs_speed

@@ -30,7 +30,9 @@ class AllTogether:
         elasticity = motion.elasticity
         by_node = elasticity.arrays.frequency_squared
         near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
-        frequency = math.sqrt(max(elasticity.frequency_squared, near))
+        # The bound of the strained body is so wide of the truth that it needs no safety on top.
+        strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body, motion.anchors)
+        frequency = math.sqrt(max(elasticity.frequency_squared, near, strained))
         surroundings = motion.surroundings
         step = SAFETY * largest_stable_step(
             frequency, surroundings.retardation_time, surroundings.drag

@@ -1,0 +1,100 @@
+"""The bound on frequencies of a body as it is deformed, against eigenvalues there."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.solids import fastest, law_of, solid_of
+from tissue.anchors import new_anchors
+from tissue.elastic import Elastic
+from tissue.jit import is_compiling
+from tissue.material import Material
+from tissue.shapes import grid
+from tissue.solid import n_blocks
+from tissue.springs import no_springs
+from tissue.strained import strained_frequency, strained_frequency_at
+from tissue.tissue import Tissue
+
+pytestmark = pytest.mark.kernel
+
+MESH = bodies.jittered(3, 1)
+STRETCHES = {
+    "rest": np.eye(3),
+    "sheet": np.diag([1.5, 1.5, 1.0 / 2.25]),
+    "swollen sheet": np.diag([1.5, 1.5, 1.0]),
+    "rod": np.diag([2.0, 0.7, 0.7]),
+    "crushed": np.diag([0.5, 1.4, 1.4]),
+    "squeezed": 0.8 * np.eye(3),
+    "sheared": np.eye(3) + np.outer([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+}
+
+
+def elastic_of(solid):
+    """Return the solid as the only thing that is elastic."""
+    n = len(solid.body.rest)
+    return Elastic(
+        springs=no_springs(n, 0),
+        solid=solid.solid,
+        has=np.array([False, True]),
+        frequency_squared=solid.solid.frequency_squared,
+    )
+
+
+def bound(solid, positions):
+    blocks = n_blocks(int(solid.body.counts[1]))
+    elastic = elastic_of(solid)
+    return float(np.sqrt(strained_frequency(elastic, positions, solid.solid.every, 0, blocks)))
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("poisson_ratio", [0.3, 0.49])
+@pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
+def test_the_bound_holds_however_the_body_is_stretched(stretch, poisson_ratio, averaged):
+    """With the nodes shaken too, so that no two tetrahedra are alike."""
+    solid = solid_of(MESH, law_of(poisson_ratio, averaged))
+    for shake in (0.0, 0.01, 0.03):
+        noise = np.random.default_rng(3).normal(size=MESH.positions.shape)
+        x = MESH.positions @ stretch.T + shake * np.ptp(MESH.positions) * noise
+        assert bound(solid, x) > 1.1 * fastest(solid, x)
+
+
+def test_at_rest_it_is_the_bound_at_rest():
+    solid = solid_of(MESH, law_of(0.45))
+    assert bound(solid, MESH.positions) == pytest.approx(solid.frequency(), rel=1e-9)
+
+
+def test_a_sheet_of_twice_the_edges_is_bound_four_times_as_high():
+    """Faces of a sheet that is pulled both ways to twice its size have four times their area."""
+    mesh = grid((2, 2, 1), (0.02, 0.02, 0.01))
+    solid = solid_of(mesh, law_of(0.45))
+    x = mesh.positions * [2.0, 2.0, 1.0]
+    assert bound(solid, x) == pytest.approx(4.0 * solid.frequency(), rel=1e-9)
+
+
+def test_under_the_blade_the_tetrahedra_that_are_held_are_looked_at():
+    solid = solid_of(MESH, law_of(0.45))
+    x = 2.0 * MESH.positions
+    anchors = new_anchors(3, 1.0, 1e4)
+    assert strained_frequency_at(elastic_of(solid), x, anchors) == 0.0
+    anchors.state[1], anchors.tetrahedron[1] = 1, 5
+    held = strained_frequency_at(elastic_of(solid), x, anchors)
+    assert 0.0 < held <= bound(solid, x) ** 2
+
+
+@pytest.mark.skipif(not is_compiling(), reason="hundreds of steps: compiled only")
+@pytest.mark.parametrize("poisson_ratio", [0.3, 0.45, 0.49])
+def test_tissue_that_is_drawn_out_and_let_go_stays_whole_without_a_time_step_given(poisson_ratio):
+    """A plate on a frame half as large again: a step that is stable at rest would make it burst."""
+    mesh = grid((6, 6, 3), (0.06, 0.06, 0.03))
+    x = mesh.positions
+    frame = bodies.sides(mesh, 0) | bodies.sides(mesh, 1)
+    tissue = Tissue(
+        mesh,
+        Material(law="neo_hookean", poisson_ratio=poisson_ratio, young_modulus=5e3),
+        fixed=frame,
+        positions=x * [1.5, 1.5, 1.0],
+    )
+    substeps = [tissue.step(None, 1e-3).n_substeps for _ in range(50)]
+    assert max(substeps) > 1
+    low, high = tissue.bounds
+    assert (np.abs(low - high) < 0.15).all()

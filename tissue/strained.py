@@ -1,0 +1,68 @@
+"""How fast tetrahedra swing as they are deformed now: a bound on frequencies beside that at rest.
+
+Where a tetrahedron is stretched, its faces grow, and pressure acts on a larger face: the stiffness
+against a change of volume grows as the square of the area of the face opposite the node that moves.
+The shear part of the law never gets stiffer than at rest. So w^2 is taken to be that at rest times
+the largest growth of the square of a face, or 1. For random deformations up to twice the length and
+half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the true w^2.
+"""
+
+from tissue.anchors import ANCHORED, Anchors
+from tissue.elastic import Elastic
+from tissue.jit import kernel
+from tissue.neo_hookean import edges, shape_of
+from tissue.simd import WIDTH, lanes
+from tissue.simd_blocks import gathered, larger, largest
+from tissue.solid import VOLUME
+from tissue.types import FloatArray, IntArray
+from tissue.vec3 import add, cross, dot
+
+
+@kernel
+def strained_frequency(
+    elastic: Elastic, positions: FloatArray, blocks: IntArray, begin: int, end: int
+) -> float:
+    """Largest bound on w^2 at `positions` over the tetrahedra in `blocks[begin:end]` [1/s2]."""
+    solid = elastic.solid
+    worst = lanes(0.0)
+    for i in range(begin, end):
+        block = blocks[i]
+        d1, d2, d3 = edges(solid, positions, block)
+        n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
+        n0 = add(n1, add(n2, n3))
+        k1, k2, k3 = (
+            shape_of(solid, block, 0),
+            shape_of(solid, block, 1),
+            shape_of(solid, block, 2),
+        )
+        mixed = shape_of(solid, block, 3) + shape_of(solid, block, 4) + shape_of(solid, block, 5)
+        k0 = k1 + k2 + k3 + mixed + mixed
+        growth = larger(
+            larger(dot(n0, n0) / k0, dot(n1, n1) / k1), larger(dot(n2, n2) / k2, dot(n3, n3) / k3)
+        )
+        growth = larger(growth / (lanes(36.0) * shape_of(solid, block, VOLUME)), lanes(1.0))
+        first = 4 * WIDTH * block
+        at_rest = larger(
+            larger(
+                gathered(elastic.frequency_squared, solid.nodes, first),
+                gathered(elastic.frequency_squared, solid.nodes, first + WIDTH),
+            ),
+            larger(
+                gathered(elastic.frequency_squared, solid.nodes, first + 2 * WIDTH),
+                gathered(elastic.frequency_squared, solid.nodes, first + 3 * WIDTH),
+            ),
+        )
+        worst = larger(worst, growth * at_rest)
+    return largest(worst)
+
+
+@kernel
+def strained_frequency_at(elastic: Elastic, positions: FloatArray, anchors: Anchors) -> float:
+    """The same over the blocks of the tetrahedra that anchors hold [1/s2]."""
+    worst = 0.0
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            block = anchors.tetrahedron[k] // WIDTH
+            every = elastic.solid.every
+            worst = max(worst, strained_frequency(elastic, positions, every, block, block + 1))
+    return worst
