@@ -100,6 +100,8 @@ class Solid(Arrays):
     """0, 1, 2 ...: the list of all blocks, or of all nodes or tetrahedra."""
     volume: FloatArray
     """Scratch: signed volume of tetrahedron t now [m3] at 8 + t; the first eight are 0."""
+    growth: FloatArray
+    """Scratch of `strained`: how far tetrahedron t is stretched, at 8 + t."""
     pressure: FloatArray
     """Scratch: lam (J - a) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
@@ -159,6 +161,7 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         used=np.zeros(1, dtype=np.int64),
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=_aligned(WIDTH + capacity),
+        growth=_aligned(WIDTH + capacity),
         pressure=np.zeros(n_nodes),
         forces=_aligned(4 * 3 * (WIDTH + capacity)),
     )

@@ -8,12 +8,12 @@ half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the t
 """
 
 from tissue.anchors import ANCHORED, Anchors
-from tissue.elastic import Elastic
-from tissue.jit import kernel
+from tissue.elastic import Elastic, bound_both_frequencies
+from tissue.jit import inlined, kernel
 from tissue.neo_hookean import edges, shape_of
-from tissue.simd import WIDTH, lanes
+from tissue.simd import WIDTH, Lanes, lanes, store
 from tissue.simd_blocks import gathered, larger, largest
-from tissue.solid import VOLUME
+from tissue.solid import VOLUME, Solid
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import add, cross, dot
 
@@ -23,36 +23,21 @@ def strained_frequency(
     elastic: Elastic, positions: FloatArray, blocks: IntArray, begin: int, end: int
 ) -> float:
     """Largest bound on w^2 at `positions` over the tetrahedra in `blocks[begin:end]` [1/s2]."""
-    solid = elastic.solid
+    nodes = elastic.solid.nodes
     worst = lanes(0.0)
     for i in range(begin, end):
-        block = blocks[i]
-        d1, d2, d3 = edges(solid, positions, block)
-        n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
-        n0 = add(n1, add(n2, n3))
-        k1, k2, k3 = (
-            shape_of(solid, block, 0),
-            shape_of(solid, block, 1),
-            shape_of(solid, block, 2),
-        )
-        mixed = shape_of(solid, block, 3) + shape_of(solid, block, 4) + shape_of(solid, block, 5)
-        k0 = k1 + k2 + k3 + mixed + mixed
-        growth = larger(
-            larger(dot(n0, n0) / k0, dot(n1, n1) / k1), larger(dot(n2, n2) / k2, dot(n3, n3) / k3)
-        )
-        growth = larger(growth / (lanes(36.0) * shape_of(solid, block, VOLUME)), lanes(1.0))
-        first = 4 * WIDTH * block
+        first = 4 * WIDTH * blocks[i]
         at_rest = larger(
             larger(
-                gathered(elastic.frequency_squared, solid.nodes, first),
-                gathered(elastic.frequency_squared, solid.nodes, first + WIDTH),
+                gathered(elastic.frequency_squared, nodes, first),
+                gathered(elastic.frequency_squared, nodes, first + WIDTH),
             ),
             larger(
-                gathered(elastic.frequency_squared, solid.nodes, first + 2 * WIDTH),
-                gathered(elastic.frequency_squared, solid.nodes, first + 3 * WIDTH),
+                gathered(elastic.frequency_squared, nodes, first + 2 * WIDTH),
+                gathered(elastic.frequency_squared, nodes, first + 3 * WIDTH),
             ),
         )
-        worst = larger(worst, growth * at_rest)
+        worst = larger(worst, _growth(elastic.solid, positions, blocks[i]) * at_rest)
     return largest(worst)
 
 
@@ -66,3 +51,44 @@ def strained_frequency_at(elastic: Elastic, positions: FloatArray, anchors: Anch
             every = elastic.solid.every
             worst = max(worst, strained_frequency(elastic, positions, every, block, block + 1))
     return worst
+
+
+@kernel
+def strain_frequencies(
+    elastic: Elastic,
+    positions: FloatArray,
+    blocks: IntArray,
+    n_blocks: int,
+    nodes: IntArray,
+    n: int,
+) -> None:
+    """Write the bound at the first `n` of `nodes` as they are now to `elastic.frequency_squared`.
+
+    `blocks` hold the tetrahedra around them.
+    """
+    solid = elastic.solid
+    for i in range(n_blocks):
+        growth = _growth(solid, positions, blocks[i])
+        store(solid.growth, WIDTH * (1 + blocks[i]), growth)
+    bound_both_frequencies(elastic, nodes, n)
+    for i in range(n):
+        node = nodes[i]
+        growth = 1.0
+        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+            growth = max(growth, solid.growth[solid.around[slot]])
+        elastic.frequency_squared[node] += (growth - 1.0) * solid.frequency_squared[node]
+
+
+@inlined
+def _growth(solid: Solid, positions: FloatArray, block: int) -> Lanes:
+    """Largest square of a face of each of eight tetrahedra over that at rest, at least 1."""
+    d1, d2, d3 = edges(solid, positions, block)
+    n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
+    n0 = add(n1, add(n2, n3))
+    k1, k2, k3 = shape_of(solid, block, 0), shape_of(solid, block, 1), shape_of(solid, block, 2)
+    mixed = shape_of(solid, block, 3) + shape_of(solid, block, 4) + shape_of(solid, block, 5)
+    k0 = k1 + k2 + k3 + mixed + mixed
+    growth = larger(
+        larger(dot(n0, n0) / k0, dot(n1, n1) / k1), larger(dot(n2, n2) / k2, dot(n3, n3) / k3)
+    )
+    return larger(growth / (lanes(36.0) * shape_of(solid, block, VOLUME)), lanes(1.0))

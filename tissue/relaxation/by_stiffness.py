@@ -5,6 +5,7 @@ import numpy as np
 from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.contact.resolve import note_positions, prepare, prepare_listed
+from tissue.elastic import TETRAHEDRA_TOO
 from tissue.elasticity import Elasticity
 from tissue.relaxation.activity import (
     N_LISTED,
@@ -30,7 +31,8 @@ from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zo
 from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
 from tissue.relaxation.options import LocalTimeStepping
-from tissue.relaxation.patches import new_patch
+from tissue.relaxation.patches import N_FORCES, new_patch
+from tissue.strained import strain_frequencies
 from tissue.types import FloatArray, IntArray
 
 
@@ -123,6 +125,7 @@ class ByStiffness:
         body, activity, zone = motion.body, self._activity, self._zone
         springs, anchors = motion.elasticity.arrays.springs, motion.anchors
         by_node = motion.elasticity.arrays.frequency_squared
+        self._strain(motion)
         n_near = find_near(body, springs, anchors, zone, self._options.rings)
         wake_each(activity, body, springs, zone.fine, n_near)
         highest = frequency_with_anchors(anchors, body, by_node, motion.stages.external)
@@ -140,6 +143,15 @@ class ByStiffness:
         )
         find_zone(motion.elasticity.arrays, activity, zone, n_near, limit)
         return n, p
+
+    def _strain(self, motion: Motion) -> None:
+        """Raise the bounds of the listed nodes where tetrahedra are stretched."""
+        elastic = motion.elasticity.arrays
+        if elastic.has[TETRAHEDRA_TOO]:
+            self._renew_patch(motion)
+            patch, nodes = self._listed, self._activity.listed
+            blocks = (patch.forces, patch.state[N_FORCES])
+            strain_frequencies(elastic, motion.body.positions, *blocks, nodes, self.n_awake)
 
     def _renew_patch(self, motion: Motion) -> None:
         """Find what the listed nodes feel, where the list or the mesh has changed."""
