@@ -271,10 +271,12 @@ def _force(
         dy = load(seen, at + WIDTH) + clock * dv - y
         dz = load(seen, at + 2 * WIDTH) + clock * dw - z
         approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
-        inverse = one / square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
+        per_squared = one / squared  # beside the root, not after it: nodes are moved one by one
         stiffness = load(springs.stiffness, slot)
-        viscous = stiffness * inverse * inverse
-        along = stiffness - load(springs.rest_pull, slot) * inverse + time * approach * viscous
+        viscous = stiffness * per_squared
+        elastic = stiffness - load(springs.rest_pull, slot) * per_squared * square_root(squared)
+        along = elastic + time * approach * viscous
         fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
         store(seen, at + 6 * WIDTH, dx)
         store(seen, at + 7 * WIDTH, dy)
