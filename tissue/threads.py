@@ -14,7 +14,14 @@ from tissue.body import NODES, TETRAHEDRA, Body
 from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
 from tissue.elastic import TETRAHEDRA_TOO, Elastic, Surroundings
 from tissue.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
-from tissue.runge_kutta import Stages, first_stage, fourth_stage, second_stage, third_stage
+from tissue.runge_kutta import (
+    Stages,
+    first_stage,
+    fourth_stage,
+    second_stage,
+    steps_between_contacts,
+    third_stage,
+)
 from tissue.slipping import slip
 from tissue.solid import n_blocks
 from tissue.star import Visits
@@ -54,11 +61,12 @@ class Threads:
         """Do what `tissue.runge_kutta.relax` does."""
         share = (end - begin) / n
         is_awake = contact.state[IS_AWAKE] == 1
+        every = steps_between_contacts(share * dt, n)
         external = stages.external
         for i in range(first, n):
             at = begin + i * share
             if contact.state[IS_PENDING] == 0:
-                if is_awake:
+                if is_awake and i % every == 0:
                     prepare(contact, body)
 
                 def pulled(x: FloatArray, when: float, weight: float, at: float = at) -> None:
@@ -66,9 +74,10 @@ class Threads:
                     pull(anchors, body, edge, x, now, weight * share, dt, toughness, external)
 
                 self._step(body, elastic, stages, surroundings, share * dt, pulled)
-            if is_awake:
+            since = i % every + 1
+            if is_awake and (since == every or i == n - 1):
                 contact.state[IS_PENDING] = 1
-                if not resolve(contact, body, share * dt):
+                if not resolve(contact, body, since * share * dt):
                     return i
                 contact.state[IS_PENDING] = 0
             clear_forces(anchors, body, external)
