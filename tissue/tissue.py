@@ -46,7 +46,7 @@ from tissue.relaxation.all_together import AllTogether
 from tissue.relaxation.motion import Motion, Relaxation
 from tissue.relaxation.moved import N_MOVED, forget_moved
 from tissue.relaxation.options import Hierarchical, LocalTimeStepping, Relaxing, checked_relaxation
-from tissue.runge_kutta import SAFETY, accelerations, largest_stable_step, new_stages
+from tissue.runge_kutta import accelerations, new_stages
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
 from tissue.snapping import EXPLAINED
@@ -340,7 +340,8 @@ class Tissue:
         for done in range(0, LONGEST_SETTLING, n_each):
             n = self.n_nodes
             strained = self._elasticity.strained_frequency_squared(self._body, anchors)
-            step = self._stable_step(max(self._elasticity.frequency_squared, strained))
+            highest = max(self._elasticity.frequency_squared, strained)
+            step = self._elasticity.stable_step(highest, self._surroundings)
             velocities = self._body.velocities[:n]
             velocities_t0 = velocities.copy()
             motion = self._motion(anchors, NOWHERE, n_each * step, 0.0, 1.0)
@@ -564,11 +565,12 @@ class Tissue:
         return max(math.dist(t1.tip, t0.tip), math.dist(t1.heel, t0.heel))
 
     def _measures(self) -> Measures:
+        elasticity = self._elasticity
         return Measures(
             n_tetrahedra=self.n_tetrahedra,
             altitude=lowest_altitude(self._body),
-            frequency=math.sqrt(self._elasticity.frequency_squared),
-            time_step=self._stable_step(self._elasticity.frequency_squared),
+            frequency=math.sqrt(elasticity.frequency_squared),
+            time_step=elasticity.stable_step(elasticity.frequency_squared, self._surroundings),
         )
 
     def _result(
@@ -645,9 +647,3 @@ class Tissue:
         self._every = np.arange(n_nodes)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
-
-    def _stable_step(self, frequency_squared: float) -> float:
-        material = self.material
-        frequency = math.sqrt(frequency_squared)
-        limit = largest_stable_step(frequency, material.retardation_time, material.viscous_damping)
-        return SAFETY * limit

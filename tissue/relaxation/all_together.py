@@ -7,7 +7,7 @@ from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.elasticity import Elasticity
 from tissue.relaxation.motion import Motion
-from tissue.runge_kutta import SAFETY, largest_stable_step, relax
+from tissue.runge_kutta import SAFETY, relax
 from tissue.threads import Threads
 from tissue.types import IntArray
 
@@ -32,11 +32,8 @@ class AllTogether:
         near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
         # The bound of the strained body is so wide of the truth that it needs no safety on top.
         strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body, motion.anchors)
-        frequency = math.sqrt(max(elasticity.frequency_squared, near, strained))
-        surroundings = motion.surroundings
-        step = SAFETY * largest_stable_step(
-            frequency, surroundings.retardation_time, surroundings.drag
-        )
+        highest = max(elasticity.frequency_squared, near, strained)
+        step = elasticity.stable_step(highest, motion.surroundings)
         n = max(1, math.ceil(motion.span / step))
         self.relax_by(motion, n)
         return n
