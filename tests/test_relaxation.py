@@ -170,3 +170,22 @@ def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
     assert result.touch.force_of_floor[2] > 0.0
     weight = 9.81 * min(piece.mass for piece in tissue.pieces())
     assert result.touch.force_of_floor[2] == pytest.approx(weight, rel=0.3)
+
+
+def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
+    """Nodes that a cut makes between fixed ones never move; contact must know where they are.
+
+    Once they were thought to come from the origin, through everything on the way.
+    """
+    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    mesh = mesh._replace(positions=mesh.positions + 0.1)
+    held = mesh.positions[:, 2] < 0.115
+    material = Material(viscous_damping=20.0, toughness=2.0)
+    tissue = Tissue(mesh, material, fixed=held, gravity=NO_GRAVITY, relaxation=LOCAL)
+    strokes.make(tissue, strokes.straight(mesh, 0.3))  # from now on lips may touch
+    results = strokes.make(tissue, strokes.straight(mesh, 0.7))
+    made = tissue.snapshot().fixed[len(mesh.positions) :]
+    assert made.any()
+    speed = np.linalg.norm(tissue.snapshot().velocities, axis=1).max()
+    assert speed < 0.05
+    assert max(r.touch.penetration for r in results) < 1e-3

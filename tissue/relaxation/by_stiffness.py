@@ -29,7 +29,7 @@ from tissue.relaxation.levels import (
 )
 from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zone
 from tissue.relaxation.motion import Motion, end_step
-from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
+from tissue.relaxation.moved import N_MOVED, Moved, grown_moved, none_moved, note_moved
 from tissue.relaxation.options import LocalTimeStepping
 from tissue.relaxation.patches import N_FORCES, new_patch
 from tissue.strained import strain_frequencies
@@ -58,6 +58,7 @@ class ByStiffness:
         self._limits, self._n_above = np.zeros((2, MOST_STEPS + 1))
         self._starts = True
         self._is_prepared = False
+        self._has_new_nodes = False
         self.body_moved(body, elasticity)
 
     @property
@@ -168,14 +169,19 @@ class ByStiffness:
             self._is_prepared = False
         elif self._is_prepared:  # those that sleep are where they were
             prepare_listed(contact.arrays, body, activity.listed, self.n_awake)
+            if self._has_new_nodes:  # fixed ones among them are never listed
+                moved = self._moved
+                note_positions(contact.arrays, body, moved.nodes, int(moved.state[N_MOVED]))
         else:
             prepare(contact.arrays, body)
             self._is_prepared = True
+        self._has_new_nodes = False
 
     def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
         """Wake the first `n` of `nodes`."""
         wake_each(self._activity, body, elasticity.arrays.springs, nodes, n)
         note_moved(self._moved, nodes, n)
+        self._has_new_nodes = True
         self._listed_version = -1
 
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
