@@ -418,6 +418,11 @@ class Tissue:
             return 0
         n = self._relaxation.relax(motion)
         self._box = self._survey()
+        if not self._box.is_finite:
+            raise TissueError(
+                "the motion of the tissue became unstable: the position of a node is no finite "
+                "number. Use a shorter time step, or a material that is softer or heavier"
+            )
         return n
 
     def _motion(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> Motion:
@@ -475,8 +480,8 @@ class Tissue:
         """Anchor the samples that have come into the tissue by themselves."""
         body = self._body
         if not self._incising:
-            low, high, is_finite = self._box
-            if not (is_finite and near_box(anchors, edge, when, low, high)):
+            low, high, _ = self._box
+            if not near_box(anchors, edge, when, low, high):
                 return
         moved = self._relaxation.moved
         nodes, n = self._every, self.n_nodes
@@ -582,12 +587,7 @@ class Tissue:
         n_substeps: int,
         profile: Profile,
     ) -> StepResult:
-        low, high, is_finite = self._box
-        if not is_finite:
-            raise TissueError(
-                "the motion of the tissue became unstable: the position of a node is no finite "
-                "number. Use a shorter time step, or a material that is softer or heavier"
-            )
+        low, high, _ = self._box
         totals = anchors.totals
         point = np.zeros(3) if sweep is None else np.array(edge.tip_t1)
         per_second = 1.0 / dt if dt > 0.0 else 0.0
