@@ -49,13 +49,6 @@ SAFETY = 0.8
 0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
 
 
-LONGEST_APART = 5e-4
-"""Time between two looks at what touches, at most [s], where Runge-Kutta steps are shorter. Contact
-follows what passed through what in that time, whatever its length; what it lets sink in meanwhile
-is some micrometres. With a look in each step, contact took two thirds of the time of a body cut six
-times."""
-
-
 class Stages(Arrays):
     """Scratch of one step, each of shape (capacity, 3)."""
 
@@ -139,30 +132,22 @@ def relax(
     """
     share = (end - begin) / n
     is_awake = contact.state[IS_AWAKE] == 1
-    every = steps_between_contacts(share * dt, n)
     for i in range(first, n):
         at = begin + i * share
         if contact.state[IS_PENDING] == 0:
-            if is_awake and i % every == 0:
+            if is_awake:
                 prepare(contact, body)
             runge_kutta_nystroem(
                 body, elastic, anchors, edge, stages, surroundings, toughness, dt, at, share
             )
-        since = i % every + 1
-        if is_awake and (since == every or i == n - 1):
+        if is_awake:
             contact.state[IS_PENDING] = 1
-            if not resolve(contact, body, since * share * dt):
+            if not resolve(contact, body, share * dt):
                 return i
             contact.state[IS_PENDING] = 0
         clear_forces(anchors, body, stages.external)  # before anchors go to other nodes
         slip(anchors, body, visits, edge, at + share, toughness, reach, queue)
     return n
-
-
-@kernel
-def steps_between_contacts(h: float, n: int) -> int:
-    """Return how many of `n` Runge-Kutta steps of `h` [s] go by between two looks at contact."""
-    return min(n, max(1, int(LONGEST_APART / h)))
 
 
 @kernel

@@ -14,14 +14,7 @@ from tissue.body import NODES, TETRAHEDRA, Body
 from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
 from tissue.elastic import TETRAHEDRA_TOO, Elastic, Surroundings
 from tissue.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
-from tissue.runge_kutta import (
-    Stages,
-    first_stage,
-    fourth_stage,
-    second_stage,
-    steps_between_contacts,
-    third_stage,
-)
+from tissue.runge_kutta import Stages, first_stage, fourth_stage, second_stage, third_stage
 from tissue.slipping import slip
 from tissue.solid import n_blocks
 from tissue.star import Visits
@@ -61,12 +54,11 @@ class Threads:
         """Do what `tissue.runge_kutta.relax` does."""
         share = (end - begin) / n
         is_awake = contact.state[IS_AWAKE] == 1
-        every = steps_between_contacts(share * dt, n)
         external = stages.external
         for i in range(first, n):
             at = begin + i * share
             if contact.state[IS_PENDING] == 0:
-                if is_awake and i % every == 0:
+                if is_awake:
                     prepare(contact, body)
 
                 def pulled(x: FloatArray, when: float, weight: float, at: float = at) -> None:
@@ -74,10 +66,9 @@ class Threads:
                     pull(anchors, body, edge, x, now, weight * share, dt, toughness, external)
 
                 self._step(body, elastic, stages, surroundings, share * dt, pulled)
-            since = i % every + 1
-            if is_awake and (since == every or i == n - 1):
+            if is_awake:
                 contact.state[IS_PENDING] = 1
-                if not resolve(contact, body, since * share * dt):
+                if not resolve(contact, body, share * dt):
                     return i
                 contact.state[IS_PENDING] = 0
             clear_forces(anchors, body, external)
