@@ -7,9 +7,10 @@ from scalpel_sim.version import version
 
 
 def make(body: Body, case: str) -> Stepper:
-    """Return the block of that size; `case` is LAW:METHOD:DAMPING."""
-    law, method, damping = case.split(":")
-    loops = Loops(len(body.tetrahedra), law, is_damped=damping == "damped")
+    """Return the block of that size; `case` is LAW:METHOD:DAMPING, and :plain where it is."""
+    law, method, damping, *plain = case.split(":")
+    is_damped, is_averaged = damping == "damped", not plain
+    loops = Loops(len(body.tetrahedra), law, is_damped=is_damped, is_averaged=is_averaged)
     steps = {"runge_kutta": loops.runge_kutta_steps, "euler": loops.euler_steps}[method]
     return Stepper(steps, lambda: loops.positions, version("scalpel-sim"))
 

@@ -12,6 +12,7 @@ from tissue.jit import kernel
 from tissue.material import Law, Material
 from tissue.relaxation.all_together import AllTogether
 from tissue.runge_kutta import accelerations
+from tissue.solid import neo_hookean
 from tissue.tissue import NOWHERE, Tissue
 from tissue.types import FloatArray, TetrahedralMesh
 
@@ -47,15 +48,34 @@ class Loops:
     """A block of so many tetrahedra, and the loops that make it move.
 
     Each method does its loop `n` times, as `timing.Case` wants it.
+
+    Args:
+        n_tetrahedra: How many.
+        law: Of what.
+        is_damped: Whether there are dampers along the edges.
+        is_averaged: Whether volumes are averaged around nodes, as the engine has it, or kept in
+            each tetrahedron, as peers have it.
     """
 
-    def __init__(self, n_tetrahedra: int, law: Law = "springs", *, is_damped: bool = True) -> None:
+    def __init__(
+        self,
+        n_tetrahedra: int,
+        law: Law = "springs",
+        *,
+        is_damped: bool = True,
+        is_averaged: bool = True,
+    ) -> None:
         mesh = block(n_tetrahedra)
         self._is_damped = is_damped
         self._all_together = AllTogether()
         self._tissue = Tissue(
             mesh, material(law, is_damped=is_damped), fixed=held(mesh), relaxation="global"
         )
+        if not is_averaged:
+            made, elasticity = material(law), self._tissue._elasticity
+            plain = neo_hookean(made.mu, made.lam, averaged=False)
+            arrays = elasticity.arrays
+            elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
 
     def forces(self, n: int) -> None:
         """Evaluate the forces on all nodes, and what they accelerate them by."""

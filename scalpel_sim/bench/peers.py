@@ -60,7 +60,7 @@ class Entry(NamedTuple):
     """What brings it."""
 
 
-OURS_SPRINGS, OURS_SOLID = "springs, Runge-Kutta", "neo-Hookean, 1 evaluation"
+OURS_SPRINGS, OURS_SOLID = "springs, Runge-Kutta", "plain neo-Hookean, 1 evaluation"
 """What others are compared with: damped with damped, undamped with undamped."""
 UNDAMPED = ", undamped"
 """End of the name of a case without dampers."""
@@ -82,11 +82,15 @@ OURS = {
         "f64; for comparison only",
     ),
     OURS_SOLID: Entry(
-        "ours", "ours.py", "neo_hookean:euler:damped", f"neo-Hookean, damped; {_EULER}", "1",
-        f"{_AVERAGED}; for comparison only",
+        "ours", "ours.py", "neo_hookean:euler:damped:plain", f"neo-Hookean, damped; {_EULER}", "1",
+        "f64; for comparison only",
     ),
     OURS_SOLID + UNDAMPED: Entry(
-        "ours", "ours.py", "neo_hookean:euler:undamped", f"neo-Hookean, no damping; {_EULER}", "1",
+        "ours", "ours.py", "neo_hookean:euler:undamped:plain",
+        f"neo-Hookean, no damping; {_EULER}", "1", "f64; for comparison only",
+    ),
+    "neo-Hookean, 1 evaluation": Entry(
+        "ours", "ours.py", "neo_hookean:euler:damped", f"neo-Hookean, damped; {_EULER}", "1",
         f"{_AVERAGED}; for comparison only",
     ),
     "neo-Hookean, Runge-Kutta": Entry(
