@@ -25,7 +25,7 @@ from tissue.types import BladeSegment, BladeSweep
 DT = 1e-3
 """[s]."""
 FASTEST = 5.0
-"""Speed of a node above which the motion counts as unstable [m/s]; the blade goes at 0.12."""
+"""Speed of a node above which the motion counts as unstable [m/s]; the blade goes at 0.3."""
 AT_REST = 0.02
 """Speed below which the body counts as at rest [m/s]."""
 
@@ -39,9 +39,9 @@ def stroke(tissue: Tissue, random: np.random.Generator) -> list[BladeSegment]:
     side = np.array([-way[1], way[0], 0.0])
     up = np.cos(lean) * np.array([0.0, 0.0, 1.0]) + np.sin(lean) * side
     middle = centre + side * random.uniform(-0.35, 0.35) * extent[:2].min()
-    middle[2] = high[2] - random.uniform(0.2, 1.1) * extent[2]
+    middle[2] = high[2] - random.uniform(0.1, 0.6) * extent[2]
     half = 0.5 * float(np.linalg.norm(extent[:2])) + 0.01
-    speed = random.uniform(0.04, 0.12)
+    speed = random.uniform(0.1, 0.3)
     along = np.arange(-half, half, speed * DT)
     return [
         BladeSegment(tip, tip + (extent[2] + 0.02) * up, way)
@@ -84,10 +84,10 @@ def main() -> int:
                 substeps, n = max(substeps, result.n_substeps), n + 1
                 if n % 20 == 0:
                     swiftest = max(swiftest, fastest(tissue))
-            for _ in range(100):
+            for _ in range(50):
                 tissue.step(None, DT)
             row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps)
-            spent = (thread_time() - began) / (n + 100) / DT
+            spent = (thread_time() - began) / (n + 50) / DT
             table.add_row(*map(str, row), f"{spent:.2f}", f"{swiftest:.2f}")
             print(*row, f"{spent:.2f} {swiftest:.2f}", file=sys.stderr)
         for _ in range(1000):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from tissue.jit import kernel
+from tissue.jit import inlined, kernel
 from tissue.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
 NEARLY_PARALLEL = 1e-3
@@ -63,6 +63,25 @@ def crossing_of(at: Edges) -> Crossing:
     return Crossing(True, scale(1.0 / length, n), -dot(w, n) / length, s, t)
 
 
+@inlined
+def way_of_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> float:
+    """Which way round the lines ab and cd overlap: the first thing to look at.
+
+    1 where cross(ab, cd) leads from the second edge to the first as they should lie, -1 where it
+    leads back, 0 where the edges do not face each other or are apart.
+    """
+    normal = cross(sub(at.b, at.a), sub(at.d, at.c))
+    towards = dot(normal, outward)
+    away = dot(normal, other_outward)
+    if away > 0.0 > towards:
+        way = 1.0
+    elif away < 0.0 < towards:
+        way = -1.0
+    else:
+        return 0.0
+    return way if way * dot(normal, sub(at.a, at.c)) < 0.0 else 0.0
+
+
 @kernel
 def edge_edge(
     t0: Edges, t1: Edges, outward: Vec3, other_outward: Vec3, slack: float, nothing_yet: float
@@ -81,16 +100,8 @@ def edge_edge(
         nothing_yet: Depth that is none [m].
     """
     outside = EdgeEdge(False, outward, 0.0, 0.0)
-    normal = cross(sub(t1.b, t1.a), sub(t1.d, t1.c))
-    towards = dot(normal, outward)
-    away = dot(normal, other_outward)
-    if away > 0.0 > towards:
-        way = 1.0
-    elif away < 0.0 < towards:
-        way = -1.0
-    else:
-        return outside  # the edges do not face each other
-    if way * dot(normal, sub(t1.a, t1.c)) >= 0.0:
+    way = way_of_overlap(t1, outward, other_outward)
+    if way == 0.0:
         return outside
     now = crossing_of(t1)
     if not (now.is_one and is_inner(now.s) and is_inner(now.t)):

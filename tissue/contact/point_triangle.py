@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from tissue.jit import kernel
+from tissue.jit import inlined, kernel
 from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
 RIM = 0.01
@@ -64,6 +64,12 @@ def under(at: Corners) -> Below:
 def is_within(b: float, c: float) -> bool:
     """Whether weights belong to a point in the triangle, or on its rim."""
     return b >= -RIM and c >= -RIM and b + c <= 1.0 + RIM
+
+
+@inlined
+def is_under(at: Corners) -> bool:
+    """Whether p is on the inner side of the triangle's plane: the first thing to look at."""
+    return dot(cross(sub(at.b, at.a), sub(at.c, at.a)), sub(at.p, at.a)) < 0.0
 
 
 @kernel

@@ -12,7 +12,7 @@ from tissue.contact.candidates import (
     find_candidates,
     have_moved,
 )
-from tissue.contact.edge_edge import Edges, crossing_of, edge_edge, is_inner
+from tissue.contact.edge_edge import Edges, crossing_of, edge_edge, is_inner, way_of_overlap
 from tissue.contact.faces import Faces
 from tissue.contact.impulses import (
     Contacts,
@@ -23,7 +23,7 @@ from tissue.contact.impulses import (
     stop_approach,
     turn,
 )
-from tissue.contact.point_triangle import Corners, is_within, point_triangle, under
+from tissue.contact.point_triangle import Corners, is_under, is_within, point_triangle, under
 from tissue.geometry import Weights, tetrahedron_volume
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
@@ -179,10 +179,12 @@ def _find_points(contact: ContactState, body: Body) -> None:
         a = candidates.triangle[row, 0]
         b = candidates.triangle[row, 1]
         c = candidates.triangle[row, 2]
+        t1 = Corners(vec3(x, node), vec3(x, a), vec3(x, b), vec3(x, c))
+        if not is_under(t1):  # most pairs; all that follows reads memory that they do not need
+            continue
         if contact.found[k] == contact.state[EPOCH] or _is_tangled(contact, node, a, b, c):
             continue
         t0 = Corners(vec3(start, node), vec3(start, a), vec3(start, b), vec3(start, c))
-        t1 = Corners(vec3(x, node), vec3(x, a), vec3(x, b), vec3(x, c))
         met = point_triangle(t0, t1, _slack(contact, node, a, b, c), contact.touch)
         if met.is_through:
             contact.found[k] = contact.state[EPOCH]
@@ -202,12 +204,14 @@ def _find_edges(contact: ContactState, body: Body) -> None:
         b = candidates.edge[row, 1]
         c = candidates.edge[other, 0]
         d = candidates.edge[other, 1]
-        if contact.found[first + k] == contact.state[EPOCH] or _is_tangled(contact, a, b, c, d):
-            continue
-        t0 = Edges(vec3(start, a), vec3(start, b), vec3(start, c), vec3(start, d))
         t1 = Edges(vec3(x, a), vec3(x, b), vec3(x, c), vec3(x, d))
         outward = add(vec3(normal, a), vec3(normal, b))
         other_outward = add(vec3(normal, c), vec3(normal, d))
+        if way_of_overlap(t1, outward, other_outward) == 0.0:
+            continue
+        if contact.found[first + k] == contact.state[EPOCH] or _is_tangled(contact, a, b, c, d):
+            continue
+        t0 = Edges(vec3(start, a), vec3(start, b), vec3(start, c), vec3(start, d))
         slack = _slack(contact, a, b, c, d)
         met = edge_edge(t0, t1, outward, other_outward, slack, contact.touch)
         if met.is_through:
