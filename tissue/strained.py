@@ -7,7 +7,6 @@ the largest growth of the square of a face, or 1. For random deformations up to 
 half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the true w^2.
 """
 
-from tissue.anchors import ANCHORED, Anchors
 from tissue.elastic import Elastic, bound_both_frequencies
 from tissue.jit import inlined, kernel
 from tissue.neo_hookean import edges, shape_of
@@ -39,18 +38,6 @@ def strained_frequency(
         )
         worst = larger(worst, _growth(elastic.solid, positions, blocks[i]) * at_rest)
     return largest(worst)
-
-
-@kernel
-def strained_frequency_at(elastic: Elastic, positions: FloatArray, anchors: Anchors) -> float:
-    """The same over the blocks of the tetrahedra that anchors hold [1/s2]."""
-    worst = 0.0
-    for k in range(len(anchors.state)):
-        if anchors.state[k] == ANCHORED:
-            block = anchors.tetrahedron[k] // WIDTH
-            every = elastic.solid.every
-            worst = max(worst, strained_frequency(elastic, positions, every, block, block + 1))
-    return worst
 
 
 @kernel

@@ -336,10 +336,9 @@ class Tissue:
     def _settle(self, anchors: Anchors) -> int:
         n_each = 4
         energy = 0.0
-        self._elasticity.look_again()
         for done in range(0, LONGEST_SETTLING, n_each):
             n = self.n_nodes
-            strained = self._elasticity.strained_frequency_squared(self._body, anchors)
+            strained = self._elasticity.strained_frequency_squared(self._body)
             highest = max(self._elasticity.frequency_squared, strained)
             step = self._elasticity.stable_step(highest, self._surroundings)
             velocities = self._body.velocities[:n]

@@ -29,6 +29,10 @@ from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, dot, norm, scale, store, sub, vec3
 
+LEAST_MOBILITY = 1e-6
+"""Share of its mobility that a contact keeps as it slides. With none left, where it comes to lie on
+fixed nodes, no impulse would part its sides, and all that it moves would be moved by 0 / 0."""
+
 SWEEPS = 10
 """Gauss-Seidel sweeps at most. Two stacked blocks need 10 to 20; what is left is pushed out in the
 steps that follow."""
@@ -145,6 +149,19 @@ def turn(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec3)
     contacts.weight[k, 3] = weights.d
     store(contacts.normal, k, normal)
     contacts.mobility[k] = _mobility(contacts, body, k)
+
+
+@kernel
+def follow(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec3) -> None:
+    """Let contact `k` be where its sides now meet, unless only fixed nodes would bear it there."""
+    before = Weights(
+        contacts.weight[k, 0], contacts.weight[k, 1], contacts.weight[k, 2], contacts.weight[k, 3]
+    )
+    normal_before = vec3(contacts.normal, k)
+    least = LEAST_MOBILITY * contacts.mobility[k]
+    turn(contacts, body, k, weights, normal)
+    if not contacts.mobility[k] > least:
+        turn(contacts, body, k, before, normal_before)
 
 
 @kernel

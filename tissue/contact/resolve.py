@@ -17,11 +17,11 @@ from tissue.contact.faces import Faces
 from tissue.contact.impulses import (
     Contacts,
     add_contact,
+    follow,
     gap,
     press,
     push_apart,
     stop_approach,
-    turn,
 )
 from tissue.contact.point_triangle import Corners, is_under, is_within, point_triangle, under
 from tissue.geometry import Weights, tetrahedron_volume
@@ -148,13 +148,13 @@ def _follow(contacts: Contacts, body: Body, k: int) -> None:
         below = under(Corners(a, b, c, d))
         if is_within(below.b, below.c):
             weights = Weights(1.0, below.b + below.c - 1.0, -below.b, -below.c)
-            turn(contacts, body, k, weights, below.normal)
+            follow(contacts, body, k, weights, below.normal)
     else:
         now = crossing_of(Edges(a, b, c, d))
         if now.is_one and is_inner(now.s) and is_inner(now.t):
             way = 1.0 if dot(now.normal, vec3(contacts.normal, k)) > 0.0 else -1.0
             weights = Weights(1.0 - now.s, now.s, now.t - 1.0, -now.t)
-            turn(contacts, body, k, weights, scale(way, now.normal))
+            follow(contacts, body, k, weights, scale(way, now.normal))
 
 
 @kernel

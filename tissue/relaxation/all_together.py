@@ -31,7 +31,7 @@ class AllTogether:
         by_node = elasticity.arrays.frequency_squared
         near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
         # The bound of the strained body is so wide of the truth that it needs no safety on top.
-        strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body, motion.anchors)
+        strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body)
         highest = max(elasticity.frequency_squared, near, strained)
         step = elasticity.stable_step(highest, motion.surroundings)
         n = max(1, math.ceil(motion.span / step))
