@@ -86,6 +86,11 @@ class Elasticity:
         """Bound on the square of the angular frequency at each node [1/s2]."""
         return self.arrays.frequency_squared
 
+    @property
+    def follows_strain(self) -> bool:
+        """Whether stiffness depends on how far the body is strained."""
+        return self._has_solid
+
     def strained_frequency_squared(self, body: Body) -> float:
         """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
 
