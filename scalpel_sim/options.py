@@ -47,7 +47,7 @@ class Body:
     """How the motion is advanced: global, all nodes together; local, small elements in substeps and
     what rests asleep; or hierarchical, the paper's, for springs."""
     threads: int | None = None
-    "Threads that share a global relaxation; pays from about 20,000 tetrahedra on [default: 1]."
+    "Threads that share a global relaxation; pays from about 30,000 tetrahedra on [default: 1]."
     snap: float | None = None
     """Where the blade passes nearer to a node than this share of the node's size, the cut goes
     through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""

@@ -25,7 +25,7 @@ from tissue.springs import bound_frequencies, build_rows, grown_springs, no_spri
 from tissue.star import LARGEST_STAR, Visits
 from tissue.strained import strained_frequency
 from tissue.touched import largest_frequency
-from tissue.types import FloatArray, IntArray
+from tissue.types import IntArray
 
 ROOM_FOR_SPRINGS = 1 << 16
 """Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
@@ -80,11 +80,6 @@ class Elasticity:
             retardation_time *= self.damper_frequency_squared / frequency_squared
         frequency = math.sqrt(frequency_squared)
         return SAFETY * largest_stable_step(frequency, retardation_time, surroundings.drag)
-
-    @property
-    def node_frequency_squared(self) -> FloatArray:
-        """Bound on the square of the angular frequency at each node [1/s2]."""
-        return self.arrays.frequency_squared
 
     @property
     def follows_strain(self) -> bool:

@@ -220,13 +220,42 @@ def nearest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3:
     return axpy(vb / total, ab, axpy(vc / total, ac, a))
 
 
+class Symmetric(NamedTuple):
+    """A symmetric 3 x 3 matrix."""
+
+    xx: float
+    yy: float
+    zz: float
+    xy: float
+    xz: float
+    yz: float
+
+
 @kernel
-def largest_eigenvalue(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> float:
-    """Largest eigenvalue of a symmetric 3x3 matrix, from the angle of its characteristic cubic."""
-    mean = (xx + yy + zz) / 3.0
-    xx -= mean
-    yy -= mean
-    zz -= mean
+def nothing_symmetric() -> Symmetric:
+    """Return the matrix of zeros."""
+    return Symmetric(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def add_square(m: Symmetric, c: float, a: Vec3) -> Symmetric:
+    """Return m + c a a^T."""
+    return Symmetric(
+        m.xx + c * a.x * a.x,
+        m.yy + c * a.y * a.y,
+        m.zz + c * a.z * a.z,
+        m.xy + c * a.x * a.y,
+        m.xz + c * a.x * a.z,
+        m.yz + c * a.y * a.z,
+    )
+
+
+@kernel
+def largest_eigenvalue(m: Symmetric) -> float:
+    """Largest eigenvalue, from the angle of the characteristic cubic."""
+    xy, xz, yz = m.xy, m.xz, m.yz
+    mean = (m.xx + m.yy + m.zz) / 3.0
+    xx, yy, zz = m.xx - mean, m.yy - mean, m.zz - mean
     square = (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0
     if square == 0.0:
         return mean

@@ -220,14 +220,3 @@ PRESETS = {
     )
 }
 """The materials by name."""
-
-
-def preset_called(name: str) -> Preset:
-    """Return the preset of that name.
-
-    Raises:
-        ValueError: there is none; the message says which there are.
-    """
-    if name not in PRESETS:
-        raise ValueError(f"no material is called '{name}'. Known: {', '.join(PRESETS)}")
-    return PRESETS[name]

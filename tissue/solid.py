@@ -18,7 +18,7 @@ import numpy as np
 from tissue.arrays import Arrays
 from tissue.body import Body
 from tissue.jit import kernel
-from tissue.simd import WIDTH
+from tissue.simd import WIDTH, aligned, filled
 from tissue.star import LARGEST_STAR, Visits, sorted_star
 from tissue.types import FloatArray, IntArray, SlotArray
 from tissue.vec3 import Vec3, cross, dot, sub, vec3
@@ -140,11 +140,11 @@ def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0
 def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return empty rows for that many nodes and tetrahedra."""
     capacity = WIDTH * n_blocks(n_tetrahedra)
-    shape = _aligned(8 * capacity)
+    shape = aligned(8 * capacity)
     shape[:] = 1.0  # of tetrahedra not in use: any, so that nothing is divided by 0
     return Solid(
         law=law,
-        nodes=_aligned(4 * capacity, np.int32),
+        nodes=aligned(4 * capacity, np.int32),
         shape=shape,
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
@@ -160,10 +160,10 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         listed=np.zeros(n_nodes, dtype=np.int64),
         used=np.zeros(1, dtype=np.int64),
         every=np.arange(max(n_nodes, n_tetrahedra)),
-        volume=_aligned(WIDTH + capacity),
-        growth=_aligned(WIDTH + capacity),
+        volume=aligned(WIDTH + capacity),
+        growth=aligned(WIDTH + capacity),
         pressure=np.zeros(n_nodes),
-        forces=_aligned(4 * 3 * (WIDTH + capacity)),
+        forces=aligned(4 * 3 * (WIDTH + capacity)),
     )
 
 
@@ -179,14 +179,6 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
 def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
     """Return the slots that rows of that many nodes and tetrahedra take, and as many to spare."""
     return 2 * (4 * n_tetrahedra + WIDTH * n_nodes) + POOL_MARGIN
-
-
-def _aligned(n: int, dtype: type = np.float64) -> np.ndarray:
-    """Return zeros from the start of a cache line: vectors across two load at half the speed."""
-    line = 64 // np.dtype(dtype).itemsize
-    memory: np.ndarray = np.zeros(n + line, dtype)
-    skip = -memory.ctypes.data % 64 // memory.itemsize
-    return memory[skip : skip + n]
 
 
 @kernel
@@ -280,12 +272,6 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
         solid.corner[first + i] = corner_place(t, k)
         volume += 0.25 * solid.shape[shape_place(t, VOLUME)]
     solid.node_volume[node] = volume
-
-
-@kernel
-def filled(n: int) -> int:
-    """Return the slots that `n` corners take: a multiple of `WIDTH`."""
-    return (n + WIDTH - 1) // WIDTH * WIDTH
 
 
 @kernel

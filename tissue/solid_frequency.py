@@ -19,7 +19,7 @@ A fixed node does not move: it counts as infinitely heavy.
 import math
 
 from tissue.body import Body
-from tissue.geometry import largest_eigenvalue
+from tissue.geometry import add_square, largest_eigenvalue, nothing_symmetric
 from tissue.jit import inlined, kernel
 from tissue.solid import Solid, corner_at, node_place, rest_normals, tetrahedron_at
 from tissue.star import Visits
@@ -156,7 +156,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     # What of lam is not averaged, at small strain. Where it is negative, less of it is still above.
     lam = max(solid.law.lam_of_tetrahedra - 5.0 / 6.0 * mu, -2.0 / 3.0 * mu)
     averaged = solid.law.lam_of_nodes != 0.0
-    isotropic = xx = yy = zz = xy = xz = yz = 0.0
+    isotropic, stiffness = 0.0, nothing_symmetric()
     visits.epoch[0] += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
@@ -175,12 +175,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
         isotropic += mu * share * length
         c = (mu + lam) * share / length
-        xx += c * normal.x * normal.x
-        yy += c * normal.y * normal.y
-        zz += c * normal.z * normal.z
-        xy += c * normal.x * normal.y
-        xz += c * normal.x * normal.z
-        yz += c * normal.y * normal.z
+        stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
                 n = _add_to_ring(solid, visits, n, t, other, normal)
@@ -189,10 +184,5 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
         length = norm(normal)
         if length > 0.0:
             c = solid.dilatation[solid.ring_nodes[i]] / (weight * length)
-            xx += c * normal.x * normal.x
-            yy += c * normal.y * normal.y
-            zz += c * normal.z * normal.z
-            xy += c * normal.x * normal.y
-            xz += c * normal.x * normal.z
-            yz += c * normal.y * normal.z
-    return (isotropic + largest_eigenvalue(xx, yy, zz, xy, xz, yz)) / body.masses[node]
+            stiffness = add_square(stiffness, c, normal)
+    return (isotropic + largest_eigenvalue(stiffness)) / body.masses[node]

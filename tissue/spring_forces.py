@@ -5,8 +5,8 @@ summed up at a node is summed in the order of its row, by whatever thread.
 """
 
 from tissue.jit import inlined
-from tissue.simd import Point, eight_points, lanes, load, square_root, summed, times
-from tissue.springs import Springs, filled
+from tissue.simd import WIDTH, Point, eight_points, filled, lanes, load, square_root, summed, times
+from tissue.springs import Springs
 from tissue.types import FloatArray
 
 NO_LENGTH = 1e-300
@@ -20,7 +20,7 @@ def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     fx = fy = fz = lanes(0.0)
     first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), 8):
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         length = square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
@@ -42,7 +42,7 @@ def damping_force(
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     fx = fy = fz = lanes(0.0)
     first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), 8):
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)
@@ -67,7 +67,7 @@ def elastic_and_damping_force(
     time, one = lanes(retardation_time), lanes(1.0)
     fx = fy = fz = lanes(0.0)
     first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), 8):
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)

@@ -14,14 +14,14 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import NODES, TETRAHEDRA, Body, grown
-from tissue.geometry import largest_eigenvalue, tetrahedron_volume
+from tissue.geometry import add_square, largest_eigenvalue, nothing_symmetric, tetrahedron_volume
 from tissue.jit import kernel
-from tissue.simd import WIDTH
-from tissue.star import Visits, sorted_star
+from tissue.simd import WIDTH, filled
+from tissue.star import LARGEST_STAR, Visits, sorted_star
 from tissue.types import FloatArray, IntArray, SlotArray
 from tissue.vec3 import norm, sub, vec3
 
-POOL_MARGIN = 1024
+POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
 
 
@@ -153,26 +153,15 @@ def _build_row(
 
 
 @kernel
-def filled(n: int) -> int:
-    """Return the slots that `n` springs take: a multiple of `WIDTH`."""
-    return (n + WIDTH - 1) // WIDTH * WIDTH
-
-
-@kernel
 def _stiffness_per_mass(body: Body, springs: Springs, node: int) -> float:
     """Largest eigenvalue of S = sum of k u u^T over the row, per mass of the node [1/s2]."""
     here = vec3(body.rest, node)
-    xx = yy = zz = xy = xz = yz = 0.0
+    stiffness = nothing_symmetric()
     for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
         d = sub(vec3(body.rest, springs.neighbour[slot]), here)
         c = springs.stiffness[slot] / (d.x * d.x + d.y * d.y + d.z * d.z)
-        xx += c * d.x * d.x
-        yy += c * d.y * d.y
-        zz += c * d.z * d.z
-        xy += c * d.x * d.y
-        xz += c * d.x * d.z
-        yz += c * d.y * d.z
-    return largest_eigenvalue(xx, yy, zz, xy, xz, yz) / body.masses[node]
+        stiffness = add_square(stiffness, c, d)
+    return largest_eigenvalue(stiffness) / body.masses[node]
 
 
 @kernel

@@ -135,7 +135,7 @@ class Tissue:
         scheme: How the mesh is cut: "stellar", or "paper" for that of Bielser, Maiwald and Gross,
             with its limits (`tissue.paper_scheme`).
         threads: How many threads share the loops over the body. The result is the same to the
-            last bit; more than one pays from about 20,000 tetrahedra on, and only where no other
+            last bit; more than one pays from about 30,000 tetrahedra on, and only where no other
             program needs the cores.
         relaxation: How the motion is advanced: "global", all nodes together; "local", small
             elements in substeps and what rests asleep; "hierarchical", the paper's; or

@@ -1,6 +1,6 @@
 import pytest
 
-from tissue.presets import DAMPING_BAND, PRESETS, Preset, preset_called
+from tissue.presets import DAMPING_BAND, PRESETS, Preset
 
 FIGURES = ("young_modulus", "poisson_ratio", "density", "toughness", "damping_ratio")
 
@@ -25,8 +25,3 @@ def test_a_preset_is_the_material_that_it_says(preset: Preset):
     assert material.law == "neo_hookean"
     for frequency in DAMPING_BAND:
         assert material.damping_ratio(frequency) == pytest.approx(preset.damping_ratio.value)
-
-
-def test_an_unknown_material_is_refused_with_those_that_there_are():
-    with pytest.raises(ValueError, match=r"no material is called 'lung'\. Known: liver, kidney"):
-        preset_called("lung")

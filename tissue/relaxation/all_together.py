@@ -1,14 +1,13 @@
 """All nodes together: the two-level Runge-Kutta method, in as many steps as stability needs."""
 
 import math
-from collections.abc import Callable
 
 from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.elasticity import Elasticity
 from tissue.relaxation.motion import Motion
+from tissue.relaxation.threads import Threads
 from tissue.runge_kutta import SAFETY, relax
-from tissue.threads import Threads
 from tissue.types import IntArray
 
 STEPS_BETWEEN_LOOKS = 2
@@ -27,7 +26,7 @@ class AllTogether:
     moving = None
 
     def __init__(self, threads: int = 1) -> None:
-        self._relax: Callable[..., int] = relax if threads == 1 else Threads(threads).relax
+        self._threads = None if threads == 1 else Threads(threads)
 
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return the Runge-Kutta steps taken."""
@@ -52,9 +51,12 @@ class AllTogether:
 
     def relax_by(self, motion: Motion, n: int) -> None:
         """Advance the motion by `n` Runge-Kutta steps."""
+        if self._threads is not None:
+            self._threads.relax_by(motion, n)
+            return
         done = 0
         while True:
-            done = self._relax(
+            done = relax(
                 motion.body,
                 motion.elasticity.arrays,
                 motion.anchors,

@@ -26,7 +26,9 @@ from tissue.relaxation.breadth_first import N_FOUND, Rings, ring_of
 from tissue.simd import (
     WIDTH,
     Point,
+    aligned,
     eight_points,
+    filled,
     lanes,
     load,
     point,
@@ -39,7 +41,7 @@ from tissue.simd import (
     times,
 )
 from tissue.spring_forces import NO_LENGTH
-from tissue.springs import Springs, filled
+from tissue.springs import Springs
 from tissue.star import LARGEST_STAR
 from tissue.types import FloatArray, IntArray
 
@@ -50,8 +52,9 @@ FRAME, N_KNOWN = 0, 1
 N_SEEN = 10
 """Numbers in `Trails.seen` for each neighbour."""
 
-LARGEST_ROW = LARGEST_STAR
-"""Neighbours of a node at most: no more than tetrahedra around it, but for few."""
+LARGEST_ROW = LARGEST_STAR + WIDTH
+"""Neighbours of a node at most: each further tetrahedron around it, through a face, adds one to the
+three of the first; and a row is filled up."""
 
 
 class Trails(Arrays):
@@ -77,16 +80,9 @@ def new_trails(n_nodes: int) -> Trails:
         origins=np.zeros((n_nodes, 3)),
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
-        seen=_aligned(N_SEEN * LARGEST_ROW),
+        seen=aligned(N_SEEN * LARGEST_ROW),
         counts=np.zeros(2, np.int64),
     )
-
-
-def _aligned(n: int) -> FloatArray:
-    """Return zeros that begin with a cache line: vectors across two cost twice."""
-    memory = np.zeros(n + WIDTH)
-    skip = -memory.ctypes.data // 8 % WIDTH
-    return memory[skip : skip + n]
 
 
 def grown_trails(trails: Trails, n_nodes: int) -> Trails:
