@@ -17,8 +17,10 @@ from bridge.wire import LARGEST_REPLY, MessageError
 from tissue.material import Material
 from tissue.quality import Measures, QualityReport
 from tissue.types import (
+    BladeContacts,
     BladeSegment,
     BladeSweep,
+    Energies,
     FloatArray,
     Profile,
     Snapshot,
@@ -87,15 +89,24 @@ def _checked_step(dt: float) -> float:
     return dt
 
 
-_RESULT = struct.Struct("<30d6q")
-RESULT_BYTES = _RESULT.size
+_RESULT = struct.Struct("<30d8q")
+_AT_T1 = 9 + 36
+"""Floats of the wrench at t1 and of the stiffness."""
+_OF_CONTACT = 11
+"""Floats of each contact of the blade."""
+MOST_BLADE_CONTACTS = 1 << 16
+RESULT_BYTES = _RESULT.size + 8 * (
+    _AT_T1 + _OF_CONTACT * MOST_BLADE_CONTACTS + len(Energies._fields)
+)
+"""At most."""
 
 
 def pack_result(result: StepResult) -> bytes:
-    """Return a reply: the floats of a result in the order of its fields, then its integers."""
+    """Return a reply: floats of a result in the order of its fields, integers, then its arrays."""
     touch = result.touch
     vectors = (*result.wrench, result.force_on_tissue, *result.bounds, touch.force_of_floor)
-    return _RESULT.pack(
+    contacts = result.contacts
+    numbers = _RESULT.pack(
         *np.concatenate(vectors).tolist(),
         result.anchored_length,
         result.cut_area,
@@ -110,7 +121,12 @@ def pack_result(result: StepResult) -> bytes:
         result.active_point_tetrahedron,
         result.n_substeps,
         touch.n_contacts,
+        len(contacts.point),
+        result.energies is not None,
     )
+    energies = () if result.energies is None else result.energies
+    arrays = (*result.wrench_t1, result.stiffness, *contacts, np.array(energies))
+    return numbers + b"".join(_floats(array) for array in arrays)
 
 
 def unpack_result(payload: bytes) -> StepResult:
@@ -122,12 +138,12 @@ def unpack_result(payload: bytes) -> StepResult:
     Raises:
         MessageError: the length is wrong, or a count is negative or too large.
     """
-    if len(payload) != _RESULT.size:
-        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_RESULT.size}")
-    fields = _RESULT.unpack(payload)
+    if len(payload) < _RESULT.size:
+        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_RESULT.size} or more")
+    fields = _RESULT.unpack(payload[: _RESULT.size])
     rows = np.array(fields[:21]).reshape(7, 3)
     length, area, work, work_of_cutting, penetration, force = fields[21:27]
-    n_tetrahedra, n_nodes, n_active, point_tetrahedron, n_substeps, n_contacts = fields[30:]
+    n_tetrahedra, n_nodes, n_active, point_tetrahedron, n_substeps, n_contacts = fields[30:36]
     _check_counts(n_nodes, n_tetrahedra)
     if not (0 <= n_active <= n_tetrahedra and -1 <= point_tetrahedron < n_tetrahedra):
         raise MessageError(
@@ -135,8 +151,29 @@ def unpack_result(payload: bytes) -> StepResult:
         )
     if n_substeps < 0 or n_contacts < 0:
         raise MessageError(f"{n_substeps} substeps and {n_contacts} contacts")
+    n_blade_contacts, has_energies = fields[36:]
+    if not 0 <= n_blade_contacts <= MOST_BLADE_CONTACTS or has_energies not in (0, 1):
+        raise MessageError(f"{n_blade_contacts} contacts of the blade, energies {has_energies}")
+    n_floats = _AT_T1 + _OF_CONTACT * n_blade_contacts + has_energies * len(Energies._fields)
+    if len(payload) != _RESULT.size + 8 * n_floats:
+        raise MessageError(
+            f"a step reply of {len(payload)} bytes; wanted {_RESULT.size + 8 * n_floats}"
+        )
+    floats = np.frombuffer(payload, "<f8", offset=_RESULT.size)
+    widths = np.array([3, 3, 3, 36, *(n_blade_contacts * w for w in (3, 3, 1, 3, 1))])
+    *parts, rest = np.split(floats, widths.cumsum())
+    point, normal, normal_force, friction, cut_area = parts[4:]
     return StepResult(
         wrench=Wrench(*rows[:3]),
+        wrench_t1=Wrench(*parts[:3]),
+        stiffness=parts[3].reshape(6, 6),
+        contacts=BladeContacts(
+            point.reshape(-1, 3),
+            normal.reshape(-1, 3),
+            normal_force,
+            friction.reshape(-1, 3),
+            cut_area,
+        ),
         force_on_tissue=rows[3],
         bounds=rows[4:6],
         n_tetrahedra=n_tetrahedra,
@@ -150,6 +187,7 @@ def unpack_result(payload: bytes) -> StepResult:
         n_substeps=n_substeps,
         touch=Touch(n_contacts, penetration, force, rows[6]),
         profile=Profile(*fields[27:30]),
+        energies=Energies(*rest.tolist()) if has_energies else None,
     )
 
 

@@ -18,6 +18,7 @@ from tissue.geometry import (
     interpolate,
 )
 from tissue.jit import kernel
+from tissue.resistance import Resistance, toughness_at
 from tissue.types import BoolArray, FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
@@ -54,6 +55,12 @@ class Anchors(Arrays):
     """Its barycentric weights, shape (n, 4)."""
     slipped: BoolArray
     """Whether it has cut since it came to hold the tissue, shape (n,)."""
+    at_skin: BoolArray
+    """Whether it holds the skin, which the edge has yet to break; shape (n,)."""
+    speed: FloatArray
+    """How fast it slipped last [m/s], shape (n,)."""
+    cut: FloatArray
+    """Area that it has cut in this step [m2], shape (n,)."""
     length: FloatArray
     """Length of edge that the sample stands for [m], shape (n,)."""
     stiffness: FloatArray
@@ -65,9 +72,12 @@ class Anchors(Arrays):
 IMPULSE, IMPULSE_TORQUE, TISSUE_IMPULSE = 0, 3, 6
 """Of the tissue on the blade [N s] and [N m s] about the origin, and on the tissue; three each."""
 
-WORK_OF_BLADE, WORK_OF_CUTTING, RELEASED = 9, 10, 11
-"""[J], [J], and the energy of anchors that let go, less that of new ones [J]."""
-N_TOTALS = 12
+WORK_OF_BLADE, WORK_OF_CUTTING, WORK_OF_BREAKING, RELEASED = 9, 10, 11, 12
+"""[J]; [J]; what breaking the skin took beyond the area that was cut [J]; and the energy of anchors
+that let go, less that of new ones [J]."""
+WORK_OF_FRICTION = 13
+"""What sliding along the faces of the blade took [J]."""
+N_TOTALS = 14
 
 
 def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
@@ -80,6 +90,9 @@ def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
         rest=np.zeros((n, 3)),
         weights=np.zeros((n, 4)),
         slipped=np.zeros(n, dtype=np.bool_),
+        at_skin=np.zeros(n, dtype=np.bool_),
+        speed=np.zeros(n),
+        cut=np.zeros(n),
         length=length,
         stiffness=ANCHOR_STIFFNESS * young_modulus * length,
         totals=np.zeros(N_TOTALS),
@@ -137,10 +150,10 @@ def pull(
     when: float,
     share: float,
     dt: float,
-    toughness: float,
+    resistance: Resistance,
     external: FloatArray,
 ) -> None:
-    """Write the anchors' forces on the nodes to `external` [N] and count impulse and work.
+    """Add the anchors' forces on the nodes to `external` [N] and count impulse and work.
 
     Args:
         anchors: The samples.
@@ -150,10 +163,9 @@ def pull(
         when: Instant, as a fraction of the step.
         share: Weight of this evaluation in the integral over the step; they add up to 1.
         dt: Length of the step [s].
-        toughness: [J/m2]; no anchor pulls harder than it holds, within a Runge-Kutta step either.
-        external: Forces on the nodes; cleared first.
+        resistance: No anchor pulls harder than it holds, within a Runge-Kutta step either.
+        external: Forces on the nodes.
     """
-    clear_forces(anchors, body, external)
     n = len(anchors.state)
     seconds = share * dt
     totals = anchors.totals
@@ -165,7 +177,7 @@ def pull(
         d = sub(b, anchor_position(anchors, body, positions, k))
         if dot(d, frame[1]) < 0.0:
             continue  # backed off: an edge pushes, and does not pull
-        surplus = surplus_of(anchors, k, d, frame, toughness)
+        surplus = surplus_of(anchors, k, d, frame, resistance)
         force = scale(anchors.stiffness[k], sub(d, surplus))
         for q in range(4):
             node = body.tetrahedra[anchors.tetrahedron[k], q]
@@ -190,8 +202,16 @@ def pull(
 
 
 @kernel
+def held_toughness(anchors: Anchors, k: int, resistance: Resistance) -> float:
+    """What anchor `k` holds per area before it slips [J/m2]; one that slips, at its speed."""
+    if anchors.at_skin[k]:
+        return resistance.skin_toughness
+    return toughness_at(resistance, anchors.speed[k])
+
+
+@kernel
 def surplus_of(
-    anchors: Anchors, k: int, d: Vec3, frame: tuple[Vec3, Vec3, Vec3], toughness: float
+    anchors: Anchors, k: int, d: Vec3, frame: tuple[Vec3, Vec3, Vec3], resistance: Resistance
 ) -> Vec3:
     """Return by how much the pull `d` [m] is longer than what the tissue holds.
 
@@ -203,33 +223,37 @@ def surplus_of(
     if distance == 0.0 or dot(d, forward) < 0.0:
         return scale(0.0, d)
     across = dot(in_plane, forward) / distance
-    surplus = distance - toughness * anchors.length[k] * across / anchors.stiffness[k]
+    force = held_toughness(anchors, k, resistance) * anchors.length[k] * across
+    surplus = distance - force / anchors.stiffness[k]
     return scale(max(surplus, 0.0) / distance, in_plane)
 
 
 @kernel
-def frequency_with_anchors(
-    anchors: Anchors, body: Body, frequency_squared: FloatArray, scratch: FloatArray
-) -> float:
-    """Bound on w^2 [1/s2] over the nodes that anchors pull on: springs and anchors together.
+def add_stiffness(anchors: Anchors, body: Body, stiffness: FloatArray) -> None:
+    """Add the anchors' rows to `stiffness` [N/m], shape (capacity, 3), of which x is used.
 
-    Gershgorin again: anchor K adds K w_q (w_a + w_b + w_c + w_d) = K w_q to the row of node q.
-    `scratch`, shape (capacity, 3), must be zero at those nodes and is so again afterwards.
+    Gershgorin's bound: anchor K adds K w_q (w_a + w_b + w_c + w_d) = K w_q to the row of node q.
     """
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            for q in range(4):
+                node = body.tetrahedra[anchors.tetrahedron[k], q]
+                stiffness[node, 0] += anchors.stiffness[k] * abs(anchors.weights[k, q])
+
+
+@kernel
+def highest_frequency(
+    anchors: Anchors, body: Body, frequency_squared: FloatArray, stiffness: FloatArray
+) -> float:
+    """Bound on w^2 [1/s2] over the nodes that anchors pull on: body and `stiffness` together."""
     worst = 0.0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
             for q in range(4):
                 node = body.tetrahedra[anchors.tetrahedron[k], q]
-                scratch[node, 0] += anchors.stiffness[k] * abs(anchors.weights[k, q])
-    for k in range(len(anchors.state)):
-        if anchors.state[k] == ANCHORED:
-            for q in range(4):
-                node = body.tetrahedra[anchors.tetrahedron[k], q]
                 if not body.fixed[node]:
-                    own = frequency_squared[node] + scratch[node, 0] / body.masses[node]
+                    own = frequency_squared[node] + stiffness[node, 0] / body.masses[node]
                     worst = max(worst, own)
-    clear_forces(anchors, body, scratch)
     return worst
 
 

@@ -109,6 +109,8 @@ def seize(
                 continue
             put(anchors, body, k, place.tetrahedron, p)
             anchors.slipped[k] = False
+            anchors.at_skin[k] = False
+            anchors.speed[k] = 0.0
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
 
 
@@ -133,6 +135,8 @@ def meet(
             if not in_slit(body, t, p, along, forward, reach):
                 put(anchors, body, k, t, p)
                 anchors.slipped[k] = False
+                anchors.at_skin[k] = True
+                anchors.speed[k] = 0.0
 
 
 @kernel

@@ -31,6 +31,21 @@ class Material:
     """[kg/m3]."""
     toughness: float = 20.0
     """Fracture toughness: the energy that a square metre of cut costs [J/m2]."""
+    skin_toughness: float = 0.0
+    """What a square metre costs until the edge has broken in [J/m2]: the peak of a puncture. Less
+    than `toughness` counts as the same, no peak."""
+    toughness_exponent: float = 0.0
+    """How toughness rises with the speed v of the cut: toughness (1 + (v / toughness_speed)^n). 0
+    for a toughness that does not."""
+    toughness_speed: float = 0.1
+    """Speed at which toughness is twice that of a slow cut [m/s]; without effect at exponent 0."""
+    work_to_rupture: float = 0.0
+    """Energy that stretching a volume of it until it breaks takes [J/m3]; what a blunt edge adds,
+    see `tissue.blade_shape.BladeShape.edge_radius`."""
+    blade_friction: float = 0.0
+    """Coulomb's coefficient of friction on the faces of the blade; with stiction."""
+    blade_viscosity: float = 0.0
+    """Shear stress per sliding speed on the faces of the blade, besides friction [Pa s/m]."""
     viscous_damping: float = 5.0
     """Drag on every node, as the rate at which its free motion dies away [1/s]."""
     retardation_time: float = 5e-5
@@ -57,7 +72,7 @@ class Material:
             value = getattr(self, field.name)
             if field.name != "law" and (not math.isfinite(value) or value < 0.0):
                 raise ValueError(f"{field.name} is {value}; it must be finite and not negative")
-        for name in ("young_modulus", "density", "spring_calibration"):
+        for name in ("young_modulus", "density", "spring_calibration", "toughness_speed"):
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} is 0; it must be positive")
         self._check_ratio()

@@ -16,15 +16,15 @@ Elastic forces are evaluated three times a step, damping four times.
 
 import numpy as np
 
-from tissue.anchors import Anchors, Edge, clear_forces, pull
+from tissue.anchors import Edge
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
 from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
 from tissue.elastic import Elastic, Surroundings, deform, internal_force, viscous_force
 from tissue.jit import inlined, kernel
 from tissue.simd import Point, point, point_of, store_point, times
-from tissue.slipping import slip
 from tissue.star import Visits
+from tissue.tool import Tool, act, give_way
 from tissue.types import FloatArray, IntArray
 
 STABILITY_LIMIT = np.array(
@@ -61,7 +61,7 @@ class Stages(Arrays):
     change: FloatArray
     """Velocities of the third stage less those of the second [m/s]."""
     external: FloatArray
-    """Forces of anchors on nodes [N]: zero everywhere but at the nodes that anchors hold."""
+    """Forces of the blade on nodes [N]: zero everywhere but at those that it acts on."""
     a1: FloatArray
     a2: FloatArray
 
@@ -93,14 +93,13 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
 def relax(
     body: Body,
     elastic: Elastic,
-    anchors: Anchors,
+    tool: Tool,
     edge: Edge,
     visits: Visits,
     stages: Stages,
     contact: ContactState,
     queue: IntArray,
     surroundings: Surroundings,
-    toughness: float,
     reach: float,
     dt: float,
     begin: float,
@@ -115,14 +114,13 @@ def relax(
     Args:
         body: Positions and velocities are written.
         elastic: What the forces inside the body follow from.
-        anchors: Slip after each step.
+        tool: What the blade does to it; gives way after each step.
         edge: The cutting edge over the whole time step of length `dt` [s].
         visits: For searches.
         stages: Scratch.
         contact: What may touch; corrects positions and velocities after each step.
         queue: Scratch.
         surroundings: Gravity and damping.
-        toughness: [J/m2].
         reach: See `slip` [m].
         dt: Length of the time step [s].
         begin: Fraction of the time step at which to begin.
@@ -137,16 +135,14 @@ def relax(
         if contact.state[IS_PENDING] == 0:
             if is_awake:
                 prepare(contact, body)
-            runge_kutta_nystroem(
-                body, elastic, anchors, edge, stages, surroundings, toughness, dt, at, share
-            )
+            runge_kutta_nystroem(body, elastic, tool, edge, stages, surroundings, dt, at, share)
         if is_awake:
             contact.state[IS_PENDING] = 1
             if not resolve(contact, body, share * dt):
                 return i
             contact.state[IS_PENDING] = 0
-        clear_forces(anchors, body, stages.external)  # before anchors go to other nodes
-        slip(anchors, body, visits, edge, at + share, toughness, reach, queue)
+        now = at + share
+        give_way(tool, body, visits, edge, stages.external, now, share * dt, reach, queue)
     return n
 
 
@@ -154,11 +150,10 @@ def relax(
 def runge_kutta_nystroem(
     body: Body,
     elastic: Elastic,
-    anchors: Anchors,
+    tool: Tool,
     edge: Edge,
     stages: Stages,
     surroundings: Surroundings,
-    toughness: float,
     dt: float,
     at: float,
     share: float,
@@ -168,17 +163,17 @@ def runge_kutta_nystroem(
     n = body.counts[NODES]
     external = stages.external
     half, end = at + 0.5 * share, at + share
-    pull(anchors, body, edge, body.positions, at, share / 6.0, dt, toughness, external)
+    act(tool, body, edge, body.positions, at, share / 6.0, dt, external)
     deform(elastic, body, body.positions)
     first_stage(body, elastic, stages, surroundings, h, 0, n)
     x2 = stages.positions
-    pull(anchors, body, edge, x2, half, share * 2.0 / 3.0, dt, toughness, external)
+    act(tool, body, edge, x2, half, share * 2.0 / 3.0, dt, external)
     deform(elastic, body, x2)
     second_stage(body, elastic, stages, surroundings, h, 0, n)
     if surroundings.retardation_time > 0.0:
         third_stage(body, elastic, stages, surroundings, h, 0, n)
     x4 = stages.positions_4
-    pull(anchors, body, edge, x4, end, share / 6.0, dt, toughness, external)
+    act(tool, body, edge, x4, end, share / 6.0, dt, external)
     deform(elastic, body, x4)
     fourth_stage(body, elastic, stages, surroundings, h, 0, n)
 

@@ -10,11 +10,13 @@ from tissue.anchors import (
     LEFT,
     RELEASED,
     RETRACTED,
+    WORK_OF_BREAKING,
     WORK_OF_CUTTING,
     Anchors,
     Edge,
     anchor_position,
     edge_frame,
+    held_toughness,
     sample_point,
     surplus_of,
 )
@@ -27,10 +29,11 @@ from tissue.geometry import (
 )
 from tissue.hanging import behind, is_open, n_behind
 from tissue.jit import kernel
+from tissue.resistance import Resistance, slip_of, toughness_at
 from tissue.rotation import to_material
 from tissue.star import Visits
 from tissue.types import IntArray
-from tissue.vec3 import Vec3, add, dot, norm, store, sub, vec3
+from tissue.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 
 SEARCH = 512
 """Tetrahedra that the search beyond a cut face looks at, at most."""
@@ -130,7 +133,8 @@ def slip(
     visits: Visits,
     edge: Edge,
     when: float,
-    toughness: float,
+    seconds: float,
+    resistance: Resistance,
     reach: float,
     queue: IntArray,
 ) -> None:
@@ -142,7 +146,8 @@ def slip(
         visits: For searches.
         edge: The cutting edge over the step.
         when: Instant, as a fraction of the step.
-        toughness: [J/m2].
+        seconds: Since anchors slipped last [s].
+        resistance: Of the tissue.
         reach: How far beside its anchor a blade that backed off still belongs to it [m].
         queue: Scratch, shape (SEARCH,) or longer.
     """
@@ -152,13 +157,12 @@ def slip(
     for k in range(n):
         if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
             continue
-        a = anchor_position(anchors, body, body.positions, k)
-        d = sub(sample_point(edge, k, n, when), a)
-        ahead = dot(d, forward)
-        if ahead < 0.0:
+        d = sub(sample_point(edge, k, n, when), anchor_position(anchors, body, body.positions, k))
+        if dot(d, forward) < 0.0:
             if anchors.state[k] == ANCHORED:
                 anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
             anchors.state[k] = FREE if abs(dot(d, flat)) > reach else RETRACTED
+            anchors.speed[k] = 0.0
             continue
         if anchors.state[k] == RETRACTED:
             if abs(dot(d, along)) > reach:  # it comes back elsewhere
@@ -166,20 +170,58 @@ def slip(
                 continue
             anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
             anchors.state[k] = ANCHORED
-        step = surplus_of(anchors, k, d, frame, toughness)
-        surplus = norm(step)
-        if surplus == 0.0:
-            continue
-        across = dot(step, forward) / surplus
-        _slip_by(anchors, body, visits, k, step, queue)
-        energy = 0.5 * anchors.stiffness[k] * dot(d, d)
-        if anchors.state[k] == LEFT:
-            anchors.totals[RELEASED] += energy
-            continue
-        # Where the tissue is very distorted an anchor slips less far than it was told to.
-        slipped = sub(anchor_position(anchors, body, body.positions, k), a)
-        way = dot(slipped, step) / surplus
-        anchors.totals[WORK_OF_CUTTING] += toughness * way * across * anchors.length[k]
+        _slip_anchor(anchors, body, visits, k, d, frame, seconds, resistance, queue)
+
+
+@kernel
+def _slip_anchor(
+    anchors: Anchors,
+    body: Body,
+    visits: Visits,
+    k: int,
+    d: Vec3,
+    frame: tuple[Vec3, Vec3, Vec3],
+    seconds: float,
+    resistance: Resistance,
+    queue: IntArray,
+) -> None:
+    """Let anchor `k` slip along its pull `d` [m], as far as it does not hold; count the work."""
+    _, forward, flat = frame
+    in_plane = axpy(-dot(d, flat), flat, d)
+    stretch = norm(in_plane)
+    if stretch == 0.0:
+        return
+    stiffness = anchors.stiffness[k]
+    across = anchors.length[k] * dot(in_plane, forward) / stretch
+    surplus = norm(surplus_of(anchors, k, d, frame, resistance))
+    if surplus == 0.0 and anchors.at_skin[k]:
+        return
+    way = slip_of(resistance, stretch, stiffness, across, seconds)
+    held = sub(d, scale(surplus / stretch, in_plane))
+    # Since the last slip the anchor pulled with no more than it holds, and gave way by the surplus.
+    spent = held_toughness(anchors, k, resistance) * across * surplus
+    energy = 0.5 * stiffness * dot(held, held) + spent
+    anchors.speed[k] = way / seconds if seconds > 0.0 else 0.0
+    if way == 0.0:
+        return
+    a = anchor_position(anchors, body, body.positions, k)
+    anchors.at_skin[k] = False
+    _slip_by(anchors, body, visits, k, scale(way / stretch, in_plane), queue)
+    if anchors.state[k] == LEFT:
+        anchors.cut[k] += surplus * across
+        anchors.totals[WORK_OF_CUTTING] += spent
+        anchors.totals[RELEASED] += energy - spent
+        return
+    # Where the tissue is very distorted an anchor slips less far than it was told to.
+    slipped = sub(anchor_position(anchors, body, body.positions, k), a)
+    area = across * dot(slipped, in_plane) / stretch
+    cost = toughness_at(resistance, anchors.speed[k]) * area
+    anchors.cut[k] += area
+    left = sub(d, slipped)
+    over = surplus_of(anchors, k, left, frame, resistance)
+    left = sub(left, over)
+    anchors.totals[WORK_OF_CUTTING] += cost
+    anchors.totals[WORK_OF_BREAKING] += energy - 0.5 * stiffness * dot(left, left) - cost
 
 
 @kernel

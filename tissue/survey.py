@@ -51,3 +51,9 @@ def _with(box: Survey, p: Vec3) -> Survey:
     # A comparison with nan is false: min and max would overlook it.
     is_finite = box.is_finite and math.isfinite(p.x + p.y + p.z)
     return Survey(low, high, is_finite)
+
+
+def boxes_meet(one: tuple[Vec3, Vec3], other: tuple[Vec3, Vec3]) -> bool:
+    """Whether two boxes, of lowest and highest corner each, have a point in common."""
+    lows, highs = zip(one[0], other[0], strict=True), zip(one[1], other[1], strict=True)
+    return all(max(low) <= min(high) for low, high in zip(lows, highs, strict=True))

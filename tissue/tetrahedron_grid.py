@@ -180,11 +180,11 @@ def _cell_range(
 ) -> tuple[int, int]:
     """First and last cell along axis `c` that the widened box of tetrahedron `t` meets."""
     low, high = _extent(body, positions, t, c)
-    return _cell_along(grid, low - grid.margin, c), _cell_along(grid, high + grid.margin, c)
+    return cell_along(grid, low - grid.margin, c), cell_along(grid, high + grid.margin, c)
 
 
 @kernel
-def _cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
+def cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
     """The cell along axis `c` that holds a coordinate [m]."""
     cell = (coordinate - grid.origin[c]) / grid.spacing
     return int(min(max(cell, 0.0), grid.shape[c] - 1.0))
@@ -196,9 +196,9 @@ def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: 
 
     It is the one of the lowest number, so that a point on a face is always found in the same one.
     """
-    i = _cell_along(grid, p.x, 0)
-    j = _cell_along(grid, p.y, 1)
-    k = _cell_along(grid, p.z, 2)
+    i = cell_along(grid, p.x, 0)
+    j = cell_along(grid, p.y, 1)
+    k = cell_along(grid, p.z, 2)
     found = -1
     at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
     while at >= 0:
@@ -218,9 +218,9 @@ def tetrahedron_in_box(
     body: Body, grid: TetrahedronGrid, positions: FloatArray, low: Vec3, high: Vec3
 ) -> int:
     """A tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
-    for i in range(_cell_along(grid, low.x, 0), _cell_along(grid, high.x, 0) + 1):
-        for j in range(_cell_along(grid, low.y, 1), _cell_along(grid, high.y, 1) + 1):
-            for k in range(_cell_along(grid, low.z, 2), _cell_along(grid, high.z, 2) + 1):
+    for i in range(cell_along(grid, low.x, 0), cell_along(grid, high.x, 0) + 1):
+        for j in range(cell_along(grid, low.y, 1), cell_along(grid, high.y, 1) + 1):
+            for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):
                 at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
                 while at >= 0:
                     if _meets_box(body, positions, grid.entry[at], low, high):

@@ -13,13 +13,12 @@ from tissue.anchors import (
     TISSUE_IMPULSE,
     WORK_OF_BLADE,
     WORK_OF_CUTTING,
-    Anchors,
     Edge,
     anchored_length,
-    clear_forces,
     is_engaged,
     new_anchors,
 )
+from tissue.blade_shape import BladeShape
 from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
 from tissue.border import (
     checked_edge,
@@ -32,9 +31,11 @@ from tissue.border import (
 )
 from tissue.caveats import warn_of_ratio, warn_of_toughness
 from tissue.contact.self_contact import SelfContact
-from tissue.cut import FULL, SPARE_NODES, Quality
+from tissue.cut import FULL, N_DIRTY, SPARE_NODES, Quality
 from tissue.elastic import Surroundings
 from tissue.elasticity import Elasticity
+from tissue.flank_faces import blade_box, find_faces, forget_changed_faces, forget_faces
+from tissue.flanks import grown_flanks, new_flanks, with_more_rows
 from tissue.holding import let_go, meet, near_box, seize
 from tissue.material import Material
 from tissue.measures import lowest_altitude, path_error
@@ -46,6 +47,7 @@ from tissue.relaxation.all_together import AllTogether
 from tissue.relaxation.motion import Motion, Relaxation
 from tissue.relaxation.moved import N_MOVED, forget_moved
 from tissue.relaxation.options import Hierarchical, LocalTimeStepping, Relaxing, checked_relaxation
+from tissue.resistance import resistance_of
 from tissue.runge_kutta import accelerations, new_stages
 from tissue.scheme import Scheme, checked_scheme
 from tissue.slipping import relocate
@@ -53,8 +55,9 @@ from tissue.snapping import EXPLAINED
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
-from tissue.survey import Survey, survey, survey_of
+from tissue.survey import Survey, boxes_meet, survey, survey_of
 from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
+from tissue.tool import Tool, clear_tool
 from tissue.touched import touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -73,6 +76,7 @@ from tissue.types import (
 )
 from tissue.validation import expect_sound
 from tissue.vec3 import Vec3
+from tissue.wrench import contacts_of, most_contacts, new_report, wrench_of, write_report
 
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
@@ -102,6 +106,10 @@ GRID_MARGIN = 0.5
 
 ROOM_FOR_TETRAHEDRA = 1 << 12
 """Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
+
+NEAR_BLADE = 0.5
+"""How near to the blade's faces the tissue's are looked at, per mean node size: twice as
+far as the blade goes between two looks."""
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
@@ -140,6 +148,8 @@ class Tissue:
         relaxation: How the motion is advanced: "global", all nodes together; "local", small
             elements in substeps and what rests asleep; "hierarchical", the paper's; or
             `LocalTimeStepping` or `Hierarchical` with settings (`tissue.relaxation.options`).
+        blade: The body of the blade, whose faces part the tissue and rub on it; None for the
+            paper's blade, a line that cuts.
 
     Raises:
         MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
@@ -159,6 +169,7 @@ class Tissue:
         scheme: str = "stellar",
         threads: int = 1,
         relaxation: str | Relaxing = "global",
+        blade: BladeShape | None = None,
     ) -> None:
         expect_sound(mesh)
         checked_scheme(scheme)
@@ -184,7 +195,6 @@ class Tissue:
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
-        self._anchors = new_anchors(2, 1.0, self.material.young_modulus)
         self._edge_length = 0.0
         self._grid = no_grid()
         self._path = new_path(2)
@@ -194,6 +204,12 @@ class Tissue:
 
         self._elasticity = Elasticity(self.material, self._body, self._visits)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
+        self._tool = Tool(
+            anchors=new_anchors(2, 1.0, self.material.young_modulus),
+            flanks=new_flanks(blade, self.material, self.node_size, n_tetrahedra),
+            resistance=resistance_of(self.material, blade),
+        )
+        self._report = new_report(most_contacts(self._tool))
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
         quality = quality or CutQuality()
@@ -251,8 +267,9 @@ class Tissue:
         edge = NOWHERE if sweep is None else checked_edge(sweep)
         if not (math.isfinite(dt) and dt >= 0.0):
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
-        anchors = self._anchors_of(sweep)
-        anchors.totals[:WORK_OF_BLADE] = 0.0
+        self._take(sweep)
+        self._tool.anchors.totals[:WORK_OF_BLADE] = 0.0
+        self._tool.anchors.cut[:] = 0.0
         self._contact.begin()
         collision = topology = relaxation = 0.0
         n_substeps = 0
@@ -260,9 +277,10 @@ class Tissue:
         for i in range(n_increments):
             begin, end = i / n_increments, (i + 1) / n_increments
             started = perf_counter()
-            n_substeps += self._relax(anchors, edge, dt, begin, end)
+            self._feel(sweep, edge, begin)
+            n_substeps += self._relax(edge, dt, begin, end)
             if sweep is not None:
-                self._hold(anchors, edge, end)
+                self._hold(edge, end)
             relaxed = perf_counter()
             detected = sweep is not None and self._detect()
             collided = perf_counter()
@@ -275,9 +293,7 @@ class Tissue:
             started = perf_counter()
             self._open_up()
             topology += perf_counter() - started
-        return self._result(
-            anchors, edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation)
-        )
+        return self._result(edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation))
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
         """Cut along a given surface in the body at rest: no blade, no force, no time passes.
@@ -328,12 +344,13 @@ class Tissue:
         Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
         has passed a peak. All nodes are moved together, whatever the relaxation.
         """
-        n_steps = self._settle(self._anchors_of(None))
+        self._take(None)
+        n_steps = self._settle()
         self._relaxation.body_moved(self._body, self._elasticity)
         self._box = survey(self._body)
         return n_steps
 
-    def _settle(self, anchors: Anchors) -> int:
+    def _settle(self) -> int:
         n_each = 4
         energy = 0.0
         for done in range(0, LONGEST_SETTLING, n_each):
@@ -343,7 +360,7 @@ class Tissue:
             step = self._elasticity.stable_step(highest, self._surroundings)
             velocities = self._body.velocities[:n]
             velocities_t0 = velocities.copy()
-            motion = self._motion(anchors, NOWHERE, n_each * step, 0.0, 1.0)
+            motion = self._motion(NOWHERE, n_each * step, 0.0, 1.0)
             self._all_together.relax_by(motion, n_each)
             if self._contact.is_awake:  # what holds a body on the floor is not in its forces
                 largest = np.abs(velocities - velocities_t0).max() / (n_each * step)
@@ -410,9 +427,9 @@ class Tissue:
 
     # stages of a step
 
-    def _relax(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> int:
+    def _relax(self, edge: Edge, dt: float, begin: float, end: float) -> int:
         """Advance the motion over a part of the step; return the steps that it took."""
-        motion = self._motion(anchors, edge, dt, begin, end)
+        motion = self._motion(edge, dt, begin, end)
         if motion.span == 0.0:
             return 0
         n = self._relaxation.relax(motion)
@@ -424,18 +441,17 @@ class Tissue:
             )
         return n
 
-    def _motion(self, anchors: Anchors, edge: Edge, dt: float, begin: float, end: float) -> Motion:
+    def _motion(self, edge: Edge, dt: float, begin: float, end: float) -> Motion:
         return Motion(
             body=self._body,
             elasticity=self._elasticity,
             contact=self._contact,
-            anchors=anchors,
+            tool=self._tool,
             edge=edge,
             visits=self._visits,
             stages=self._stages,
             queue=self._around,
             surroundings=self._surroundings,
-            toughness=self.material.toughness,
             reach=self.node_size,
             dt=dt,
             begin=begin,
@@ -461,28 +477,45 @@ class Tissue:
             return survey(self._body)
         return survey_of(self._body, *moving, self._box)
 
-    def _hold(self, anchors: Anchors, edge: Edge, when: float) -> None:
+    def _feel(self, sweep: BladeSweep | None, edge: Edge, when: float) -> None:
+        """Find the faces of the tissue that the faces of the blade may touch."""
+        tool = self._tool
+        if tool.flanks.half_thickness == 0.0:
+            return
+        margin = NEAR_BLADE * self.node_size
+        totals = tool.anchors.totals
+        low, high, _ = self._box
+        if sweep is None or not boxes_meet(blade_box(tool.flanks, edge, when, margin), (low, high)):
+            forget_faces(tool.flanks, totals)
+            return
+        self._list_tetrahedra()
+        while not find_faces(
+            self._tool.flanks, self._body, self._visits, self._grid, edge, when, margin, totals
+        ):
+            self._tool = self._tool.replaced(flanks=with_more_rows(self._tool.flanks))
+            self._report = new_report(most_contacts(self._tool))
+
+    def _hold(self, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
-        clear_forces(anchors, self._body, self._stages.external)
-        let_go(anchors, self._body, self._visits, self._path, edge, when, self._around)
+        anchors, body = self._tool.anchors, self._body
+        clear_tool(self._tool, body, self._stages.external)
+        let_go(anchors, body, self._visits, self._path, edge, when, self._around)
         far = FURTHEST_HOLD * self.node_size
-        seize(anchors, self._body, self._visits, edge, when, far, self._around)
-        self._meet(anchors, edge, when)
+        seize(anchors, body, self._visits, edge, when, far, self._around)
+        low, high, _ = self._box
+        if self._incising or near_box(anchors, edge, when, low, high):
+            self._list_tetrahedra()
+            meet(anchors, body, self._grid, edge, when, EXPLAINED * self._snap_floor)
         if not is_engaged(anchors):
             self._end_incision()
             return
         self._incising = True
         margin = SHEET_MARGIN * self.node_size
-        trace_path(anchors, self._body, edge, when, margin, self._path)
+        trace_path(anchors, body, edge, when, margin, self._path)
 
-    def _meet(self, anchors: Anchors, edge: Edge, when: float) -> None:
-        """Anchor the samples that have come into the tissue by themselves."""
-        body = self._body
-        if not self._incising:
-            low, high, _ = self._box
-            if not near_box(anchors, edge, when, low, high):
-                return
-        moved = self._relaxation.moved
+    def _list_tetrahedra(self) -> None:
+        """Let the grid list where the tetrahedra are now."""
+        body, moved = self._body, self._relaxation.moved
         nodes, n = self._every, self.n_nodes
         if moved is not None:
             nodes, n = moved.nodes, int(moved.state[N_MOVED])
@@ -495,7 +528,6 @@ class Tissue:
             forget_moved(moved)
         if not has_room:
             self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
-        meet(anchors, body, self._grid, edge, when, EXPLAINED * self._snap_floor)
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
@@ -530,7 +562,9 @@ class Tissue:
             n = touched_nodes(self._body, change, self._visits, self._nodes)
             if n:
                 self._elasticity.mesh_changed(self._body, self._visits, change, self._nodes, n)
-                relocate(self._anchors, self._body, self._visits, self._around)
+                relocate(self._tool.anchors, self._body, self._visits, self._around)
+                if self._tool.flanks.half_thickness > 0.0:
+                    forget_changed_faces(self._tool.flanks, change.dirty, change.counts[N_DIRTY])
                 self._contact.mesh_changed(self._body, change)
                 self._relaxation.mesh_changed(self._body, self._elasticity, self._nodes, n)
             full = bool(change.counts[FULL])
@@ -579,7 +613,6 @@ class Tissue:
 
     def _result(
         self,
-        anchors: Anchors,
         edge: Edge,
         sweep: BladeSweep | None,
         dt: float,
@@ -587,7 +620,9 @@ class Tissue:
         profile: Profile,
     ) -> StepResult:
         low, high, _ = self._box
+        anchors = self._tool.anchors
         totals = anchors.totals
+        write_report(self._report, self._tool, self._body, edge)
         point = np.zeros(3) if sweep is None else np.array(edge.tip_t1)
         per_second = 1.0 / dt if dt > 0.0 else 0.0
         force = totals[IMPULSE : IMPULSE + 3] * per_second
@@ -596,6 +631,9 @@ class Tissue:
         torque -= np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
         return StepResult(
             wrench=Wrench(force, torque, point),
+            wrench_t1=wrench_of(self._report, point),
+            stiffness=self._report.stiffness.copy(),
+            contacts=contacts_of(self._report),
             force_on_tissue=totals[TISSUE_IMPULSE : TISSUE_IMPULSE + 3] * per_second,
             bounds=np.array([low, high]),
             n_tetrahedra=self.n_tetrahedra,
@@ -609,23 +647,25 @@ class Tissue:
             n_substeps=n_substeps,
             touch=self._contact.touch(dt),
             profile=profile,
+            energies=None,
         )
 
     # arrays
 
-    def _anchors_of(self, sweep: BladeSweep | None) -> Anchors:
-        """Return the samples of this blade; another blade, or none, lets go of the tissue."""
+    def _take(self, sweep: BladeSweep | None) -> None:
+        """Take the edge of this blade; another blade, or none, lets go of the tissue."""
         length = 0.0 if sweep is None else float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip))
         if abs(length - self._edge_length) <= SAME_LENGTH * length:
-            return self._anchors
+            return
         n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
         n = min(max(n, 2), MOST_SAMPLES)
         self._end_incision()
-        totals = self._anchors.totals
-        self._anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
+        totals = self._tool.anchors.totals
+        anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
+        self._tool = self._tool.replaced(anchors=anchors)
+        self._report = new_report(most_contacts(self._tool))
         self._edge_length = length
         self._path = new_path(n)
-        return self._anchors
 
     def _grow(self) -> None:
         """Make room for the next pass of a cut step: arrays double when they are nearly full."""
@@ -641,6 +681,8 @@ class Tissue:
         self._elasticity.grow(n_nodes, n_tetrahedra)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
+        flanks = grown_flanks(self._tool.flanks, n_tetrahedra)
+        self._tool = self._tool.replaced(flanks=flanks)
         self._contact.grow(n_nodes, n_tetrahedra)
         self._relaxation.grow(n_nodes, n_tetrahedra)
         self._every = np.arange(n_nodes)

@@ -45,6 +45,67 @@ class Wrench(NamedTuple):
     """[m], shape (3,)."""
 
 
+class BladeContacts(NamedTuple):
+    """Where the blade acts on the tissue at the end of a step. Views, valid until the next step.
+
+    First the samples of the edge that hold tissue, then the points of the tissue that touch the
+    faces of the blade.
+    """
+
+    point: FloatArray
+    """[m], shape (n, 3)."""
+    normal: FloatArray
+    """Unit vector out of the blade into the tissue, shape (n, 3): forward for a sample of the
+    edge, out of the face for another point."""
+    normal_force: FloatArray
+    """Of the blade on the tissue along the normal [N], shape (n,)."""
+    friction: FloatArray
+    """The rest of that force [N], shape (n, 3): friction, and at the edge what holds it sideways
+    and along."""
+    cut_area: FloatArray
+    """Area that each sample of the edge has cut in this step [m2], 0 for others; shape (n,)."""
+
+
+class Energies(NamedTuple):
+    """Where the work of the blade went, since the body was made [J].
+
+    work_of_blade = change of elastic, kinetic, potential and held + damping + cutting + breaking
+    + friction + contact + topology + released + residual. Nodes that are fixed do not move, so
+    that what holds them does no work.
+    """
+
+    work_of_blade: float
+    """What the blade did to the tissue."""
+    elastic: float
+    """Stored in the tissue, less what was stored at first."""
+    kinetic: float
+    """The same of its motion."""
+    potential: float
+    """The same of its height."""
+    held: float
+    """Stored between blade and tissue: in what the edge holds, and the faces press."""
+    damping: float
+    """Taken by viscosity and drag."""
+    cutting: float
+    """Toughness times area."""
+    breaking: float
+    """What breaking the skin took beyond that."""
+    friction: float
+    """Taken by sliding along the faces of the blade."""
+    contact: float
+    """Taken where the body touches itself or the floor: impacts and friction."""
+    topology: float
+    """What changing the mesh took: impacts of nodes that part, and, under laws other than plain
+    tetrahedra, elastic energy."""
+    released: float
+    """Held by what the blade let go of, and lost."""
+
+    @property
+    def residual(self) -> float:
+        """What is not accounted for [J]: the error of the motion."""
+        return self.work_of_blade - sum(self[1:])
+
+
 class Profile(NamedTuple):
     """Wall time of the stages of one step [s], under the names of the paper's Table 1."""
 
@@ -76,6 +137,13 @@ class StepResult(NamedTuple):
 
     wrench: Wrench
     """What the tissue does to the blade, averaged over the step; `point` is the tip at t1."""
+    wrench_t1: Wrench
+    """The same at t1, the end of the step."""
+    stiffness: FloatArray
+    """How that changes as the blade moves by a small way and turn about the point: by -stiffness
+    times (way [m], turn [rad]); shape (6, 6), symmetric and positive. Of what is between blade and
+    tissue, while the tissue itself stays: an upper bound for slower motion."""
+    contacts: BladeContacts
     force_on_tissue: FloatArray
     """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
     bounds: FloatArray
@@ -99,6 +167,8 @@ class StepResult(NamedTuple):
     """Runge-Kutta steps taken in this step."""
     touch: Touch
     profile: Profile
+    energies: Energies | None
+    """Where the work went; None without an audit."""
 
 
 class TetrahedralMesh(NamedTuple):

@@ -97,7 +97,7 @@ class Loops:
     def runge_kutta_steps(self, n: int) -> None:
         """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
         tissue = self._tissue
-        self._all_together.relax_by(tissue._motion(tissue._anchors, NOWHERE, n * DT, 0.0, 1.0), n)
+        self._all_together.relax_by(tissue._motion(NOWHERE, n * DT, 0.0, 1.0), n)
 
     def frames(self, n: int) -> None:
         """Let the body live through time steps, all included but a blade."""

@@ -12,8 +12,10 @@ from tests.bridge.bits import bits
 from tissue.material import Material
 from tissue.quality import Measures, QualityReport
 from tissue.types import (
+    BladeContacts,
     BladeSegment,
     BladeSweep,
+    Energies,
     Profile,
     Snapshot,
     StepResult,
@@ -46,8 +48,18 @@ def sweeps(draw):
 def results(draw):
     vectors = draw(rows(7, any_float))
     n_tetrahedra = draw(counts)
+    n_contacts = draw(st.integers(0, 3))
     return StepResult(
         wrench=Wrench(*vectors[:3]),
+        wrench_t1=Wrench(*draw(rows(3, any_float))),
+        stiffness=draw(rows(12, any_float)).reshape(6, 6),
+        contacts=BladeContacts(
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float))[:, 0],
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float))[:, 1],
+        ),
         force_on_tissue=vectors[3],
         bounds=vectors[4:6],
         n_tetrahedra=n_tetrahedra,
@@ -61,6 +73,7 @@ def results(draw):
         n_substeps=draw(counts),
         touch=Touch(draw(counts), draw(any_float), draw(any_float), vectors[6]),
         profile=Profile(*draw(st.tuples(any_float, any_float, any_float))),
+        energies=draw(st.none() | st.builds(Energies, *[any_float] * len(Energies._fields))),
     )
 
 
@@ -219,7 +232,11 @@ def test_a_result_with_impossible_counts_is_refused(change, why):
     zeros = np.zeros(3)
     wrench, bounds, profile = Wrench(zeros, zeros, zeros), np.zeros((2, 3)), Profile(0.0, 0.0, 0.0)
     touch = Touch(0, 0.0, 0.0, zeros)
-    good = StepResult(wrench, zeros, bounds, 3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1, touch, profile)
+    none = np.zeros((0, 3))
+    contacts = BladeContacts(none, none, np.zeros(0), none, np.zeros(0))
+    at_t1 = (wrench, np.zeros((6, 6)), contacts)
+    counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1)
+    good = StepResult(wrench, *at_t1, zeros, bounds, *counts_and_floats, touch, profile, None)
     with pytest.raises(MessageError, match=why):
         messages.unpack_result(messages.pack_result(good._replace(**change)))
 

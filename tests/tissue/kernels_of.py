@@ -8,13 +8,17 @@ from tissue.anchors import Anchors, new_anchors
 from tissue.body import NODES, Body, build_body, grown_body
 from tissue.cut import SPARE_NODES, Cut, Quality, new_change, new_work
 from tissue.elastic import Elastic, Surroundings
+from tissue.flanks import new_flanks
+from tissue.material import Material
 from tissue.path import new_path
+from tissue.resistance import resistance_of
 from tissue.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
 from tissue.sheet import new_sheet
 from tissue.solid import no_solid, room_for_stars, volume_term
 from tissue.springs import POOL_MARGIN, Springs, bound_frequencies, build_rows, no_springs
 from tissue.star import LARGEST_STAR, no_visits
 from tissue.tissue import NOWHERE
+from tissue.tool import Tool
 from tissue.types import BoolArray, FloatArray, TetrahedralMesh
 from tissue.vec3 import Vec3
 
@@ -87,12 +91,21 @@ def elastic_of(springs: Springs) -> Elastic:
     return Elastic(springs=springs, solid=solid, has=has, frequency_squared=frequencies)
 
 
+def tool_with(anchors: Anchors, material: Material = Material()) -> Tool:
+    """Return a blade that is a line."""
+    return Tool(
+        anchors=anchors,
+        flanks=new_flanks(None, material, 1.0, 0),
+        resistance=resistance_of(material, None),
+    )
+
+
 class Network(NamedTuple):
     """A body that moves by itself: no blade."""
 
     body: Body
     springs: Springs
-    anchors: Anchors
+    tool: Tool
     stages: Stages
     surroundings: Surroundings
 
@@ -106,8 +119,8 @@ class Network(NamedTuple):
     def advance(self, h: float, n: int = 1) -> None:
         """Take `n` Runge-Kutta steps of `h` [s]."""
         elastic = elastic_of(self.springs)
-        blade = (self.anchors, NOWHERE)
-        rest = (self.stages, self.surroundings, 0.0, h, 0.0, 1.0)
+        blade = (self.tool, NOWHERE)
+        rest = (self.stages, self.surroundings, h, 0.0, 1.0)
         for _ in range(n):
             runge_kutta_nystroem(self.body, elastic, *blade, *rest)
 
@@ -122,9 +135,9 @@ def network_of(
     body = build_body(mesh, None, fixed)
     springs = springs_of(body)
     stages = new_stages(len(mesh.positions))
-    anchors = new_anchors(2, 1.0, YOUNG_MODULUS)
+    tool = tool_with(new_anchors(2, 1.0, YOUNG_MODULUS))
     surroundings = Surroundings(Vec3(0.0, 0.0, 0.0), viscous_damping, retardation_time)
-    return Network(body, springs, anchors, stages, surroundings)
+    return Network(body, springs, tool, stages, surroundings)
 
 
 def oscillator(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.tissue.kernels_of import springs_of
+from tests.tissue.kernels_of import springs_of, tool_with
 from tissue.anchors import (
     ANCHORED,
     FREE,
@@ -20,7 +20,6 @@ from tissue.anchors import (
     anchored_length,
     clear_forces,
     edge_frame,
-    frequency_with_anchors,
     is_engaged,
     new_anchors,
     pull,
@@ -28,11 +27,14 @@ from tissue.anchors import (
 from tissue.body import CUT, OUTER, build_body, walk
 from tissue.geometry import Matrix3
 from tissue.holding import meet, seize
+from tissue.material import Material
+from tissue.resistance import resistance_of
 from tissue.rotation import rotation_of, to_material
 from tissue.shapes import grid
 from tissue.slipping import find, put, slip
 from tissue.star import LARGEST_STAR, no_visits
 from tissue.tetrahedron_grid import build_grid
+from tissue.tool import frequency_with_tool
 from tissue.vec3 import Vec3, vec3
 
 pytestmark = pytest.mark.kernel
@@ -57,17 +59,20 @@ class Held:
         self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
         self.queue = np.zeros(LARGEST_STAR, dtype=np.int64)
         self.anchors = new_anchors(N, 0.016, STIFF)
+        self.tough = resistance_of(Material(toughness=TOUGH), None)
         self.forces = np.zeros_like(self.body.rest)
         grid = build_grid(self.body, self.body.positions, 0.0)
         meet(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3)
 
     def pull(self, edge, toughness=TOUGH):
         x = self.body.positions
-        pull(self.anchors, self.body, edge, x, 1.0, 1.0, 1.0, toughness, self.forces)
+        clear_forces(self.anchors, self.body, self.forces)
+        tough = resistance_of(Material(toughness=toughness), None)
+        pull(self.anchors, self.body, edge, x, 1.0, 1.0, 1.0, tough, self.forces)
         return self.anchors.totals
 
     def slip(self, edge, reach=0.005):
-        slip(self.anchors, self.body, self.visits, edge, 1.0, TOUGH, reach, self.queue)
+        slip(self.anchors, self.body, self.visits, edge, 1.0, 1e-3, self.tough, reach, self.queue)
 
 
 @pytest.fixture
@@ -96,7 +101,7 @@ def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     meet(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3)
     assert not is_engaged(anchors)
     x = held.body.positions
-    pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, TOUGH, held.forces)
+    pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, held.tough, held.forces)
     assert not anchors.totals.any()
     assert not held.forces.any()
 
@@ -216,11 +221,11 @@ def test_the_neighbours_of_an_anchored_sample_that_are_inside_are_anchored_too(h
 def test_anchors_raise_the_bound_on_frequency_by_their_stiffness(held):
     scratch = np.zeros_like(held.body.rest)
     none = np.zeros(len(held.body.rest))
-    bound = frequency_with_anchors(held.anchors, held.body, none, scratch)
+    bound = frequency_with_tool(tool_with(held.anchors), held.body, none, scratch)
     assert not scratch.any()
     assert bound > 4.0 * STIFF * held.anchors.length[0] / held.body.masses.sum()
     held.anchors.state[:] = FREE
-    assert frequency_with_anchors(held.anchors, held.body, none, scratch) == 0.0
+    assert frequency_with_tool(tool_with(held.anchors), held.body, none, scratch) == 0.0
 
 
 def test_anchored_length_is_that_of_the_samples_that_pull(held):

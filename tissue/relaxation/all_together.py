@@ -2,12 +2,12 @@
 
 import math
 
-from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.elasticity import Elasticity
 from tissue.relaxation.motion import Motion
 from tissue.relaxation.threads import Threads
 from tissue.runge_kutta import SAFETY, relax
+from tissue.tool import frequency_with_tool
 from tissue.types import IntArray
 
 STEPS_BETWEEN_LOOKS = 2
@@ -32,7 +32,7 @@ class AllTogether:
         """Advance the motion; return the Runge-Kutta steps taken."""
         elasticity = motion.elasticity
         by_node = elasticity.arrays.frequency_squared
-        near = frequency_with_anchors(motion.anchors, motion.body, by_node, motion.stages.external)
+        near = frequency_with_tool(motion.tool, motion.body, by_node, motion.stages.external)
         done = 0
         while True:
             # The bound of the strained body is so wide of the truth that it needs no safety on top.
@@ -59,14 +59,13 @@ class AllTogether:
             done = relax(
                 motion.body,
                 motion.elasticity.arrays,
-                motion.anchors,
+                motion.tool,
                 motion.edge,
                 motion.visits,
                 motion.stages,
                 motion.contact.arrays,
                 motion.queue,
                 motion.surroundings,
-                motion.toughness,
                 motion.reach,
                 motion.dt,
                 motion.begin,

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.contact.resolve import prepare
 from tissue.elasticity import Elasticity
@@ -21,6 +20,7 @@ from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import Moved, grown_moved, none_moved, note_moved
 from tissue.relaxation.options import Hierarchical
 from tissue.runge_kutta import SAFETY, largest_stable_step
+from tissue.tool import frequency_with_tool
 from tissue.types import IntArray
 
 
@@ -71,13 +71,12 @@ class ByRings:
         hierarchical_frame(
             body,
             springs,
-            motion.anchors,
+            motion.tool,
             motion.edge,
             self._rings,
             self._trails,
             motion.stages.external,
             motion.surroundings,
-            motion.toughness,
             motion.dt,
             motion.begin,
             motion.end - motion.begin,
@@ -93,7 +92,7 @@ class ByRings:
     def _find_rings(self, motion: Motion) -> None:
         """Find the rings around what the blade holds."""
         springs = motion.elasticity.arrays.springs
-        find_held(self._held, motion.body, motion.anchors)
+        find_held(self._held, motion.body, motion.tool)
         last = self._options.rings + 1
         find_rings(self._rings, self._held, springs, last, self._scratch)
 
@@ -103,7 +102,7 @@ class ByRings:
         highest, options = self._highest, self._options
         by_node = elasticity.arrays.frequency_squared
         ring_frequencies(body, by_node, self._rings, options.rings, self._is_far_frozen, highest)
-        near = frequency_with_anchors(motion.anchors, body, by_node, motion.stages.external)
+        near = frequency_with_tool(motion.tool, body, by_node, motion.stages.external)
         highest[0] = max(highest[0], near)
         around = motion.surroundings
         needed = []

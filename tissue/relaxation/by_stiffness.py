@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from tissue.anchors import frequency_with_anchors
 from tissue.body import Body
 from tissue.contact.resolve import note_positions, prepare, prepare_listed
 from tissue.elastic import TETRAHEDRA_TOO
@@ -33,6 +32,7 @@ from tissue.relaxation.moved import N_MOVED, Moved, grown_moved, none_moved, not
 from tissue.relaxation.options import LocalTimeStepping
 from tissue.relaxation.patches import N_FORCES, new_patch
 from tissue.strained import strain_frequencies
+from tissue.tool import frequency_with_tool
 from tissue.types import FloatArray, IntArray
 
 
@@ -95,7 +95,7 @@ class ByStiffness:
             macro_step(
                 body,
                 elastic,
-                motion.anchors,
+                motion.tool,
                 motion.edge,
                 activity,
                 self._listed,
@@ -103,7 +103,6 @@ class ByStiffness:
                 coefficients,
                 motion.stages.external,
                 motion.surroundings,
-                motion.toughness,
                 motion.dt,
                 at,
                 share,
@@ -124,12 +123,12 @@ class ByStiffness:
     def _divide(self, motion: Motion) -> tuple[int, int]:
         """Find the fine nodes; return the macro steps to take, and the substeps of each."""
         body, activity, zone = motion.body, self._activity, self._zone
-        springs, anchors = motion.elasticity.arrays.springs, motion.anchors
+        springs, tool = motion.elasticity.arrays.springs, motion.tool
         by_node = motion.elasticity.arrays.frequency_squared
         self._strain(motion)
-        n_near = find_near(body, springs, anchors, zone, self._options.rings)
+        n_near = find_near(body, springs, tool, zone, self._options.rings)
         wake_each(activity, body, springs, zone.fine, n_near)
-        highest = frequency_with_anchors(anchors, body, by_node, motion.stages.external)
+        highest = frequency_with_tool(tool, body, by_node, motion.stages.external)
         n, p, limit = plan(
             activity,
             body.fixed,

@@ -1,10 +1,11 @@
 """The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
 
-from tissue.anchors import ANCHORED, Anchors
+from tissue.anchors import ANCHORED
 from tissue.body import Body
 from tissue.jit import kernel
 from tissue.relaxation.breadth_first import EPOCH, N_FOUND, Rings, add_focus, begin_search, search
 from tissue.springs import Springs
+from tissue.tool import Tool
 from tissue.types import IntArray
 
 N_CORNERS = 4
@@ -12,11 +13,12 @@ N_CORNERS = 4
 
 
 @kernel
-def find_held(held: Rings, body: Body, anchors: Anchors) -> bool:
-    """Make the nodes that anchors pull on ring 0 of `held`; return whether there are any.
+def find_held(held: Rings, body: Body, tool: Tool) -> bool:
+    """Make the nodes that the blade acts on ring 0 of `held`; return whether there are any.
 
     Those of the anchor nearest to the tip come first. Where there are none, `held` stays as it was.
     """
+    anchors, flanks = tool.anchors, tool.flanks
     n = 0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
@@ -25,6 +27,12 @@ def find_held(held: Rings, body: Body, anchors: Anchors) -> bool:
             n += 1
             for q in range(N_CORNERS):
                 add_focus(held, body.tetrahedra[anchors.tetrahedron[k], q])
+    for i in range(flanks.count[0]):
+        if n == 0:
+            begin_search(held)
+        n += 1
+        for corner in range(3):
+            add_focus(held, flanks.node[i, corner])
     return n > 0
 
 

@@ -17,7 +17,7 @@ At rest all that is gone: the equilibrium is that of all nodes moved together.
 
 import numpy as np
 
-from tissue.anchors import Anchors, Edge, clear_forces, pull
+from tissue.anchors import Edge
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body, grown
 from tissue.elastic import Surroundings
@@ -43,6 +43,7 @@ from tissue.simd import (
 from tissue.spring_forces import NO_LENGTH
 from tissue.springs import Springs
 from tissue.star import LARGEST_STAR
+from tissue.tool import Tool, act, clear_tool
 from tissue.types import FloatArray, IntArray
 
 FRAME, N_KNOWN = 0, 1
@@ -95,13 +96,12 @@ def grown_trails(trails: Trails, n_nodes: int) -> Trails:
 def hierarchical_frame(
     body: Body,
     springs: Springs,
-    anchors: Anchors,
+    tool: Tool,
     edge: Edge,
     rings: Rings,
     trails: Trails,
     external: FloatArray,
     surroundings: Surroundings,
-    toughness: float,
     dt: float,
     at: float,
     share: float,
@@ -115,13 +115,12 @@ def hierarchical_frame(
     Args:
         body: Positions and velocities are written.
         springs: The rows.
-        anchors: Pull in every micro step; all nodes that they pull on should be in ring 0.
+        tool: Acts in every micro step; all nodes that it acts on should be in ring 0.
         edge: The cutting edge over the whole time step of length `dt` [s].
         rings: Searched up to `last_ring + 1`: the ring beyond the last is seen, but not moved.
         trails: Scratch.
-        external: Scratch for the forces of the anchors [N], shape (capacity, 3).
+        external: Scratch for the forces of the blade [N], shape (capacity, 3).
         surroundings: Gravity and damping.
-        toughness: [J/m2].
         dt: Length of the time step [s].
         at: Where in the time step the frame begins.
         share: Which share of it the frame is.
@@ -136,7 +135,7 @@ def hierarchical_frame(
     n_far = every[last_ring + 1]
     for j in range(1, n + 1):
         begin = at + share * (j - 1) / n
-        pull(anchors, body, edge, body.positions, begin, share / n, dt, toughness, external)
+        act(tool, body, edge, body.positions, begin, share / n, dt, external)
         t1 = span * j / n
         for k in range(rings.state[N_FOUND]):
             node = rings.order[k]
@@ -149,7 +148,7 @@ def hierarchical_frame(
             for node in range(body.counts[NODES]):
                 if not 0 <= ring_of(rings, node) <= last_ring:
                     _move(body, springs, trails, external, surroundings, node, t1)
-    clear_forces(anchors, body, external)
+    clear_tool(tool, body, external)
 
 
 @kernel

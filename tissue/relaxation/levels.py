@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 
-from tissue.anchors import Anchors
 from tissue.body import Body
 from tissue.elastic import TETRAHEDRA_TOO, Elastic
 from tissue.jit import kernel
@@ -14,6 +13,7 @@ from tissue.relaxation.focus import find_held
 from tissue.relaxation.local_time_stepping import Zone
 from tissue.relaxation.patches import Patch, find_patch, reach_of
 from tissue.springs import Springs
+from tissue.tool import Tool
 from tissue.types import BoolArray, FloatArray
 
 SAFETY = 0.8
@@ -48,7 +48,7 @@ def plan(
         activity: The nodes.
         fixed: Which nodes do not move.
         frequency_squared: Bound on w^2 of each [1/s2].
-        highest: Bound on w^2 of those that anchors pull on, with what they add [1/s2].
+        highest: Bound on w^2 of those that the blade acts on, with what it adds [1/s2].
         n_near: Fine nodes anyway, around the blade.
         span: What is to be divided [s].
         retardation_time: Damping along springs [s].
@@ -107,13 +107,13 @@ def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -
 
 
 @kernel
-def find_near(body: Body, springs: Springs, anchors: Anchors, zone: Zone, n_rings: int) -> int:
-    """Write the nodes that anchors pull on, and `n_rings` around, to `zone.fine`; return how many.
+def find_near(body: Body, springs: Springs, tool: Tool, zone: Zone, n_rings: int) -> int:
+    """Write the nodes that the blade acts on, and rings around, to `zone.fine`; return how many.
 
     Only those that can move.
     """
     rings = zone.rings
-    if not find_held(rings, body, anchors):
+    if not find_held(rings, body, tool):
         return 0
     search(rings, springs, n_rings)
     n = 0

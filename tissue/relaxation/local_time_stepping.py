@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from tissue.anchors import Anchors, Edge, clear_forces, pull
+from tissue.anchors import Edge
 from tissue.arrays import Arrays
 from tissue.body import Body, grown
 from tissue.elastic import Elastic, Surroundings, internal_force
@@ -42,6 +42,7 @@ from tissue.relaxation.chebyshev import Chebyshev
 from tissue.relaxation.patches import Patch, deform_patch, new_patch
 from tissue.simd import Point, point, point_of, store_point, times
 from tissue.springs import Springs
+from tissue.tool import Tool, act, clear_tool
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import axpy, dot, store, sub, vec3
 
@@ -90,7 +91,7 @@ def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
 def macro_step(
     body: Body,
     elastic: Elastic,
-    anchors: Anchors,
+    tool: Tool,
     edge: Edge,
     activity: Activity,
     listed: Patch,
@@ -98,7 +99,6 @@ def macro_step(
     chebyshev: Chebyshev,
     external: FloatArray,
     surroundings: Surroundings,
-    toughness: float,
     dt: float,
     at: float,
     share: float,
@@ -109,15 +109,14 @@ def macro_step(
     Args:
         body: Positions and velocities are written.
         elastic: What the forces inside the body follow from.
-        anchors: Pull in every substep; all nodes that they pull on should be fine.
+        tool: Acts in every substep; all nodes that it acts on should be fine.
         edge: The cutting edge over the whole time step of length `dt` [s].
         activity: Only awake nodes move.
         listed: What the listed nodes feel.
         zone: Of `find_zone`.
         chebyshev: Coefficients for the substeps.
-        external: Scratch for the forces of the anchors [N], shape (capacity, 3).
+        external: Scratch for the forces of the blade [N], shape (capacity, 3).
         surroundings: Gravity and damping.
-        toughness: [J/m2].
         dt: Length of the time step [s].
         at: Where in the time step the macro step begins.
         share: Which share of it the macro step is.
@@ -130,11 +129,11 @@ def macro_step(
     _begin_fine(body, springs, zone, surroundings)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
-        pull(anchors, body, edge, body.positions, at, part, dt, toughness, external)
+        act(tool, body, edge, body.positions, at, part, dt, external)
         if m > 0:
             deform_patch(zone.patch, elastic, body.positions)
         _substep(body, elastic, activity, zone, chebyshev, external, h, m)
-    clear_forces(anchors, body, external)
+    clear_tool(tool, body, external)
     _kick(body, activity, zone, surroundings.drag, h, kick)
     if surroundings.retardation_time > 0.0:
         _damp_fine(body, springs, activity, zone.rings, surroundings.retardation_time * h)

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from tissue.anchors import Anchors, Edge, clear_forces
+from tissue.anchors import Edge
 from tissue.body import Body
 from tissue.contact.resolve import resolve
 from tissue.contact.self_contact import SelfContact
@@ -10,8 +10,8 @@ from tissue.elastic import Surroundings
 from tissue.elasticity import Elasticity
 from tissue.relaxation.moved import Moved
 from tissue.runge_kutta import Stages
-from tissue.slipping import slip
 from tissue.star import Visits
+from tissue.tool import Tool, give_way
 from tissue.types import IntArray
 
 
@@ -21,15 +21,13 @@ class Motion(NamedTuple):
     body: Body
     elasticity: Elasticity
     contact: SelfContact
-    anchors: Anchors
+    tool: Tool
     edge: Edge
     visits: Visits
     stages: Stages
     queue: IntArray
     """Scratch for searches, shape (LARGEST_STAR,)."""
     surroundings: Surroundings
-    toughness: float
-    """[J/m2]."""
     reach: float
     """See `slip` [m]."""
     dt: float
@@ -76,17 +74,16 @@ class Relaxation(Protocol):
 
 
 def end_step(motion: Motion, seconds: float, when: float) -> None:
-    """After a step: set right what went through what, and let the anchors slip.
+    """After a step: set right what went through what, and let give way what does not hold.
 
     Args:
         motion: What takes part.
         seconds: Length of the step [s].
         when: Its end, as a fraction of the time step.
     """
-    contact, body, anchors = motion.contact, motion.body, motion.anchors
+    contact, body = motion.contact, motion.body
     if contact.is_awake:
         while not resolve(contact.arrays, body, seconds):
             contact.make_room()
-    clear_forces(anchors, body, motion.stages.external)  # before anchors go to other nodes
-    toughness, reach = motion.toughness, motion.reach
-    slip(anchors, body, motion.visits, motion.edge, when, toughness, reach, motion.queue)
+    edge, external, reach = motion.edge, motion.stages.external, motion.reach
+    give_way(motion.tool, body, motion.visits, edge, external, when, seconds, reach, motion.queue)

@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from tissue.anchors import pull
 from tissue.body import NODES, TETRAHEDRA, Body
 from tissue.contact.resolve import prepare
 from tissue.elastic import TETRAHEDRA_TOO, Elastic
@@ -18,6 +17,7 @@ from tissue.neo_hookean import corner_forces, has_averaged_volumes, pressures, v
 from tissue.relaxation.motion import Motion, end_step
 from tissue.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
 from tissue.solid import n_blocks
+from tissue.tool import act
 from tissue.types import FloatArray
 
 
@@ -47,24 +47,23 @@ class Threads:
         body, elastic, stages = motion.body, motion.elasticity.arrays, motion.stages
         n = int(body.counts[NODES])
         arguments = (body, elastic, stages, motion.surroundings, share * motion.dt)
-        self._pull(motion, body.positions, at, share / 6.0)
+        self._act(motion, body.positions, at, share / 6.0)
         self._deform(body, elastic, body.positions)
         self._share(n, first_stage, *arguments)
-        self._pull(motion, stages.positions, at + 0.5 * share, share * 2.0 / 3.0)
+        self._act(motion, stages.positions, at + 0.5 * share, share * 2.0 / 3.0)
         self._deform(body, elastic, stages.positions)
         self._share(n, second_stage, *arguments)
         if motion.surroundings.retardation_time > 0.0:
             self._share(n, third_stage, *arguments)
-        self._pull(motion, stages.positions_4, at + share, share / 6.0)
+        self._act(motion, stages.positions_4, at + share, share / 6.0)
         self._deform(body, elastic, stages.positions_4)
         self._share(n, fourth_stage, *arguments)
 
     @staticmethod
-    def _pull(motion: Motion, positions: FloatArray, when: float, share: float) -> None:
-        """Let the anchors pull on the nodes at `positions` [m]."""
-        anchors, edge, external = motion.anchors, motion.edge, motion.stages.external
-        toughness, dt = motion.toughness, motion.dt
-        pull(anchors, motion.body, edge, positions, when, share, dt, toughness, external)
+    def _act(motion: Motion, positions: FloatArray, when: float, share: float) -> None:
+        """Let the blade act on the nodes at `positions` [m]."""
+        edge, dt, external = motion.edge, motion.dt, motion.stages.external
+        act(motion.tool, motion.body, edge, positions, when, share, dt, external)
 
     def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
         """Evaluate all tetrahedra (see `tissue.elastic.deform`)."""

@@ -77,12 +77,12 @@ def frames(
     trails = trails or new_trails(n_nodes)
     external = np.zeros((n_nodes, 3))
     n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
-    settings = (0.0, span, 0.0, 1.0, n_micro, every, last_ring, frozen)
+    settings = (span, 0.0, 1.0, n_micro, every, last_ring, frozen)
     for _ in range(n):
         hierarchical_frame(
             network.body,
             network.springs,
-            network.anchors,
+            network.tool,
             NOWHERE,
             rings,
             trails,
@@ -117,7 +117,7 @@ def leaps(
         macro_step(
             body,
             elastic,
-            network.anchors,
+            network.tool,
             NOWHERE,
             activity,
             listed,
@@ -125,7 +125,6 @@ def leaps(
             chebyshev(n_substeps, stabilisation),
             np.zeros((n_nodes, 3)),
             network.surroundings,
-            0.0,
             span,
             0.0,
             1.0,

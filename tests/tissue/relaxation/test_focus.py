@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.tissue.kernels_of import tool_with
 from tests.tissue.relaxation.networks import block, found
 from tissue.anchors import ANCHORED, new_anchors
 from tissue.relaxation.breadth_first import (
@@ -29,7 +30,7 @@ def held_by(*tetrahedra):
     anchors.state[1:] = ANCHORED  # the very tip is out of the tissue
     anchors.tetrahedron[1:] = tetrahedra
     held = new_rings(N_NODES)
-    assert find_held(held, BODY, anchors)
+    assert find_held(held, BODY, tool_with(anchors))
     return held
 
 
@@ -74,6 +75,6 @@ def test_the_order_is_ring_by_ring_and_each_node_once():
 def test_when_the_blade_has_let_go_the_focus_stays():
     held = held_by(TIP)
     before = found(held)
-    assert not find_held(held, BODY, new_anchors(2, 0.01, 10e3))
+    assert not find_held(held, BODY, tool_with(new_anchors(2, 0.01, 10e3)))
     assert found(held) == before
     assert ring_of(held, int(BODY.tetrahedra[HEEL, 0])) == UNREACHED

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.tissue.kernels_of import elastic_of
+from tests.tissue.kernels_of import elastic_of, tool_with
 from tests.tissue.relaxation.networks import block, found
 from tissue.anchors import ANCHORED, new_anchors
 from tissue.relaxation.activity import all_asleep, wake_all
@@ -94,9 +94,9 @@ def test_fine_are_the_nodes_at_the_blade_and_those_that_are_stiff():
     held = [int(i) for i in BODY.tetrahedra[5] if not BODY.fixed[i]]
     stiff = int(np.flatnonzero(~BODY.fixed)[-1])
     elastic.frequency_squared[stiff] = 2.0
-    n_near = find_near(BODY, SPRINGS, anchors, zone, 0)
+    n_near = find_near(BODY, SPRINGS, tool_with(anchors), zone, 0)
     assert sorted(zone.fine[:n_near].tolist()) == sorted(held)
     find_zone(elastic, activity, zone, n_near, 1.0)
     fine = [i for i in found(zone.rings) if ring_of(zone.rings, i) == 0]
     assert sorted(fine) == sorted([*held, stiff])
-    assert find_near(BODY, SPRINGS, new_anchors(2, 0.01, 10e3), zone, 0) == 0
+    assert find_near(BODY, SPRINGS, tool_with(new_anchors(2, 0.01, 10e3)), zone, 0) == 0

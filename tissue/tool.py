@@ -1,0 +1,117 @@
+"""The blade in the tissue: its edge, which cuts, and its faces, which part what is cut."""
+
+from tissue.anchors import (
+    Anchors,
+    Edge,
+    add_stiffness,
+    clear_forces,
+    highest_frequency,
+    pull,
+)
+from tissue.arrays import Arrays
+from tissue.body import Body
+from tissue.flanks import (
+    Flanks,
+    add_flank_stiffness,
+    clear_flanks,
+    highest_flank_frequency,
+    press_flanks,
+    slide_flanks,
+)
+from tissue.jit import kernel
+from tissue.resistance import Resistance
+from tissue.slipping import slip
+from tissue.star import Visits
+from tissue.types import FloatArray, IntArray
+
+
+class Tool(Arrays):
+    """All through which blade and tissue act on each other."""
+
+    anchors: Anchors
+    flanks: Flanks
+    resistance: Resistance
+
+
+@kernel
+def clear_tool(tool: Tool, body: Body, external: FloatArray) -> None:
+    """Set the forces on the nodes that the blade acts on to zero: the others are zero anyway."""
+    clear_forces(tool.anchors, body, external)
+    clear_flanks(tool.flanks, external)
+
+
+@kernel
+def act(
+    tool: Tool,
+    body: Body,
+    edge: Edge,
+    positions: FloatArray,
+    when: float,
+    share: float,
+    dt: float,
+    external: FloatArray,
+) -> None:
+    """Write the blade's forces on the nodes to `external` [N] and count impulse and work.
+
+    Args:
+        tool: Its totals are written.
+        body: For the nodes.
+        edge: The cutting edge over the step.
+        positions: Where the nodes are [m].
+        when: Instant, as a fraction of the step.
+        share: Weight of this evaluation in the integral over the step; they add up to 1.
+        dt: Length of the step [s].
+        external: Forces on the nodes; cleared first.
+    """
+    clear_tool(tool, body, external)
+    anchors = tool.anchors
+    pull(anchors, body, edge, positions, when, share, dt, tool.resistance, external)
+    press_flanks(tool.flanks, edge, positions, when, share, dt, external, anchors.totals)
+
+
+@kernel
+def give_way(
+    tool: Tool,
+    body: Body,
+    visits: Visits,
+    edge: Edge,
+    external: FloatArray,
+    when: float,
+    seconds: float,
+    reach: float,
+    queue: IntArray,
+) -> None:
+    """After a step: let slip and slide what does not hold. Clears `external` [N].
+
+    Args:
+        tool: Written.
+        body: The tissue.
+        visits: For searches.
+        edge: The cutting edge over the time step.
+        external: Forces on the nodes.
+        when: Instant, as a fraction of the time step.
+        seconds: Since the last call [s].
+        reach: See `slip` [m].
+        queue: Scratch.
+    """
+    clear_tool(tool, body, external)  # before anchors go to other nodes
+    slip(tool.anchors, body, visits, edge, when, seconds, tool.resistance, reach, queue)
+    slide_flanks(tool.flanks, edge, body.positions, when, seconds, tool.anchors.totals)
+
+
+@kernel
+def frequency_with_tool(
+    tool: Tool, body: Body, frequency_squared: FloatArray, scratch: FloatArray
+) -> float:
+    """Bound on w^2 [1/s2] over the nodes that the blade acts on: body and blade together.
+
+    `scratch`, shape (capacity, 3), must be zero at those nodes and is so again afterwards.
+    """
+    add_stiffness(tool.anchors, body, scratch)
+    add_flank_stiffness(tool.flanks, scratch)
+    worst = max(
+        highest_frequency(tool.anchors, body, frequency_squared, scratch),
+        highest_flank_frequency(tool.flanks, body, frequency_squared, scratch),
+    )
+    clear_tool(tool, body, scratch)
+    return worst
