@@ -58,7 +58,11 @@ class Anchors(Arrays):
     at_skin: BoolArray
     """Whether it holds the skin, which the edge has yet to break; shape (n,)."""
     speed: FloatArray
-    """How fast it slipped last [m/s], shape (n,)."""
+    """How fast its sample of the edge goes forward in this step [m/s], shape (n,). The toughness
+    that it meets is that of a crack as fast: a crack's own speed, from one short step to the next,
+    would make the anchor stick and slip by turns."""
+    slips: BoolArray
+    """Whether it slipped when it was looked at last, shape (n,)."""
     cut: FloatArray
     """Area that it has cut in this step [m2], shape (n,)."""
     length: FloatArray
@@ -92,6 +96,7 @@ def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
         slipped=np.zeros(n, dtype=np.bool_),
         at_skin=np.zeros(n, dtype=np.bool_),
         speed=np.zeros(n),
+        slips=np.zeros(n, dtype=np.bool_),
         cut=np.zeros(n),
         length=length,
         stiffness=ANCHOR_STIFFNESS * young_modulus * length,
@@ -110,6 +115,16 @@ def edge_point(edge: Edge, along: float, when: float) -> Vec3:
 def sample_point(edge: Edge, k: int, n: int, when: float) -> Vec3:
     """Where sample `k` of `n` is [m]."""
     return edge_point(edge, k / (n - 1.0), when)
+
+
+@kernel
+def measure_speeds(anchors: Anchors, edge: Edge, dt: float) -> None:
+    """Write how fast each sample goes forward in a time step of `dt` [s]."""
+    n = len(anchors.state)
+    forward = edge_frame(edge, 0.5)[1]
+    for k in range(n):
+        way = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
+        anchors.speed[k] = max(dot(way, forward), 0.0) / dt if dt > 0.0 else 0.0
 
 
 @kernel
@@ -203,7 +218,7 @@ def pull(
 
 @kernel
 def held_toughness(anchors: Anchors, k: int, resistance: Resistance) -> float:
-    """What anchor `k` holds per area before it slips [J/m2]; one that slips, at its speed."""
+    """What anchor `k` holds per area before it slips [J/m2]."""
     if anchors.at_skin[k]:
         return resistance.skin_toughness
     return toughness_at(resistance, anchors.speed[k])
@@ -226,6 +241,20 @@ def surplus_of(
     force = held_toughness(anchors, k, resistance) * anchors.length[k] * across
     surplus = distance - force / anchors.stiffness[k]
     return scale(max(surplus, 0.0) / distance, in_plane)
+
+
+@kernel
+def stored_energy(
+    anchors: Anchors, k: int, d: Vec3, frame: tuple[Vec3, Vec3, Vec3], resistance: Resistance
+) -> float:
+    """Energy of anchor `k` [J], whose pull is `d` [m].
+
+    Of its spring as far as the tissue holds; and of the surplus, at the force that it holds. That
+    is taken when the anchor slips, and until then the tissue can give it back.
+    """
+    surplus = surplus_of(anchors, k, d, frame, resistance)
+    held = sub(d, surplus)
+    return anchors.stiffness[k] * (0.5 * dot(held, held) + dot(held, surplus))
 
 
 @kernel

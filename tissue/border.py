@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.anchors import Edge
+from tissue.relaxation.options import Global, Relaxing
 from tissue.types import BladeSweep, BoolArray, FloatArray
 from tissue.vec3 import Vec3
 
@@ -182,3 +183,16 @@ def checked_threads(threads: int) -> int:
             f"threads is {threads!r}; it is a whole number from 1 to {cores}, the cores"
         )
     return threads
+
+
+def checked_audit(audit: bool, relaxing: Relaxing) -> None:
+    """Refuse an account of energy for a relaxation that has none.
+
+    Raises:
+        ValueError: the relaxation is not global.
+    """
+    if audit and not isinstance(relaxing, Global):
+        raise ValueError(
+            "an audit needs relaxation='global': in the others nodes are at different instants, "
+            "so that the energy of the whole is not known. Leave audit away, or relax globally"
+        )

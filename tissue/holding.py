@@ -12,6 +12,7 @@ from tissue.anchors import (
     anchor_position,
     edge_frame,
     sample_point,
+    stored_energy,
 )
 from tissue.body import Body
 from tissue.geometry import (
@@ -21,13 +22,14 @@ from tissue.geometry import (
 )
 from tissue.jit import kernel
 from tissue.path import Path
+from tissue.resistance import Resistance
 from tissue.rotation import mean_rotation, turned_back
 from tissue.slipping import find, put
 from tissue.slit import behind_edge, in_slit
 from tissue.star import Visits
 from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
-from tissue.vec3 import Vec3, add, dot, norm, sub, vec3
+from tissue.vec3 import Vec3, add, norm, sub, vec3
 
 
 @kernel
@@ -79,6 +81,7 @@ def seize(
     edge: Edge,
     when: float,
     far: float,
+    resistance: Resistance,
     queue: IntArray,
 ) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
@@ -89,6 +92,7 @@ def seize(
     """
     n = len(anchors.state)
     rotation = mean_rotation(anchors, body)
+    frame = edge_frame(edge, when)
     for sweep in range(2):
         for i in range(n):
             k = i if sweep == 0 else n - 1 - i
@@ -110,8 +114,7 @@ def seize(
             put(anchors, body, k, place.tetrahedron, p)
             anchors.slipped[k] = False
             anchors.at_skin[k] = False
-            anchors.speed[k] = 0.0
-            anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
+            anchors.totals[RELEASED] -= stored_energy(anchors, k, d, frame, resistance)
 
 
 @kernel
@@ -136,7 +139,6 @@ def meet(
                 put(anchors, body, k, t, p)
                 anchors.slipped[k] = False
                 anchors.at_skin[k] = True
-                anchors.speed[k] = 0.0
 
 
 @kernel

@@ -5,9 +5,6 @@ from tissue.blade_shape import BladeShape
 from tissue.jit import kernel
 from tissue.material import Material
 
-HALVINGS = 30
-"""Of the interval in which the slip of a rate-dependent anchor lies: to a billionth of it."""
-
 
 class Resistance(Arrays):
     """Energy that an area of cut costs."""
@@ -45,32 +42,3 @@ def toughness_at(resistance: Resistance, speed: float) -> float:
         return resistance.toughness
     more = (speed / resistance.speed) ** resistance.exponent
     return resistance.toughness * (1.0 + more)
-
-
-@kernel
-def slip_of(
-    resistance: Resistance, stretch: float, stiffness: float, length: float, seconds: float
-) -> float:
-    """How far an anchor slips [m] until what it holds is what the cut costs at that speed.
-
-    Solves stiffness (stretch - s) = length J(s / seconds) for s, implicitly in the speed: stable
-    however steeply toughness rises with it.
-
-    Args:
-        resistance: Of the tissue.
-        stretch: Of the anchor's spring [m].
-        stiffness: Of it [N/m].
-        length: Of edge that cuts, across the way [m].
-        seconds: In which it slips [s].
-    """
-    high = stretch - resistance.toughness * length / stiffness
-    if high <= 0.0 or resistance.exponent == 0.0 or seconds <= 0.0:
-        return max(high, 0.0)
-    low = 0.0
-    for _ in range(HALVINGS):
-        s = 0.5 * (low + high)
-        if stiffness * (stretch - s) > length * toughness_at(resistance, s / seconds):
-            low = s
-        else:
-            high = s
-    return 0.5 * (low + high)

@@ -18,6 +18,7 @@ from tissue.anchors import (
     edge_frame,
     held_toughness,
     sample_point,
+    stored_energy,
     surplus_of,
 )
 from tissue.body import INSIDE_TOLERANCE, OUTER, Body, walk
@@ -29,7 +30,7 @@ from tissue.geometry import (
 )
 from tissue.hanging import behind, is_open, n_behind
 from tissue.jit import kernel
-from tissue.resistance import Resistance, slip_of, toughness_at
+from tissue.resistance import Resistance
 from tissue.rotation import to_material
 from tissue.star import Visits
 from tissue.types import IntArray
@@ -133,7 +134,6 @@ def slip(
     visits: Visits,
     edge: Edge,
     when: float,
-    seconds: float,
     resistance: Resistance,
     reach: float,
     queue: IntArray,
@@ -146,7 +146,6 @@ def slip(
         visits: For searches.
         edge: The cutting edge over the step.
         when: Instant, as a fraction of the step.
-        seconds: Since anchors slipped last [s].
         resistance: Of the tissue.
         reach: How far beside its anchor a blade that backed off still belongs to it [m].
         queue: Scratch, shape (SEARCH,) or longer.
@@ -162,15 +161,14 @@ def slip(
             if anchors.state[k] == ANCHORED:
                 anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
             anchors.state[k] = FREE if abs(dot(d, flat)) > reach else RETRACTED
-            anchors.speed[k] = 0.0
             continue
         if anchors.state[k] == RETRACTED:
             if abs(dot(d, along)) > reach:  # it comes back elsewhere
                 anchors.state[k] = FREE
                 continue
-            anchors.totals[RELEASED] -= 0.5 * anchors.stiffness[k] * dot(d, d)
+            anchors.totals[RELEASED] -= stored_energy(anchors, k, d, frame, resistance)
             anchors.state[k] = ANCHORED
-        _slip_anchor(anchors, body, visits, k, d, frame, seconds, resistance, queue)
+        _slip_anchor(anchors, body, visits, k, d, frame, resistance, queue)
 
 
 @kernel
@@ -181,7 +179,6 @@ def _slip_anchor(
     k: int,
     d: Vec3,
     frame: tuple[Vec3, Vec3, Vec3],
-    seconds: float,
     resistance: Resistance,
     queue: IntArray,
 ) -> None:
@@ -191,37 +188,30 @@ def _slip_anchor(
     stretch = norm(in_plane)
     if stretch == 0.0:
         return
-    stiffness = anchors.stiffness[k]
     across = anchors.length[k] * dot(in_plane, forward) / stretch
     surplus = norm(surplus_of(anchors, k, d, frame, resistance))
-    if surplus == 0.0 and anchors.at_skin[k]:
+    anchors.slips[k] = surplus > 0.0
+    if surplus == 0.0:
         return
-    way = slip_of(resistance, stretch, stiffness, across, seconds)
-    held = sub(d, scale(surplus / stretch, in_plane))
-    # Since the last slip the anchor pulled with no more than it holds, and gave way by the surplus.
+    before = stored_energy(anchors, k, d, frame, resistance)
     spent = held_toughness(anchors, k, resistance) * across * surplus
-    energy = 0.5 * stiffness * dot(held, held) + spent
-    anchors.speed[k] = way / seconds if seconds > 0.0 else 0.0
-    if way == 0.0:
-        return
+    anchors.at_skin[k] = False  # what is broken holds no more than the rest of the tissue
+    way = norm(surplus_of(anchors, k, d, frame, resistance))
     a = anchor_position(anchors, body, body.positions, k)
-    anchors.at_skin[k] = False
     _slip_by(anchors, body, visits, k, scale(way / stretch, in_plane), queue)
     if anchors.state[k] == LEFT:
         anchors.cut[k] += surplus * across
         anchors.totals[WORK_OF_CUTTING] += spent
-        anchors.totals[RELEASED] += energy - spent
+        anchors.totals[RELEASED] += before - spent
         return
     # Where the tissue is very distorted an anchor slips less far than it was told to.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     area = across * dot(slipped, in_plane) / stretch
-    cost = toughness_at(resistance, anchors.speed[k]) * area
+    cost = held_toughness(anchors, k, resistance) * area
     anchors.cut[k] += area
-    left = sub(d, slipped)
-    over = surplus_of(anchors, k, left, frame, resistance)
-    left = sub(left, over)
+    left = stored_energy(anchors, k, sub(d, slipped), frame, resistance)
     anchors.totals[WORK_OF_CUTTING] += cost
-    anchors.totals[WORK_OF_BREAKING] += energy - 0.5 * stiffness * dot(left, left) - cost
+    anchors.totals[WORK_OF_BREAKING] += before - left - cost
 
 
 @kernel

@@ -18,9 +18,11 @@ from tissue.anchors import (
     is_engaged,
     new_anchors,
 )
+from tissue.audit import Audit
 from tissue.blade_shape import BladeShape
 from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
 from tissue.border import (
+    checked_audit,
     checked_edge,
     checked_edges,
     checked_fixed,
@@ -57,12 +59,13 @@ from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
 from tissue.survey import Survey, boxes_meet, survey, survey_of
 from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
-from tissue.tool import Tool, clear_tool
+from tissue.tool import Tool, begin_step, clear_tool, release_edge
 from tissue.touched import touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
     BladeSweep,
     BoolArray,
+    Energies,
     FloatArray,
     IntArray,
     Piece,
@@ -150,6 +153,8 @@ class Tissue:
             `LocalTimeStepping` or `Hierarchical` with settings (`tissue.relaxation.options`).
         blade: The body of the blade, whose faces part the tissue and rub on it; None for the
             paper's blade, a line that cuts.
+        audit: Whether to keep an account of the energy (`StepResult.energies`), for a global
+            relaxation. It takes about as long as the motion itself, and one thread.
 
     Raises:
         MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
@@ -170,18 +175,21 @@ class Tissue:
         threads: int = 1,
         relaxation: str | Relaxing = "global",
         blade: BladeShape | None = None,
+        audit: bool = False,
     ) -> None:
         expect_sound(mesh)
         checked_scheme(scheme)
         checked_threads(threads)
-        self._all_together = AllTogether(threads)
         self.material = material or Material()
         relaxing = checked_relaxation(relaxation, self.material)
+        checked_audit(audit, relaxing)
         self._surroundings = Surroundings(
             checked_gravity(gravity),
             self.material.viscous_damping,
             self.material.retardation_time,
         )
+        self._audit = Audit(self._surroundings.gravity) if audit else None
+        self._all_together = AllTogether(threads, self._audit.audited if self._audit else None)
         self._body = build_body(
             mesh,
             checked_positions(positions, mesh.positions),
@@ -235,7 +243,9 @@ class Tissue:
         self._relaxation = self._relaxation_of(relaxing)
         self._every = np.arange(len(self._body.rest))
         self._box = survey(self._body)
+        self._now = (NOWHERE, 1.0)
         self._grow()
+        self._begin_audit()
 
     @property
     def n_nodes(self) -> int:
@@ -268,8 +278,8 @@ class Tissue:
         if not (math.isfinite(dt) and dt >= 0.0):
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
         self._take(sweep)
-        self._tool.anchors.totals[:WORK_OF_BLADE] = 0.0
-        self._tool.anchors.cut[:] = 0.0
+        self._now = (edge, 0.0)
+        begin_step(self._tool, self._body, edge, dt)
         self._contact.begin()
         collision = topology = relaxation = 0.0
         n_substeps = 0
@@ -279,6 +289,7 @@ class Tissue:
             started = perf_counter()
             self._feel(sweep, edge, begin)
             n_substeps += self._relax(edge, dt, begin, end)
+            self._now = (edge, end)
             if sweep is not None:
                 self._hold(edge, end)
             relaxed = perf_counter()
@@ -348,6 +359,7 @@ class Tissue:
         n_steps = self._settle()
         self._relaxation.body_moved(self._body, self._elasticity)
         self._box = survey(self._body)
+        self._begin_audit()
         return n_steps
 
     def _settle(self) -> int:
@@ -501,7 +513,8 @@ class Tissue:
         clear_tool(self._tool, body, self._stages.external)
         let_go(anchors, body, self._visits, self._path, edge, when, self._around)
         far = FURTHEST_HOLD * self.node_size
-        seize(anchors, body, self._visits, edge, when, far, self._around)
+        resistance = self._tool.resistance
+        seize(anchors, body, self._visits, edge, when, far, resistance, self._around)
         low, high, _ = self._box
         if self._incising or near_box(anchors, edge, when, low, high):
             self._list_tetrahedra()
@@ -556,6 +569,14 @@ class Tissue:
 
     def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
         """Cut what was detected, and renew what depends on the mesh."""
+        if self._audit:
+            self._audit.before_cut(self._body, self._elasticity.arrays, self._tool, *self._now)
+        self._cut_in_passes(one_pass)
+        if self._audit:
+            self._audit.after_cut(self._body, self._elasticity.arrays, self._tool, *self._now)
+
+    def _cut_in_passes(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
+        """Cut; where room runs out make some, and cut on."""
         change = self._scheme.change
         while True:
             one_pass(self._body, self._visits, self._path)
@@ -572,6 +593,17 @@ class Tissue:
             if not full:
                 return
             self._scheme.detect(self._body, self._visits, self._path)
+
+    def _begin_audit(self) -> None:
+        """Begin the account of energy with the body as it is."""
+        if self._audit:
+            self._audit.begin(self._body, self._elasticity.arrays)
+            self._tool.anchors.totals[WORK_OF_BLADE:] = 0.0
+
+    def _energies(self, edge: Edge) -> Energies | None:
+        if self._audit is None:
+            return None
+        return self._audit.energies(self._body, self._elasticity.arrays, self._tool, edge)
 
     def _end_incision(self) -> None:
         """Resolve what the blade left behind, and let the next contact begin another sheet."""
@@ -647,7 +679,7 @@ class Tissue:
             n_substeps=n_substeps,
             touch=self._contact.touch(dt),
             profile=profile,
-            energies=None,
+            energies=self._energies(edge),
         )
 
     # arrays
@@ -660,6 +692,7 @@ class Tissue:
         n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
         n = min(max(n, 2), MOST_SAMPLES)
         self._end_incision()
+        release_edge(self._tool, self._body, *self._now)
         totals = self._tool.anchors.totals
         anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
         self._tool = self._tool.replaced(anchors=anchors)

@@ -1,15 +1,20 @@
 """The blade in the tissue: its edge, which cuts, and its faces, which part what is cut."""
 
 from tissue.anchors import (
+    RELEASED,
+    WORK_OF_BLADE,
+    WORK_OF_BREAKING,
     Anchors,
     Edge,
     add_stiffness,
     clear_forces,
     highest_frequency,
+    measure_speeds,
     pull,
 )
 from tissue.arrays import Arrays
 from tissue.body import Body
+from tissue.energies import anchors_energy
 from tissue.flanks import (
     Flanks,
     add_flank_stiffness,
@@ -38,6 +43,21 @@ def clear_tool(tool: Tool, body: Body, external: FloatArray) -> None:
     """Set the forces on the nodes that the blade acts on to zero: the others are zero anyway."""
     clear_forces(tool.anchors, body, external)
     clear_flanks(tool.flanks, external)
+
+
+@kernel
+def begin_step(tool: Tool, body: Body, edge: Edge, dt: float) -> None:
+    """Begin to count impulse and area; measure how fast the edge goes in this step of `dt` [s]."""
+    anchors = tool.anchors
+    for i in range(WORK_OF_BLADE):
+        anchors.totals[i] = 0.0
+    for k in range(len(anchors.state)):
+        anchors.cut[k] = 0.0
+    before = anchors_energy(anchors, body, edge, 0.0, tool.resistance)
+    measure_speeds(anchors, edge, dt)
+    # An edge that slows down meets less: what it holds too much, it is about to cut.
+    after = anchors_energy(anchors, body, edge, 0.0, tool.resistance)
+    anchors.totals[WORK_OF_BREAKING] += before - after
 
 
 @kernel
@@ -95,8 +115,15 @@ def give_way(
         queue: Scratch.
     """
     clear_tool(tool, body, external)  # before anchors go to other nodes
-    slip(tool.anchors, body, visits, edge, when, seconds, tool.resistance, reach, queue)
+    slip(tool.anchors, body, visits, edge, when, tool.resistance, reach, queue)
     slide_flanks(tool.flanks, edge, body.positions, when, seconds, tool.anchors.totals)
+
+
+@kernel
+def release_edge(tool: Tool, body: Body, edge: Edge, when: float) -> None:
+    """Count the energy of all that the edge holds as released: the blade is taken away."""
+    anchors = tool.anchors
+    anchors.totals[RELEASED] += anchors_energy(anchors, body, edge, when, tool.resistance)
 
 
 @kernel

@@ -103,8 +103,7 @@ def _report_edge(report: Report, tool: Tool, body: Body, edge: Edge) -> None:
         lever = sub(sub(b, surplus), edge.tip_t1)
         _add_force(report, lever, force)
         # What slips pulls no harder when it is pulled farther.
-        slips = anchors.speed[k] > 0.0
-        gives = scale(1.0 if slips else 0.0, axpy(-dot(d, frame[2]), frame[2], d))
+        gives = scale(1.0 if anchors.slips[k] else 0.0, axpy(-dot(d, frame[2]), frame[2], d))
         _add_stiffness(report, lever, anchors.stiffness[k], gives)
         across = dot(force, forward)
         _add_contact(report, b, forward, across, axpy(-across, forward, force), anchors.cut[k])

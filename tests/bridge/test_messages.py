@@ -126,7 +126,22 @@ def test_what_arrives_may_be_written_to():
 
 
 def test_a_description_arrives_with_every_property_of_the_material():
-    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4, 0.2, "neo_hookean", 0.45)
+    material = Material(
+        young_modulus=12e3,
+        density=1050.0,
+        toughness=25.0,
+        skin_toughness=40.0,
+        toughness_exponent=0.5,
+        toughness_speed=0.2,
+        work_to_rupture=1e4,
+        blade_friction=0.1,
+        blade_viscosity=300.0,
+        viscous_damping=4.0,
+        retardation_time=1e-4,
+        friction=0.2,
+        law="neo_hookean",
+        poisson_ratio=0.45,
+    )
     sent = TissueDescription("slab", material, np.array([[0.0, 0.1, 0.2], [1, 2, 3]]), 576, 175)
     received = messages.unpack_description(messages.pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)

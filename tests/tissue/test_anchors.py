@@ -72,7 +72,7 @@ class Held:
         return self.anchors.totals
 
     def slip(self, edge, reach=0.005):
-        slip(self.anchors, self.body, self.visits, edge, 1.0, 1e-3, self.tough, reach, self.queue)
+        slip(self.anchors, self.body, self.visits, edge, 1.0, self.tough, reach, self.queue)
 
 
 @pytest.fixture
@@ -213,7 +213,7 @@ def test_the_blade_works_force_times_way(held):
 def test_the_neighbours_of_an_anchored_sample_that_are_inside_are_anchored_too(held):
     held.anchors.state[:] = FREE
     held.anchors.state[2] = ANCHORED
-    seize(held.anchors, held.body, held.visits, edge_at(0.0095), 1.0, 1e-2, held.queue)
+    seize(held.anchors, held.body, held.visits, edge_at(0.0095), 1.0, 1e-2, held.tough, held.queue)
     assert (held.anchors.state == ANCHORED).all()
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009, atol=1e-12)
 

@@ -4,6 +4,7 @@ import math
 
 from tissue.body import Body
 from tissue.elasticity import Elasticity
+from tissue.relaxation.audited import Audited
 from tissue.relaxation.motion import Motion
 from tissue.relaxation.threads import Threads
 from tissue.runge_kutta import SAFETY, relax
@@ -20,13 +21,16 @@ class AllTogether:
 
     Args:
         threads: How many threads share the loops over the body.
+        audited: What keeps an account of the energy, where one is wanted; by one thread.
     """
 
     moved = None
     moving = None
 
-    def __init__(self, threads: int = 1) -> None:
-        self._threads = None if threads == 1 else Threads(threads)
+    def __init__(self, threads: int = 1, audited: Audited | None = None) -> None:
+        self._stepper: Audited | Threads | None = audited
+        if audited is None and threads > 1:
+            self._stepper = Threads(threads)
 
     def relax(self, motion: Motion) -> int:
         """Advance the motion; return the Runge-Kutta steps taken."""
@@ -51,8 +55,8 @@ class AllTogether:
 
     def relax_by(self, motion: Motion, n: int) -> None:
         """Advance the motion by `n` Runge-Kutta steps."""
-        if self._threads is not None:
-            self._threads.relax_by(motion, n)
+        if self._stepper is not None:
+            self._stepper.relax_by(motion, n)
             return
         done = 0
         while True:

@@ -81,9 +81,18 @@ def end_step(motion: Motion, seconds: float, when: float) -> None:
         seconds: Length of the step [s].
         when: Its end, as a fraction of the time step.
     """
-    contact, body = motion.contact, motion.body
-    if contact.is_awake:
-        while not resolve(contact.arrays, body, seconds):
-            contact.make_room()
-    edge, external, reach = motion.edge, motion.stages.external, motion.reach
+    if motion.contact.is_awake:
+        set_right(motion, seconds)
+    give_way_after(motion, seconds, when)
+
+
+def set_right(motion: Motion, seconds: float) -> None:
+    """Set right what went through what in a step of that length [s]."""
+    while not resolve(motion.contact.arrays, motion.body, seconds):
+        motion.contact.make_room()
+
+
+def give_way_after(motion: Motion, seconds: float, when: float) -> None:
+    """Let give way what the blade does not hold: see `end_step`."""
+    body, edge, external, reach = motion.body, motion.edge, motion.stages.external, motion.reach
     give_way(motion.tool, body, motion.visits, edge, external, when, seconds, reach, motion.queue)
