@@ -1,0 +1,251 @@
+"""The force of a cut: what it follows from, and where the work of the blade goes.
+
+Tests 28 to 33 of the specification. A block is held at two sides, and a blade goes through it.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tests.bodies import sides
+from tissue.blade_shape import BladeShape
+from tissue.material import Material
+from tissue.shapes import grid
+from tissue.tissue import Tissue
+from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
+
+SIZE = np.array([0.04, 0.04, 0.02])
+DT = 1e-3
+NO_GRAVITY = (0.0, 0.0, 0.0)
+SCALPEL = BladeShape()
+TOUGHNESS = 20.0
+SOFT = {"toughness": TOUGHNESS, "law": "neo_hookean", "poisson_ratio": 0.45}
+
+
+def segment(tip, along=(0.0, 0.0, 1.0), forward=(0.0, 1.0, 0.0), length=0.03):
+    along = np.array(along) / np.linalg.norm(along)
+    return BladeSegment(np.array(tip), tip + length * along, np.array(forward))
+
+
+def upright(speed=0.05, x=0.0201, begin=-0.003, end=0.043, slice_ratio=0.0):
+    """An upright edge that goes along y, and down by `slice_ratio` of that."""
+    ys = np.arange(begin, end, speed * DT)
+    length = 0.03 + slice_ratio * (end - begin)
+    zs = -0.005 - slice_ratio * (ys - begin)
+    return [segment((x, y, z), length=length) for y, z in zip(ys, zs, strict=True)]
+
+
+def mirrored(cells):
+    """Return a block whose halves are mirror images across x."""
+    half = grid((cells[0] // 2, *cells[1:]), SIZE * (0.5, 1.0, 1.0))
+    other = half.positions * (-1.0, 1.0, 1.0) + (SIZE[0], 0.0, 0.0)
+    points, place = np.unique(
+        np.round(np.concatenate((half.positions, other)), 9), axis=0, return_inverse=True
+    )
+    n = len(half.positions)
+    turned = half.tetrahedra[:, [1, 0, 2, 3]] + n  # a mirror image would be inside out
+    return TetrahedralMesh(points, place.ravel()[np.concatenate((half.tetrahedra, turned))])
+
+
+class Run:
+    """A stroke through a block, with its account."""
+
+    def __init__(self, poses, blade=None, cells=(8, 8, 4), dt=DT, mesh=None, **material):
+        mesh = mesh or grid(cells, SIZE)
+        of_tissue = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
+        self.tissue = Tissue(
+            mesh, Material(**SOFT | material), blade=blade, audit=True, **of_tissue
+        )
+        self.poses = poses
+        self.results = [
+            self.tissue.step(BladeSweep(a, b), dt) for a, b in itertools.pairwise(poses)
+        ]
+        self.force = -np.array([r.wrench.force for r in self.results])
+        self.y = np.array([pose.tip[1] for pose in poses[1:]])
+
+    @property
+    def energies(self):
+        return self.results[-1].energies
+
+    def steady(self, axis=1, begin=0.012, end=0.03):
+        """Mean force on the tissue along an axis while the blade is well within it [N]."""
+        return self.force[(self.y > begin) & (self.y < end), axis].mean()
+
+    def anchored(self, begin=0.012, end=0.03):
+        lengths = np.array([r.anchored_length for r in self.results])
+        return lengths[(self.y > begin) & (self.y < end)].mean()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{}, {"cells": (12, 12, 6)}, {"poses": upright(0.1)}, {"dt": 5e-4, "poses": upright(0.1)}],
+    ids=["as is", "finer", "faster", "shorter steps"],
+)
+def test_the_steady_force_is_toughness_times_depth(change):
+    run = Run(**{"poses": upright()} | change)
+    assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
+
+
+@pytest.mark.parametrize("slice_ratio", [0.0, 0.5, 1.0])
+def test_slicing_lowers_the_normal_force_as_theory_says(slice_ratio):
+    """Atkins: the work goes into area alone, so both forces are along the way: 1 / (1 + xi^2)."""
+    run = Run(upright(slice_ratio=slice_ratio))
+    pressing = TOUGHNESS * run.anchored() / (1.0 + slice_ratio**2)
+    assert run.steady() == pytest.approx(pressing, rel=0.05)
+    assert -run.steady(axis=2) == pytest.approx(slice_ratio * pressing, abs=0.05 * pressing)
+
+
+def test_toughness_rises_with_the_speed_of_the_edge():
+    run = Run(upright(0.1), toughness=10.0, toughness_exponent=0.5, toughness_speed=0.1)
+    assert run.steady() == pytest.approx(2.0 * 10.0 * run.anchored(), rel=0.03)
+
+
+def test_a_blunt_edge_costs_twice_its_radius_times_the_work_to_rupture():
+    blunt = BladeShape(thickness=1e-5, edge_radius=50e-6)
+    run = Run(upright(), blade=blunt, work_to_rupture=1e5)
+    assert run.steady() == pytest.approx((TOUGHNESS + 10.0) * run.anchored(), rel=0.04)
+
+
+def down_and_up(length, depth=0.008, speed=0.05):
+    """A level edge that goes into the block from above, and out again."""
+    zs = 0.0205 - np.arange(0.0, depth, speed * DT)
+    zs = np.concatenate((zs, zs[::-1]))
+    at = [(0.0201, 0.02 - 0.5 * length, z) for z in zs]
+    return [segment(tip, (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), length) for tip in at]
+
+
+@pytest.fixture(scope="module")
+def puncture():
+    return Run(
+        down_and_up(0.002), blade=SCALPEL, skin_toughness=3.0 * TOUGHNESS, blade_friction=0.2
+    )
+
+
+def test_the_skin_breaks_at_a_peak_and_the_force_drops(puncture):
+    down = -puncture.force[: len(puncture.force) // 2, 2]
+    peak = down.argmax()
+    assert down[peak] == pytest.approx(3.0 * TOUGHNESS * 0.002, rel=0.12)
+    assert down[peak + 5] < 0.6 * down[peak]
+    area = np.array([r.contacts.cut_area.sum() for r in puncture.results])
+    assert not area[: peak - 2].any()  # until then it only dents
+
+
+def test_withdrawal_cuts_nothing_and_friction_turns_round(puncture):
+    half = len(puncture.results) // 2
+    going_up = puncture.results[half + 40 : half + 100]
+    areas = {r.cut_area for r in going_up}
+    assert len(areas) == 1
+    assert np.mean([r.wrench.force[2] for r in going_up]) < 0.0  # it holds the blade back
+    before, after = going_up[0].energies, going_up[-1].energies
+    assert after.cutting == before.cutting
+    assert after.friction > before.friction
+
+
+def curved():
+    angles = np.arange(0.0, 1.3, 1.2e-3)
+    radius = 0.04
+    return [
+        segment(
+            (0.0201 - radius + radius * np.cos(a - 0.5), 0.02 + radius * np.sin(a - 0.75), -0.005),
+            forward=(-np.sin(a - 0.5), np.cos(a - 0.5), 0.0),
+        )
+        for a in angles
+    ]
+
+
+def slanted():
+    ys = np.arange(-0.003, 0.043, 5e-5)
+    return [segment((0.014 + 0.1 * y, y, -0.005), along=(0.3, 0.0, 1.0)) for y in ys]
+
+
+def press_and_release():
+    ys = np.arange(-0.003, 0.002, 5e-5)
+    return [segment((0.0201, y, -0.005)) for y in np.concatenate((ys, ys[::-1]))]
+
+
+STROKES = {
+    "press": (press_and_release(), {"toughness": 2000.0}),
+    "puncture": (down_and_up(0.004), {"skin_toughness": 60.0}),
+    "straight": (upright(), {}),
+    "slanted": (slanted(), {}),
+    "curved": (curved(), {}),
+    "slicing": (upright(slice_ratio=1.0), {}),
+    "fast": (upright(0.1), {"toughness_exponent": 0.5}),
+}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("blade", [None, SCALPEL], ids=["line", "scalpel"])
+@pytest.mark.parametrize("stroke", STROKES)
+def test_the_account_closes_within_half_a_percent(stroke, blade):
+    poses, material = STROKES[stroke]
+    run = Run(poses, blade=blade, blade_friction=0.3, **material)
+    assert abs(run.energies.residual) < 5e-3 * run.energies.work_of_blade
+
+
+def test_cutting_takes_toughness_times_the_area_swept():
+    run = Run(upright(end=0.055))
+    area = 0.04 * 0.02
+    assert run.energies.cutting / TOUGHNESS == pytest.approx(area, rel=0.02)
+    assert run.results[-1].cut_area == pytest.approx(area, rel=0.1)
+
+
+@pytest.mark.parametrize("stroke", ["straight", "slanted", "slicing"])
+def test_action_is_reaction_in_every_step_with_cuts_friction_and_side_load(stroke):
+    poses, _ = STROKES[stroke]
+    run = Run(poses[:500], blade=SCALPEL, blade_friction=0.3)
+    for result in run.results:
+        np.testing.assert_allclose(result.force_on_tissue, -result.wrench.force, atol=1e-12)
+
+
+def test_a_symmetric_cut_pushes_the_blade_to_no_side():
+    run = Run(upright(x=0.02), blade=SCALPEL, mesh=mirrored((8, 8, 4)), blade_friction=0.3)
+    assert abs(run.steady(axis=0)) < 0.05 * run.steady()
+
+
+def test_a_blade_pushed_sideways_is_pushed_back_with_a_torque():
+    """Its flat goes 3 mm into the side of a block that is held at its far side."""
+    mesh = grid((6, 6, 3), SIZE)
+    fixed = mesh.positions[:, 0] < 1e-9
+    tissue = Tissue(mesh, Material(**SOFT), fixed=fixed, gravity=NO_GRAVITY, blade=SCALPEL)
+    xs = 0.0403 - np.arange(0.0, 0.003, 2e-5)
+    poses = [segment((x, 0.022, 0.004), length=0.012) for x in xs]
+    results = [tissue.step(BladeSweep(a, b), DT) for a, b in itertools.pairwise(poses)]
+    assert results[-1].wrench.force[0] > 0.05
+    assert results[-1].wrench.torque[1] > 0.0  # of a force 6 mm up from the tip
+    lever = results[-1].wrench.torque[1] / results[-1].wrench.force[0]
+    assert 0.002 < lever < 0.010
+    assert results[-1].cut_area == 0.0
+
+
+def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
+    """The lips are as far apart as the blade is thick, and behind it they are not."""
+    thick = BladeShape(thickness=1e-3, bevel_angle=0.2, height=8e-3)
+    run = Run(upright(end=0.035), blade=thick)
+    contacts = run.results[-1].contacts
+    touching = contacts.point[np.abs(contacts.normal[:, 0]) > 0.5]
+    gap = touching[:, 0].max() - touching[:, 0].min()
+    assert 0.5e-3 < gap < 1.2e-3
+    tip = run.poses[-1].tip[1]
+    assert (touching[:, 1] < tip).all()
+    assert (touching[:, 1] > tip - 8e-3).all()
+    surface = run.tissue.surface()
+    lips = surface.positions[np.unique(surface.triangles[surface.is_cut])]
+    behind = lips[(lips[:, 1] < tip - 0.012) & (lips[:, 1] > 0.002)]
+    assert np.ptp(behind[:, 0]) < 0.4e-3
+
+
+def test_an_audit_of_another_relaxation_is_refused():
+    with pytest.raises(ValueError, match="audit"):
+        Tissue(grid((2, 2, 2), SIZE), audit=True, relaxation="local")
+
+
+def test_an_audit_changes_nothing():
+    poses = upright()[:300]
+    with_audit = Run(poses, blade=SCALPEL).tissue.snapshot()
+    mesh = grid((8, 8, 4), SIZE)
+    without = Tissue(mesh, Material(**SOFT), fixed=sides(mesh), gravity=NO_GRAVITY, blade=SCALPEL)
+    for a, b in itertools.pairwise(poses):
+        without.step(BladeSweep(a, b), DT)
+    np.testing.assert_array_equal(with_audit.positions, without.snapshot().positions)
