@@ -37,9 +37,10 @@ from tissue.surface import OUTWARD
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, add, axpy, cross, dot, lerp, scale, sub, vec3
 
-FLANK_STIFFNESS = 4.0
+FLANK_STIFFNESS = 2.0
 """Stiffness of a face of the blade, as pressure per depth, over Young's modulus per node size. It
-stands for the tissue nearer to the face than the mesh resolves, as that of an anchor does."""
+stands for the tissue nearer to the face than the mesh resolves, as that of an anchor does. With 4
+the Runge-Kutta steps of a fine mesh were half as many again."""
 
 POINTS = 3
 """Points of a face, each for a third of its area: a quadrature exact for linear pressure."""
@@ -50,8 +51,9 @@ LATE, STUCK_ALONG, STUCK_BEHIND, SPEED = 0, 1, 2, 3
 """Places in `Flanks.state`: by how much the bevel begins late [m]; where on the blade friction
 would be zero [m], two of them; and how fast the point slid last [m/s]."""
 
-END_SLOPE = 1.0
-"""Of the blade's back and ends against its plane: 45 degrees."""
+END_SLOPE = 0.5
+"""Of the blade's back and ends against its plane. Steeper ends would let go of the tissue within
+one step, and take shorter ones."""
 
 
 class Flanks(Arrays):

@@ -14,6 +14,7 @@ from tissue.anchors import (
     RETRACTED,
     TISSUE_IMPULSE,
     WORK_OF_BLADE,
+    WORK_OF_BREAKING,
     WORK_OF_CUTTING,
     Edge,
     anchor_position,
@@ -21,6 +22,7 @@ from tissue.anchors import (
     clear_forces,
     edge_frame,
     is_engaged,
+    measure_speeds,
     new_anchors,
     pull,
 )
@@ -119,6 +121,32 @@ def test_a_stronger_pull_slips_until_toughness_times_length_is_left(held):
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.0 * THRESHOLD, rtol=1e-12)
     totals = held.pull(edge)
     assert totals[TISSUE_IMPULSE + 1] == pytest.approx(TOUGH * 0.016, rel=1e-12)
+
+
+def test_skin_holds_more_until_it_breaks_and_then_as_much_as_the_rest(held):
+    held.tough = resistance_of(Material(toughness=TOUGH, skin_toughness=3.0 * TOUGH), None)
+    before = held.anchors.rest.copy()
+    held.slip(edge_at(0.009 + 2.9 * THRESHOLD))
+    np.testing.assert_array_equal(held.anchors.rest, before)
+    held.slip(edge_at(0.009 + 3.1 * THRESHOLD))
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.1 * THRESHOLD, rtol=1e-12)
+    assert not held.anchors.at_skin.any()
+    # The spring gives (9 - 1) / 2 and 3 x 0.1 of surplus, the area takes 2.1; the rest is breaking.
+    unit = TOUGH * 0.016 * THRESHOLD
+    assert held.anchors.totals[WORK_OF_BREAKING] == pytest.approx(2.2 * unit, rel=1e-6)
+
+
+def test_an_edge_that_goes_faster_is_held_harder(held):
+    held.tough = resistance_of(
+        Material(toughness=TOUGH, toughness_exponent=1.0, toughness_speed=0.1), None
+    )
+    fast = edge_at(0.009 + 5.0 * THRESHOLD)
+    slow = edge_at(0.009 + 5.0 * THRESHOLD - 1e-4)
+    edge = Edge(*slow[:3], *fast[3:])
+    measure_speeds(held.anchors, edge, 1e-3)  # 0.1 mm in 1 ms
+    np.testing.assert_allclose(held.anchors.speed, 0.1, rtol=1e-9)
+    held.slip(edge)
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 3.0 * THRESHOLD, rtol=1e-9)
 
 
 def test_slipping_further_costs_toughness_times_area(held):

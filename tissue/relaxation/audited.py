@@ -4,7 +4,6 @@ import numpy as np
 
 from tissue.body import NODES
 from tissue.contact.resolve import prepare
-from tissue.elastic import Elastic
 from tissue.energies import anchors_energy, body_energy, dissipated_power
 from tissue.relaxation.motion import Motion, give_way_after, set_right
 from tissue.runge_kutta import runge_kutta_nystroem
@@ -24,6 +23,7 @@ class Audited:
         self.contact = 0.0
         """What contact took so far [J]."""
         self._positions, self._velocities, self._scratch = np.zeros((3, 0, 3))
+        self._power_now = 0.0
 
     def relax_by(self, motion: Motion, n: int) -> None:
         """Advance the motion by `n` Runge-Kutta steps."""
@@ -35,6 +35,8 @@ class Audited:
         for i in range(n):
             at = motion.begin + i * share
             self._prepare(motion, at)
+            if i == 0 or motion.contact.is_awake:
+                self._power_now = self._power_of(motion, motion.body.velocities)
             self._step(motion, at, share)
             self._set_right(motion, share * motion.dt, at + share)
             give_way_after(motion, share * motion.dt, at + share)
@@ -43,22 +45,25 @@ class Audited:
         body, stages, elastic = motion.body, motion.stages, motion.elasticity.arrays
         n, h = int(body.counts[NODES]), share * motion.dt
         self._positions[:n], self._velocities[:n] = body.positions[:n], body.velocities[:n]
-        before = self._power(motion, elastic, body.positions, body.velocities)
+        before = self._power_now
         blade = (motion.tool, motion.edge, stages)
         runge_kutta_nystroem(body, elastic, *blade, motion.surroundings, motion.dt, at, share)
-        after = self._power(motion, elastic, body.positions, body.velocities)
+        after = self._power_of(motion, body.velocities)
         # Simpson's rule for the way gives the velocity half-way, of 4th order as the rest.
         way = body.positions[:n] - self._positions[:n]
         ends = self._velocities[:n] + body.velocities[:n]
         self._velocities[:n] = 1.5 / h * way - 0.25 * ends
-        middle = self._power(motion, elastic, stages.positions, self._velocities)
+        middle = self._power_of(motion, self._velocities, stages.positions)
         self.damping += h / 6.0 * (before + 4.0 * middle + after)
+        self._power_now = after
 
-    def _power(
-        self, motion: Motion, elastic: Elastic, positions: FloatArray, velocities: FloatArray
+    def _power_of(
+        self, motion: Motion, velocities: FloatArray, positions: FloatArray | None = None
     ) -> float:
-        around = motion.surroundings
-        return dissipated_power(motion.body, elastic, around, positions, velocities, self._scratch)
+        """What damping takes at these velocities, where the nodes are or at `positions` [W]."""
+        body, elastic = motion.body, motion.elasticity.arrays
+        at = body.positions if positions is None else positions
+        return dissipated_power(body, elastic, motion.surroundings, at, velocities, self._scratch)
 
     def _prepare(self, motion: Motion, when: float) -> None:
         if motion.contact.is_awake:
