@@ -8,15 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.anchors import (
-    IMPULSE,
-    IMPULSE_TORQUE,
-    TISSUE_IMPULSE,
     WORK_OF_BLADE,
     WORK_OF_CUTTING,
     Edge,
     anchored_length,
-    is_engaged,
-    new_anchors,
 )
 from tissue.audit import Audit
 from tissue.blade_shape import BladeShape
@@ -33,12 +28,10 @@ from tissue.border import (
 )
 from tissue.caveats import warn_of_ratio, warn_of_toughness
 from tissue.contact.self_contact import SelfContact
-from tissue.cut import FULL, N_DIRTY, SPARE_NODES, Quality
+from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.elastic import Surroundings
 from tissue.elasticity import Elasticity
-from tissue.flank_faces import blade_box, find_faces, forget_changed_faces, forget_faces
-from tissue.flanks import grown_flanks, new_flanks, with_more_rows
-from tissue.holding import let_go, meet, near_box, seize
+from tissue.grip import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE, Grip
 from tissue.material import Material
 from tissue.measures import lowest_altitude, path_error
 from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
@@ -46,20 +39,19 @@ from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.prescribed import begin_path, prescribe_path
 from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.relaxation.all_together import AllTogether
-from tissue.relaxation.motion import Motion, Relaxation
-from tissue.relaxation.moved import N_MOVED, forget_moved
-from tissue.relaxation.options import Hierarchical, LocalTimeStepping, Relaxing, checked_relaxation
-from tissue.resistance import resistance_of
-from tissue.runge_kutta import accelerations, new_stages
+from tissue.relaxation.choice import relaxation_of
+from tissue.relaxation.motion import Motion
+from tissue.relaxation.options import Relaxing, checked_relaxation
+from tissue.relaxation.settling import settle
+from tissue.runge_kutta import new_stages
 from tissue.scheme import Scheme, checked_scheme
-from tissue.slipping import relocate
 from tissue.snapping import EXPLAINED
 from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
-from tissue.survey import Survey, boxes_meet, survey, survey_of
-from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
-from tissue.tool import Tool, begin_step, clear_tool, release_edge
+from tissue.survey import Survey, survey, survey_of
+from tissue.tetrahedron_grid import build_grid
+from tissue.tool import begin_step, clear_tool
 from tissue.touched import touched_nodes
 from tissue.trace import forget_path, trace_path
 from tissue.types import (
@@ -75,25 +67,13 @@ from tissue.types import (
     StepResult,
     Surface,
     TetrahedralMesh,
-    Wrench,
 )
 from tissue.validation import expect_sound
 from tissue.vec3 import Vec3
-from tissue.wrench import contacts_of, most_contacts, new_report, wrench_of, write_report
-
-SAMPLES_PER_NODE_SIZE = 6.0
-"""Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
-enters and leaves the skin; more cost time in every Runge-Kutta stage."""
-MOST_SAMPLES = 512
-"""Samples at most, for a long blade in a fine mesh."""
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
 steep curves leave tetrahedra that bridge the cut."""
-
-FURTHEST_HOLD = 1.0
-"""How far from the edge tissue is taken hold of beside what it holds already, per mean node size. A
-lip that has turned aside would else draw the edge into the tissue behind it."""
 
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
@@ -104,27 +84,11 @@ instant at each turn; to lay a crack front there each time would shred the mesh.
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
 
-GRID_MARGIN = 0.5
-"""How far a node goes before it is listed for the search of contact again, per mean node size."""
-
 ROOM_FOR_TETRAHEDRA = 1 << 12
 """Free tetrahedra that a pass of a cut step begins with; more are made between passes."""
 
-NEAR_BLADE = 0.5
-"""How near to the blade's faces the tissue's are looked at, per mean node size: twice as
-far as the blade goes between two looks."""
-
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
-
-SAME_LENGTH = 1e-3
-"""Relative change in length below which it is the same blade. Poses in single precision, or between
-two places of a turning blade, differ by less; another blade would begin another incision."""
-
-SETTLED = 1e-3
-"""Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
-LONGEST_SETTLING = 20_000
-"""Runge-Kutta steps after which `settle` gives up waiting."""
 
 
 class TissueError(RuntimeError):
@@ -203,8 +167,6 @@ class Tissue:
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
-        self._edge_length = 0.0
-        self._grid = no_grid()
         self._path = new_path(2)
         self._incising = False
         self._is_open = False
@@ -212,12 +174,7 @@ class Tissue:
 
         self._elasticity = Elasticity(self.material, self._body, self._visits)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
-        self._tool = Tool(
-            anchors=new_anchors(2, 1.0, self.material.young_modulus),
-            flanks=new_flanks(blade, self.material, self.node_size, n_tetrahedra),
-            resistance=resistance_of(self.material, blade),
-        )
-        self._report = new_report(most_contacts(self._tool))
+        self._grip = Grip(blade, self.material, self.node_size, n_tetrahedra)
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
         quality = quality or CutQuality()
@@ -240,8 +197,7 @@ class Tissue:
         self._contact = SelfContact(self._body, self.node_size, self.material.friction, floor)
         self._guard = 0.0 if scheme == "paper" else quality.guard * self.node_size
         self._at_first = self._measures()
-        self._relaxation = self._relaxation_of(relaxing)
-        self._every = np.arange(len(self._body.rest))
+        self._relaxation = relaxation_of(relaxing, self._all_together, self._body, self._elasticity)
         self._box = survey(self._body)
         self._now = (NOWHERE, 1.0)
         self._grow()
@@ -279,7 +235,7 @@ class Tissue:
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
         self._take(sweep)
         self._now = (edge, 0.0)
-        begin_step(self._tool, self._body, edge, dt)
+        begin_step(self._grip.tool, self._body, edge, dt)
         self._contact.begin()
         collision = topology = relaxation = 0.0
         n_substeps = 0
@@ -287,7 +243,7 @@ class Tissue:
         for i in range(n_increments):
             begin, end = i / n_increments, (i + 1) / n_increments
             started = perf_counter()
-            self._feel(sweep, edge, begin)
+            self._feel(edge if sweep else None, begin)
             n_substeps += self._relax(edge, dt, begin, end)
             self._now = (edge, end)
             if sweep is not None:
@@ -356,40 +312,11 @@ class Tissue:
         has passed a peak. All nodes are moved together, whatever the relaxation.
         """
         self._take(None)
-        n_steps = self._settle()
+        n_steps = settle(self._all_together, self._motion(NOWHERE, 0.0, 0.0, 1.0))
         self._relaxation.body_moved(self._body, self._elasticity)
         self._box = survey(self._body)
         self._begin_audit()
         return n_steps
-
-    def _settle(self) -> int:
-        n_each = 4
-        energy = 0.0
-        for done in range(0, LONGEST_SETTLING, n_each):
-            n = self.n_nodes
-            strained = self._elasticity.strained_frequency_squared(self._body)
-            highest = max(self._elasticity.frequency_squared, strained)
-            step = self._elasticity.stable_step(highest, self._surroundings)
-            velocities = self._body.velocities[:n]
-            velocities_t0 = velocities.copy()
-            motion = self._motion(NOWHERE, n_each * step, 0.0, 1.0)
-            self._all_together.relax_by(motion, n_each)
-            if self._contact.is_awake:  # what holds a body on the floor is not in its forces
-                largest = np.abs(velocities - velocities_t0).max() / (n_each * step)
-            else:
-                out, external = self._stages.a1, self._stages.external
-                accelerations(
-                    self._body, self._elasticity.arrays, external, self._surroundings, out
-                )
-                largest = np.abs(out[:n]).max()
-            before, energy = energy, float((self._body.masses[:n, None] * velocities**2).sum())
-            if energy < before:
-                velocities[:] = 0.0
-                energy = 0.0
-            if largest < SETTLED * 9.81:
-                velocities[:] = 0.0
-                return done + n_each
-        return LONGEST_SETTLING
 
     def snapshot(self) -> Snapshot:
         """Return a copy of the whole state."""
@@ -458,7 +385,7 @@ class Tissue:
             body=self._body,
             elasticity=self._elasticity,
             contact=self._contact,
-            tool=self._tool,
+            tool=self._grip.tool,
             edge=edge,
             visits=self._visits,
             stages=self._stages,
@@ -470,18 +397,6 @@ class Tissue:
             end=end,
         )
 
-    def _relaxation_of(self, relaxing: Relaxing) -> Relaxation:
-        """Return what relaxes the body. Imported late: kernels that are not used cost no start."""
-        if isinstance(relaxing, Hierarchical):
-            from tissue.relaxation.by_rings import ByRings
-
-            return ByRings(relaxing, len(self._body.rest))
-        if isinstance(relaxing, LocalTimeStepping):
-            from tissue.relaxation.by_stiffness import ByStiffness
-
-            return ByStiffness(relaxing, self._body, self._elasticity)
-        return self._all_together
-
     def _survey(self) -> Survey:
         """Return where the body is, from what may have moved since the last survey."""
         moving = self._relaxation.moving
@@ -489,58 +404,24 @@ class Tissue:
             return survey(self._body)
         return survey_of(self._body, *moving, self._box)
 
-    def _feel(self, sweep: BladeSweep | None, edge: Edge, when: float) -> None:
+    def _feel(self, edge: Edge | None, when: float) -> None:
         """Find the faces of the tissue that the faces of the blade may touch."""
-        tool = self._tool
-        if tool.flanks.half_thickness == 0.0:
-            return
-        margin = NEAR_BLADE * self.node_size
-        totals = tool.anchors.totals
-        low, high, _ = self._box
-        if sweep is None or not boxes_meet(blade_box(tool.flanks, edge, when, margin), (low, high)):
-            forget_faces(tool.flanks, totals)
-            return
-        self._list_tetrahedra()
-        while not find_faces(
-            self._tool.flanks, self._body, self._visits, self._grid, edge, when, margin, totals
-        ):
-            self._tool = self._tool.replaced(flanks=with_more_rows(self._tool.flanks))
-            self._report = new_report(most_contacts(self._tool))
+        moved = self._relaxation.moved
+        self._grip.feel(self._body, self._visits, moved, edge, when, self._box)
 
     def _hold(self, edge: Edge, when: float) -> None:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
-        anchors, body = self._tool.anchors, self._body
-        clear_tool(self._tool, body, self._stages.external)
-        let_go(anchors, body, self._visits, self._path, edge, when, self._around)
-        far = FURTHEST_HOLD * self.node_size
-        resistance = self._tool.resistance
-        seize(anchors, body, self._visits, edge, when, far, resistance, self._around)
-        low, high, _ = self._box
-        if self._incising or near_box(anchors, edge, when, low, high):
-            self._list_tetrahedra()
-            meet(anchors, body, self._grid, edge, when, EXPLAINED * self._snap_floor)
-        if not is_engaged(anchors):
+        body, moved = self._body, self._relaxation.moved
+        clear_tool(self._grip.tool, body, self._stages.external)
+        box = None if self._incising else self._box
+        reach = EXPLAINED * self._snap_floor
+        self._grip.hold(body, self._visits, self._path, moved, edge, when, box, reach)
+        if not self._grip.is_engaged:
             self._end_incision()
             return
         self._incising = True
         margin = SHEET_MARGIN * self.node_size
-        trace_path(anchors, body, edge, when, margin, self._path)
-
-    def _list_tetrahedra(self) -> None:
-        """Let the grid list where the tetrahedra are now."""
-        body, moved = self._body, self._relaxation.moved
-        nodes, n = self._every, self.n_nodes
-        if moved is not None:
-            nodes, n = moved.nodes, int(moved.state[N_MOVED])
-        has_room = (
-            len(self._grid.listed_at) == len(body.positions)
-            and list_moved(body, self._visits, self._grid, nodes, n, self._around)
-            and list_appended(body, body.positions, self._grid)
-        )
-        if moved is not None:
-            forget_moved(moved)
-        if not has_room:
-            self._grid = build_grid(body, body.positions, GRID_MARGIN * self.node_size)
+        trace_path(self._grip.tool.anchors, body, edge, when, margin, self._path)
 
     def _detect(self) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
@@ -570,10 +451,10 @@ class Tissue:
     def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
         """Cut what was detected, and renew what depends on the mesh."""
         if self._audit:
-            self._audit.before_cut(self._body, self._elasticity.arrays, self._tool, *self._now)
+            self._audit.before_cut(self._body, self._elasticity.arrays, self._grip.tool, *self._now)
         self._cut_in_passes(one_pass)
         if self._audit:
-            self._audit.after_cut(self._body, self._elasticity.arrays, self._tool, *self._now)
+            self._audit.after_cut(self._body, self._elasticity.arrays, self._grip.tool, *self._now)
 
     def _cut_in_passes(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
         """Cut; where room runs out make some, and cut on."""
@@ -583,9 +464,7 @@ class Tissue:
             n = touched_nodes(self._body, change, self._visits, self._nodes)
             if n:
                 self._elasticity.mesh_changed(self._body, self._visits, change, self._nodes, n)
-                relocate(self._tool.anchors, self._body, self._visits, self._around)
-                if self._tool.flanks.half_thickness > 0.0:
-                    forget_changed_faces(self._tool.flanks, change.dirty, change.counts[N_DIRTY])
+                self._grip.mesh_changed(self._body, self._visits, change)
                 self._contact.mesh_changed(self._body, change)
                 self._relaxation.mesh_changed(self._body, self._elasticity, self._nodes, n)
             full = bool(change.counts[FULL])
@@ -598,12 +477,12 @@ class Tissue:
         """Begin the account of energy with the body as it is."""
         if self._audit:
             self._audit.begin(self._body, self._elasticity.arrays)
-            self._tool.anchors.totals[WORK_OF_BLADE:] = 0.0
+            self._grip.tool.anchors.totals[WORK_OF_BLADE:] = 0.0
 
     def _energies(self, edge: Edge) -> Energies | None:
         if self._audit is None:
             return None
-        return self._audit.energies(self._body, self._elasticity.arrays, self._tool, edge)
+        return self._audit.energies(self._body, self._elasticity.arrays, self._grip.tool, edge)
 
     def _end_incision(self) -> None:
         """Resolve what the blade left behind, and let the next contact begin another sheet."""
@@ -652,27 +531,22 @@ class Tissue:
         profile: Profile,
     ) -> StepResult:
         low, high, _ = self._box
-        anchors = self._tool.anchors
-        totals = anchors.totals
-        write_report(self._report, self._tool, self._body, edge)
+        grip = self._grip
+        totals = grip.tool.anchors.totals
+        grip.report(self._body, edge)
         point = np.zeros(3) if sweep is None else np.array(edge.tip_t1)
-        per_second = 1.0 / dt if dt > 0.0 else 0.0
-        force = totals[IMPULSE : IMPULSE + 3] * per_second
-        torque = totals[IMPULSE_TORQUE : IMPULSE_TORQUE + 3] * per_second
-        (x, y, z), (fx, fy, fz) = point.tolist(), force.tolist()  # np.cross would cost 20 us
-        torque -= np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
         return StepResult(
-            wrench=Wrench(force, torque, point),
-            wrench_t1=wrench_of(self._report, point),
-            stiffness=self._report.stiffness.copy(),
-            contacts=contacts_of(self._report),
-            force_on_tissue=totals[TISSUE_IMPULSE : TISSUE_IMPULSE + 3] * per_second,
+            wrench=grip.mean_wrench(point, dt),
+            wrench_t1=grip.wrench_t1(point),
+            stiffness=grip.stiffness,
+            contacts=grip.contacts,
+            force_on_tissue=grip.mean_force_on_tissue(dt),
             bounds=np.array([low, high]),
             n_tetrahedra=self.n_tetrahedra,
             n_nodes=self.n_nodes,
             n_active=self._scheme.n_active,
             active_point_tetrahedron=int(self._path.seed[0]) if sweep is not None else -1,
-            anchored_length=anchored_length(anchors),
+            anchored_length=anchored_length(grip.tool.anchors),
             cut_area=float(self._scheme.change.area[0]),
             work_of_blade=float(totals[WORK_OF_BLADE]),
             work_of_cutting=float(totals[WORK_OF_CUTTING]),
@@ -687,18 +561,10 @@ class Tissue:
     def _take(self, sweep: BladeSweep | None) -> None:
         """Take the edge of this blade; another blade, or none, lets go of the tissue."""
         length = 0.0 if sweep is None else float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip))
-        if abs(length - self._edge_length) <= SAME_LENGTH * length:
-            return
-        n = math.ceil(length / self.node_size * SAMPLES_PER_NODE_SIZE) + 1
-        n = min(max(n, 2), MOST_SAMPLES)
-        self._end_incision()
-        release_edge(self._tool, self._body, *self._now)
-        totals = self._tool.anchors.totals
-        anchors = new_anchors(n, length, self.material.young_modulus).replaced(totals=totals)
-        self._tool = self._tool.replaced(anchors=anchors)
-        self._report = new_report(most_contacts(self._tool))
-        self._edge_length = length
-        self._path = new_path(n)
+        if self._grip.is_another(length):
+            self._end_incision()
+            self._grip.take(length, self._body, *self._now)
+            self._path = new_path(self._grip.n_samples)
 
     def _grow(self) -> None:
         """Make room for the next pass of a cut step: arrays double when they are nearly full."""
@@ -714,10 +580,8 @@ class Tissue:
         self._elasticity.grow(n_nodes, n_tetrahedra)
         self._visits = no_visits(n_nodes, n_tetrahedra)
         self._scheme.grow(n_nodes, n_tetrahedra)
-        flanks = grown_flanks(self._tool.flanks, n_tetrahedra)
-        self._tool = self._tool.replaced(flanks=flanks)
+        self._grip.grow(n_tetrahedra)
         self._contact.grow(n_nodes, n_tetrahedra)
         self._relaxation.grow(n_nodes, n_tetrahedra)
-        self._every = np.arange(n_nodes)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
