@@ -22,7 +22,7 @@ def bodies_of(seed=0, n_contacts=12):
     n = len(body.rest)
     body.masses[:] = random.uniform(1e-4, 1e-3, n)
     body.velocities[:] = random.normal(size=(n, 3))
-    contacts = new_contacts(n_contacts, 1.0)
+    contacts = new_contacts(n, n_contacts, 1.0)
     for _ in range(n_contacts):
         a, b, c, d = random.choice(n, 4, replace=False).tolist()
         w = random.dirichlet([1.0, 1.0, 1.0]).tolist()
@@ -64,7 +64,7 @@ def one_on_floor(velocity, depth=0.0):
     body.masses[:] = 0.5
     body.positions[0, 2] = -depth
     body.velocities[0] = velocity
-    contacts = new_contacts(1, 1.0)
+    contacts = new_contacts(len(body.rest), 1, 1.0)
     add_contact(contacts, body, (0, 0, 0, 0), Weights(1.0, 0.0, 0.0, 0.0), UP, 0.0)
     return body, contacts
 
