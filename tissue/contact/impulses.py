@@ -63,6 +63,8 @@ class Contacts(Arrays):
     """Height of the floor where the other side is the floor, else 0 [m]; shape (capacity,)."""
     mobility: FloatArray
     """Sum of squared weight over mass [1/kg], shape (capacity,)."""
+    share: FloatArray
+    """Weight over mass of each node, 0 where it is fixed [1/kg]; shape (capacity, 4)."""
     shift: FloatArray
     """Correction of positions along the normal [kg m], shape (capacity,)."""
     closing: FloatArray
@@ -96,6 +98,7 @@ def new_contacts(n_nodes: int, capacity: int, most_push: float) -> Contacts:
         normal=np.zeros((capacity, 3)),
         floor=np.zeros(capacity),
         mobility=np.zeros(capacity),
+        share=np.zeros((capacity, 4)),
         shift=np.zeros(capacity),
         closing=np.zeros(capacity),
         drag=np.zeros((capacity, 3)),
@@ -157,6 +160,7 @@ def press(contacts: Contacts, body: Body, tangled: IntArray, epoch: int) -> None
         for q in range(4):
             contacts.node[n, q] = contacts.node[k, q]
             contacts.weight[n, q] = contacts.weight[k, q]
+            contacts.share[n, q] = contacts.share[k, q]
         for x in range(3):
             contacts.normal[n, x] = contacts.normal[k, x]
             contacts.friction[n, x] = share * contacts.friction[k, x]
@@ -167,7 +171,7 @@ def press(contacts: Contacts, body: Body, tangled: IntArray, epoch: int) -> None
         contacts.last_impulse[n] = contacts.impulse[k]
         contacts.impulse[n] = lasting
         given = axpy(lasting, vec3(contacts.normal, n), vec3(contacts.friction, n))
-        _apply(contacts, body, n, given, body.velocities)
+        _apply(contacts, n, given, body.velocities)
         n += 1
     contacts.count[0] = n
 
@@ -180,7 +184,14 @@ def turn(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec3)
     contacts.weight[k, 2] = weights.c
     contacts.weight[k, 3] = weights.d
     store(contacts.normal, k, normal)
-    contacts.mobility[k] = _mobility(contacts, body, k)
+    mobility = 0.0
+    for q in range(4):
+        node = contacts.node[k, q]
+        contacts.share[k, q] = 0.0
+        if not body.fixed[node]:
+            contacts.share[k, q] = contacts.weight[k, q] / body.masses[node]
+            mobility += contacts.weight[k, q] ** 2 / body.masses[node]
+    contacts.mobility[k] = mobility
 
 
 @kernel
@@ -194,16 +205,6 @@ def follow(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec
     turn(contacts, body, k, weights, normal)
     if not contacts.mobility[k] > least:
         turn(contacts, body, k, before, normal_before)
-
-
-@kernel
-def _mobility(contacts: Contacts, body: Body, k: int) -> float:
-    mobility = 0.0
-    for q in range(4):
-        node = contacts.node[k, q]
-        if not body.fixed[node]:
-            mobility += contacts.weight[k, q] ** 2 / body.masses[node]
-    return mobility
 
 
 @kernel
@@ -254,12 +255,12 @@ def gap(contacts: Contacts, body: Body, k: int) -> float:
 
 
 @kernel
-def _apply(contacts: Contacts, body: Body, k: int, correction: Vec3, values: FloatArray) -> None:
+def _apply(contacts: Contacts, k: int, correction: Vec3, values: FloatArray) -> None:
     """Add a correction [kg m] or [kg m/s] to the nodes of contact `k`, each by its weight."""
     for q in range(4):
-        node = contacts.node[k, q]
-        if not body.fixed[node]:
-            share = contacts.weight[k, q] / body.masses[node]
+        share = contacts.share[k, q]
+        if share != 0.0:
+            node = contacts.node[k, q]
             values[node, 0] += share * correction.x
             values[node, 1] += share * correction.y
             values[node, 2] += share * correction.z
@@ -275,7 +276,7 @@ def _push(contacts: Contacts, body: Body, k: int) -> float:
         return 0.0
     contacts.shift[k] = now
     normal = vec3(contacts.normal, k)
-    _apply(contacts, body, k, scale(now - before, normal), body.positions)
+    _apply(contacts, k, scale(now - before, normal), body.positions)
     return abs(now - before) * contacts.mobility[k]
 
 
@@ -339,7 +340,7 @@ def push_apart(
             if contacts.shift[k] > 0.0 and is_due(contacts, k):
                 moved = sub(difference(contacts, k, body.positions), difference(contacts, k, start))
                 limit = coefficient * contacts.shift[k]
-                move = _hold(contacts, body, k, moved, limit, contacts.drag, body.positions)
+                move = _hold(contacts, k, moved, limit, contacts.drag, body.positions)
                 note_move(contacts, k, move > small)
 
 
@@ -373,7 +374,7 @@ def stop_approach(
             contacts.impulse[k] = now
             move = abs(now - before) * contacts.mobility[k] * seconds
             if now != before:
-                _apply(contacts, body, k, scale(now - before, normal), body.velocities)
+                _apply(contacts, k, scale(now - before, normal), body.velocities)
                 most = max(most, move)
             note_move(contacts, k, move > small)
         if most <= small:
@@ -386,16 +387,13 @@ def stop_approach(
             if contacts.impulse[k] > 0.0 or norm(vec3(contacts.friction, k)) > 0.0:
                 sliding = difference(contacts, k, body.velocities)
                 limit = coefficient * contacts.impulse[k]
-                change = _hold(
-                    contacts, body, k, sliding, limit, contacts.friction, body.velocities
-                )
+                change = _hold(contacts, k, sliding, limit, contacts.friction, body.velocities)
                 note_move(contacts, k, change * seconds > small)
 
 
 @kernel
 def _hold(
     contacts: Contacts,
-    body: Body,
     k: int,
     relative: Vec3,
     limit: float,
@@ -414,5 +412,5 @@ def _hold(
     held[k, 1] = now.y
     held[k, 2] = now.z
     change = sub(now, before)
-    _apply(contacts, body, k, change, values)
+    _apply(contacts, k, change, values)
     return norm(change) * contacts.mobility[k]

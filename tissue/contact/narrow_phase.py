@@ -16,7 +16,13 @@ from tissue.contact.candidates import (
     rim_of,
 )
 from tissue.contact.distance import distance_of_edges, distance_to_triangle
-from tissue.contact.edge_edge import EdgeEdge, Edges, edge_edge, way_of_overlap
+from tissue.contact.edge_edge import (
+    EdgeEdge,
+    Edges,
+    edge_edge,
+    face_the_same_way,
+    way_of_overlap,
+)
 from tissue.contact.faces import N_FACES, NONE
 from tissue.contact.impulses import add_contact, have_moved_since
 from tissue.contact.known_contacts import is_known
@@ -119,6 +125,12 @@ def _look(contact: ContactState, kind: int) -> int:
 
 
 @kernel
+def _is_due(contact: ContactState, nodes: Nodes, last: int) -> bool:
+    """Whether nodes have moved since a look in this step, or there was none."""
+    return last < 0 or have_moved_since(contact.contacts, nodes, last)
+
+
+@kernel
 def _find_points(contact: ContactState, body: Body) -> None:
     candidates, motion, hits, x = contact.candidates, contact.motion, contact.hits, body.positions
     pairs, touch = candidates.point_triangle, contact.touch
@@ -131,7 +143,7 @@ def _find_points(contact: ContactState, body: Body) -> None:
             drop_pair(pairs, k)
             continue
         nodes = nodes_of(pairs.node, k)
-        if not have_moved_since(contact.contacts, nodes, last):
+        if not _is_due(contact, nodes, last):
             k += 1
             continue
         now = _corners(x, nodes)
@@ -152,8 +164,8 @@ def _find_points(contact: ContactState, body: Body) -> None:
         if is_dead_point(candidates, k):
             drop_pair(pairs, k)
             continue
-        if can_touch(motion, pairs, k, touch):
-            nodes = nodes_of(pairs.node, k)
+        nodes = nodes_of(pairs.node, k)
+        if can_touch(motion, pairs, k, touch) and _is_due(contact, nodes, last):
             now = _corners(x, nodes)
             if _point_triangle(contact, now, nodes).is_through:
                 _note_hit(contact, nodes)
@@ -212,7 +224,7 @@ def _find_edges(contact: ContactState, body: Body) -> None:
             drop_pair(pairs, k)
             continue
         nodes = nodes_of(pairs.node, k)
-        if not have_moved_since(contact.contacts, nodes, last):
+        if not _is_due(contact, nodes, last):
             k += 1
             continue
         now = _edges(x, nodes)
@@ -233,8 +245,8 @@ def _find_edges(contact: ContactState, body: Body) -> None:
         if is_dead_edge(candidates, k):
             drop_pair(pairs, k)
             continue
-        if can_touch(motion, pairs, k, touch):
-            nodes = nodes_of(pairs.node, k)
+        nodes = nodes_of(pairs.node, k)
+        if can_touch(motion, pairs, k, touch) and _is_due(contact, nodes, last):
             now = _edges(x, nodes)
             if _edge_edge(contact, now, nodes).is_through:
                 _note_hit(contact, nodes)
@@ -263,7 +275,11 @@ def _edge_edge(contact: ContactState, now: Edges, nodes: Nodes) -> EdgeEdge:
     normal = contact.normal
     outward = add(vec3(normal, nodes[0]), vec3(normal, nodes[1]))
     other_outward = add(vec3(normal, nodes[2]), vec3(normal, nodes[3]))
-    if way_of_overlap(now, outward, other_outward) == 0.0 or _is_tangled(contact, nodes):
+    if (
+        way_of_overlap(now, outward, other_outward) == 0.0
+        or face_the_same_way(outward, other_outward)
+        or _is_tangled(contact, nodes)
+    ):
         return EdgeEdge(False, outward, 0.0, 0.0)
     before, slack = _edges(contact.start, nodes), _slack(contact, nodes)
     return edge_edge(before, now, outward, other_outward, slack, contact.touch)
