@@ -331,6 +331,28 @@ def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
+def cut_and_dropped(n_steps: int) -> Snapshot:
+    """Cut a block in two, slanting, so that one lip slides down the other on to the floor."""
+    mesh = grid((4, 2, 2), (0.04, 0.02, 0.02))
+    fixed = mesh.positions[:, 0] == 0.0
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.01)
+    strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
+    results = [tissue.step(None, strokes.DT) for _ in range(n_steps)]
+    assert tissue.n_pieces() == 2
+    assert max(result.touch.force for result in results) > 0.01
+    assert results[-1].touch.force_of_floor[2] > 0.01
+    return tissue.snapshot()
+
+
+def test_to_look_at_every_pair_of_the_body_in_every_step_changes_no_bit(monkeypatch):
+    """With an endless margin all are paired, and where any motion is little all pairs are near."""
+    frugal = cut_and_dropped(150)
+    monkeypatch.setattr("tissue.contact.self_contact.MARGIN", 1e3)
+    monkeypatch.setattr("tissue.contact.self_contact.LITTLE", 1e3)
+    for one, other in zip(frugal, cut_and_dropped(150), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 @pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])
 def test_a_floor_that_is_none_or_in_the_body_is_refused(floor):
     mesh = grid((1, 1, 1), (0.01,) * 3)

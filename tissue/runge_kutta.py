@@ -19,7 +19,8 @@ import numpy as np
 from tissue.anchors import Edge
 from tissue.arrays import Arrays
 from tissue.body import NODES, Body
-from tissue.contact.resolve import IS_AWAKE, IS_PENDING, ContactState, prepare, resolve
+from tissue.contact.resolve import prepare, resolve
+from tissue.contact.state import IS_AWAKE, IS_PENDING, ContactState
 from tissue.elastic import Elastic, Surroundings, deform, internal_force, viscous_force
 from tissue.jit import inlined, kernel
 from tissue.simd import Point, point, point_of, store_point, times

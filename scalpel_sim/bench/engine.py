@@ -7,7 +7,8 @@ import numpy as np
 from scalpel_sim.bench.blocks import block, held
 from scalpel_sim.bench.traffic import Traffic, traffic
 from tissue.body import NODES, Body
-from tissue.contact.resolve import IS_STALE, N_TOUCHING, prepare, resolve
+from tissue.contact.resolve import prepare, resolve
+from tissue.contact.state import ANEW, IS_STALE, N_TOUCHING
 from tissue.jit import kernel
 from tissue.material import Law, Material
 from tissue.relaxation.all_together import AllTogether
@@ -149,7 +150,7 @@ class Touching:
     def searches(self, n: int) -> None:
         """Look for all pairs that may touch, as where faces have moved by the margin."""
         for _ in range(n):
-            self._tissue._contact.arrays.state[IS_STALE] = 1
+            self._tissue._contact.arrays.state[IS_STALE] = ANEW
             self.checks(1)
 
     def checks(self, n: int) -> None:

@@ -14,15 +14,22 @@ from tissue.types import FloatArray, IntArray
 ROOM_FOR_FACES = 1 << 14
 """Faces that there is room for at first: those of several cuts, so that few steps must grow it."""
 
-N_FACES, WITH_SKIN = 0, 1
+NONE = -1
+"""In place of a face that is no more."""
+
+N_FACES, WITH_SKIN, N_FREE = 0, 1, 2
 """Places in `Faces.counts`."""
 
 
 class Faces(Arrays):
-    """The faces, in no particular order, but the same in every run."""
+    """The faces, in no particular order, but the same in every run. Each keeps its place."""
 
     face: IntArray
-    """4 * tetrahedron + local face, shape (capacity,)."""
+    """4 * tetrahedron + local face, or NONE; shape (capacity,)."""
+    generation: IntArray
+    """How often what is in each place has changed, shape (capacity,)."""
+    free: IntArray
+    """Places that are free again, shape (capacity,)."""
     place: IntArray
     """Where in `face` each face is, or -1; shape (tetrahedron capacity, 4)."""
     piece: IntArray
@@ -33,18 +40,21 @@ class Faces(Arrays):
     high: FloatArray
     """Scratch: highest corner of each piece [m], shape (n_pieces, 3)."""
     counts: IntArray
-    """How many faces there are, and whether skin is among them; shape (2,)."""
+    """How many places are in use or free again, whether skin is among the faces, and how many
+    places are free again; shape (3,)."""
 
 
 def new_faces(n_tetrahedra: int) -> Faces:
     """Return no faces, of a body with room for that many tetrahedra."""
     return Faces(
         face=np.zeros(ROOM_FOR_FACES, np.int64),
+        generation=np.zeros(ROOM_FOR_FACES, np.int64),
+        free=np.zeros(ROOM_FOR_FACES, np.int64),
         place=np.full((n_tetrahedra, 4), -1, np.int64),
         piece=np.full(n_tetrahedra, -1, np.int64),
         low=np.zeros((1, 3)),
         high=np.zeros((1, 3)),
-        counts=np.zeros(2, np.int64),
+        counts=np.zeros(3, np.int64),
     )
 
 
@@ -60,7 +70,8 @@ def with_room(faces: Faces, n_more: int) -> Faces:
     needed = int(faces.counts[N_FACES]) + n_more
     if needed <= len(faces.face):
         return faces
-    return faces.replaced(face=grown(faces.face, 2 * needed))
+    of_faces = ("face", "generation", "free")
+    return faces.replaced(**{name: grown(getattr(faces, name), 2 * needed) for name in of_faces})
 
 
 @kernel
@@ -97,15 +108,33 @@ def _renew(faces: Faces, body: Body, t: int) -> None:
         wanted = link == CUT or (link == OUTER and counts[WITH_SKIN] == 1)
         at = faces.place[t, f]
         if wanted and at < 0:
-            faces.face[counts[N_FACES]] = 4 * t + f
-            faces.place[t, f] = counts[N_FACES]
-            counts[N_FACES] += 1
+            at = _free_place(faces)
+            faces.face[at] = 4 * t + f
+            faces.place[t, f] = at
         elif not wanted and at >= 0:
-            counts[N_FACES] -= 1
-            last = faces.face[counts[N_FACES]]
-            faces.face[at] = last
-            faces.place[last // 4, last % 4] = at
+            faces.face[at] = NONE
             faces.place[t, f] = -1
+            faces.free[counts[N_FREE]] = at
+            counts[N_FREE] += 1
+        if at >= 0:
+            faces.generation[at] += 1
+
+
+@kernel
+def _free_place(faces: Faces) -> int:
+    counts = faces.counts
+    if counts[N_FREE] > 0:
+        counts[N_FREE] -= 1
+        return faces.free[counts[N_FREE]]
+    counts[N_FACES] += 1
+    return counts[N_FACES] - 1
+
+
+@kernel
+def is_cut(faces: Faces, body: Body, at: int) -> bool:
+    """Whether the face in that place is one of a cut."""
+    face = faces.face[at]
+    return body.links[face // 4, face % 4] == CUT
 
 
 def in_pieces(faces: Faces, piece: IntArray, n_pieces: int) -> Faces:
@@ -123,9 +152,9 @@ def measure_pieces(faces: Faces, body: Body) -> None:
             faces.high[p, x] = -np.inf
     for i in range(faces.counts[N_FACES]):
         t = faces.face[i] // 4
-        p = faces.piece[t]
-        if p < 0:
+        if faces.face[i] == NONE or faces.piece[t] < 0:
             continue
+        p = faces.piece[t]
         for k in range(4):
             if k != faces.face[i] % 4:
                 node = body.tetrahedra[t, k]

@@ -14,7 +14,8 @@ Contacts act at both ends of a Runge-Kutta step:
   take back what was given too much before. No contact ever pulls.
 
 Friction follows the same law in positions and velocities: within Coulomb's cone it holds the points
-together, on the cone it slides. All of it by Gauss-Seidel, in a fixed order.
+together, on the cone it slides. All of it by Gauss-Seidel, in a fixed order; a contact is passed
+over as long as no other moves its nodes.
 
 Sources: Moreau (1988), Unilateral contact and dry friction in finite freedom dynamics, for the
 plastic impact; Mueller et al. (2007), Position based dynamics, for corrections by weight over mass.
@@ -24,6 +25,14 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import Body, grown
+from tissue.contact.known_contacts import (
+    KnownContacts,
+    forget_known,
+    is_known,
+    know,
+    new_known_contacts,
+)
+from tissue.contact.pairs import Nodes, nodes_of
 from tissue.geometry import Weights
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
@@ -54,6 +63,8 @@ class Contacts(Arrays):
     """Height of the floor where the other side is the floor, else 0 [m]; shape (capacity,)."""
     mobility: FloatArray
     """Sum of squared weight over mass [1/kg], shape (capacity,)."""
+    share: FloatArray
+    """Weight over mass of each node, 0 where it is fixed [1/kg]; shape (capacity, 4)."""
     shift: FloatArray
     """Correction of positions along the normal [kg m], shape (capacity,)."""
     closing: FloatArray
@@ -66,13 +77,20 @@ class Contacts(Arrays):
     """In the step before, 0 where there was none [N s]; shape (capacity,)."""
     friction: FloatArray
     """Across it [N s], shape (capacity, 3)."""
+    known: KnownContacts
+    done: IntArray
+    """When each was last corrected, by `clock`; shape (capacity,)."""
+    moved: IntArray
+    """When each node was last moved by a correction, by `clock`; shape (node capacity,)."""
+    clock: IntArray
+    """Corrections that moved something so far, shape (1,)."""
     count: IntArray
     """Shape (1,)."""
     most_push: float
     """The most by which two sides are pushed apart in a step [m]."""
 
 
-def new_contacts(capacity: int, most_push: float) -> Contacts:
+def new_contacts(n_nodes: int, capacity: int, most_push: float) -> Contacts:
     """Return no contacts, with room for that many; see `Contacts` for `most_push` [m]."""
     return Contacts(
         node=np.zeros((capacity, 4), np.int64),
@@ -80,21 +98,38 @@ def new_contacts(capacity: int, most_push: float) -> Contacts:
         normal=np.zeros((capacity, 3)),
         floor=np.zeros(capacity),
         mobility=np.zeros(capacity),
+        share=np.zeros((capacity, 4)),
         shift=np.zeros(capacity),
         closing=np.zeros(capacity),
         drag=np.zeros((capacity, 3)),
         impulse=np.zeros(capacity),
         last_impulse=np.zeros(capacity),
         friction=np.zeros((capacity, 3)),
+        known=new_known_contacts(capacity),
+        done=np.zeros(capacity, np.int64),
+        moved=np.zeros(n_nodes, np.int64),
+        clock=np.zeros(1, np.int64),
         count=np.zeros(1, np.int64),
         most_push=most_push,
     )
 
 
-def grown_contacts(contacts: Contacts, capacity: int) -> Contacts:
+def grown_contacts(contacts: Contacts, n_nodes: int, capacity: int) -> Contacts:
     """Return the contacts with room for that many."""
-    names = set(Contacts.__annotations__) - {"count", "most_push"}
-    return contacts.replaced(**{name: grown(getattr(contacts, name), capacity) for name in names})
+    names = set(Contacts.__annotations__) - {"known", "moved", "clock", "count", "most_push"}
+    return contacts.replaced(
+        **{name: grown(getattr(contacts, name), capacity) for name in names},
+        known=new_known_contacts(capacity),
+        moved=grown(contacts.moved, n_nodes),
+    )
+
+
+@kernel
+def know_contacts(contacts: Contacts) -> None:
+    """Let those that there are be found by their nodes. To be called before others are added."""
+    forget_known(contacts.known)
+    for k in range(contacts.count[0]):
+        know(contacts.known, contacts.node, k)
 
 
 @kernel
@@ -125,6 +160,7 @@ def press(contacts: Contacts, body: Body, tangled: IntArray, epoch: int) -> None
         for q in range(4):
             contacts.node[n, q] = contacts.node[k, q]
             contacts.weight[n, q] = contacts.weight[k, q]
+            contacts.share[n, q] = contacts.share[k, q]
         for x in range(3):
             contacts.normal[n, x] = contacts.normal[k, x]
             contacts.friction[n, x] = share * contacts.friction[k, x]
@@ -135,7 +171,7 @@ def press(contacts: Contacts, body: Body, tangled: IntArray, epoch: int) -> None
         contacts.last_impulse[n] = contacts.impulse[k]
         contacts.impulse[n] = lasting
         given = axpy(lasting, vec3(contacts.normal, n), vec3(contacts.friction, n))
-        _apply(contacts, body, n, given, body.velocities)
+        _apply(contacts, n, given, body.velocities)
         n += 1
     contacts.count[0] = n
 
@@ -148,7 +184,14 @@ def turn(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec3)
     contacts.weight[k, 2] = weights.c
     contacts.weight[k, 3] = weights.d
     store(contacts.normal, k, normal)
-    contacts.mobility[k] = _mobility(contacts, body, k)
+    mobility = 0.0
+    for q in range(4):
+        node = contacts.node[k, q]
+        contacts.share[k, q] = 0.0
+        if not body.fixed[node]:
+            contacts.share[k, q] = contacts.weight[k, q] / body.masses[node]
+            mobility += contacts.weight[k, q] ** 2 / body.masses[node]
+    contacts.mobility[k] = mobility
 
 
 @kernel
@@ -165,44 +208,24 @@ def follow(contacts: Contacts, body: Body, k: int, weights: Weights, normal: Vec
 
 
 @kernel
-def _mobility(contacts: Contacts, body: Body, k: int) -> float:
-    mobility = 0.0
-    for q in range(4):
-        node = contacts.node[k, q]
-        if not body.fixed[node]:
-            mobility += contacts.weight[k, q] ** 2 / body.masses[node]
-    return mobility
-
-
-@kernel
-def is_contact_of(contacts: Contacts, k: int, nodes: tuple[int, int, int, int]) -> bool:
-    """Whether contact `k` is between these nodes; two edges may come in either order."""
-    row = contacts.node
-    a, b, c, d = row[k, 0], row[k, 1], row[k, 2], row[k, 3]
-    return (a, b, c, d) == nodes or (contacts.weight[k, 1] > 0.0 and (c, d, a, b) == nodes)
-
-
-@kernel
 def add_contact(
     contacts: Contacts,
     body: Body,
-    nodes: tuple[int, int, int, int],
+    nodes: Nodes,
     weights: Weights,
     normal: Vec3,
     floor: float,
 ) -> None:
     """Add a contact and push it apart, unless it is there already or nothing in it can move."""
     k = contacts.count[0]
-    if k == len(contacts.shift):
+    if k == len(contacts.shift) or is_known(contacts.known, contacts.node, nodes):
         return
-    for other in range(k):
-        if is_contact_of(contacts, other, nodes):
-            return
     for q in range(4):
         contacts.node[k, q] = nodes[q]
     turn(contacts, body, k, weights, normal)
     if contacts.mobility[k] == 0.0:
         return
+    know(contacts.known, contacts.node, k)
     contacts.count[0] += 1
     contacts.floor[k] = floor
     contacts.shift[k] = 0.0
@@ -211,7 +234,7 @@ def add_contact(
     for x in range(3):
         contacts.drag[k, x] = 0.0
         contacts.friction[k, x] = 0.0
-    _push(contacts, body, k)
+    note_move(contacts, k, _push(contacts, body, k) > 0.0)
 
 
 @kernel
@@ -232,12 +255,12 @@ def gap(contacts: Contacts, body: Body, k: int) -> float:
 
 
 @kernel
-def _apply(contacts: Contacts, body: Body, k: int, correction: Vec3, values: FloatArray) -> None:
+def _apply(contacts: Contacts, k: int, correction: Vec3, values: FloatArray) -> None:
     """Add a correction [kg m] or [kg m/s] to the nodes of contact `k`, each by its weight."""
     for q in range(4):
-        node = contacts.node[k, q]
-        if not body.fixed[node]:
-            share = contacts.weight[k, q] / body.masses[node]
+        share = contacts.share[k, q]
+        if share != 0.0:
+            node = contacts.node[k, q]
             values[node, 0] += share * correction.x
             values[node, 1] += share * correction.y
             values[node, 2] += share * correction.z
@@ -253,8 +276,39 @@ def _push(contacts: Contacts, body: Body, k: int) -> float:
         return 0.0
     contacts.shift[k] = now
     normal = vec3(contacts.normal, k)
-    _apply(contacts, body, k, scale(now - before, normal), body.positions)
+    _apply(contacts, k, scale(now - before, normal), body.positions)
     return abs(now - before) * contacts.mobility[k]
+
+
+@kernel
+def have_moved_since(contacts: Contacts, nodes: Nodes, when: int) -> bool:
+    """Whether a correction has moved one of the nodes after that time, by `clock`."""
+    moved = contacts.moved
+    a, b, c, d = nodes
+    return moved[a] > when or moved[b] > when or moved[c] > when or moved[d] > when
+
+
+@kernel
+def begin_sweeps(contacts: Contacts) -> None:
+    """Let every contact be due."""
+    for k in range(contacts.count[0]):
+        contacts.done[k] = -1
+
+
+@kernel
+def is_due(contacts: Contacts, k: int) -> bool:
+    """Whether a node of contact `k` was moved since it was last corrected."""
+    return have_moved_since(contacts, nodes_of(contacts.node, k), contacts.done[k])
+
+
+@kernel
+def note_move(contacts: Contacts, k: int, has_moved: bool) -> None:
+    """Note that contact `k` is corrected, and whether that is for others to look at."""
+    if has_moved:
+        contacts.clock[0] += 1
+        for q in range(4):
+            contacts.moved[contacts.node[k, q]] = contacts.clock[0]
+    contacts.done[k] = contacts.clock[0]
 
 
 @kernel
@@ -270,18 +324,24 @@ def push_apart(
         coefficient: Of friction.
         small: Move at which the sweeps end [m].
     """
+    begin_sweeps(contacts)
     for _ in range(SWEEPS):
         most = 0.0
         for k in range(contacts.count[0]):
-            most = max(most, _push(contacts, body, k))
+            if is_due(contacts, k):
+                move = _push(contacts, body, k)
+                note_move(contacts, k, move > small)
+                most = max(most, move)
         if most <= small:
             break
+    begin_sweeps(contacts)
     for _ in range(FRICTION_SWEEPS):
         for k in range(contacts.count[0]):
-            if contacts.shift[k] > 0.0:
+            if contacts.shift[k] > 0.0 and is_due(contacts, k):
                 moved = sub(difference(contacts, k, body.positions), difference(contacts, k, start))
                 limit = coefficient * contacts.shift[k]
-                _hold(contacts, body, k, moved, limit, contacts.drag, body.positions)
+                move = _hold(contacts, k, moved, limit, contacts.drag, body.positions)
+                note_move(contacts, k, move > small)
 
 
 @kernel
@@ -301,38 +361,46 @@ def stop_approach(
     """
     for k in range(contacts.count[0]):
         contacts.closing[k] = max(gap(contacts, body, k), 0.0) / seconds
+    begin_sweeps(contacts)
     for _ in range(SWEEPS):
         most = 0.0
         for k in range(contacts.count[0]):
+            if not is_due(contacts, k):
+                continue
             normal = vec3(contacts.normal, k)
             speed = dot(normal, difference(contacts, k, body.velocities))
             before = contacts.impulse[k]
             now = max(before - (speed + contacts.closing[k]) / contacts.mobility[k], 0.0)
             contacts.impulse[k] = now
+            move = abs(now - before) * contacts.mobility[k] * seconds
             if now != before:
-                _apply(contacts, body, k, scale(now - before, normal), body.velocities)
-                most = max(most, abs(now - before) * contacts.mobility[k])
-        if most * seconds <= small:
+                _apply(contacts, k, scale(now - before, normal), body.velocities)
+                most = max(most, move)
+            note_move(contacts, k, move > small)
+        if most <= small:
             break
+    begin_sweeps(contacts)
     for _ in range(FRICTION_SWEEPS):
         for k in range(contacts.count[0]):
+            if not is_due(contacts, k):
+                continue
             if contacts.impulse[k] > 0.0 or norm(vec3(contacts.friction, k)) > 0.0:
                 sliding = difference(contacts, k, body.velocities)
                 limit = coefficient * contacts.impulse[k]
-                _hold(contacts, body, k, sliding, limit, contacts.friction, body.velocities)
+                change = _hold(contacts, k, sliding, limit, contacts.friction, body.velocities)
+                note_move(contacts, k, change * seconds > small)
 
 
 @kernel
 def _hold(
     contacts: Contacts,
-    body: Body,
     k: int,
     relative: Vec3,
     limit: float,
     held: FloatArray,
     values: FloatArray,
-) -> None:
-    """Take away the part of `relative` across the normal, by at most `limit` in all."""
+) -> float:
+    """Take away the part of `relative` across the normal, by at most `limit` in all; return it."""
     normal = vec3(contacts.normal, k)
     across = axpy(-dot(relative, normal), normal, relative)
     before = vec3(held, k)
@@ -343,4 +411,6 @@ def _hold(
     held[k, 0] = now.x
     held[k, 1] = now.y
     held[k, 2] = now.z
-    _apply(contacts, body, k, sub(now, before), values)
+    change = sub(now, before)
+    _apply(contacts, k, change, values)
+    return norm(change) * contacts.mobility[k]

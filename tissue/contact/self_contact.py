@@ -23,8 +23,12 @@ from tissue.contact.faces import (
     renew_faces,
     with_room,
 )
-from tissue.contact.impulses import grown_contacts, new_contacts
-from tissue.contact.resolve import (
+from tissue.contact.impulses import Contacts, grown_contacts, new_contacts
+from tissue.contact.motion import grown_motion, new_motion
+from tissue.contact.pairs import new_hits
+from tissue.contact.state import (
+    ANEW,
+    CHANGED,
     FLOOR_IMPULSE,
     IS_AWAKE,
     IS_STALE,
@@ -39,12 +43,20 @@ from tissue.pieces import label_pieces
 from tissue.types import Touch
 
 MARGIN = 0.25
-"""How far apart candidates may be, per mean node size. Larger: more pairs to look at in each step;
-smaller: a search more often."""
+"""How far apart candidates may be, per mean node size. Larger: more pairs, each to be looked at now
+and then; smaller: nodes are sought anew more often."""
+
+LITTLE = 1.0 / 64.0
+"""How far a node moves in a Runge-Kutta step at most that is not restless, in margins. Larger: all
+pairs are looked at more often; smaller: more nodes are asked one by one."""
 
 TOUCH = 1e-6
 """Distance that is none, per mean node size: thousands of times below what one could measure,
 thousands above rounding. Without it a node left on a triangle might be on either side of it."""
+
+SETTLED = 1e-5
+"""Correction below which sweeps end, per mean node size. Larger: nodes that are pressed tremble;
+smaller: all sweeps are done always, for nanometres."""
 
 MOST_PUSH = 0.1
 """How far two sides are pushed apart in one Runge-Kutta step at most, per mean node size. What they
@@ -53,7 +65,7 @@ nobody paid for: without the limit, lips that a blade drags over each other gain
 end."""
 
 CAPACITY = 256
-"""Triangles that there is room for at first."""
+"""Faces that there is room for at first."""
 
 
 class SelfContact:
@@ -71,11 +83,17 @@ class SelfContact:
     ) -> None:
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         self._capacity = CAPACITY
+        self._cell = float(node_size)
+        most_push = float(MOST_PUSH * node_size)
+        candidates = new_candidates(n_nodes, CAPACITY, self._cell)
         self.arrays = ContactState(
             faces=new_faces(n_tetrahedra),
-            candidates=new_candidates(n_nodes, CAPACITY),
-            contacts=new_contacts(self._n_pairs(n_nodes), float(MOST_PUSH * node_size)),
-            found=np.zeros(self._n_pairs(n_nodes), np.int64),
+            candidates=candidates,
+            motion=new_motion(n_nodes, float(LITTLE * MARGIN * node_size)),
+            contacts=new_contacts(n_nodes, self._n_contacts(n_nodes), most_push),
+            normal=np.zeros((n_nodes, 3)),
+            hits=new_hits(len(candidates.edge_edge.wake)),
+            looked=np.zeros(2, np.int64),
             start=np.zeros((n_nodes, 3)),
             depth=np.zeros(n_nodes),
             depth_epoch=np.zeros(n_nodes, np.int64),
@@ -86,6 +104,7 @@ class SelfContact:
             floor=-np.inf if floor is None else float(floor),
             margin=float(MARGIN * node_size),
             touch=float(TOUCH * node_size),
+            settled=float(SETTLED * node_size),
         )
         self.arrays.state[IS_AWAKE] = floor is not None
         self.look_for_pieces(body)
@@ -120,7 +139,7 @@ class SelfContact:
         renew_faces(faces, body, change)
         if faces is not self.arrays.faces:
             self.arrays = self.arrays.replaced(faces=faces)
-        state[IS_STALE] = 1
+        state[IS_STALE] = max(int(state[IS_STALE]), CHANGED)
         self.arrays.contacts.count[0] = 0  # their nodes may be others now
 
     def incision_ended(self, body: Body) -> None:
@@ -142,34 +161,34 @@ class SelfContact:
             faces.counts[WITH_SKIN] = 1
             collect_faces(faces, body)
         self.arrays = self.arrays.replaced(faces=faces)
-        self.arrays.state[[IS_AWAKE, IS_STALE]] = 1
+        self.arrays.state[[IS_AWAKE, IS_STALE]] = 1, ANEW
 
     def make_room(self) -> None:
         """Double the room for what may touch."""
         self._capacity *= 2
         n_nodes = len(self.arrays.depth)
-        search = self.arrays.candidates.search
-        candidates = new_candidates(n_nodes, self._capacity)
-        candidates.search[:] = search
-        self.arrays = self.arrays.replaced(candidates=candidates, **self._of_pairs(n_nodes))
+        candidates = new_candidates(n_nodes, self._capacity, self._cell)
+        self.arrays = self.arrays.replaced(
+            candidates=candidates,
+            hits=new_hits(len(candidates.edge_edge.wake)),
+            contacts=self._larger_contacts(n_nodes),
+        )
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         arrays = self.arrays
-        of_nodes = ("start", "depth", "depth_epoch", "tangled")
+        of_nodes = ("start", "depth", "depth_epoch", "tangled", "normal")
         self.arrays = arrays.replaced(
             faces=grown_faces(arrays.faces, n_tetrahedra),
             candidates=grown_candidates(arrays.candidates, n_nodes),
-            **self._of_pairs(n_nodes),
+            motion=grown_motion(arrays.motion, n_nodes),
+            contacts=self._larger_contacts(n_nodes),
             **{name: grown(getattr(arrays, name), n_nodes) for name in of_nodes},
         )
 
-    def _of_pairs(self, n_nodes: int) -> dict[str, object]:
-        """Return the arrays of pairs with room for all of them."""
-        n_pairs = self._n_pairs(n_nodes)
-        contacts = grown_contacts(self.arrays.contacts, n_pairs)
-        return {"contacts": contacts, "found": np.zeros(n_pairs, np.int64)}
+    def _larger_contacts(self, n_nodes: int) -> Contacts:
+        return grown_contacts(self.arrays.contacts, n_nodes, self._n_contacts(n_nodes))
 
-    def _n_pairs(self, n_nodes: int) -> int:
-        """Return how many pairs there is room for, every node on the floor among them."""
+    def _n_contacts(self, n_nodes: int) -> int:
+        """Return how many there is room for, every node on the floor among them."""
         return 16 * self._capacity + n_nodes

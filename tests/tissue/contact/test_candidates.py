@@ -1,4 +1,4 @@
-"""The broad phase leaves out nothing that is near."""
+"""The broad phase leaves out nothing that is near, and seeks anew what moved or changed alone."""
 
 import itertools
 
@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 
 from tests import bodies, naive
-from tissue.body import build_body
-from tissue.contact.candidates import (
-    N_EDGE_EDGE,
-    N_EDGES,
-    N_POINT_TRIANGLE,
-    N_TRIANGLES,
-    SAME_WAY,
-    find_candidates,
-    have_moved,
-    new_candidates,
-)
+from tissue.body import CUT, build_body
+from tissue.contact.candidates import N_DIRTY, is_dead_edge, is_dead_point, new_candidates
+from tissue.contact.candidates import renew_candidates as renew
 from tissue.contact.faces import (
     WITH_SKIN,
     collect_faces,
@@ -25,12 +17,14 @@ from tissue.contact.faces import (
     new_faces,
     with_room,
 )
+from tissue.contact.motion import new_motion
 from tissue.shapes import grid
 from tissue.types import TetrahedralMesh
 
 pytestmark = pytest.mark.kernel
 
 MARGIN = 0.004
+CELL = 0.005
 
 
 def two_bodies(offset):
@@ -42,67 +36,137 @@ def two_bodies(offset):
     )
 
 
-def candidates_of(mesh, margin=MARGIN, capacity=64):
-    body = build_body(mesh, None, None)
-    faces = with_room(new_faces(len(mesh.tetrahedra)), count_faces(body, True))
-    faces.counts[WITH_SKIN] = 1
-    faces = in_pieces(faces, (np.arange(len(mesh.tetrahedra)) >= 24).astype(np.int64), 2)
-    collect_faces(faces, body)
-    found = new_candidates(len(mesh.positions), capacity)
-    if not find_candidates(found, faces, body, body.positions, margin):
-        return None
-    return body, found
+class Broad:
+    """The candidates of a body in two pieces: the tetrahedra before `first`, and the others."""
+
+    def __init__(self, mesh, first=24, capacity=256):
+        self.body = build_body(mesh, None, None)
+        faces = with_room(new_faces(len(mesh.tetrahedra)), count_faces(self.body, True))
+        faces.counts[WITH_SKIN] = 1
+        piece = (np.arange(len(mesh.tetrahedra)) >= first).astype(np.int64)
+        self.faces = in_pieces(faces, piece, 2)
+        collect_faces(self.faces, self.body)
+        n = len(mesh.positions)
+        self.found, self.motion = new_candidates(n, capacity, CELL), new_motion(n, 1e-4)
+
+    def renew(self, has_changed=True):
+        body = self.body
+        rest = (self.faces, body, body.positions.copy(), 0.0, has_changed, MARGIN)
+        return renew(self.found, self.motion, *rest)
+
+    def pairs(self, name):
+        pairs = getattr(self.found, name)
+        is_dead = is_dead_point if name == "point_triangle" else is_dead_edge
+        rows = range(pairs.counts[1])
+        alive = [tuple(pairs.node[k].tolist()) for k in rows if not is_dead(self.found, k)]
+        assert len(set(alive)) == len(alive)
+        return set(alive)
+
+    def near(self, reach):
+        """Return the pairs of the two pieces that are within reach [m], by looking at all."""
+        x, triangles = self.body.positions, self.triangles()
+        of = {node: triangle[-1] for triangle in triangles for node in triangle[:3]}
+        points = {
+            (node, *t[:3])
+            for node, t in itertools.product(of, triangles)
+            if of[node] != t[3] and naive.distance_to_triangle(x[node], x[list(t[:3])]) <= reach
+        }
+        edges = {(a, b, t[3]) for t in triangles for a, b in sides(t) if a < b}
+        return points, {
+            (*p[:2], *q[:2])
+            for p, q in itertools.product(edges, edges)
+            if p[2] != q[2] and p[0] < q[0] and distance(x[list(p[:2])], x[list(q[:2])]) <= reach
+        }
+
+    def triangles(self):
+        rows = [face for face in self.faces.face[: self.faces.counts[0]].tolist() if face >= 0]
+        outward = self.found.outward
+        return [
+            (*self.body.tetrahedra[r // 4][outward[r % 4]].tolist(), int(self.faces.piece[r // 4]))
+            for r in rows
+        ]
 
 
-def pairs(found, name, place):
-    return {tuple(row) for row in getattr(found, name)[: found.counts[place]].tolist()}
+def sides(triangle):
+    a, b, c = triangle[:3]
+    return (a, b), (b, c), (c, a)
+
+
+def distance(first, second):
+    """Return the distance of two segments [m], at most a little too large."""
+    s = np.linspace(0.0, 1.0, 41)[:, None]
+    p, q = (ends[0] + s * (ends[1] - ends[0]) for ends in (first, second))
+    return float(np.linalg.norm(p[:, None] - q[None], axis=2).min())
+
+
+def expect_complete(broad, reach=MARGIN):
+    points, edges = broad.near(reach)
+    assert points <= broad.pairs("point_triangle")
+    assert edges <= broad.pairs("edge_edge")
+    return len(points), len(edges)
 
 
 @pytest.mark.parametrize("height", [0.0101, 0.012, 0.0135])
-def test_every_node_near_a_triangle_is_paired_with_it_once(height):
-    body, found = candidates_of(two_bodies([0.008, 0.007, height]))
-    n = found.counts[N_TRIANGLES]
-    point_triangle = pairs(found, "point_triangle", N_POINT_TRIANGLE)
-    assert len(point_triangle) == found.counts[N_POINT_TRIANGLE] > 0
-    for row, node in itertools.product(range(n), found.node[: found.counts[0]].tolist()):
-        corners = found.triangle[row]
-        near = naive.distance_to_triangle(body.positions[node], body.positions[corners]) <= MARGIN
-        if near and node not in corners:
-            assert (node, row) in point_triangle
+def test_what_is_near_is_paired_once(height):
+    broad = Broad(two_bodies([0.008, 0.007, height]))
+    assert broad.renew()
+    n_points, n_edges = expect_complete(broad)
+    assert n_points > 0 and n_edges > 0
 
 
-def test_edges_of_two_bodies_that_face_each_other_are_paired_once():
-    body, found = candidates_of(two_bodies([0.008, 0.007, 0.0105]))
-    edge_edge = pairs(found, "edge_edge", N_EDGE_EDGE)
-    assert len(edge_edge) == found.counts[N_EDGE_EDGE]
-    n_facing = 0
-    for i, j in itertools.combinations(range(found.counts[N_EDGES]), 2):
-        first, second = found.edge[i], found.edge[j]
-        x, y = body.positions[first], body.positions[second]
-        near = (x.min(axis=0) <= y.max(axis=0) + MARGIN) & (y.min(axis=0) <= x.max(axis=0) + MARGIN)
-        n, m = (found.normal[pair].sum(axis=0) for pair in (first, second))
-        facing = n @ m <= SAME_WAY * np.linalg.norm(n) * np.linalg.norm(m)
-        apart = not set(first.tolist()) & set(second.tolist())
-        assert ((i, j) in edge_edge) == bool(near.all() and facing and apart)
-        n_facing += (i, j) in edge_edge
-    assert n_facing > 10
+def test_what_is_far_is_not():
+    broad = Broad(two_bodies([0.008, 0.007, 0.0101]))
+    broad.renew()
+    x = broad.body.positions
+    for node, *corners in broad.pairs("point_triangle"):
+        assert naive.distance_to_triangle(x[node], x[corners]) <= 1.1 * MARGIN
+    for a, b, c, d in broad.pairs("edge_edge"):
+        assert distance(x[[a, b]], x[[c, d]]) <= 1.1 * MARGIN
 
 
 def test_skin_that_is_far_from_every_other_piece_is_left_out():
-    _, found = candidates_of(two_bodies([0.0, 0.0, 0.1]))
-    assert not found.counts.any()
+    broad = Broad(two_bodies([0.0, 0.0, 0.1]))
+    broad.renew()
+    assert not broad.found.node.any() and not broad.pairs("edge_edge")
 
 
-def test_too_little_room_is_said_and_nothing_is_written_beyond_it():
-    assert candidates_of(two_bodies([0.008, 0.007, 0.0105]), capacity=4) is None
+def test_too_little_room_is_said():
+    assert not Broad(two_bodies([0.008, 0.007, 0.0105]), capacity=4).renew()
 
 
-def test_candidates_are_out_of_date_when_a_node_has_moved_by_half_the_margin():
-    body, found = candidates_of(two_bodies([0.008, 0.007, 0.0105]))
-    assert not have_moved(found, body, MARGIN)
-    body.positions[20] += [0.49 * MARGIN, 0.0, 0.0]
-    assert not have_moved(found, body, MARGIN)
-    body.positions[20] += [0.02 * MARGIN, 0.0, 0.0]
-    assert have_moved(found, body, MARGIN)
-    body.positions[20] = np.nan
-    assert have_moved(found, body, MARGIN)
+def test_a_node_is_sought_anew_when_it_has_moved_by_half_the_margin_and_not_before():
+    broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
+    broad.renew()
+    moved = len(broad.body.positions) - 1
+    for way, n_faces in ((0.49 * MARGIN, 0), (0.02 * MARGIN, 3)):
+        broad.body.positions[moved, 0] += way
+        broad.found.counts[N_DIRTY] = 0
+        broad.renew(has_changed=False)
+        assert broad.found.counts[N_DIRTY] == n_faces
+
+
+def test_pairs_stay_complete_while_a_piece_travels_over_another():
+    """It is within half the margin of where it was sought: pairs are complete to the rest."""
+    broad = Broad(two_bodies([-0.01, 0.007, 0.0112]))
+    for i in range(40):
+        broad.renew(has_changed=False)
+        if i % 5 == 0:
+            expect_complete(broad, 0.5 * MARGIN)
+        broad.body.positions[-4:, 0] += 0.2 * MARGIN
+        broad.found.way[0] += 0.2 * MARGIN
+
+
+def test_faces_that_a_cut_makes_are_sought_and_those_that_go_are_forgotten():
+    """The second piece's tetrahedron goes from the list and comes back, as one that is split."""
+    broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
+    broad.renew()
+    complete = expect_complete(broad)
+    body, last = broad.body, len(broad.body.tetrahedra) - 1
+    body.links[last] = 0
+    collect_faces(broad.faces, body)
+    broad.renew()
+    assert not any(max(pair) >= len(body.positions) - 4 for pair in broad.pairs("point_triangle"))
+    body.links[last] = CUT
+    collect_faces(broad.faces, body)
+    broad.renew()
+    assert expect_complete(broad) == complete

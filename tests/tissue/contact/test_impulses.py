@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from tissue.body import build_body
-from tissue.contact.impulses import add_contact, gap, new_contacts, push_apart, stop_approach
+from tissue.contact.impulses import (
+    add_contact,
+    begin_sweeps,
+    gap,
+    is_due,
+    new_contacts,
+    note_move,
+    push_apart,
+    stop_approach,
+)
 from tissue.geometry import Weights
 from tissue.shapes import grid
 from tissue.vec3 import Vec3
@@ -15,14 +24,15 @@ UP = Vec3(0.0, 0.0, 1.0)
 STEP = 1e-3
 
 
-def bodies_of(seed=0, n_contacts=12):
+def bodies_of(seed=0, n_contacts=12, n_fixed=0):
     """Return nodes with random masses and velocities, and random contacts that overlap a little."""
     random = np.random.default_rng(seed)
     body = build_body(grid((2, 2, 2)), None, None)
     n = len(body.rest)
     body.masses[:] = random.uniform(1e-4, 1e-3, n)
     body.velocities[:] = random.normal(size=(n, 3))
-    contacts = new_contacts(n_contacts, 1.0)
+    body.fixed[:n_fixed] = True
+    contacts = new_contacts(n, n_contacts, 1.0)
     for _ in range(n_contacts):
         a, b, c, d = random.choice(n, 4, replace=False).tolist()
         w = random.dirichlet([1.0, 1.0, 1.0]).tolist()
@@ -58,13 +68,13 @@ def test_impulses_keep_momentum_and_only_take_energy(seed, coefficient):
     ).all()
 
 
-def one_on_floor(velocity, depth=0.0):
+def one_on_floor(velocity, depth=0.0, n_contacts=1):
     """Return a body whose node 0 is on the floor, or in it."""
     body = build_body(grid((1, 1, 1)), None, None)
     body.masses[:] = 0.5
     body.positions[0, 2] = -depth
     body.velocities[0] = velocity
-    contacts = new_contacts(1, 1.0)
+    contacts = new_contacts(len(body.rest), n_contacts, 1.0)
     add_contact(contacts, body, (0, 0, 0, 0), Weights(1.0, 0.0, 0.0, 0.0), UP, 0.0)
     return body, contacts
 
@@ -96,10 +106,31 @@ def test_a_node_in_the_floor_is_put_on_it():
 
 
 def test_fixed_nodes_take_any_impulse():
-    body, contacts = bodies_of()
-    body.fixed[:] = True
+    body, contacts = bodies_of(n_fixed=13)
     x, v = body.positions.copy(), body.velocities.copy()
     push_apart(contacts, body, x.copy(), 0.3, 0.0)
     stop_approach(contacts, body, 0.3, STEP, 0.0)
-    np.testing.assert_array_equal(body.positions, x)
-    np.testing.assert_array_equal(body.velocities, v)
+    np.testing.assert_array_equal(body.positions[:13], x[:13])
+    np.testing.assert_array_equal(body.velocities[:13], v[:13])
+    assert (body.velocities[13:] != v[13:]).any()
+
+
+def test_a_contact_between_the_same_nodes_is_added_once():
+    body, contacts = bodies_of()
+    n = contacts.count[0]
+    known = [tuple(row) for row in contacts.node[:n].tolist()]
+    for nodes in known:
+        add_contact(contacts, body, nodes, Weights(1.0, -0.2, -0.3, -0.5), UP, 0.0)
+    assert contacts.count[0] == n == len(set(known))
+
+
+def test_a_contact_is_passed_over_until_another_moves_its_nodes():
+    """One is of node 0 alone, the other of nodes 0 to 3."""
+    body, contacts = one_on_floor([0.0, 0.0, -1.0], n_contacts=2)
+    add_contact(contacts, body, (0, 1, 2, 3), Weights(1.0, -0.2, -0.3, -0.5), UP, 0.0)
+    begin_sweeps(contacts)
+    for k, has_moved, due in [(0, True, [False, True]), (1, False, [False, False])]:
+        note_move(contacts, k, has_moved)
+        assert [is_due(contacts, 0), is_due(contacts, 1)] == due
+    note_move(contacts, 1, True)
+    assert is_due(contacts, 0) and not is_due(contacts, 1)
