@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT
+from bridge.address import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
 from scalpel_sim.console import progress, report, say, say_error, talking
 from scalpel_sim.errors import (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-import bridge.server
+import bridge.peer
 from bridge.bridge import Bridge
 from bridge.link import InProcessLink
 from bridge.server import serve
@@ -35,7 +35,7 @@ def compile_kernels() -> None:
 
 if __name__ == "__main__":
     compile_kernels()
-    bridge.server.HANDSHAKE_SECONDS = 0.5
-    bridge.server.FRAME_SECONDS = 0.5
-    bridge.server.SEND_SECONDS = 0.5
+    bridge.peer.HANDSHAKE_SECONDS = 0.5
+    bridge.peer.FRAME_SECONDS = 0.5
+    bridge.peer.SEND_SECONDS = 0.5
     serve(block, scene="block", port=0, on_listening=lambda address: print(address, flush=True))

@@ -12,12 +12,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from bridge.address import parse_address
 from bridge.bridge import Bridge
 from bridge.link import InProcessLink, LinkError
-from bridge.messages import pack_error, pack_step, unpack_error
+from bridge.messages.step import pack_step
+from bridge.messages.text import pack_error, unpack_error
+from bridge.peer import HANDSHAKE_BYTES
 from bridge.server import MOST_CONNECTIONS, TissueServer
-from bridge.tcp import TcpLink, parse_address
-from bridge.wire import LARGEST_REPLY, LARGEST_REQUEST, VERSION, FrameReader, Kind, pack_frame
+from bridge.tcp import TcpLink
+from bridge.wire import VERSION, FrameReader, Kind, pack_frame
 from tests.bridge.bits import bits
 from tests.bridge.serve_block import block as make_block
 from tissue.types import BladeSegment, BladeSweep
@@ -33,7 +36,7 @@ def connected(address):
 
 def read_all(connection):
     """Return the frames that the other side sends until it hangs up."""
-    reader, frames = FrameReader(LARGEST_REPLY), []
+    reader, frames = FrameReader(), []
     with contextlib.suppress(ConnectionResetError):
         while data := connection.recv(1 << 16):
             reader.feed(data)
@@ -44,7 +47,7 @@ def read_all(connection):
 
 def read_one(connection):
     """Return the next frame."""
-    reader = FrameReader(LARGEST_REPLY)
+    reader = FrameReader()
     while (frame := reader.take()) is None:
         reader.feed(connection.recv(1 << 16))
     return frame
@@ -163,7 +166,7 @@ def assert_serves(server):
         (pack_frame(Kind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "speaks version 99"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
-        (pack_frame(Kind.HELLO, 0, bytes(LARGEST_REQUEST + 1)), "at most 1048576 are allowed"),
+        (pack_frame(Kind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],
     ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
 )
@@ -372,7 +375,9 @@ def test_a_request_that_was_interrupted_does_not_put_the_link_out_of_step(link, 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "", "::", "192.0.2.1"])
 def test_a_host_that_others_can_reach_is_refused(host):
-    with pytest.raises(ValueError, match="is open to other machines, and the link has no keys yet"):
+    with pytest.raises(
+        ValueError, match=r"is open to other machines, and that takes a key: .*scalpel-sim key"
+    ):
         TissueServer(make_block, host=host, port=0)
 
 
