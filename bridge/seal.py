@@ -13,7 +13,7 @@ import secrets
 import struct
 from typing import NamedTuple
 
-from bridge.wire import Frame, MessageError
+from bridge.wire import VERSION, Frame, MessageError
 
 NONCE_BYTES = 32
 """[byte]. Random, so that no two conversations have the same keys."""
@@ -39,8 +39,8 @@ def direction_keys(key: bytes, client_nonce: bytes, server_nonce: bytes) -> Dire
     """Return the keys of one conversation."""
     nonces = client_nonce + server_nonce
     return DirectionKeys(
-        hmac.digest(key, b"scalpel-sim 3 to server" + nonces, "sha256"),
-        hmac.digest(key, b"scalpel-sim 3 to client" + nonces, "sha256"),
+        hmac.digest(key, b"scalpel-sim %d to server" % VERSION + nonces, "sha256"),
+        hmac.digest(key, b"scalpel-sim %d to client" % VERSION + nonces, "sha256"),
     )
 
 

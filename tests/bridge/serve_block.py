@@ -1,9 +1,15 @@
-"""Serves a small block to cut, in a process of its own. Patience is short, for hostile clients."""
+"""Serves a small block to cut, in a process of its own. Patience is short, for hostile clients.
+
+python serve_block.py [HOST]: the key is the environment's, if it has one.
+"""
+
+import sys
 
 import numpy as np
 
 import bridge.peer
 from bridge.bridge import Bridge
+from bridge.keys import chosen_key
 from bridge.link import InProcessLink
 from bridge.server import serve
 from tissue.material import Material
@@ -38,4 +44,11 @@ if __name__ == "__main__":
     bridge.peer.HANDSHAKE_SECONDS = 0.5
     bridge.peer.FRAME_SECONDS = 0.5
     bridge.peer.SEND_SECONDS = 0.5
-    serve(block, scene="block", port=0, on_listening=lambda address: print(address, flush=True))
+    serve(
+        block,
+        scene="block",
+        host=(sys.argv[1:] or ["127.0.0.1"])[0],
+        port=0,
+        key=chosen_key(None),
+        on_listening=lambda address: print(address, flush=True),
+    )
