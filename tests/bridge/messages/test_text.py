@@ -15,7 +15,9 @@ from tissue.material import Material
 
 
 def test_a_description_arrives_with_every_property_of_the_material():
-    material = Material(12e3, 1050.0, 25.0, 4.0, 1e-4, 0.2, "neo_hookean", 0.45)
+    material = Material(
+        12e3, 1050.0, 25.0, 99.0, 0.3, 0.2, 40.0, 0.1, 2.0, 4.0, 1e-4, 0.2, "neo_hookean", 0.45
+    )
     sent = TissueDescription("slab", material, np.array([[0.0, 0.1, 0.2], [1, 2, 3]]), 576, 175)
     received = unpack_description(pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)
