@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from bridge.address import DEFAULT_HOST, DEFAULT_PORT, bound, name_of
 from bridge.link import InProcessLink, LinkError, TissueLink
 from bridge.messages.body import pack_pieces, pack_snapshot, pack_surface
+from bridge.messages.chunks import pack_chunks
 from bridge.messages.quality import pack_quality
 from bridge.messages.result import pack_result
 from bridge.messages.step import unpack_step
@@ -244,6 +245,8 @@ class TissueServer:
             return pack_snapshot(self._link.snapshot())
         if frame.kind == Kind.SURFACE:
             return pack_surface(self._link.surface())
+        if frame.kind == Kind.CHUNKS:
+            return pack_chunks(self._link.chunks())
         if frame.kind == Kind.PIECES:
             return pack_pieces(self._link.n_pieces())
         if frame.kind == Kind.QUALITY:

@@ -17,6 +17,7 @@ from bridge.messages.body import (
     unpack_snapshot,
     unpack_surface,
 )
+from bridge.messages.chunks import LARGEST_CHUNKS, unpack_chunks
 from bridge.messages.quality import QUALITY_BYTES, unpack_quality
 from bridge.messages.result import LARGEST_RESULT, unpack_result
 from bridge.messages.step import pack_step
@@ -29,7 +30,7 @@ from bridge.messages.text import (
 from bridge.seal import NONCE_BYTES, direction_keys, new_nonce
 from bridge.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, Kind, MessageError
 from tissue.quality import QualityReport
-from tissue.types import BladeSweep, Snapshot, StepResult, Surface
+from tissue.types import BladeSweep, Chunks, Snapshot, StepResult, Surface
 
 Value = TypeVar("Value")
 
@@ -88,6 +89,10 @@ class TcpLink:
         """See `TissueLink.snapshot`."""
         limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
         return self._ask(Kind.SNAPSHOT, b"", limit, unpack_snapshot)
+
+    def chunks(self) -> Chunks:
+        """See `TissueLink.chunks`."""
+        return self._ask(Kind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
 
     def surface(self) -> Surface:
         """See `TissueLink.surface`."""

@@ -48,6 +48,7 @@ class Kind(enum.IntEnum):
     ERROR = 6
     QUALITY = 7
     CHALLENGE = 8
+    CHUNKS = 9
 
 
 class Frame(NamedTuple):

@@ -1,11 +1,14 @@
 """What has names and text: the description of the tissue (JSON) and an error (plain UTF-8)."""
 
+import math
+
 import msgspec
 import numpy as np
 
 from bridge.link import TissueDescription
 from bridge.messages.counts import check_counts
 from bridge.wire import MessageError
+from tissue.blade_shape import BladeShape
 from tissue.material import Material
 
 LARGEST_ERROR = 1 << 16
@@ -20,6 +23,8 @@ class _Description(msgspec.Struct, forbid_unknown_fields=True):
     bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
     n_tetrahedra: int
     n_nodes: int
+    blade: BladeShape | None
+    floor: float | None
 
 
 _description_decoder = msgspec.json.Decoder(_Description)
@@ -35,6 +40,8 @@ def pack_description(description: TissueDescription) -> bytes:
             (tuple(low), tuple(high)),
             description.n_tetrahedra,
             description.n_nodes,
+            description.blade,
+            description.floor,
         )
     )
 
@@ -53,7 +60,17 @@ def unpack_description(payload: bytes) -> TissueDescription:
     if not (np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all()):
         raise MessageError(f"the tissue's bounds are {bounds.tolist()} m")
     check_counts(found.n_nodes, found.n_tetrahedra)
-    return TissueDescription(found.scene, found.material, bounds, found.n_tetrahedra, found.n_nodes)
+    if found.floor is not None and not math.isfinite(found.floor):
+        raise MessageError(f"the floor is at {found.floor} m")
+    return TissueDescription(
+        found.scene,
+        found.material,
+        bounds,
+        found.n_tetrahedra,
+        found.n_nodes,
+        found.blade,
+        found.floor,
+    )
 
 
 def pack_error(message: str) -> bytes:

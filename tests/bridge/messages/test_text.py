@@ -11,14 +11,36 @@ from bridge.messages.text import (
 )
 from bridge.wire import MessageError
 from tests.bridge.bits import bits
+from tissue.blade_shape import BladeShape
 from tissue.material import Material
 
 
-def test_a_description_arrives_with_every_property_of_the_material():
+def test_a_description_arrives_with_every_property_of_material_and_blade():
     material = Material(
-        12e3, 1050.0, 25.0, 99.0, 0.3, 0.2, 40.0, 0.1, 2.0, 4.0, 1e-4, 0.2, "neo_hookean", 0.45
+        young_modulus=12e3,
+        density=1050.0,
+        toughness=25.0,
+        skin_toughness=40.0,
+        toughness_exponent=0.5,
+        toughness_speed=0.2,
+        work_to_rupture=1e4,
+        blade_friction=0.1,
+        blade_viscosity=300.0,
+        viscous_damping=4.0,
+        retardation_time=1e-4,
+        friction=0.2,
+        law="neo_hookean",
+        poisson_ratio=0.45,
     )
-    sent = TissueDescription("slab", material, np.array([[0.0, 0.1, 0.2], [1, 2, 3]]), 576, 175)
+    sent = TissueDescription(
+        "slab",
+        material,
+        np.array([[0.0, 0.1, 0.2], [1, 2, 3]]),
+        576,
+        175,
+        BladeShape(thickness=3e-4),
+        -0.01,
+    )
     received = unpack_description(pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)
     assert received._replace(bounds=None) == sent._replace(bounds=None)
