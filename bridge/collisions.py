@@ -1,11 +1,11 @@
 """Which parts of an arm meet what stands around them, and where its instrument meets the arm."""
 
+import math
 from collections.abc import Iterable, Sequence
 
 import fcl
 import numpy as np
 
-from bridge.checks import finite
 from bridge.collision_objects import MovableBox, Obstacles, fixture_objects
 from bridge.fixtures import Fixture
 from bridge.parts import Part
@@ -70,8 +70,13 @@ class Collisions:
             ValueError: a shape is another, or a number is not finite.
         """
         n = len(self._parts)
-        positions = finite(positions, (n, 3), "the positions of the arm's parts")
-        axes = finite(axes, (n, 3, 3), "the axes of the arm's parts")
+        if positions.shape != (n, 3) or axes.shape != (n, 3, 3):
+            raise ValueError(
+                f"poses of shape {positions.shape} and {axes.shape} for {n} parts; wanted "
+                f"{(n, 3)} and {(n, 3, 3)}"
+            )
+        if not math.isfinite(positions.sum() + axes.sum()):
+            raise ValueError("the pose of a part of the arm is not finite")
         for thing, position, turned in zip(self._objects, positions, axes, strict=True):
             thing.setTransform(fcl.Transform(turned, position))
         self._links.moved()
@@ -86,7 +91,7 @@ class Collisions:
                 pairs += [(part.name, other) for other in self._fixtures.met_by(thing)]
             if part.is_instrument:
                 pairs += [(part.name, other) for other in self._links.met_by(thing)]
-        self._positions, self._axes = positions, axes
+        self._positions, self._axes = positions.copy(), axes.copy()
         return tuple(pairs)
 
     def _is_fast(self, positions: FloatArray, axes: FloatArray) -> list[bool]:

@@ -1,16 +1,13 @@
 """From a scene to a simulation: body, stroke through it, and an arm that reaches."""
 
-import numpy as np
-
-from bridge.fixtures import FixtureBox
 from bridge.frames import TissueFrame
-from bridge.link import InProcessLink, TissueDescription, TissueLink
+from bridge.link import InProcessLink, TissueLink
 from scalpel_sim.body import make_tissue
 from scalpel_sim.placement import place
 from scalpel_sim.planning import check_meets, plan
 from scalpel_sim.scenes import Scene, read_stroke
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.touching import floor_fixture
+from scalpel_sim.touching import floor_below
 from tissue.types import TetrahedralMesh
 
 
@@ -38,13 +35,6 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
     check_meets(stroke, mesh)
     placement = place(stroke, link.describe().bounds, scene.arm)
     frame = TissueFrame(origin=placement.tissue_origin)
-    return Simulation(placement.arm(), stroke, link, frame, _floor(link.describe(), frame))
-
-
-def _floor(tissue: TissueDescription, frame: TissueFrame) -> list[FixtureBox]:
-    """Return the floor below the tissue, if there is one."""
-    if tissue.floor is None:
-        return []
-    middle = np.append(tissue.bounds[:, :2].mean(axis=0), tissue.floor)
-    at = frame.points_to_world(middle)
-    return [floor_fixture(float(at[2]), at)]
+    tissue = link.describe()
+    floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor, frame)]
+    return Simulation(placement.arm(), stroke, link, frame, floor)

@@ -8,12 +8,14 @@ import numpy as np
 
 from bridge.collisions import Collisions
 from bridge.fixtures import Fixture, FixtureBox
+from bridge.frames import TissueFrame
 from scalpel_sim.arm import Arm
 from scalpel_sim.arm_parts import TABLE_THICKNESS, ArmParts, tables
 from tissue.types import FloatArray
 
-FLOOR_SIDE = 1.0
-"""[m]. Of the floor below the body, which for the tissue has no end."""
+FLOOR_MARGIN = 0.02
+"""[m], by which the floor reaches beyond the body. For the tissue it has no end; where the arm's
+base stands there is none."""
 
 log = logging.getLogger("scalpel_sim")
 
@@ -63,12 +65,15 @@ class Touching:
             self._frames[pair] += 1
 
 
-def floor_fixture(height: float, below: FloatArray) -> FixtureBox:
-    """Return the floor that loose pieces land on.
+def floor_below(bounds: FloatArray, height: float, frame: TissueFrame) -> FixtureBox:
+    """Return the floor that loose pieces land on, as far as it is below the body.
 
     Args:
-        height: Of its upper side [m], world frame.
-        below: What it lies below [m], shape (3,).
+        bounds: Lowest and highest corner of the body [m], tissue frame, shape (2, 3).
+        height: Of the upper side of the floor [m], tissue frame.
+        frame: Where the tissue lies in the world.
     """
-    centre = np.array([below[0], below[1], height - 0.5 * TABLE_THICKNESS])
-    return FixtureBox("floor", np.array([FLOOR_SIDE, FLOOR_SIDE, TABLE_THICKNESS]), centre)
+    low, high = bounds[:, :2]
+    centre = np.array([*(0.5 * (low + high)), height - 0.5 * TABLE_THICKNESS])
+    size = np.array([*(high - low + 2.0 * FLOOR_MARGIN), TABLE_THICKNESS])
+    return FixtureBox("floor", size, frame.points_to_world(centre), frame.rotation)

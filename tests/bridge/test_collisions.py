@@ -104,7 +104,7 @@ def test_an_arm_without_parts_and_a_world_without_fixtures_meet_nothing():
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_pose_that_is_not_finite_is_refused_before_the_collision_library_sees_it(bad):
-    with pytest.raises(ValueError, match="positions of the arm's parts is not finite"):
+    with pytest.raises(ValueError, match="pose of a part of the arm is not finite"):
         look(Collisions([ROD], [TABLE]), (0.0, bad, 0.0))
 
 
@@ -113,3 +113,8 @@ def test_two_parts_or_fixtures_of_one_name_are_refused():
         Collisions([ROD, ROD])
     with pytest.raises(ValueError, match="two fixtures have the name 'table'"):
         Collisions([ROD], [TABLE, TABLE])
+
+
+def test_poses_of_another_number_of_parts_are_refused():
+    with pytest.raises(ValueError, match=r"poses of shape \(2, 3\) .* for 1 parts"):
+        look(Collisions([ROD], [TABLE]), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
