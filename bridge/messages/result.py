@@ -19,23 +19,23 @@ from tissue.types import (
 MOST_CONTACTS = 1 << 16
 """Of the blade: a thousand times what a scalpel has in an organ."""
 
-_COUNTS = struct.Struct("<8q")
-_N_FIXED = 9 + 9 + 36 + 3 + 6 + 4 + 2 + 3 + 3
-"""Floats that every reply has."""
+_HEAD = struct.Struct("<8q9d")
+_N_ALWAYS = 9 + 9 + 36 + 3 + 6 + 3
+"""Floats of the arrays that every reply has."""
 _N_EACH = 3 + 3 + 1 + 3 + 1
 """Floats of each contact."""
 _N_ENERGIES = len(Energies._fields)
-LARGEST_RESULT = _COUNTS.size + 8 * (_N_FIXED + _N_EACH * MOST_CONTACTS + _N_ENERGIES)
+LARGEST_RESULT = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * MOST_CONTACTS + _N_ENERGIES)
 """[byte]."""
 
 
 def pack_result(result: StepResult) -> bytes:
-    """Return a reply: the integers of a result, then its floats in the order of its fields.
+    """Return a reply: the integers of a result, its single floats, its arrays.
 
     The contacts and the energies, of which there may be any number and none, come last.
     """
     touch, contacts, energies = result.touch, result.contacts, result.energies
-    counts = _COUNTS.pack(
+    head = _HEAD.pack(
         result.n_tetrahedra,
         result.n_nodes,
         result.n_active,
@@ -44,24 +44,23 @@ def pack_result(result: StepResult) -> bytes:
         touch.n_contacts,
         len(contacts.point),
         energies is not None,
+        result.anchored_length,
+        result.cut_area,
+        result.work_of_blade,
+        result.work_of_cutting,
+        touch.penetration,
+        touch.force,
+        *result.profile,
     )
-    floats = np.concatenate(
+    # One call for all: each array by itself costs as much as the rest of the message.
+    arrays = np.concatenate(
         (
             *result.wrench,
             *result.wrench_t1,
             result.stiffness.ravel(),
             result.force_on_tissue,
             result.bounds.ravel(),
-            (
-                result.anchored_length,
-                result.cut_area,
-                result.work_of_blade,
-                result.work_of_cutting,
-                touch.penetration,
-                touch.force,
-            ),
             touch.force_of_floor,
-            result.profile,
             contacts.point.ravel(),
             contacts.normal.ravel(),
             contacts.normal_force,
@@ -71,7 +70,7 @@ def pack_result(result: StepResult) -> bytes:
         ),
         dtype="<f8",
     )
-    return counts + floats.tobytes()
+    return head + arrays.tobytes()
 
 
 def unpack_result(payload: bytes) -> StepResult:
@@ -83,10 +82,10 @@ def unpack_result(payload: bytes) -> StepResult:
     Raises:
         MessageError: the length is wrong, or a count is negative or too large.
     """
-    if len(payload) < _COUNTS.size:
-        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_COUNTS.size} at least")
-    counts = _COUNTS.unpack_from(payload)
-    n_tetrahedra, n_nodes, n_active, tip_tetrahedron, n_substeps, n_touching, n, audited = counts
+    if len(payload) < _HEAD.size:
+        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_HEAD.size} at least")
+    head = _HEAD.unpack_from(payload)
+    n_tetrahedra, n_nodes, n_active, tip_tetrahedron, n_substeps, n_touching, n, audited = head[:8]
     check_counts(n_nodes, n_tetrahedra)
     if not (0 <= n_active <= n_tetrahedra and -1 <= tip_tetrahedron < n_tetrahedra):
         raise MessageError(
@@ -96,32 +95,28 @@ def unpack_result(payload: bytes) -> StepResult:
         raise MessageError(f"{n_substeps} substeps and {n_touching} contacts")
     if not (0 <= n <= MOST_CONTACTS and audited in (0, 1)):
         raise MessageError(f"{n} contacts of the blade, and {audited} audits")
-    n_floats = _N_FIXED + _N_EACH * n + _N_ENERGIES * audited
-    if len(payload) != _COUNTS.size + 8 * n_floats:
-        raise MessageError(
-            f"a step reply of {len(payload)} bytes; wanted {_COUNTS.size + 8 * n_floats}"
-        )
-    floats = np.frombuffer(payload, "<f8", offset=_COUNTS.size).astype(np.float64)  # a copy
-    of_contacts = floats[_N_FIXED : _N_FIXED + _N_EACH * n]
-    length, area, work, work_of_cutting, penetration, force = floats[63:69].tolist()
+    wanted = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * n + _N_ENERGIES * audited)
+    if len(payload) != wanted:
+        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {wanted}")
+    floats = np.frombuffer(payload, "<f8", offset=_HEAD.size).astype(np.float64)  # a copy
     return StepResult(
         wrench=Wrench(floats[0:3], floats[3:6], floats[6:9]),
         wrench_t1=Wrench(floats[9:12], floats[12:15], floats[15:18]),
         stiffness=floats[18:54].reshape(6, 6),
-        contacts=_contacts(of_contacts, n),
+        contacts=_contacts(floats[_N_ALWAYS : _N_ALWAYS + _N_EACH * n], n),
         force_on_tissue=floats[54:57],
         bounds=floats[57:63].reshape(2, 3),
         n_tetrahedra=n_tetrahedra,
         n_nodes=n_nodes,
         n_active=n_active,
         active_point_tetrahedron=tip_tetrahedron,
-        anchored_length=length,
-        cut_area=area,
-        work_of_blade=work,
-        work_of_cutting=work_of_cutting,
+        anchored_length=head[8],
+        cut_area=head[9],
+        work_of_blade=head[10],
+        work_of_cutting=head[11],
         n_substeps=n_substeps,
-        touch=Touch(n_touching, penetration, force, floats[69:72]),
-        profile=Profile(*floats[72:75].tolist()),
+        touch=Touch(n_touching, head[12], head[13], floats[63:66]),
+        profile=Profile(*head[14:]),
         energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
     )
 
