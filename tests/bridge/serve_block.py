@@ -12,6 +12,7 @@ from bridge.bridge import Bridge
 from bridge.keys import chosen_key
 from bridge.link import InProcessLink
 from bridge.server import serve
+from tissue.blade_shape import BladeShape
 from tissue.material import Material
 from tissue.shapes import grid
 from tissue.tissue import Tissue
@@ -21,10 +22,13 @@ SIDE = 0.02
 
 
 def block() -> Tissue:
-    """Return a block of 3 x 2 x 2 cells and 2 cm in length, held at its left and right sides."""
+    """Return a block of 3 x 2 x 2 cells and 2 cm in length, held at its left and right sides.
+
+    The blade is a body and its work is audited, so that a reply has all that one may have.
+    """
     mesh = grid((3, 2, 2), (SIDE, SIDE, SIDE))
     fixed = (mesh.positions[:, 0] == 0.0) | (mesh.positions[:, 0] == SIDE)
-    return Tissue(mesh, Material(toughness=5.0), fixed=fixed)
+    return Tissue(mesh, Material(toughness=5.0), fixed=fixed, blade=BladeShape(), audit=True)
 
 
 def compile_kernels() -> None:
@@ -35,6 +39,7 @@ def compile_kernels() -> None:
         tip, heel = np.array([0.009, y, -0.005]), np.array([0.009, y, 0.025])
         bridge.step(BladeSegment(tip, heel, np.array([0.0, 1.0, 0.0])), 1e-3)
     tissue.surface()
+    tissue.chunks()
     tissue.n_pieces()
     tissue.quality()
 

@@ -56,10 +56,12 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert felt_here[-1].cut_area > 1e-5
     assert max(len(result.contacts.point) for result in felt_here) > 3
     assert max(np.linalg.norm(result.stiffness) for result in felt_here) > 1.0
+    assert felt_here[-1].energies.cutting > 0.0
     assert felt_here[-1].n_tetrahedra > felt_here[0].n_tetrahedra
     assert [bits(r) for r in felt_here] == [bits(r) for r in felt_there]
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
+    assert bits(here.chunks()) == bits(link.chunks())
     assert here.n_pieces() == link.n_pieces()
     assert bits(here.quality()) == bits(link.quality())
     assert link.quality().n_cut_nodes > 0

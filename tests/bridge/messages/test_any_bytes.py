@@ -14,6 +14,7 @@ from bridge.messages.body import (
     unpack_snapshot,
     unpack_surface,
 )
+from bridge.messages.chunks import pack_chunks, unpack_chunks
 from bridge.messages.quality import pack_quality, unpack_quality
 from bridge.messages.result import pack_result, unpack_result
 from bridge.messages.step import pack_step, unpack_step
@@ -36,6 +37,7 @@ def real_messages():
         "step": (pack_step(BladeSweep(edge, edge), 1e-3), unpack_step),
         "result": (pack_result(result), unpack_result),
         "snapshot": (pack_snapshot(tissue.snapshot()), unpack_snapshot),
+        "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
         "pieces": (pack_pieces(1), unpack_pieces),
         "quality": (pack_quality(tissue.quality()), unpack_quality),
@@ -90,6 +92,8 @@ def is_fit(what, value):
         return value.triangles.min() >= 0 and value.triangles.max() < len(value.positions)
     if what == "result":
         return -1 <= value.active_point_tetrahedron < value.n_tetrahedra
+    if what == "chunks":
+        return np.isfinite(value.boxes).all() and 0.0 <= value.fastest < np.inf
     if what == "description":
         return np.isfinite(value.bounds).all() and value.material.density > 0.0
     if what == "error":
