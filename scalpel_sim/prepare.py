@@ -1,5 +1,10 @@
 """From a scene to a simulation: body, stroke through it, and an arm that reaches."""
 
+from collections.abc import Iterable
+
+import numpy as np
+
+from bridge.fixtures import Fixture
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink, TissueLink
 from scalpel_sim.body import make_tissue
@@ -11,7 +16,9 @@ from scalpel_sim.touching import floor_below
 from tissue.types import TetrahedralMesh
 
 
-def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
+def prepare(
+    scene: Scene, link: TissueLink | None = None, fixtures: Iterable[Fixture] = ()
+) -> Simulation:
     """Return the simulation of a scene, at its start.
 
     The stroke is planned on the body as it lies there, sagged and stretched: what the link says of
@@ -20,6 +27,8 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
     Args:
         scene: What to cut, and how.
         link: A body that is elsewhere already; None makes the scene's own in this process.
+        fixtures: What stands around the body, in its frame: where that lies in the world is chosen
+            here, so that the arm reaches.
 
     Raises:
         ValueError: the scene does not fit together; each part says how.
@@ -36,5 +45,9 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
     placement = place(stroke, link.describe().bounds, scene.arm)
     frame = TissueFrame(origin=placement.tissue_origin)
     tissue = link.describe()
-    floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor, frame)]
-    return Simulation(placement.arm(), stroke, link, frame, floor)
+    floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
+    world = TissueFrame(
+        frame.rotation.T, frame.points_to_tissue(np.zeros(3))
+    )  # as the tissue sees it
+    standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
+    return Simulation(placement.arm(), stroke, link, frame, standing)

@@ -8,7 +8,6 @@ import numpy as np
 
 from bridge.collisions import Collisions
 from bridge.fixtures import Fixture, FixtureBox
-from bridge.frames import TissueFrame
 from scalpel_sim.arm import Arm
 from scalpel_sim.arm_parts import TABLE_THICKNESS, ArmParts, tables
 from tissue.types import FloatArray
@@ -65,15 +64,14 @@ class Touching:
             self._frames[pair] += 1
 
 
-def floor_below(bounds: FloatArray, height: float, frame: TissueFrame) -> FixtureBox:
-    """Return the floor that loose pieces land on, as far as it is below the body.
+def floor_below(bounds: FloatArray, height: float) -> FixtureBox:
+    """Return the floor that loose pieces land on, as far as it is below the body. Tissue frame.
 
     Args:
-        bounds: Lowest and highest corner of the body [m], tissue frame, shape (2, 3).
-        height: Of the upper side of the floor [m], tissue frame.
-        frame: Where the tissue lies in the world.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+        height: Of the upper side of the floor [m].
     """
     low, high = bounds[:, :2]
     centre = np.array([*(0.5 * (low + high)), height - 0.5 * TABLE_THICKNESS])
     size = np.array([*(high - low + 2.0 * FLOOR_MARGIN), TABLE_THICKNESS])
-    return FixtureBox("floor", size, frame.points_to_world(centre), frame.rotation)
+    return FixtureBox("floor", size, centre)

@@ -94,7 +94,8 @@ def horseshoe(blade):
     bent = np.stack([radius * np.cos(turn), radius * np.sin(turn), mesh.positions[:, 2]], axis=1)
     material = Material(young_modulus=1e3, toughness=1.0)  # sound goes 1.1 mm in a frame
     fixed = np.abs(mesh.positions[:, 0] - 0.03) < 1e-3
-    return Tissue(TetrahedralMesh(bent, mesh.tetrahedra), material, fixed=fixed, blade=blade)
+    body = TetrahedralMesh(bent, mesh.tetrahedra)
+    return Tissue(body, material, fixed=fixed, blade=blade, gravity=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("blade", [None, BladeShape()], ids=["line", "body"])

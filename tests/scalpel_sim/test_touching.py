@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from bridge.fixtures import FixtureBox
-from bridge.frames import TissueFrame
 from scalpel_sim.arm import PRESETS, Arm
 from scalpel_sim.prepare import prepare
 from scalpel_sim.scenes import SCENES, changed
@@ -80,7 +79,15 @@ def test_a_blade_that_passes_below_the_body_meets_the_floor_there():
 
 def test_the_floor_lies_below_the_body_and_no_farther():
     bounds = np.array([[0.0, 0.0, 0.0], [0.04, 0.02, 0.01]])
-    floor = floor_below(bounds, -0.005, TissueFrame(origin=np.array([1.0, 2.0, 3.0])))
-    np.testing.assert_allclose(floor.centre[:2], [1.02, 2.01])
-    assert floor.centre[2] + 0.5 * floor.size[2] == pytest.approx(2.995)
+    floor = floor_below(bounds, -0.005)
+    np.testing.assert_allclose(floor.centre[:2], [0.02, 0.01])
+    assert floor.centre[2] + 0.5 * floor.size[2] == pytest.approx(-0.005)
     np.testing.assert_allclose(floor.size[:2], [0.04 + 2 * FLOOR_MARGIN, 0.02 + 2 * FLOOR_MARGIN])
+
+
+def test_what_stands_around_the_body_is_said_in_its_frame():
+    start = prepare(SCENES["grid2"]).stroke.pose(0.0)
+    clamp = FixtureBox("clamp", np.full(3, 5e-3), 0.5 * (start.tip + start.heel))
+    simulation = prepare(SCENES["grid2"], fixtures=[clamp])
+    simulation.run(0.003)
+    assert simulation.touching.now == (("blade", "clamp"),)
