@@ -1,7 +1,9 @@
 """Times a step over TCP against the same step in process: python benchmarks/round_trip.py.
 
-The tissue is one cell at rest without a blade near, so that what remains is the link. It lives in a
-second process, as with `scalpel-sim serve`. Run it on an idle machine, from the repository.
+The tissue is small and lives in a second process, as with `scalpel-sim serve`: at rest without a
+blade, with a blade that hangs above it, with one that it holds, whose contacts travel too; and the
+same with a key. What the link adds includes what it costs the step to find its data gone from the
+cache, after a process that slept. Run it on an idle machine, from the repository.
 """
 
 import subprocess
@@ -21,36 +23,68 @@ from tissue.types import BladeSegment, BladeSweep, FloatArray
 DT = 1e-4
 """[s]. One Runge-Kutta step of the cell."""
 N_WARM_UP = 200
-N_STEPS = 10_000
+N_STEPS = 4_000
 MICROSECONDS = 1e6
+SIDE = 0.01
+"""Of the cell [m]."""
+KEY = bytes(range(32))
+WITH_KEY = "with a key"
 
-HERE = BladeSegment(np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.1]), np.array([0.0, 1.0, 0.0]))
-"""A blade a metre above the tissue: a full request, and nothing to cut."""
+
+def upright(y: float, z: float) -> BladeSegment:
+    """Return an edge over the middle of the cell that faces along y."""
+    tip = np.array([0.4 * SIDE, y, z])
+    return BladeSegment(tip, tip + np.array([0.0, 0.0, 3.0 * SIDE]), np.array([0.0, 1.0, 0.0]))
 
 
 def main() -> None:
-    """Print the times of a step through both links."""
-    if sys.argv[1:] == ["serve"]:
-        serve(cell, port=0, on_listening=lambda address: print(address, flush=True))
+    """Print the times of a step through each link."""
+    if sys.argv[1:2] == ["serve"]:
+        key = KEY if WITH_KEY in sys.argv else None
+        serve(cell, port=0, key=key, on_listening=lambda address: print(address, flush=True))
         return
-    server = subprocess.Popen(
-        [sys.executable, __file__, "serve"], stdout=subprocess.PIPE, text=True
-    )
+    links: dict[str, TissueLink] = {"in process": InProcessLink(cell())}
+    servers = []
     try:
-        assert server.stdout is not None
-        with closing(TcpLink(server.stdout.readline().strip())) as there:
-            links: dict[str, TissueLink] = {"in process": InProcessLink(cell()), "over TCP": there}
-            report({name: times(link, None) for name, link in links.items()}, "no blade near")
-            sweep = BladeSweep(HERE, HERE)
-            report({name: times(link, sweep) for name, link in links.items()}, "with a blade")
+        for name, options in (("over TCP", []), (WITH_KEY, [WITH_KEY])):
+            server = subprocess.Popen(
+                [sys.executable, __file__, "serve", *options], stdout=subprocess.PIPE, text=True
+            )
+            servers.append(server)
+            assert server.stdout is not None
+            address = server.stdout.readline().strip()
+            links[name] = TcpLink(address, key=KEY if options else None)
+        above, within = upright(0.5 * SIDE, SIDE), upright(0.3 * SIDE, -SIDE)
+        report("no blade", {name: times(link, None) for name, link in links.items()})
+        for what, pose in (("a blade above", above), ("a blade held", within)):
+            for link in links.values():
+                draw_in(link, pose)
+            sweep = BladeSweep(pose, pose)
+            print(f"{what}: {len(link.step(sweep, DT).contacts.point)} contacts")
+            report(what, {name: times(link, sweep) for name, link in links.items()})
     finally:
-        server.terminate()
-        server.wait()
+        for link in links.values():
+            with closing(link):
+                pass
+        for server in servers:
+            server.terminate()
+            server.wait()
 
 
 def cell() -> Tissue:
-    """Return one cell of six tetrahedra, at rest."""
-    return Tissue(grid((1, 1, 1), (0.01, 0.01, 0.01)), gravity=(0.0, 0.0, 0.0))
+    """Return one cell of six tetrahedra, held by its lowest nodes, at rest."""
+    mesh = grid((1, 1, 1), (SIDE, SIDE, SIDE))
+    return Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0, gravity=(0.0, 0.0, 0.0))
+
+
+def draw_in(link: TissueLink, pose: BladeSegment) -> None:
+    """Bring the blade to a pose from in front of the cell."""
+    before = None
+    for y in np.linspace(-0.1 * SIDE, pose.tip[1], 200):
+        shift = np.array([0.0, y - pose.tip[1], 0.0])
+        after = pose._replace(tip=pose.tip + shift, heel=pose.heel + shift)
+        link.step(BladeSweep(before or after, after), 1e-3)
+        before = after
 
 
 def times(link: TissueLink, sweep: BladeSweep | None) -> FloatArray:
@@ -65,13 +99,16 @@ def times(link: TissueLink, sweep: BladeSweep | None) -> FloatArray:
     return taken * MICROSECONDS
 
 
-def report(taken: dict[str, FloatArray], what: str) -> None:
-    """Print median and 99th percentile of each link, and what TCP adds."""
+def report(what: str, taken: dict[str, FloatArray]) -> None:
+    """Print median and 99th percentile of each link, and what it adds to the step itself."""
+    alone = np.median(taken["in process"])
     for name, values in taken.items():
         median, p99 = np.percentile(values, [50, 99])
-        print(f"{what:14} {name:11} median {median:7.1f} µs   p99 {p99:7.1f} µs")
-    medians = {name: np.median(values) for name, values in taken.items()}
-    print(f"{what:14} the link adds {medians['over TCP'] - medians['in process']:.1f} µs\n")
+        print(
+            f"{what:13}  {name:10}  median {median:6.1f} µs  p99 {p99:6.1f} µs  "
+            f"the link adds {median - alone:6.1f} µs"
+        )
+    print()
 
 
 if __name__ == "__main__":

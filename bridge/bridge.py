@@ -72,6 +72,8 @@ class Bridge:
             tissue.bounds,
             tissue.material.wave_speed,
             map(frame.fixture_to_tissue, fixtures),
+            blade=tissue.blade,
+            chunks=link.chunks,
         )
         self._segment: BladeSegment | None = None
         self._result: StepResult | None = None
@@ -100,8 +102,8 @@ class Bridge:
         _check(segment, dt)
         after = self._frame.segment_to_tissue(segment)
         sweep = BladeSweep(self._segment or after, after)
-        contacts = self._broad_phase.contacts(sweep, dt)
-        near = contacts.tissue or self._engaged()
+        contacts = self._broad_phase.contacts(sweep, dt, engaged=self._engaged())
+        near = contacts.tissue
         result = self._link.step(sweep if near else None, dt)
         if not np.isfinite(result.bounds).all():
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from tissue.blade_shape import BladeShape
 from tissue.material import Material
 from tissue.quality import QualityReport
-from tissue.types import BladeSweep, FloatArray, Snapshot, StepResult, Surface
+from tissue.types import BladeSweep, Chunks, FloatArray, Snapshot, StepResult, Surface
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
     from tissue.tissue import Tissue
@@ -26,6 +27,10 @@ class TissueDescription(NamedTuple):
     """Lowest and highest corner now [m], shape (2, 3)."""
     n_tetrahedra: int
     n_nodes: int
+    blade: BladeShape | None = None
+    """The body of the blade that cuts it; None for the paper's blade, a line."""
+    floor: float | None = None
+    """Height of the floor that pieces land on [m]; None for no floor."""
 
 
 class TissueLink(Protocol):
@@ -43,6 +48,9 @@ class TissueLink(Protocol):
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
+
+    def chunks(self) -> Chunks:
+        """Return boxes that together hold the body, and how fast its nodes are now."""
 
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
@@ -72,6 +80,8 @@ class InProcessLink:
             self._tissue.bounds,
             self._tissue.n_tetrahedra,
             self._tissue.n_nodes,
+            self._tissue.blade,
+            self._tissue.floor,
         )
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
@@ -81,6 +91,10 @@ class InProcessLink:
     def snapshot(self) -> Snapshot:
         """See `TissueLink.snapshot`."""
         return self._tissue.snapshot()
+
+    def chunks(self) -> Chunks:
+        """See `TissueLink.chunks`."""
+        return self._tissue.chunks()
 
     def surface(self) -> Surface:
         """See `TissueLink.surface`."""

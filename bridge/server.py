@@ -7,50 +7,32 @@ client does (silence, half a message, garbage, floods, death) costs only that cl
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import logging
 import selectors
 import signal
-import socket
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from bridge.address import DEFAULT_HOST, DEFAULT_PORT, bound, name_of
 from bridge.link import InProcessLink, LinkError, TissueLink
-from bridge.messages import (
-    pack_description,
-    pack_error,
-    pack_pieces,
-    pack_quality,
-    pack_result,
-    pack_snapshot,
-    pack_surface,
-    unpack_step,
-)
-from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT, READ_BYTES
-from bridge.wire import (
-    LARGEST_REPLY,
-    LARGEST_REQUEST,
-    Frame,
-    FrameReader,
-    Kind,
-    MessageError,
-    pack_frame,
-)
+from bridge.messages.body import pack_pieces, pack_snapshot, pack_surface
+from bridge.messages.chunks import pack_chunks
+from bridge.messages.quality import pack_quality
+from bridge.messages.result import pack_result
+from bridge.messages.step import unpack_step
+from bridge.messages.text import pack_description, pack_error
+from bridge.peer import Peer
+from bridge.seal import NONCE_BYTES, direction_keys, new_nonce
+from bridge.wire import LARGEST_REPLY, READ_BYTES, Frame, Kind, MessageError, pack_frame
 
 if TYPE_CHECKING:  # only its maker needs the engine
     from tissue.tissue import Tissue
 
 logger = logging.getLogger(__name__)
 
-HANDSHAKE_SECONDS = 2.0
-"""How long somebody may be connected without having said HELLO [s]."""
-FRAME_SECONDS = 2.0
-"""How long the rest of a message may take once it has begun [s]. On loopback: microseconds."""
-SEND_SECONDS = 10.0
-"""How long a client may take to read a reply [s]. The largest is a gibibyte."""
 MOST_CONNECTIONS = 8
-"""Connections that are open at a time: the client's, and those that have not said HELLO yet."""
+"""Connections that are open at a time: the client's, and those that want to be it."""
 
 
 def serve(
@@ -59,6 +41,7 @@ def serve(
     scene: str = "",
     host: str = DEFAULT_HOST,
     port: int = DEFAULT_PORT,
+    key: bytes | None = None,
     on_listening: Callable[[str], None] | None = None,
 ) -> None:
     """Serve tissues until SIGINT or SIGTERM. Call it from the main thread.
@@ -66,34 +49,22 @@ def serve(
     Args:
         make_tissue: Makes the tissue that a client gets: the same one every time.
         scene: What it makes, as the command line names it.
-        host: Where to listen; loopback only.
+        host: Where to listen; without a key loopback only.
         port: 0 for any that is free.
+        key: What a client must have, too (`keys.read_key`); None: whoever is on this machine.
         on_listening: Told the address "HOST:PORT" once clients can connect.
 
     Raises:
-        ValueError: the host is not loopback, or the port is none.
+        ValueError: the host is not loopback and there is no key, or the port is none.
         LinkError: the port is in use or not allowed.
     """
-    with TissueServer(make_tissue, scene=scene, host=host, port=port) as server:
+    with TissueServer(make_tissue, scene=scene, host=host, port=port, key=key) as server:
         logger.info("serving %s at %s", scene or "a tissue", server.address)
         with _terminate_as_interrupt(), contextlib.suppress(KeyboardInterrupt):
             if on_listening is not None:
                 on_listening(server.address)
             server.run()
     logger.info("stopped")
-
-
-class _Peer:
-    """Somebody who is connected."""
-
-    def __init__(self, connection: socket.socket, name: str) -> None:
-        self.socket = connection
-        self.name = name
-        self.reader = FrameReader(LARGEST_REQUEST)
-        self.sequence = -1
-        """Number of the last request."""
-        self.deadline: float | None = time.monotonic() + HANDSHAKE_SECONDS
-        """When to stop waiting for the rest of a message [s on the monotonic clock]; or None."""
 
 
 class TissueServer:
@@ -109,9 +80,17 @@ class TissueServer:
         scene: str = "",
         host: str = DEFAULT_HOST,
         port: int = DEFAULT_PORT,
+        key: bytes | None = None,
     ) -> None:
         self._make_link = lambda: InProcessLink(make_tissue(), scene)
-        self._listener = _bound(host, port)
+        self._key = key
+        try:
+            self._listener = bound(host, port, has_key=key is not None)
+        except OSError as cause:
+            raise LinkError(
+                f"cannot listen at {name_of((host, port))}: {cause.strerror}. Choose another port, "
+                "or 0 for any that is free"
+            ) from cause
         try:
             self._link: TissueLink = self._make_link()
             self._listener.listen(MOST_CONNECTIONS)
@@ -121,8 +100,8 @@ class TissueServer:
         self._listener.setblocking(False)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._listener, selectors.EVENT_READ)
-        self._peers: list[_Peer] = []
-        self._client: _Peer | None = None
+        self._peers: list[Peer] = []
+        self._client: Peer | None = None
 
     def __enter__(self) -> TissueServer:
         return self
@@ -133,7 +112,7 @@ class TissueServer:
     @property
     def address(self) -> str:
         """Where it listens, "HOST:PORT"."""
-        return _name(self._listener.getsockname())
+        return name_of(self._listener.getsockname())
 
     def run(self) -> None:
         """Serve until an exception, such as KeyboardInterrupt, ends it."""
@@ -150,7 +129,7 @@ class TissueServer:
     def close(self) -> None:
         """Close every connection and the listening socket."""
         for peer in self._peers:
-            peer.socket.close()
+            peer.close()
         self._peers.clear()
         self._selector.close()
         self._listener.close()
@@ -166,15 +145,13 @@ class TissueServer:
         except OSError as error:  # gone again, or no file descriptor left
             logger.warning("a connection could not be accepted: %s", error)
             return
-        connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        peer = _Peer(connection, _name(where))
+        peer = Peer(connection, name_of(where))
         self._peers.append(peer)
         self._selector.register(connection, selectors.EVENT_READ, peer)
         if len(self._peers) > MOST_CONNECTIONS:
             self._refuse(peer, f"{MOST_CONNECTIONS} connections are open; there may be no more")
 
-    def _hear(self, peer: _Peer) -> None:
+    def _hear(self, peer: Peer) -> None:
         """Take what has come from a peer, and answer each whole request in it."""
         if peer not in self._peers:
             return  # dropped while an earlier event was handled
@@ -186,53 +163,71 @@ class TissueServer:
             return self._drop(peer, f"the connection broke: {error}")
         if not data:
             return self._drop(peer, "it has left")
-        peer.reader.feed(data)
+        peer.channel.feed(data)
         try:
-            while (frame := peer.reader.take()) is not None:
-                self._answer(peer, frame)
-                if peer not in self._peers:
-                    return
-                peer.deadline = None
+            while peer in self._peers and (frame := peer.take()) is not None:
+                if peer is self._client or self._takes_seat(peer, frame):
+                    self._answer(peer, frame)
         except MessageError as error:  # nobody knows where the next message begins
+            if peer is not self._client and peer.channel.is_sealed:
+                logger.warning("%s has another key", peer.name)
+                return self._refuse(peer, "your key is not the one of this server")
             return self._refuse(peer, str(error))
-        if peer.deadline is None and peer.reader.is_within_a_frame:
-            peer.deadline = time.monotonic() + FRAME_SECONDS
 
-    def _answer(self, peer: _Peer, frame: Frame) -> None:
-        if peer is not self._client and not self._take_seat(peer, frame):
-            return
-        try:
-            _check_sequence(frame.sequence, peer.sequence)
-            peer.sequence = frame.sequence
-            reply = self._reply(frame)
-            if len(reply) > LARGEST_REPLY:
-                raise MessageError(f"the reply has {len(reply)} bytes, over {LARGEST_REPLY}")
-        except MessageError as error:
-            logger.warning("refused a request of %s: %s", peer.name, error)
-            self._send(peer, pack_frame(Kind.ERROR, frame.sequence, pack_error(str(error))))
-        except Exception as error:  # the tissue's failure is the client's to hear of, not our end
-            logger.exception("the tissue of %s failed", peer.name)
-            text = f"{type(error).__name__}: {error}"
-            self._send(peer, pack_frame(Kind.ERROR, frame.sequence, pack_error(text)))
-        else:
-            self._send(peer, pack_frame(Kind(frame.kind), frame.sequence, reply))
+    def _takes_seat(self, peer: Peer, frame: Frame) -> bool:
+        """Go on with the handshake; return whether the frame is a HELLO that makes it the client.
 
-    def _take_seat(self, peer: _Peer, frame: Frame) -> bool:
-        """Make the peer the client if it says HELLO and the place is free; else refuse it."""
-        peer.sequence = frame.sequence - 1
+        Without a key that is the first one, and empty. With a key the first one brings the client's
+        nonce, and is answered by a CHALLENGE with ours; the second one is sealed with the key.
+        """
         if frame.kind != Kind.HELLO:
             self._refuse(peer, "the first message must be a HELLO")
-            return False
-        if self._client is not None:
+        elif self._key is None and frame.payload:
+            self._refuse(peer, "you come with a key, and this server has none: serve with --key")
+        elif self._key is not None and not peer.channel.is_sealed:
+            self._challenge(peer, frame, self._key)
+        elif self._client is not None:
             self._refuse(
                 peer,
                 f"the client {self._client.name} has the tissue, and only one at a time can; "
                 "try again when it has left, or start another server on another port",
             )
-            return False
-        self._client = peer
-        logger.info("client %s has the tissue", peer.name)
-        return True
+        else:
+            if not peer.channel.is_sealed:
+                peer.sequence = frame.sequence - 1
+            peer.take_seat()
+            self._client = peer
+            logger.info("client %s has the tissue", peer.name)
+            return True
+        return False
+
+    def _challenge(self, peer: Peer, frame: Frame, key: bytes) -> None:
+        """Send our nonce, and ask for seals from now on."""
+        if len(frame.payload) != NONCE_BYTES:
+            return self._refuse(
+                peer, "this server asks for a key: give the one that it has with --key FILE"
+            )
+        nonce = new_nonce()
+        peer.sequence = frame.sequence
+        self._send(peer, Kind.CHALLENGE, nonce)
+        keys = direction_keys(key, frame.payload, nonce)
+        peer.channel.seal(outgoing=keys.to_client, incoming=keys.to_server)
+
+    def _answer(self, peer: Peer, frame: Frame) -> None:
+        try:
+            peer.check_newer(frame.sequence)
+            reply = self._reply(frame)
+            if len(reply) > LARGEST_REPLY:
+                raise MessageError(f"the reply has {len(reply)} bytes, over {LARGEST_REPLY}")
+        except MessageError as error:
+            logger.warning("refused a request of %s: %s", peer.name, error)
+            self._send(peer, Kind.ERROR, pack_error(str(error)), frame.sequence)
+        except Exception as error:  # the tissue's failure is the client's to hear of, not our end
+            logger.exception("the tissue of %s failed", peer.name)
+            text = f"{type(error).__name__}: {error}"
+            self._send(peer, Kind.ERROR, pack_error(text), frame.sequence)
+        else:
+            self._send(peer, Kind(frame.kind), reply, frame.sequence)
 
     def _reply(self, frame: Frame) -> bytes:
         """Return the payload of the reply to a request.
@@ -250,87 +245,39 @@ class TissueServer:
             return pack_snapshot(self._link.snapshot())
         if frame.kind == Kind.SURFACE:
             return pack_surface(self._link.surface())
+        if frame.kind == Kind.CHUNKS:
+            return pack_chunks(self._link.chunks())
         if frame.kind == Kind.PIECES:
             return pack_pieces(self._link.n_pieces())
         if frame.kind == Kind.QUALITY:
             return pack_quality(self._link.quality())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
-    def _send(self, peer: _Peer, message: bytes) -> None:
+    def _send(self, peer: Peer, kind: Kind, payload: bytes, sequence: int | None = None) -> None:
+        if sequence is None:
+            sequence = peer.sequence
         try:
-            try:
-                sent = peer.socket.send(message)
-            except BlockingIOError:
-                sent = 0
-            if sent < len(message):
-                peer.socket.settimeout(SEND_SECONDS)
-                peer.socket.sendall(memoryview(message)[sent:])
-                peer.socket.setblocking(False)
+            peer.send(peer.channel.pack(kind, sequence, payload))
         except OSError as error:
             self._drop(peer, f"it does not take its reply: {error}")
 
-    def _refuse(self, peer: _Peer, reason: str) -> None:
+    def _refuse(self, peer: Peer, reason: str) -> None:
         """Say why, if that goes without waiting, and drop the peer."""
-        message = pack_frame(Kind.ERROR, (peer.sequence + 1) % (1 << 32), pack_error(reason))
-        with contextlib.suppress(OSError):
-            peer.socket.send(message)
-        self._drop(peer, reason)
+        sequence, text = (peer.sequence + 1) % (1 << 32), pack_error(reason)
+        # Without a seal during the handshake: who has no key, or another, could not read it.
+        plain = pack_frame(Kind.ERROR, sequence, text)
+        is_client = peer is self._client
+        words = b"".join(peer.channel.pack(Kind.ERROR, sequence, text)) if is_client else plain
+        self._drop(peer, reason, words)
 
-    def _drop(self, peer: _Peer, reason: str) -> None:
+    def _drop(self, peer: Peer, reason: str, last_words: bytes = b"") -> None:
         logger.info("dropped %s: %s", peer.name, reason)
         self._peers.remove(peer)
         self._selector.unregister(peer.socket)
-        with contextlib.suppress(OSError):
-            peer.socket.shutdown(socket.SHUT_WR)
-        peer.socket.close()
+        peer.close(last_words)
         if peer is self._client:
             self._client = None
             self._link = self._make_link()
-
-
-def _check_sequence(sequence: int, last: int) -> None:
-    """Refuse a request that is not newer than the last one. Numbers wrap; a gap is no harm."""
-    if not 0 < (sequence - last) % (1 << 32) < 1 << 31:
-        raise MessageError(f"request {sequence} came after request {last}")
-
-
-def _bound(host: str, port: int) -> socket.socket:
-    """Return a socket bound to a loopback address.
-
-    Raises:
-        ValueError: the host is not loopback, or the port is none.
-        LinkError: the port is in use or not allowed.
-    """
-    if not 0 <= port <= 65535:
-        raise ValueError(f"port {port} is none; wanted 1 to 65535, or 0 for any that is free")
-    try:
-        found = socket.getaddrinfo(host or "0.0.0.0", port, type=socket.SOCK_STREAM)
-    except (OSError, UnicodeError) as cause:
-        raise ValueError(f"there is no host {host!r}: {cause}") from cause
-    for *_, address in found:
-        if not ipaddress.ip_address(str(address[0]).partition("%")[0]).is_loopback:
-            raise ValueError(
-                f"{host!r} is open to other machines, and the link has no keys yet; listen on "
-                "127.0.0.1, and reach it from elsewhere through an SSH tunnel"
-            )
-    family, kind, protocol, _, address = found[0]
-    listener = socket.socket(family, kind, protocol)
-    try:
-        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        listener.bind(address)
-    except OSError as cause:
-        listener.close()
-        raise LinkError(
-            f"cannot listen at {_name(address)}: {cause.strerror}. Choose another port, or 0 for "
-            "any that is free"
-        ) from cause
-    return listener
-
-
-def _name(address: tuple[Any, ...]) -> str:
-    """Return "HOST:PORT" of a socket's address."""
-    host, port = address[:2]
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 @contextlib.contextmanager

@@ -1,45 +1,44 @@
 """A tissue in another process: the client's end of the TCP link."""
 
+import contextlib
 import socket
 import time
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from bridge.address import is_loopback, parse_address
+from bridge.channel import Channel
 from bridge.link import LinkError, TissueDescription
-from bridge.messages import (
-    LARGEST_DESCRIPTION,
-    LARGEST_ERROR,
+from bridge.messages.body import (
     PIECES_BYTES,
-    QUALITY_BYTES,
-    RESULT_BYTES,
-    pack_step,
     snapshot_bytes,
     surface_bytes,
-    unpack_description,
-    unpack_error,
     unpack_pieces,
-    unpack_quality,
-    unpack_result,
     unpack_snapshot,
     unpack_surface,
 )
-from bridge.wire import LARGEST_REPLY, Frame, FrameReader, Kind, MessageError, pack_frame
+from bridge.messages.chunks import LARGEST_CHUNKS, unpack_chunks
+from bridge.messages.quality import QUALITY_BYTES, unpack_quality
+from bridge.messages.result import LARGEST_RESULT, unpack_result
+from bridge.messages.step import pack_step
+from bridge.messages.text import (
+    LARGEST_DESCRIPTION,
+    LARGEST_ERROR,
+    unpack_description,
+    unpack_error,
+)
+from bridge.seal import NONCE_BYTES, direction_keys, new_nonce
+from bridge.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, Kind, MessageError
 from tissue.quality import QualityReport
-from tissue.types import BladeSweep, Snapshot, StepResult, Surface
+from tissue.types import BladeSweep, Chunks, Snapshot, StepResult, Surface
 
 Value = TypeVar("Value")
-
-DEFAULT_HOST = "127.0.0.1"
-DEFAULT_PORT = 8766
 
 CONNECT_SECONDS = 5.0
 """How long to wait for a connection [s]. On loopback it is there at once or not at all."""
 ANSWER_SECONDS = 60.0
 """How long to wait for an answer [s]. A step takes a millisecond, but the first steps of a freshly
 installed server compile."""
-READ_BYTES = 1 << 16
-"""How much to take from a socket at once [byte]. From 128 KiB on, every read would map fresh memory
-from the system, which takes longer than the rest of a round trip."""
 
 
 class TcpLink:
@@ -50,20 +49,25 @@ class TcpLink:
     Args:
         address: "HOST:PORT".
         timeout: How long to wait for an answer [s].
+        key: What both sides have (`keys.read_key`); None for a server on this machine without one.
 
     Raises:
-        ValueError: the address is malformed.
-        LinkError: nobody listens there, another client holds the tissue, or the other side is not
-            a tissue of this version.
+        ValueError: the address is malformed, or another machine's, and there is no key.
+        LinkError: nobody listens there, another client holds the tissue, or the other side has
+            another key, or is not a tissue of this version.
     """
 
-    def __init__(self, address: str, timeout: float = ANSWER_SECONDS) -> None:
+    def __init__(
+        self, address: str, timeout: float = ANSWER_SECONDS, *, key: bytes | None = None
+    ) -> None:
         self._address = address
         self._timeout = timeout
         self._sequence = 0
-        self._reader = FrameReader(LARGEST_ERROR)
-        self._socket: socket.socket | None = _connect(address, timeout)
+        self._channel = Channel()
+        self._socket: socket.socket | None = _connect(address, timeout, has_key=key is not None)
         try:
+            if key is not None:
+                self._prove(key)
             self.describe()
         except LinkError:
             self.close()
@@ -77,7 +81,7 @@ class TcpLink:
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """See `TissueLink.step`."""
-        result = self._ask(Kind.STEP, pack_step(sweep, dt), RESULT_BYTES, unpack_result)
+        result = self._ask(Kind.STEP, pack_step(sweep, dt), LARGEST_RESULT, unpack_result)
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
@@ -85,6 +89,10 @@ class TcpLink:
         """See `TissueLink.snapshot`."""
         limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
         return self._ask(Kind.SNAPSHOT, b"", limit, unpack_snapshot)
+
+    def chunks(self) -> Chunks:
+        """See `TissueLink.chunks`."""
+        return self._ask(Kind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
 
     def surface(self) -> Surface:
         """See `TissueLink.surface`."""
@@ -105,25 +113,39 @@ class TcpLink:
             self._socket.close()
             self._socket = None
 
+    def _prove(self, key: bytes) -> None:
+        """Draw a nonce, hear the server's, and seal all that follows.
+
+        The server proves itself too: its next reply would not open if it had another key.
+        """
+        mine = new_nonce()
+        theirs = self._ask(Kind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=Kind.CHALLENGE)
+        keys = direction_keys(key, mine, theirs)
+        self._channel.seal(keys.to_server, keys.to_client, plain_error_may_come=True)
+
     def _ask(
-        self, kind: Kind, payload: bytes, limit: int, unpack: Callable[[bytes], Value]
+        self,
+        kind: Kind,
+        payload: bytes,
+        limit: int,
+        unpack: Callable[[bytes], Value],
+        reply_kind: Kind | None = None,
     ) -> Value:
         """Send a request and return what its reply of at most `limit` bytes says."""
         if self._socket is None:
             raise LinkError(f"the link to the tissue at {self._address} is closed")
-        # The limit only grows: the reply to a request that Ctrl-C interrupted may still come.
-        self._reader.limit = min(max(self._reader.limit, limit), LARGEST_REPLY)
         sequence = self._sequence
         self._sequence = (sequence + 1) % (1 << 32)
         try:
-            self._socket.sendall(pack_frame(kind, sequence, payload))
-            frame = self._answer_to(sequence, self._socket)
-            if frame.kind == Kind.ERROR:
-                error = unpack_error(frame.payload)
-            elif frame.kind != kind:
-                raise MessageError(f"a reply of kind {frame.kind} to a request of kind {kind}")
+            for message in self._channel.pack(kind, sequence, payload):
+                self._socket.sendall(message)
+            answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket)
+            if answer.kind == Kind.ERROR:
+                error = unpack_error(answer.payload)
+            elif answer.kind != (reply_kind or kind):
+                raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
             else:
-                return unpack(frame.payload)
+                return unpack(answer.payload)
         except TimeoutError as cause:
             self.close()
             raise LinkError(
@@ -134,41 +156,57 @@ class TcpLink:
             raise LinkError(f"the link to the tissue at {self._address} broke: {cause}") from cause
         raise LinkError(f"the tissue at {self._address} refused: {error}")
 
-    def _answer_to(self, sequence: int, connection: socket.socket) -> Frame:
+    def _answer_to(self, sequence: int, limit: int, connection: socket.socket) -> Frame:
         """Return the reply to the request of this number; drop replies to earlier ones."""
         deadline = time.monotonic() + self._timeout
+        limit = min(limit, LARGEST_REPLY)
+        parts: list[bytes] = []
+        n_bytes = 0
         while True:
-            frame = self._reader.take()
-            if frame is not None and frame.sequence == sequence:
-                return frame
-            if frame is not None:
-                continue
-            if time.monotonic() > deadline:  # each read has its own limit; this is for a trickle
-                raise TimeoutError
-            data = connection.recv(READ_BYTES)
-            if not data:
-                raise ConnectionResetError("the other side has gone")
-            self._reader.feed(data)
+            frame = self._channel.take()
+            if frame is None:
+                if (
+                    time.monotonic() > deadline
+                ):  # each read has its own limit; this is for a trickle
+                    raise TimeoutError
+                data = connection.recv(READ_BYTES)
+                if not data:
+                    raise ConnectionResetError("the other side has gone")
+                self._channel.feed(data)
+            elif frame.sequence == sequence:  # else of a request that Ctrl-C interrupted
+                n_bytes += len(frame.payload)
+                if n_bytes > limit:
+                    raise MessageError(f"a reply of {n_bytes} bytes; at most {limit} are allowed")
+                if not (frame.kind & MORE or parts):
+                    return frame
+                parts.append(frame.payload)
+                if not frame.kind & MORE:
+                    return frame._replace(payload=b"".join(parts))
 
 
-def parse_address(address: str) -> tuple[str, int]:
-    """Return host and port of "HOST:PORT", or of "[HOST]:PORT" where the host has colons.
+def _checked_nonce(payload: bytes) -> bytes:
+    if len(payload) != NONCE_BYTES:
+        raise MessageError(f"a challenge of {len(payload)} bytes; wanted {NONCE_BYTES}")
+    return payload
+
+
+def _connect(address: str, timeout: float, *, has_key: bool) -> socket.socket:
+    """Return a connection that sends small messages at once.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the address is malformed, or another machine's, and there is no key.
+        LinkError: nobody can be reached there.
     """
-    host, colon, port = address.rpartition(":")
-    host = host.removeprefix("[").removesuffix("]")
-    if not colon or not host or not (port.isascii() and port.isdigit()) or int(port) > 65535:
-        raise ValueError(f"{address!r} is no address; wanted HOST:PORT, as in 127.0.0.1:8766")
-    return host, int(port)
-
-
-def _connect(address: str, timeout: float) -> socket.socket:
-    where = parse_address(address)
+    host, port = parse_address(address)
     seconds = min(timeout, CONNECT_SECONDS)
     try:
-        connection = socket.create_connection(where, seconds)
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        if not has_key and not all(is_loopback(where) for *_, where in found):
+            raise ValueError(
+                f"{address} is another machine, and that takes a key: give the one that its "
+                "server has with --key FILE, or reach it through an SSH tunnel"
+            )
+        connection = _first_that_answers([where for *_, where in found], seconds)
     except TimeoutError as cause:
         raise LinkError(f"nobody answers at {address} within {seconds:g} s") from cause
     except ConnectionRefusedError as cause:
@@ -180,3 +218,11 @@ def _connect(address: str, timeout: float) -> socket.socket:
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     connection.settimeout(timeout)
     return connection
+
+
+def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
+    """Return a connection to one of the addresses of a host; raise what the last one gave."""
+    for where in addresses[:-1]:
+        with contextlib.suppress(OSError):
+            return socket.create_connection(where[:2], seconds)
+    return socket.create_connection(addresses[-1][:2], seconds)

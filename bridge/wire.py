@@ -1,12 +1,12 @@
-"""Frames of bytes between two processes.
+"""Frames of bytes between two processes; docs/wire.md tells the whole protocol.
 
 A frame is a header of 24 bytes and a payload, little-endian:
 
     magic      4 bytes   b"SCUT"
     version    uint16    VERSION; both sides must speak the same
-    kind       uint16    Kind
+    kind       uint16    Kind, and MORE where another part of the same message follows
     sequence   uint32    a request's number, counted from 0; its reply carries the same
-    length     uint32    of the payload
+    length     uint32    of the payload, at most LARGEST_FRAME
     checksum   uint32    CRC-32 of the payload
     header     uint32    CRC-32 of the 20 bytes before, so that a broken length is never waited for
 """
@@ -17,14 +17,20 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-VERSION = 2
-"""2: the material says its law and Poisson's ratio."""
+VERSION = 3
+"""3: keys; long replies in parts; wrench at t1, stiffness, contacts and energies of a step."""
 
-LARGEST_REQUEST = 1 << 20
-"""[byte]. The largest request is a step of 152 bytes; a mebibyte leaves room for later ones."""
+LARGEST_FRAME = 1 << 20
+"""[byte]. What one side must hold of the other's before it can be checked. A step is 152 bytes;
+what is longer, a whole body, comes in parts."""
 LARGEST_REPLY = 1 << 30
-"""[byte]. A snapshot of ten million tetrahedra is half of it. What a single reply may have follows
-from the mesh: see `messages.snapshot_bytes` and `messages.surface_bytes`."""
+"""[byte], all parts. A snapshot of ten million tetrahedra is half of it. What a single reply may
+have follows from the mesh: see `snapshot_bytes` and `surface_bytes` in `messages.body`."""
+READ_BYTES = 1 << 16
+"""How much to take from a socket at once [byte]. From 128 KiB on, every read would map fresh memory
+from the system, which takes longer than the rest of a round trip."""
+MORE = 0x8000
+"""Bit of `kind`: another part of the same message follows."""
 
 
 class MessageError(ValueError):
@@ -32,7 +38,7 @@ class MessageError(ValueError):
 
 
 class Kind(enum.IntEnum):
-    """What a frame is. A reply has its request's kind, or is an ERROR."""
+    """What a frame is. A reply has its request's kind, or is an ERROR or a CHALLENGE."""
 
     HELLO = 1
     STEP = 2
@@ -41,12 +47,15 @@ class Kind(enum.IntEnum):
     PIECES = 5
     ERROR = 6
     QUALITY = 7
+    CHALLENGE = 8
+    CHUNKS = 9
 
 
 class Frame(NamedTuple):
-    """One message."""
+    """One message, or a part of one."""
 
     kind: int
+    """With MORE, if more follows."""
     sequence: int
     payload: bytes
 
@@ -56,7 +65,7 @@ _CHECKSUM = struct.Struct("<I")
 HEADER_BYTES = _HEADER.size + _CHECKSUM.size
 
 
-def pack_frame(kind: Kind, sequence: int, payload: bytes = b"") -> bytes:
+def pack_frame(kind: int, sequence: int, payload: bytes = b"") -> bytes:
     """Return the bytes of a frame."""
     header = _HEADER.pack(MAGIC, VERSION, kind, sequence, len(payload), zlib.crc32(payload))
     return header + _CHECKSUM.pack(zlib.crc32(header)) + payload
@@ -68,7 +77,7 @@ class FrameReader:
     After a MessageError the stream cannot be read any further: nobody knows where a frame begins.
     """
 
-    def __init__(self, limit: int) -> None:
+    def __init__(self, limit: int = LARGEST_FRAME) -> None:
         self.limit = limit
         """The largest payload to accept [byte]."""
         self._buffer = bytearray()
@@ -78,7 +87,7 @@ class FrameReader:
         """Whether a part of a frame has come, so that the rest must follow."""
         return len(self._buffer) > 0
 
-    def feed(self, data: bytes) -> None:
+    def feed(self, data: bytes | memoryview) -> None:
         """Take what the socket gave."""
         self._buffer += data
 
@@ -89,7 +98,9 @@ class FrameReader:
             MessageError: these are not our bytes, they are broken, of another version, or too many.
         """
         buffer = self._buffer
-        if bytes(buffer[:4]) != MAGIC[: len(buffer)]:
+        if not buffer:
+            return None
+        if not MAGIC.startswith(buffer[:4]):
             raise MessageError(f"this is not scalpel-sim: it begins with {bytes(buffer[:16])!r}")
         if len(buffer) < HEADER_BYTES:
             return None

@@ -1,4 +1,4 @@
-"""The command line: `scalpel-sim run`, `view`, `serve`, `bench`, `materials` and `figure`."""
+"""The command line: `scalpel-sim run`, `view`, `serve`, `key`, `bench`, `materials`, `figure`."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from bridge.tcp import DEFAULT_HOST, DEFAULT_PORT
+from bridge.address import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
 from scalpel_sim.console import progress, report, say, say_error, talking
 from scalpel_sim.errors import (
@@ -111,6 +111,7 @@ def serve(
     *,
     host: str = DEFAULT_HOST,
     port: int = DEFAULT_PORT,
+    key: Path | None = None,
     body: Body = Body(),
     talk: Talk = Talk(),
 ) -> None:
@@ -119,14 +120,17 @@ def serve(
     Every client finds the body as at the start. Ctrl-C ends it.
 
     Args:
-        host: Address to listen on; this machine's own only.
+        host: Address to listen on; with a key any, such as 0.0.0.0, else this machine's own only.
         port: Port to listen on; 0 for any free one.
+        key: Serve only who has the key in this file; else in SCALPEL_SIM_KEY, if that is set.
     """
+    from bridge.keys import chosen_key
     from bridge.server import serve as serve_tissue
     from scalpel_sim.body import check, make_tissue
     from scalpel_sim.ready import chosen_scene, load_kernels, springs_as_asked
 
     with talking(talk):
+        secret = chosen_key(key)
         served = chosen_scene(scene, body)
         check(served)
         served, springs = springs_as_asked(served, body)
@@ -138,10 +142,28 @@ def serve(
             scene=served.name,
             host=host,
             port=port,
+            key=secret,
             on_listening=lambda address: print(
                 f"{served.name} at {address}; Ctrl-C ends it", flush=True
             ),
         )
+
+
+@app.command
+def key(file: Path, /, *, talk: Talk = Talk()) -> None:
+    """Write a new random key to a file, for `serve --key` and, copied there, `run --key`.
+
+    Whoever has the file can connect, so hand it over as you would a password.
+
+    Args:
+        file: Must not exist yet. Only you can read it.
+    """
+    from bridge.keys import write_new_key
+
+    with talking(talk):
+        write_new_key(file)
+        if not talk.quiet:
+            print(f"{file}: a new key, readable by you alone")
 
 
 app.command(bench)

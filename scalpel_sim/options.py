@@ -81,6 +81,8 @@ class Motion:
     "Seed of whatever is random. Kept in summary.json."
     connect: str | None = None
     "The tissue is elsewhere: HOST:PORT of `scalpel-sim serve`."
+    key: Path | None = None
+    "File with the key of that server; else SCALPEL_SIM_KEY, if that is set. See `scalpel-sim key`."
     out: Path | None = None
     "Folder for the files; out/SCENE if not given."
 

@@ -1,5 +1,10 @@
 """From a scene to a simulation: body, stroke through it, and an arm that reaches."""
 
+from collections.abc import Iterable
+
+import numpy as np
+
+from bridge.fixtures import Fixture
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink, TissueLink
 from scalpel_sim.body import make_tissue
@@ -7,10 +12,13 @@ from scalpel_sim.placement import place
 from scalpel_sim.planning import check_meets, plan
 from scalpel_sim.scenes import Scene, read_stroke
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.touching import floor_below
 from tissue.types import TetrahedralMesh
 
 
-def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
+def prepare(
+    scene: Scene, link: TissueLink | None = None, fixtures: Iterable[Fixture] = ()
+) -> Simulation:
     """Return the simulation of a scene, at its start.
 
     The stroke is planned on the body as it lies there, sagged and stretched: what the link says of
@@ -19,6 +27,8 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
     Args:
         scene: What to cut, and how.
         link: A body that is elsewhere already; None makes the scene's own in this process.
+        fixtures: What stands around the body, in its frame: where that lies in the world is chosen
+            here, so that the arm reaches.
 
     Raises:
         ValueError: the scene does not fit together; each part says how.
@@ -34,4 +44,10 @@ def prepare(scene: Scene, link: TissueLink | None = None) -> Simulation:
     check_meets(stroke, mesh)
     placement = place(stroke, link.describe().bounds, scene.arm)
     frame = TissueFrame(origin=placement.tissue_origin)
-    return Simulation(placement.arm(), stroke, link, frame)
+    tissue = link.describe()
+    floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
+    world = TissueFrame(
+        frame.rotation.T, frame.points_to_tissue(np.zeros(3))
+    )  # as the tissue sees it
+    standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
+    return Simulation(placement.arm(), stroke, link, frame, standing)

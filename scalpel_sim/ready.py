@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from bridge.keys import chosen_key
 from bridge.link import InProcessLink, TissueLink
 from bridge.tcp import TcpLink
 from scalpel_sim.body import check, make_tissue
@@ -50,6 +51,10 @@ def ready_run(name: str | None, body: Body, motion: Motion, talk: Talk) -> Itera
         raise UsageError(
             f"--seconds is {motion.seconds}; it must be above 0 and at most {LONGEST_RUN:g}"
         )
+    if motion.key is not None and motion.connect is None:
+        raise UsageError(
+            "--key is for a tissue elsewhere; add --connect HOST:PORT, or leave it away"
+        )
     tissue = _tissue_here if motion.connect is None else _tissue_elsewhere
     link, scene, settings = tissue(name, body, motion, talk)
     try:
@@ -84,7 +89,7 @@ def _tissue_elsewhere(
                 f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
                 f"{motion.connect}; give it to `scalpel-sim serve`"
             )
-    link = TcpLink(motion.connect)
+    link = TcpLink(motion.connect, key=chosen_key(motion.key))
     try:
         scene = changed(scene_of(link), **_given(motion))
         if name not in (None, scene.name):

@@ -103,6 +103,8 @@ def print_table(summary: Summary, console: Console) -> None:
     row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
     row("peak force", f"{summary.force_peak_n:.3f} N")
     row("mean force", f"{summary.force_mean_n:.3f} N")
+    for pair, frames in summary.touched.items():
+        row(f"met: {pair}", f"{frames:,} frames")
     row("work of the blade", f"{summary.work_of_blade_j * MJ_PER_J:.2f} mJ")
     row(
         "frames/s, median",

@@ -96,6 +96,7 @@ def perform(
         pieces=pieces,
         quality=quality,
         counters=simulation.bridge.counters._asdict(),
+        touched=simulation.touching.frames,
         settings=settings,
     )
     with unwritten:

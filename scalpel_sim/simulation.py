@@ -2,17 +2,19 @@
 
 import gc
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from bridge.bridge import Bridge
+from bridge.fixtures import Fixture
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink
 from scalpel_sim.arm import Arm
 from scalpel_sim.recording import Recording
 from scalpel_sim.stroke import Stroke
+from scalpel_sim.touching import Touching
 from tissue.types import BladeSegment, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
@@ -32,9 +34,17 @@ class Simulation:
         stroke: Where the hand leads the blade, tissue frame.
         link: The tissue.
         frame: Where the tissue lies in the world.
+        fixtures: What stands around it in the world, beside the arm's table: see `touching`.
     """
 
-    def __init__(self, arm: Arm, stroke: Stroke, link: TissueLink, frame: TissueFrame) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        stroke: Stroke,
+        link: TissueLink,
+        frame: TissueFrame,
+        fixtures: Iterable[Fixture] = (),
+    ) -> None:
         self.arm = arm
         self.stroke = stroke
         self.link = link
@@ -42,6 +52,8 @@ class Simulation:
         self.bridge = Bridge(link, frame, arm.limits)
         self.wrench = NO_WRENCH
         """What the blade felt in the last frame, world frame."""
+        self.touching = Touching(arm, fixtures)
+        """Which parts of the arm meet what."""
         self.recording = Recording()
         """What happened in each frame so far."""
         self.pictures: list[Picture] = []
@@ -79,6 +91,7 @@ class Simulation:
         start = time.perf_counter()
         self.arm.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
         self.arm.step1()
+        self.touching.look()
         segment = self.arm.blade.segment()
         self.wrench = self._answer(segment)
         self.arm.blade.apply(self.wrench)

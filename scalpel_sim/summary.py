@@ -56,6 +56,8 @@ class Summary(NamedTuple):
     They sum to 1."""
     counters: dict[str, int]
     """What the bridge had to do: broad-phase rejections, saturations and the like."""
+    touched: dict[str, int]
+    """In how many frames a part of the arm met what it must not: "PART, FIXTURE OR PART"."""
     settings: dict[str, Any]
     """The resolved settings of the run: material, stroke, arm."""
     versions: dict[str, str]
@@ -74,6 +76,7 @@ def summarise(
     pieces: Sequence[Piece] | None,
     quality: QualityReport | None,
     counters: dict[str, int],
+    touched: dict[str, int],
     settings: dict[str, Any],
 ) -> Summary:
     """Return the figures of a run whose frames of `dt` [s] took `wall_seconds` in all."""
@@ -103,6 +106,7 @@ def summarise(
         work_of_blade_j=float(recording.column("work_of_blade_j")[-1]) if n else 0.0,
         share=shares(recording, wall_seconds),
         counters=counters,
+        touched=touched,
         settings=settings,
         versions=versions(),
     )

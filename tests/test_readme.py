@@ -39,6 +39,10 @@ def test_a_body_is_cut_along_a_given_surface(capsys):
     assert float(area) == pytest.approx(60 * 40, rel=0.1) and int(pieces) == 2
 
 
+def test_a_clamp_in_the_way_of_the_blade_is_met(capsys):
+    assert re.search(r"'blade, clamp': \d+", printed(BLOCKS[3], capsys))
+
+
 def test_every_file_that_a_run_writes_is_explained():
     assert [name for name in NAMES if f"`{name}`" not in README] == []
 

@@ -27,6 +27,7 @@ from tissue.border import (
     checked_threads,
 )
 from tissue.caveats import warn_of_ratio, warn_of_toughness
+from tissue.chunks import chunk_cells, chunks_of
 from tissue.contact.self_contact import SelfContact
 from tissue.cut import FULL, SPARE_NODES, Quality
 from tissue.elastic import Surroundings
@@ -57,6 +58,7 @@ from tissue.trace import forget_path, trace_path
 from tissue.types import (
     BladeSweep,
     BoolArray,
+    Chunks,
     Energies,
     FloatArray,
     IntArray,
@@ -145,6 +147,8 @@ class Tissue:
         checked_scheme(scheme)
         checked_threads(threads)
         self.material = material or Material()
+        self.blade = blade
+        self.floor = floor
         relaxing = checked_relaxation(relaxation, self.material)
         checked_audit(audit, relaxing)
         self._surroundings = Surroundings(
@@ -200,6 +204,7 @@ class Tissue:
         self._relaxation = relaxation_of(relaxing, self._all_together, self._body, self._elasticity)
         self._box = survey(self._body)
         self._now = (NOWHERE, 1.0)
+        self._cells = chunk_cells(self._body)
         self._grow()
         self._begin_audit()
 
@@ -333,6 +338,13 @@ class Tissue:
     def surface(self) -> Surface:
         """Return the boundary triangles, skin and cut faces apart."""
         return boundary_surface(self._body)
+
+    def chunks(self) -> Chunks:
+        """Return boxes that together hold the body: where a blade outside of them touches nothing.
+
+        They cost a look at every tetrahedron, some 8 ns each.
+        """
+        return chunks_of(self._body, self._cells)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

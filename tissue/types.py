@@ -210,6 +210,15 @@ class Surface(NamedTuple):
     """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
 
 
+class Chunks(NamedTuple):
+    """Boxes around parts of the body, which together hold all of it. Copies."""
+
+    boxes: FloatArray
+    """Lowest and highest corner of each [m], shape (n, 2, 3)."""
+    fastest: float
+    """Speed of the fastest node [m/s]."""
+
+
 class Piece(NamedTuple):
     """A connected piece of the body and its mass properties; its mass is at its nodes. Copies."""
 

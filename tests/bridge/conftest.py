@@ -7,6 +7,7 @@ import hypothesis
 import numpy as np
 import pytest
 
+from bridge.keys import KEY_VARIABLE
 from tissue.types import BladeSegment
 
 # A busy machine is no fault of the code under test.
@@ -20,11 +21,11 @@ SERVE_BLOCK = Path(__file__).with_name("serve_block.py")
 class ServerProcess:
     """A tissue server in a second process."""
 
-    def __init__(self) -> None:
+    def __init__(self, host: str = "127.0.0.1", key: bytes | None = None) -> None:
         path = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
         self.process = subprocess.Popen(
-            [sys.executable, str(SERVE_BLOCK)],
-            env=os.environ | {"PYTHONPATH": path},
+            [sys.executable, str(SERVE_BLOCK), host],
+            env=os.environ | {"PYTHONPATH": path} | ({KEY_VARIABLE: key.hex()} if key else {}),
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -45,8 +46,8 @@ class ServerProcess:
 def start_server():
     servers = []
 
-    def start():
-        servers.append(ServerProcess())
+    def start(**how):
+        servers.append(ServerProcess(**how))
         return servers[-1]
 
     yield start

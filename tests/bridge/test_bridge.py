@@ -8,9 +8,12 @@ from bridge.coupling import CouplingError, DeviceLimits
 from bridge.fixtures import FixtureBox
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink
+from tests.bridge.bits import bits
+from tissue.blade_shape import BladeShape
+from tissue.material import Material
 from tissue.shapes import grid
 from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep
+from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
 
 DT = 1e-3
 ABOVE = 0.1
@@ -81,6 +84,41 @@ def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(bl
         before = segment
     assert 50 < n_rejected < 350
     assert bridge.result.cut_area == pytest.approx(without_filter.cut_area)
+
+
+def horseshoe(blade):
+    """Return a bar of soft tissue that is bent to half a ring around z, held by its middle."""
+    mesh = grid((12, 2, 3), (0.06, 0.01, 0.01))
+    turn = np.pi * (1.0 - mesh.positions[:, 0] / 0.06)
+    radius = 0.015 + mesh.positions[:, 1]
+    bent = np.stack([radius * np.cos(turn), radius * np.sin(turn), mesh.positions[:, 2]], axis=1)
+    material = Material(young_modulus=1e3, toughness=1.0)  # sound goes 1.1 mm in a frame
+    fixed = np.abs(mesh.positions[:, 0] - 0.03) < 1e-3
+    body = TetrahedralMesh(bent, mesh.tetrahedra)
+    return Tissue(body, material, fixed=fixed, blade=blade, gravity=(0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("blade", [None, BladeShape()], ids=["line", "body"])
+def test_in_the_hollow_of_a_body_the_broad_phase_is_strict_too(upright, blade):
+    """A blade goes into the hollow and turns there, then out through an arm of the horseshoe."""
+    filtered, asked = horseshoe(blade), horseshoe(blade)
+    bridge = Bridge(InProcessLink(filtered))
+    before, n_free, n_touching = None, 0, 0
+    for i in range(500):
+        turn = 0.03 * min(i, 250)
+        segment = upright(1.2e-4 * max(i - 250, 0), -0.005 + 1e-4 * min(i, 120))
+        segment = segment._replace(forward=np.array([np.sin(turn), np.cos(turn), 0.0]))
+        n_rejected = bridge.counters.rejected
+        bridge.step(segment, DT)
+        result = asked.step(BladeSweep(before or segment, segment), DT)
+        before = segment
+        touches = result.n_active > 0 or len(result.contacts.point) > 0
+        n_touching += touches
+        if bridge.counters.rejected > n_rejected:
+            assert not touches
+            n_free += bool((filtered.bounds[0, :2] < segment.tip[:2]).all())
+    assert n_free > 30 and n_touching > 50
+    assert bits(filtered.snapshot()) == bits(asked.snapshot())
 
 
 def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block, upright):

@@ -3,9 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.broad_phase import BroadPhase, swept_box
+from bridge.broad_phase import BroadPhase
 from bridge.fixtures import FixtureBox, FixtureMesh
-from tissue.types import BladeSegment, BladeSweep
+from tissue.blade_shape import BladeShape
+from tissue.types import BladeSegment, BladeSweep, Chunks
 
 UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
 SOUND_SPEED = 3.0
@@ -39,23 +40,6 @@ def test_an_edge_that_passes_through_the_tissue_is_never_hidden(
     tip_t0 = np.array(inside) - there
     sweep = BladeSweep(segment(tip_t0, edge_t0), segment(tip_t0 + motion, edge_t1))
     assert BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
-
-
-@given(vectors, edges, edges, vectors, fractions, fractions)
-def test_the_swept_box_holds_the_edge_during_the_whole_step(
-    tip, edge_t0, edge_t1, motion, along, when
-):
-    sweep = BladeSweep(segment(tip, edge_t0), segment(tip + motion, edge_t1))
-    point = tip + when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
-    box = swept_box(sweep)
-    assert np.all(np.abs(box.axes.T @ (point - box.centre)) <= 0.5 * box.size)
-
-
-@given(edges)
-def test_the_axes_of_the_swept_box_are_a_rotation(edge):
-    axes = swept_box(resting((0.0, 0.0, 0.0), edge)).axes
-    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
-    assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
 def test_a_blade_above_the_tissue_does_not_touch_it():
@@ -138,3 +122,86 @@ def test_a_turned_box_is_met_where_it_is():
 def test_two_fixtures_of_one_name_are_refused():
     with pytest.raises(ValueError, match="two fixtures have the name 'table'"):
         BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, TABLE])
+
+
+# ---- chunks --------------------------------------------------------------------------------------
+
+HORSESHOE = np.array(
+    [
+        [[0.0, 0.0, 0.0], [1.0, 0.2, 1.0]],
+        [[0.0, 0.2, 0.0], [0.2, 1.0, 1.0]],
+        [[0.8, 0.2, 0.0], [1.0, 1.0, 1.0]],
+    ]
+)
+"""Three boxes around a hollow, open at the back: the unit box is the box around all of them."""
+
+
+class Source:
+    """Chunks that can be moved, and how often they were asked for."""
+
+    def __init__(self, boxes, fastest=0.0):
+        self.boxes, self.fastest, self.n_asked = boxes, fastest, 0
+
+    def __call__(self):
+        self.n_asked += 1
+        return Chunks(self.boxes, self.fastest)
+
+
+def test_a_blade_in_the_hollow_of_a_body_touches_nothing():
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=Source(HORSESHOE))
+    assert not phase.contacts(resting((0.5, 0.6, 0.0)), DT).tissue
+    assert phase.contacts(resting((0.9, 0.6, 0.0)), DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0).contacts(resting((0.5, 0.6, 0.0)), DT).tissue
+
+
+def test_chunks_are_asked_for_only_in_the_box_around_all_and_before_the_blade_holds_tissue():
+    source = Source(HORSESHOE)
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
+    phase.contacts(resting((0.5, 0.6, 2.0)), DT)
+    assert phase.contacts(resting((0.5, 0.6, 0.0)), DT, engaged=True).tissue
+    assert source.n_asked == 0
+    phase.contacts(resting((0.5, 0.6, 0.0)), DT)
+    assert source.n_asked == 1
+
+
+@pytest.mark.parametrize(("fastest", "touches"), [(0.0, False), (98.0, False), (100.0, True)])
+def test_chunks_reach_as_far_as_sound_and_their_fastest_node_go_in_a_step(fastest, touches):
+    """The lips are 0.3 m from the middle of the hollow, but for a slack of a millimetre; sound goes
+    0.2 m."""
+    phase = BroadPhase(UNIT_BOX, 200.0, chunks=Source(HORSESHOE, fastest))
+    blade = BladeSegment(
+        np.array([0.5, 0.6, 0.0]), np.array([0.5, 0.6, 1.0]), np.array([0, 1.0, 0])
+    )
+    assert phase.contacts(BladeSweep(blade, blade), DT).tissue == touches
+
+
+def test_chunks_that_move_are_met_where_they_are():
+    source = Source(HORSESHOE)
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
+    blade = resting((0.5, 0.6, 0.0))
+    assert not phase.contacts(blade, DT).tissue
+    source.boxes = HORSESHOE + np.array([0.35, 0.0, 0.0])
+    assert phase.contacts(blade, DT).tissue
+    source.boxes = HORSESHOE[:2]
+    assert not phase.contacts(blade, DT).tissue
+
+
+@given(st.lists(vectors, min_size=1, max_size=6), vectors, edges, vectors, fractions)
+def test_no_chunk_is_passed_through_unseen(corners, tip, edge, motion, when):
+    """A box of a millimetre around a point that the edge sweeps, among others."""
+    point = tip + when * motion + 0.3 * edge
+    low = np.array([point, *corners])
+    boxes = np.stack([low - 5e-4, low + 5e-4], axis=1)
+    bounds = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    phase = BroadPhase(bounds, 0.0, chunks=Source(boxes))
+    assert phase.contacts(BladeSweep(segment(tip, edge), segment(tip + motion, edge)), DT).tissue
+
+
+def test_the_body_of_a_blade_meets_what_its_edge_does_not():
+    shape = BladeShape(thickness=0.02, bevel_angle=0.5, height=0.3)
+    blade = BladeSegment(
+        np.array([0.5, 1.2, 0.0]), np.array([0.5, 1.2, 1.0]), np.array([0, 1.0, 0])
+    )
+    sweep = BladeSweep(blade, blade)
+    assert not BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0, blade=shape).contacts(sweep, DT).tissue

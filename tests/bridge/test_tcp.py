@@ -9,68 +9,28 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 
+from bridge.address import parse_address
 from bridge.bridge import Bridge
 from bridge.link import InProcessLink, LinkError
-from bridge.messages import pack_error, pack_step, unpack_error
+from bridge.messages.step import pack_step
+from bridge.messages.text import pack_error, unpack_error
+from bridge.peer import HANDSHAKE_BYTES
 from bridge.server import MOST_CONNECTIONS, TissueServer
-from bridge.tcp import TcpLink, parse_address
-from bridge.wire import LARGEST_REPLY, LARGEST_REQUEST, VERSION, FrameReader, Kind, pack_frame
+from bridge.tcp import TcpLink
+from bridge.wire import VERSION, Kind, pack_frame
+from tests.bridge.bare_sockets import (
+    DT,
+    HELLO,
+    assert_serves,
+    connected,
+    link_once_free,
+    read_all,
+    seated,
+)
 from tests.bridge.bits import bits
 from tests.bridge.serve_block import block as make_block
-from tissue.types import BladeSegment, BladeSweep
-
-DT = 1e-3
-HELLO = pack_frame(Kind.HELLO, 0)
-
-
-def connected(address):
-    """Return a bare socket to the server: a client that may do anything."""
-    return socket.create_connection(parse_address(address), 5.0)
-
-
-def read_all(connection):
-    """Return the frames that the other side sends until it hangs up."""
-    reader, frames = FrameReader(LARGEST_REPLY), []
-    with contextlib.suppress(ConnectionResetError):
-        while data := connection.recv(1 << 16):
-            reader.feed(data)
-            while (frame := reader.take()) is not None:
-                frames.append(frame)
-    return frames
-
-
-def read_one(connection):
-    """Return the next frame."""
-    reader = FrameReader(LARGEST_REPLY)
-    while (frame := reader.take()) is None:
-        reader.feed(connection.recv(1 << 16))
-    return frame
-
-
-def link_once_free(address):
-    """Return a link, as soon as the server has noticed that the client before has left."""
-    for _ in range(200):
-        try:
-            return TcpLink(address, 10.0)
-        except LinkError as error:
-            assert "has the tissue" in str(error) or "connections are open" in str(error)
-            time.sleep(0.02)
-    raise AssertionError("the server never let go of its client")
-
-
-def seated(address):
-    """Return a bare socket that the server takes for its client."""
-    for _ in range(200):
-        peer = connected(address)
-        peer.sendall(HELLO)
-        if read_one(peer).kind == Kind.HELLO:
-            return peer
-        peer.close()
-        time.sleep(0.02)
-    raise AssertionError("the server never let go of its client")
+from tissue.types import BladeContacts, BladeSegment, BladeSweep
 
 
 @pytest.fixture
@@ -85,7 +45,8 @@ def cut(link, upright):
     results = []
     for i in range(250):
         bridge.step(upright(0.009, -0.002 + 0.05 * DT * i), DT)
-        results.append(bridge.result._replace(profile=None))
+        result = bridge.result._replace(profile=None)
+        results.append(result._replace(contacts=BladeContacts(*map(np.copy, result.contacts))))
     return results
 
 
@@ -93,10 +54,14 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     here = InProcessLink(make_block())
     felt_here, felt_there = cut(here, upright), cut(link, upright)
     assert felt_here[-1].cut_area > 1e-5
+    assert max(len(result.contacts.point) for result in felt_here) > 3
+    assert max(np.linalg.norm(result.stiffness) for result in felt_here) > 1.0
+    assert felt_here[-1].energies.cutting > 0.0
     assert felt_here[-1].n_tetrahedra > felt_here[0].n_tetrahedra
     assert [bits(r) for r in felt_here] == [bits(r) for r in felt_there]
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
+    assert bits(here.chunks()) == bits(link.chunks())
     assert here.n_pieces() == link.n_pieces()
     assert bits(here.quality()) == bits(link.quality())
     assert link.quality().n_cut_nodes > 0
@@ -150,11 +115,6 @@ def test_a_failure_of_the_tissue_is_reported_in_its_words(link, upright):
 # ---- hostile clients: each is followed by one that must be served --------------------------------
 
 
-def assert_serves(server):
-    with contextlib.closing(link_once_free(server.address)) as link:
-        assert link.step(None, DT).n_tetrahedra == 72
-
-
 @pytest.mark.parametrize(
     ("garbage", "answer"),
     [
@@ -163,7 +123,7 @@ def assert_serves(server):
         (pack_frame(Kind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "speaks version 99"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
-        (pack_frame(Kind.HELLO, 0, bytes(LARGEST_REQUEST + 1)), "at most 1048576 are allowed"),
+        (pack_frame(Kind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],
     ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
 )
@@ -249,19 +209,6 @@ def test_an_old_request_is_not_done_twice(server):
         peer.sendall(step + step)
         peer.shutdown(socket.SHUT_WR)
         assert [frame.kind for frame in read_all(peer)] == [Kind.STEP, Kind.ERROR]
-    assert_serves(server)
-
-
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
-@given(data=st.data())
-def test_no_mutated_message_harms_the_server(server, data):
-    stream = bytearray(HELLO + pack_frame(Kind.STEP, 1, pack_step(None, DT)))
-    for _ in range(data.draw(st.integers(1, 4))):
-        stream[data.draw(st.integers(0, len(stream) - 1))] = data.draw(st.integers(0, 255))
-    with connected(server.address) as peer:
-        peer.sendall(bytes(stream))
-        peer.shutdown(socket.SHUT_WR)
-        read_all(peer)
     assert_serves(server)
 
 
@@ -372,7 +319,9 @@ def test_a_request_that_was_interrupted_does_not_put_the_link_out_of_step(link, 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "", "::", "192.0.2.1"])
 def test_a_host_that_others_can_reach_is_refused(host):
-    with pytest.raises(ValueError, match="is open to other machines, and the link has no keys yet"):
+    with pytest.raises(
+        ValueError, match=r"is open to other machines, and that takes a key: .*scalpel-sim key"
+    ):
         TissueServer(make_block, host=host, port=0)
 
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bridge.wire import (
     HEADER_BYTES,
-    LARGEST_REQUEST,
+    LARGEST_FRAME,
     VERSION,
     FrameReader,
     Kind,
@@ -18,7 +18,7 @@ frames = st.tuples(st.sampled_from(Kind), st.integers(0, 2**32 - 1), st.binary(m
 
 
 def reader_of(data):
-    reader = FrameReader(LARGEST_REQUEST)
+    reader = FrameReader()
     reader.feed(data)
     return reader
 
@@ -26,7 +26,7 @@ def reader_of(data):
 @given(st.lists(frames), st.integers(1, 50))
 def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(sent, piece):
     stream = b"".join(pack_frame(*frame) for frame in sent)
-    reader, received = FrameReader(LARGEST_REQUEST), []
+    reader, received = FrameReader(), []
     for at in range(0, len(stream), piece):
         reader.feed(stream[at : at + piece])
         while (frame := reader.take()) is not None:
@@ -59,7 +59,7 @@ def test_bytes_that_are_not_ours_are_refused_at_once(data):
 
 
 def test_a_payload_over_the_limit_is_refused_before_it_comes():
-    stream = pack_frame(Kind.STEP, 0, bytes(LARGEST_REQUEST + 1))
+    stream = pack_frame(Kind.STEP, 0, bytes(LARGEST_FRAME + 1))
     with pytest.raises(MessageError, match="1048577 bytes; at most 1048576"):
         reader_of(stream[:HEADER_BYTES]).take()
 

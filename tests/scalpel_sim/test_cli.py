@@ -86,7 +86,17 @@ WRONG_USE = {
         ["run", "--connect", "127.0.0.1:1", "--young", "1e4"],
         "scalpel-sim serve",
     ),
-    "a host that others can reach": (["serve", "grid2", "--host", "0.0.0.0"], "0.0.0.0"),
+    "a host that others can reach": (
+        ["serve", "grid2", "--host", "0.0.0.0"],
+        "'0.0.0.0' is open to other machines, and that takes a key",
+    ),
+    "another machine without a key": (
+        ["run", "--connect", "192.0.2.1:8766"],
+        "another machine, and that takes a key",
+    ),
+    "a key for no server": (["run", "grid2", "--key", "{text}"], "add --connect"),
+    "a key that is none": (["serve", "grid2", "--key", "{text}"], "key file text.stl"),
+    "a key written over a file": (["key", "{text}"], "exists already"),
     "a port that does not exist": (["view", "grid2", "--port", "99999"], "99999"),
 }
 

@@ -77,6 +77,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
         pieces=PIECES,
         quality=QUALITY,
         counters={},
+        touched={},
         settings={"stroke": "straight"},
     )
 

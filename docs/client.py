@@ -1,0 +1,35 @@
+"""Cuts a tissue that `scalpel-sim serve` holds; no package needed: python client.py [PORT]."""
+
+import json
+import socket
+import struct
+import sys
+import zlib
+
+HELLO, STEP, ERROR = 1, 2, 6
+connection = socket.create_connection(("127.0.0.1", int([*sys.argv, "8766"][1])))
+connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def ask(sequence, kind, payload=b""):
+    """Return the payload of the reply to a request."""
+    head = struct.pack("<4sHHIII", b"SCUT", 3, kind, sequence, len(payload), zlib.crc32(payload))
+    connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
+    head = connection.recv(24, socket.MSG_WAITALL)
+    _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
+    reply = connection.recv(length, socket.MSG_WAITALL) if length else b""
+    if answer == ERROR or zlib.crc32(reply) != checksum:
+        sys.exit(reply.decode(errors="replace"))
+    return reply
+
+
+(x0, y0, z0), (x1, y1, z1) = json.loads(ask(0, HELLO))["bounds"]
+x, y, way, down = (x0 + x1) / 2, y0 - 2e-3, (0.0, 1.0, 0.0), z0 - 5e-3  # upright, in front of it
+pose = (x, y, down, x, y, z1 + 5e-3, *way)
+for frame in range(1, 1001):  # 1 ms each, at 60 mm/s along y
+    before, y = pose, y + 60e-6
+    pose = (x, y, down, x, y, z1 + 5e-3, *way)
+    result = ask(frame, STEP, struct.pack("<19d", 1e-3, *before, *pose))
+    force, area = struct.unpack_from("<3d", result, 136), struct.unpack_from("<d", result, 72)[0]
+    if frame % 100 == 0:
+        print(f"{frame} ms: {force[1]:+.3f} N along y, {area * 1e6:.0f} mm2 cut")
