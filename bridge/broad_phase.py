@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge.chunk_boxes import ChunkBoxes
-from bridge.collision_objects import MovableBox, Obstacles, fixture_objects
+from bridge.collision_objects import MovableBox, Obstacles, fixture_objects, meet
 from bridge.fixtures import Fixture
 from bridge.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
 from tissue.blade_shape import BladeShape
@@ -69,7 +69,6 @@ class BroadPhase:
         self._blade = MovableBox()
         self._chunk_boxes = ChunkBoxes()
         self._tissue = MovableBox()
-        self._around = Obstacles({"tissue": (self._tissue.geometry, self._tissue.object)})
         self._fixtures = Obstacles(fixture_objects(list(fixtures)))
 
     def contacts(self, sweep: BladeSweep, dt: float, *, engaged: bool = False) -> Contacts:
@@ -94,16 +93,15 @@ class BroadPhase:
         low, high = self._bounds
         size = high - low + 2.0 * TOUCHING_MARGIN
         self._tissue.place(SweptBox(0.5 * (low + high), size, _UNTURNED))
-        self._around.moved("tissue")
         self._blade.place(_inflated(box, (self._sound_speed + self._bounds_speed) * dt))
-        if not self._around.met_by(self._blade.object):
+        if not meet(self._tissue.object, self._blade.object):
             return False
         if self._chunks is None:
             return True
         chunks = self._chunks()
-        self._chunk_boxes.fit(chunks.boxes)
-        self._blade.place(_inflated(box, (self._sound_speed + chunks.fastest) * dt))
-        return self._chunk_boxes.are_met_by(self._blade.object)
+        box = _inflated(box, (self._sound_speed + chunks.fastest) * dt)
+        self._blade.place(box)
+        return self._chunk_boxes.are_met_by(box, self._blade.object, chunks.boxes)
 
 
 _UNTURNED = np.eye(3)

@@ -1,52 +1,52 @@
-"""The boxes of the tissue's chunks in a collision manager, moved only where they must be."""
+"""Which boxes of the tissue's chunks the swept box of a blade meets."""
 
 import fcl
 import numpy as np
 
-from bridge.collision_objects import MovableBox
-from bridge.swept_box import SweptBox
-from tissue.types import FloatArray
-
-SLACK = 1e-3
-"""[m], by which a box is larger than its chunk on every side, so that one which trembles, or sags
-slowly, need not be moved in each step. A quarter of what the broad phase allows for sound."""
+from bridge.collision_objects import MovableBox, meet
+from bridge.swept_box import TOUCHING_MARGIN, SweptBox
+from tissue.types import FloatArray, IntArray
 
 _UNTURNED = np.eye(3)
 
 
+def not_separated(box: SweptBox, chunks: FloatArray) -> IntArray:
+    """Return the numbers of the chunks from which no face of the box, or of theirs, separates it.
+
+    Six of the fifteen axes of the separating axis theorem (Gottschalk et al. 1996), for all chunks
+    at once; some that only a pair of edges separates are left over. The trees of the collision
+    library would not do: they hold a turned box by the ball around it, and a blade is long.
+
+    Args:
+        box: Around the blade.
+        chunks: Lowest and highest corners, shape (n, 2, 3).
+    """
+    half = 0.5 * (chunks[:, 1] - chunks[:, 0]) + TOUCHING_MARGIN
+    way = 0.5 * (chunks[:, 0] + chunks[:, 1]) - box.centre
+    cosines = np.abs(box.axes)
+    apart = np.abs(way) > half + cosines @ (0.5 * box.size)
+    apart |= np.abs(way @ box.axes) > 0.5 * box.size + half @ cosines
+    return np.flatnonzero(~apart.any(axis=1))
+
+
 class ChunkBoxes:
-    """Boxes that hold the tissue, and whether another object meets one of them."""
+    """Asks the collision library about the few chunks that are left over."""
 
     def __init__(self) -> None:
-        self._boxes: list[MovableBox] = []
-        self._held = np.zeros((0, 2, 3))
-        self._manager = fcl.DynamicAABBTreeCollisionManager()
+        self._chunk = MovableBox()
 
-    def fit(self, chunks: FloatArray) -> int:
-        """Make the boxes hold these chunks, shape (n, 2, 3); return how many had to be moved."""
-        if len(chunks) != len(self._boxes):
-            self._boxes = [MovableBox() for _ in chunks]
-            self._held = np.full((len(chunks), 2, 3), np.nan)
-            self._manager = fcl.DynamicAABBTreeCollisionManager()
-            self._manager.registerObjects([box.object for box in self._boxes])
-            self._manager.setup()
-        inside = (self._held[:, 0] <= chunks[:, 0]) & (chunks[:, 1] <= self._held[:, 1])
-        left = np.flatnonzero(~inside.all(axis=1))
-        if len(left) == 0:
-            return 0
-        self._held[left, 0] = chunks[left, 0] - SLACK
-        self._held[left, 1] = chunks[left, 1] + SLACK
-        for i in left.tolist():
-            low, high = self._held[i]
-            self._boxes[i].place(SweptBox(0.5 * (low + high), high - low, _UNTURNED))
-        self._manager.update([self._boxes[i].object for i in left.tolist()])
-        return len(left)
+    def are_met_by(self, box: SweptBox, there: fcl.CollisionObject, chunks: FloatArray) -> bool:
+        """Whether a box meets a chunk.
 
-    def are_met_by(self, other: fcl.CollisionObject) -> bool:
-        """Whether an object meets one of them."""
-        found = fcl.CollisionData(request=_ONE_CONTACT)
-        self._manager.collide(other, found, fcl.defaultCollisionCallback)
-        return bool(found.result.is_collision)
-
-
-_ONE_CONTACT = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
+        Args:
+            box: Around the blade.
+            there: The same as a collision object.
+            chunks: Lowest and highest corners, shape (n, 2, 3).
+        """
+        for i in not_separated(box, chunks).tolist():
+            low, high = chunks[i]
+            size = high - low + 2.0 * TOUCHING_MARGIN
+            self._chunk.place(SweptBox(0.5 * (low + high), size, _UNTURNED))
+            if meet(self._chunk.object, there):
+                return True
+        return False

@@ -9,6 +9,8 @@ None of these is called anywhere, for each was seen to end the process or to ans
 - `distance` to a mesh: it is positive where the two overlap.
 - a callback that raises: the exception is printed and lost.
 - `clear` of a manager, and registering an object twice: the manager keeps both.
+- a manager of many objects, asked with a long one that is turned: no crash, but it holds what is
+  turned by the ball around it, and looks at all that the ball meets.
 - a pose that is not finite: it is taken silently. Poses are checked where they come in.
 """
 
@@ -49,12 +51,9 @@ class Obstacles:
         self._manager.registerObjects([thing for _, thing in objects.values()])
         self._manager.setup()
 
-    def moved(self, name: str | None = None) -> None:
-        """Take note that an object has moved; all of them, if none is named."""
-        if name is None:
-            self._manager.update()
-        else:
-            self._manager.update(self._objects[name][1])
+    def moved(self) -> None:
+        """Take note that its objects have moved."""
+        self._manager.update()
 
     def met_by(self, other: fcl.CollisionObject) -> tuple[str, ...]:
         """Return the names of those that meet an object which is not one of them, in order."""
@@ -63,6 +62,11 @@ class Obstacles:
         if not met:
             return ()
         return tuple(name for name, (shape, _) in self._objects.items() if id(shape) in met)
+
+
+def meet(one: fcl.CollisionObject, other: fcl.CollisionObject) -> bool:
+    """Whether two objects meet, by their exact shapes."""
+    return bool(fcl.collide(one, other, _ONE_CONTACT, fcl.CollisionResult()))
 
 
 def fixture_object(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.CollisionObject]:

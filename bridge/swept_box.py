@@ -40,9 +40,9 @@ def box_around(points: FloatArray, axes: FloatArray, margin: float = 0.0) -> Swe
 def swept_blade(sweep: BladeSweep, shape: BladeShape | None = None) -> SweptBox:
     """Return the box aligned with the edge at t1 that holds the blade during the whole step.
 
-    The ends of the edge move on straight lines, as in the tissue. The body behind the edge turns
-    with it: its corners leave the chords of their arcs by less than their distance from the edge
-    times the square of the angle, and none is ever farther than that distance from the edge.
+    The ends of the edge move on straight lines, as in the tissue. The body behind the edge turns on
+    the way: none of its points is farther from where it would be without that than its distance
+    from the edge times the change of the axes, and none is ever farther from the edge.
 
     Args:
         sweep: Motion of the edge.
@@ -50,20 +50,17 @@ def swept_blade(sweep: BladeSweep, shape: BladeShape | None = None) -> SweptBox:
     """
     axes = edge_axes(sweep.t1)
     ends = np.array((sweep.t0.tip, sweep.t0.heel, sweep.t1.tip, sweep.t1.heel))
+    edge = box_around(ends, axes)
     if shape is None:
-        return box_around(ends, axes)
-    axes_t0 = edge_axes(sweep.t0)
-    half = 0.5 * shape.thickness
-    section = np.array(((0.0, half), (0.0, -half), (-shape.height, half), (-shape.height, -half)))
-    corners = np.concatenate(
-        (
-            (ends[:2, None] + section @ axes_t0[:, ::2].T).reshape(-1, 3),
-            (ends[2:, None] + section @ axes[:, ::2].T).reshape(-1, 3),
-        )
+        return edge
+    change = axes - edge_axes(sweep.t0)
+    reach = math.hypot(shape.height, 0.5 * shape.thickness)
+    margin = reach * min(math.sqrt(float(np.square(change).sum())), 1.0)
+    return SweptBox(
+        edge.centre - 0.5 * shape.height * axes[:, 0],
+        edge.size + (np.array((shape.height, 0.0, shape.thickness)) + 2.0 * margin),
+        axes,
     )
-    radius = math.hypot(shape.height, half)
-    turn_squared = 0.5 * float(np.square(axes - axes_t0).sum())
-    return box_around(corners, axes, radius * min(turn_squared, 1.0))
 
 
 def edge_axes(segment: BladeSegment) -> FloatArray:

@@ -10,68 +10,60 @@ from tissue.types import Chunks, FloatArray, IntArray
 
 TETRAHEDRA_EACH = 64
 """Tetrahedra in a chunk, about. Fewer make closer boxes, and more of them to look through: with 64
-the organ has 80, 15 mm wide."""
+the organ has 85, 15 mm wide."""
 MOST_CHUNKS = 512
-"""A large body has larger chunks: its boxes are for a collision library, which takes a microsecond
-for each that has moved."""
+"""A large body has larger chunks: who asks looks through all of their boxes a thousand times a
+second."""
 
 
-class ChunkCells(NamedTuple):
-    """A lattice over the body at rest. The tetrahedra whose first node is in a cell are a chunk.
+class ChunkNodes(NamedTuple):
+    """The nodes of the tetrahedra of each chunk. A node may be in several, for a tetrahedron is
+    wholly in one."""
 
-    So a chunk needs no record of its members, and the parts of a tetrahedron that is cut stay in
-    the chunk, or go to the next.
+    nodes: IntArray
+    """Of all chunks, one after the other, shape (n,)."""
+    first: IntArray
+    """Where those of each chunk begin, and the end, shape (n_chunks + 1,)."""
+
+
+def chunk_nodes(body: Body) -> ChunkNodes:
+    """Divide the body by a lattice over it at rest, of cells as near to cubes as numbers allow.
+
+    The tetrahedra whose first node is in a cell are a chunk.
     """
-
-    origin: FloatArray
-    """Lowest corner [m], shape (3,)."""
-    per_metre: FloatArray
-    """Cells per length [1/m], shape (3,)."""
-    counts: IntArray
-    """Cells along each axis, shape (3,)."""
-
-
-def chunk_cells(body: Body) -> ChunkCells:
-    """Return cells as near to cubes as whole numbers allow."""
-    rest = body.rest[: body.counts[NODES]]
+    tetrahedra = body.tetrahedra[: body.counts[TETRAHEDRA]]
+    n_nodes = int(body.counts[NODES])
+    rest = body.rest[:n_nodes]
     low, extent = rest.min(axis=0), np.ptp(rest, axis=0)
-    n = min(max(int(body.counts[TETRAHEDRA]) // TETRAHEDRA_EACH, 1), MOST_CHUNKS)
-    side = np.cbrt(extent.prod() / n)
-    counts = np.maximum(np.rint(extent / side).astype(np.int64), 1)
-    return ChunkCells(low, counts / extent, counts)
+    n = min(max(len(tetrahedra) // TETRAHEDRA_EACH, 1), MOST_CHUNKS)
+    counts = np.maximum(np.rint(extent / np.cbrt(extent.prod() / n)).astype(np.int64), 1)
+    at = (rest[tetrahedra[:, 0]] - low) * (counts / extent)
+    cells = np.ravel_multi_index(
+        tuple(np.minimum(at.astype(np.int64), counts - 1).T), tuple(counts)
+    )
+    each = np.unique(cells[:, None] * n_nodes + tetrahedra)
+    _, first = np.unique(each // n_nodes, return_index=True)
+    return ChunkNodes(each % n_nodes, np.append(first, len(each)))
 
 
-def chunks_of(body: Body, cells: ChunkCells) -> Chunks:
-    """Return the boxes of the chunks that have a tetrahedron, and the speed of the fastest node."""
-    n = int(cells.counts.prod())
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    fastest = enclose(body, cells, low, high)
-    used = low[:, 0] <= high[:, 0]
-    return Chunks(np.stack([low[used], high[used]], axis=1), fastest)
+def chunks_of(body: Body, chunks: ChunkNodes) -> Chunks:
+    """Return the boxes of the chunks now, and the speed of the fastest node."""
+    boxes = np.empty((len(chunks.first) - 1, 2, 3))
+    return Chunks(boxes, enclose(body, chunks, boxes))
 
 
 @kernel
-def enclose(body: Body, cells: ChunkCells, low: FloatArray, high: FloatArray) -> float:
-    """Widen the box of each chunk to hold its tetrahedra; return the largest speed [m/s].
-
-    Args:
-        body: The body.
-        cells: Which chunk a tetrahedron is in.
-        low: Lowest corners [m], infinite at first, shape (n_chunks, 3).
-        high: Highest corners.
-    """
-    x, v, rest, counts = body.positions, body.velocities, body.rest, cells.counts
-    for t in range(body.counts[TETRAHEDRA]):
-        chunk = 0
+def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
+    """Write the lowest and highest corner of each chunk; return the largest speed [m/s]."""
+    x, v = body.positions, body.velocities
+    for chunk in range(len(boxes)):
+        first = chunks.first[chunk]
         for axis in range(3):
-            at = rest[body.tetrahedra[t, 0], axis] - cells.origin[axis]
-            cell = int(at * cells.per_metre[axis])
-            chunk = chunk * counts[axis] + min(max(cell, 0), counts[axis] - 1)
-        for k in range(4):
-            node = body.tetrahedra[t, k]
-            for axis in range(3):
-                low[chunk, axis] = min(low[chunk, axis], x[node, axis])
-                high[chunk, axis] = max(high[chunk, axis], x[node, axis])
+            low = high = x[chunks.nodes[first], axis]
+            for i in range(first + 1, chunks.first[chunk + 1]):
+                here = x[chunks.nodes[i], axis]
+                low, high = min(low, here), max(high, here)
+            boxes[chunk, 0, axis], boxes[chunk, 1, axis] = low, high
     largest = 0.0
     for node in range(body.counts[NODES]):
         largest = max(largest, v[node, 0] ** 2 + v[node, 1] ** 2 + v[node, 2] ** 2)

