@@ -203,6 +203,47 @@ def test_a_flood_of_requests_is_answered_in_order(server):
     assert_serves(server)
 
 
+def test_strangers_who_flood_the_server_do_not_change_a_cut(server, upright):
+    """They connect, say nothing, garbage, half a hello or a whole one, and leave or stay."""
+    with contextlib.closing(link_once_free(server.address)) as alone:
+        expected = [bits(result) for result in cut(alone, upright)]
+    done = threading.Event()
+
+    def bother():
+        talk = [b"", b"GET / HTTP/1.1\r\n\r\n", HELLO, HELLO[:9], bytes(1 << 20)]
+        with contextlib.ExitStack() as staying:
+            for i in range(10**6):
+                if done.is_set():
+                    return
+                with contextlib.suppress(OSError):
+                    stranger = connected(server.address)
+                    stranger.sendall(talk[i % len(talk)])
+                    if i % 7:
+                        stranger.close()
+                    else:
+                        staying.callback(stranger.close)
+
+    with contextlib.closing(link_once_free(server.address)) as link:
+        crowd = threading.Thread(target=bother)
+        crowd.start()
+        try:
+            found = [bits(result) for result in cut(link, upright)]
+        finally:
+            done.set()
+            crowd.join()
+    assert found == expected
+    assert_serves(server)
+
+
+def test_a_client_that_comes_back_in_the_middle_of_a_cut_finds_a_whole_body(start_server, upright):
+    server = start_server()
+    with contextlib.closing(TcpLink(server.address)) as link:
+        whole = bits(link.snapshot())
+        assert cut(link, upright)[-1].cut_area > 0.0
+    with contextlib.closing(link_once_free(server.address)) as link:
+        assert bits(link.snapshot()) == whole
+
+
 def test_an_old_request_is_not_done_twice(server):
     with seated(server.address) as peer:
         step = pack_frame(Kind.STEP, 1, pack_step(None, DT))

@@ -320,10 +320,14 @@ def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
 def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
     here, there = tmp_path / "here", tmp_path / "there"
     assert command_line(["run", "grid2", "--seconds", "0.9", "-q", "--out", str(here)]) == 0
-    server = start("serve", "grid2", "--port", "0")
+    key = str(tmp_path / "link.key")
+    assert command_line(["key", key]) == 0
+    server = start("serve", "grid2", "--port", "0", "--key", key)
     try:
         address = re.search(r"127\.0\.0\.1:\d+", server.stdout.readline()).group()
         words = ["run", "--connect", address, "--seconds", "0.9", "-q", "--out", str(there)]
+        assert command_line(words) == 1  # without the key
+        words += ["--key", key]
         assert command_line(words) == 0
     finally:
         server.send_signal(signal.SIGINT)
