@@ -7,6 +7,7 @@ import numpy as np
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
 from tissue.boundary import fixed_nodes
+from tissue.resistance import resistance_of
 from tissue.tissue import Tissue
 from tissue.types import FloatArray
 
@@ -39,6 +40,8 @@ def make_tissue(scene: Scene) -> Tissue:
         scheme=scene.scheme,
         relaxation=scene.relaxation,
         threads=scene.threads,
+        blade=scene.blade,
+        audit=scene.audit,
     )
     if fixed.any():
         tissue.settle()
@@ -56,7 +59,7 @@ def check(scene: Scene) -> None:
     mesh = scene.mesh()
     fixed_nodes(mesh, scene.fixed)
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)
-    drag = scene.material.toughness / scene.material.young_modulus
+    drag = toughest(scene) / scene.material.young_modulus
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
     if drag > LONG_DRAG * extent:
         log.warning(
@@ -66,6 +69,17 @@ def check(scene: Scene) -> None:
             1e3 * drag,
             1e3 * extent,
         )
+
+
+def toughest(scene: Scene) -> float:
+    """Return the most that a square metre of the scene's cut costs [J/m2]: skin, speed, edge."""
+    material = scene.material
+    resistance = resistance_of(material, scene.blade)
+    at_speed = resistance.toughness
+    if material.toughness_exponent > 0.0:
+        ratio = scene.speed / material.toughness_speed
+        at_speed *= 1.0 + ratio**material.toughness_exponent
+    return max(resistance.skin_toughness, at_speed)
 
 
 def pulled_apart(positions: FloatArray, fixed: str, stretch: float) -> FloatArray:

@@ -57,7 +57,7 @@ def run(
     with talking(talk), Plotter() as plotter:  # it loads while we do
         from scalpel_sim.ready import ready_run
 
-        with ready_run(scene, body, motion, talk) as ready:
+        with ready_run(scene, body, motion, talk, audits=True) as ready:
             report(_perform(ready, motion, talk, plotter), ready.folder, talk)
 
 

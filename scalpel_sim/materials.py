@@ -16,9 +16,16 @@ MM_PER_M = 1e3
 NOT_CONFIRMED = "*"
 """Marks a figure that could not be traced to a measurement."""
 
-HEADINGS = ("name", "E, kPa", "nu", "kg/m³", "J, J/m²", "damping", "J / E, mm")
+HEADINGS = ("name", "E, kPa", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
 
-SOURCED = ("young_modulus", "poisson_ratio", "density", "toughness", "damping_ratio")
+SOURCED = (
+    "young_modulus",
+    "poisson_ratio",
+    "density",
+    "toughness",
+    "damping_ratio",
+    "blade_friction",
+)
 """The figures of a preset."""
 
 
@@ -54,6 +61,7 @@ def print_presets(presets: Sequence[Preset]) -> None:
             _marked(preset.density),
             _marked(preset.toughness),
             _marked(preset.damping_ratio),
+            _marked(preset.blade_friction),
             f"{preset.toughness.value / preset.young_modulus.value * MM_PER_M:.1f}",
         )
     console.print(table)
@@ -61,8 +69,8 @@ def print_presets(presets: Sequence[Preset]) -> None:
     console.print(
         f"{NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
         "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
-        f"stretching at {low:g} and {high:g} Hz, less between. J / E: how far a blade drags "
-        "the tissue along before it parts.",
+        f"stretching at {low:g} and {high:g} Hz, less between. friction: on the faces of "
+        "a blade. J / E: how far a blade drags the tissue along before it parts.",
         markup=False,
         highlight=False,
         soft_wrap=True,

@@ -41,6 +41,27 @@ class Body:
     "Density [kg/m3]."
     toughness: float | None = None
     "Fracture toughness: what a square metre of cut costs [J/m2]."
+    skin_toughness: float | None = None
+    "What it costs until the edge has broken in, the peak of a puncture [J/m2]."
+    toughness_exponent: float | None = None
+    "n of a toughness that rises with the speed of the cut: toughness (1 + (speed / S)^n)."
+    toughness_speed: float | None = None
+    "S: the speed at which toughness is twice that of a slow cut [m/s]."
+    work_to_rupture: float | None = None
+    "Energy that it takes to stretch a volume until it breaks [J/m3]: what a blunt edge adds."
+    blade_friction: float | None = None
+    "Coefficient of friction on the faces of the blade."
+    blade_viscosity: float | None = None
+    "Shear stress per sliding speed on the faces of the blade, besides friction [Pa s/m]."
+    blade_thickness: float | None = None
+    """Thickness of the blade [m]; 0: a line, as in the paper. The paper's scenes meet a line, all
+    others a scalpel of 0.0004."""
+    blade_bevel: float | None = None
+    "Angle between each bevel and the plane of the blade [degree; a scalpel's: 10]."
+    blade_height: float | None = None
+    "From the edge to the back of the blade [m; a scalpel's: 0.006]."
+    blade_edge_radius: float | None = None
+    "Radius of the edge: how blunt it is [m; a scalpel's: 0.000001]."
     scheme: str | None = None
     "How the mesh is cut: stellar [default], or paper: the paper's own scheme, with its limits."
     relaxation: str | None = None
@@ -62,6 +83,9 @@ class Body:
     "Coefficient of friction of cut faces, pieces and the floor."
     floor: float | None = None
     "Height of a floor [m], below the body: pieces that are cut loose land on it."
+    audit: bool | None = None
+    """Account for the energy: where the work of the blade goes. Needs a global relaxation on one
+    thread, and is done there by `run` unless you say no."""
 
 
 @Parameter(name="*")

@@ -19,10 +19,11 @@ T = TypeVar("T")
 SUMMARY = "summary.json"
 FORCES = "forces.csv"
 PLOT = "force.png"
+ENERGY_PLOT = "energy.png"
 INITIAL = "initial.vtu"
 FINAL = "final.vtu"
 REPLAY = "replay.html"
-NAMES = (SUMMARY, FORCES, PLOT, INITIAL, FINAL, REPLAY)
+NAMES = (SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 
 FRAMES_PER_FLUSH = 100
 """So often are rows of `forces.csv` handed to the system: a kill loses a tenth of a second."""
@@ -35,7 +36,7 @@ class Outputs:
 
     Args:
         folder: Made where there is none.
-        plotter: Draws `force.png`. Whoever made it closes it.
+        plotter: Draws the plots. Whoever made it closes it.
 
     Raises:
         UsageError, RunError: as `check_folder`.
@@ -72,9 +73,9 @@ class Outputs:
         self._append(text)
         self._n_written = len(recording)
 
-    def write_plot(self, title: str) -> None:
-        """Draw `force.png` from `forces.csv`."""
-        self._plotter.draw(self.path(FORCES), title, self.path(PLOT))
+    def write_plots(self, title: str) -> None:
+        """Draw `force.png`, and with an audit `energy.png`, from `forces.csv`."""
+        self._plotter.draw(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""

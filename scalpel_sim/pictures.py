@@ -1,5 +1,6 @@
 """What the 3D views are handed of a running simulation."""
 
+from scalpel_sim.force_parts import force_parts
 from scalpel_sim.model_shapes import body_poses
 from scalpel_sim.replay import ReplayWriter
 from scalpel_sim.scene3d import Readings
@@ -9,11 +10,22 @@ from scalpel_sim.viewer import Viewer
 
 def readings(simulation: Simulation) -> Readings | None:
     """Return the numbers to show beside the picture of now; None before the first frame."""
-    wrench, result = simulation.wrench, simulation.bridge.result
+    wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
     if result is None:
         return None
+    contacts = result.contacts
+    on_tissue = contacts.normal_force[:, None] * contacts.normal + contacts.friction
+    forward = frame.vectors_to_tissue(simulation.arm.blade.segment().forward)
     return Readings(
-        simulation.time, wrench.force, wrench.point, result.cut_area, result.n_tetrahedra
+        simulation.time,
+        wrench.force,
+        wrench.point,
+        result.cut_area,
+        result.n_tetrahedra,
+        contact_points=frame.points_to_world(contacts.point),
+        contact_forces=frame.vectors_to_world(-on_tissue),
+        parts=force_parts(contacts, forward),
+        energies=result.energies,
     )
 
 

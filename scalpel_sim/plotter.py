@@ -31,21 +31,28 @@ class Plotter:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
         )
 
-    def draw(self, forces: Path, title: str, picture: Path) -> None:
+    def draw(self, recorded: Path, title: str, forces: Path, energies: Path) -> None:
         """Draw what is in a `forces.csv`, and end the process.
 
+        Args:
+            recorded: The table.
+            title: Heading of the pictures.
+            forces: Where the picture of the forces goes.
+            energies: Where that of the energies goes, if they are in the table.
+
         Raises:
-            RunError: the plot could not be drawn or written.
+            RunError: a plot could not be drawn or written.
         """
-        request = json.dumps({"forces": str(forces), "title": title, "picture": str(picture)})
+        paths = {"recorded": recorded, "forces": forces, "energies": energies}
+        request = json.dumps({"title": title} | {key: str(path) for key, path in paths.items()})
         try:
             _, complaint = self._process.communicate(request, timeout=SLOWEST)
         except subprocess.TimeoutExpired:
             self.close()
-            raise RunError(f"{picture}: drawing it took more than {SLOWEST:g} s") from None
+            raise RunError(f"{forces}: drawing it took more than {SLOWEST:g} s") from None
         if self._process.returncode != 0:
             reason = complaint.strip().rpartition("\n")[2] or f"exit {self._process.returncode}"
-            raise RunError(f"{picture}: could not be drawn ({reason})")
+            raise RunError(f"{forces}: could not be drawn ({reason})")
 
     def __enter__(self) -> "Plotter":
         return self
@@ -63,12 +70,14 @@ class Plotter:
 
 def main() -> None:
     """Load what is needed, and draw what the standard input then asks for."""
+    from scalpel_sim.energy_plot import plot_energies
     from scalpel_sim.plot import plot_forces
     from scalpel_sim.recording import read_forces
 
     text = sys.stdin.read()
     if text:
         request = json.loads(text)
-        plot_forces(
-            read_forces(Path(request["forces"])), request["title"], Path(request["picture"])
-        )
+        recording = read_forces(Path(request["recorded"]))
+        plot_forces(recording, request["title"], Path(request["forces"]))
+        if recording.is_audited:
+            plot_energies(recording, request["title"], Path(request["energies"]))

@@ -16,11 +16,13 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.options import Body, Motion, Talk
 from scalpel_sim.outputs import check_folder
 from scalpel_sim.prepare import prepare
+from scalpel_sim.scalpel import chosen_blade, expect_faces
 from scalpel_sim.scenes import (
     DEFAULT_SCENE,
     Scene,
     changed,
     check_motion,
+    has_account,
     material_called,
     mesh_scene,
     scene_called,
@@ -45,8 +47,13 @@ class Ready(NamedTuple):
 
 
 @contextmanager
-def ready_run(name: str | None, body: Body, motion: Motion, talk: Talk) -> Iterator[Ready]:
-    """Yield the run that the command line asks for, and let go of the tissue afterwards."""
+def ready_run(
+    name: str | None, body: Body, motion: Motion, talk: Talk, *, audits: bool = False
+) -> Iterator[Ready]:
+    """Yield the run that the command line asks for, and let go of the tissue afterwards.
+
+    `audits` says whether an account of the energy is kept where nothing is said of it.
+    """
     if motion.seconds is not None and not 0.0 < motion.seconds <= LONGEST_RUN:
         raise UsageError(
             f"--seconds is {motion.seconds}; it must be above 0 and at most {LONGEST_RUN:g}"
@@ -55,8 +62,10 @@ def ready_run(name: str | None, body: Body, motion: Motion, talk: Talk) -> Itera
         raise UsageError(
             "--key is for a tissue elsewhere; add --connect HOST:PORT, or leave it away"
         )
-    tissue = _tissue_here if motion.connect is None else _tissue_elsewhere
-    link, scene, settings = tissue(name, body, motion, talk)
+    if motion.connect is None:
+        link, scene, settings = _tissue_here(name, body, motion, talk, audits)
+    else:
+        link, scene, settings = _tissue_elsewhere(name, body, motion, talk)
     try:
         simulation = prepare(scene, link)
         settings |= {"arm": simulation.arm.preset, "seconds": motion.seconds}
@@ -66,10 +75,12 @@ def ready_run(name: str | None, body: Body, motion: Motion, talk: Talk) -> Itera
 
 
 def _tissue_here(
-    name: str | None, body: Body, motion: Motion, talk: Talk
+    name: str | None, body: Body, motion: Motion, talk: Talk, audits: bool
 ) -> tuple[TissueLink, Scene, dict[str, Any]]:
     """Make the tissue in this process, after all checks that need none."""
     scene = changed(chosen_scene(name, body), **_given(motion))
+    if audits and body.audit is None and has_account(scene.relaxation, scene.threads):
+        scene = replace(scene, audit=True)
     check(scene)
     check_folder(_folder(motion, scene))
     scene, springs = springs_as_asked(scene, body)
@@ -108,6 +119,8 @@ def _tissue_elsewhere(
         "scheme",
         "relaxation",
         "threads",
+        "blade",
+        "audit",
     }  # the server knows, and does not say
     settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
     return link, scene, settings | {"connect": motion.connect}
@@ -173,7 +186,7 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         raise UsageError(f"both the scene '{name}' and --mesh {body.mesh} are given; choose one")
     else:
         scene = mesh_scene(body.mesh, 1.0 if body.scale is None else body.scale)
-    return changed(
+    scene = changed(
         scene,
         fixed=body.fix,
         material=None if body.material is None else material_called(body.material),
@@ -182,6 +195,12 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         poisson_ratio=body.poisson_ratio,
         density=body.density,
         toughness=body.toughness,
+        skin_toughness=body.skin_toughness,
+        toughness_exponent=body.toughness_exponent,
+        toughness_speed=body.toughness_speed,
+        work_to_rupture=body.work_to_rupture,
+        blade_friction=body.blade_friction,
+        blade_viscosity=body.blade_viscosity,
         scheme=body.scheme,
         relaxation=body.relaxation,
         threads=body.threads,
@@ -191,4 +210,14 @@ def chosen_scene(name: str | None, body: Body) -> Scene:
         gravity=body.gravity,
         friction=body.friction,
         floor=body.floor,
+        audit=body.audit,
     )
+    blade = chosen_blade(
+        scene.blade,
+        thickness=body.blade_thickness,
+        bevel=body.blade_bevel,
+        height=body.blade_height,
+        edge_radius=body.blade_edge_radius,
+    )
+    expect_faces(blade, vars(body))
+    return replace(scene, blade=blade)

@@ -5,32 +5,47 @@ from pathlib import Path
 
 import numpy as np
 
-from tissue.types import FloatArray
+from tissue.types import Energies, FloatArray
+
+ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
+"""Where the work of the blade went since the start, and what is not accounted for: see
+`tissue.types.Energies`. NaN without an audit."""
+N_OF_ACCOUNT = len(ACCOUNT)
+
+
+def _vector(name: str, unit: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
+
 
 COLUMNS = (
     "time_s",
-    "tip_x_m",
-    "tip_y_m",
-    "tip_z_m",
-    "force_x_n",
-    "force_y_n",
-    "force_z_n",
-    "torque_x_nm",
-    "torque_y_nm",
-    "torque_z_nm",
+    *_vector("tip", "m"),
+    *_vector("force", "n"),
+    *_vector("torque", "nm"),
+    *_vector("tissue_force", "n"),
+    *_vector("tissue_torque", "nm"),
+    *_vector("edge_force", "n"),
+    *_vector("pressing_force", "n"),
+    *_vector("friction_force", "n"),
+    *(f"stiffness_{axes}_n_m" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
     "cut_area_m2",
     "tetrahedra",
     "anchored_length_m",
     "work_of_blade_j",
+    *ACCOUNT,
     "cd_s",
     "gc_s",
     "rx_s",
     "rd_s",
     "frame_s",
 )
-"""Names and units. Vectors are in the world frame; force and torque are what the blade feels, the
-torque about the tip. `cd_s` to `rd_s` are wall times of the stages that the paper's Table 1 names;
-`frame_s` is the wall time of the whole frame without pictures (`rd_s`)."""
+"""Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
+averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` the same
+before the limits of the device. `edge_force`, `pressing_force` and `friction_force` are what the
+tissue does to the blade's edge, to its faces, and along them, at the end of the frame; `stiffness`
+is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall times of the
+stages that the paper's Table 1 names; `frame_s` is the wall time of the whole frame without
+pictures (`rd_s`)."""
 
 FRAMES_AT_FIRST = 1024
 
@@ -62,9 +77,14 @@ class Recording:
         return self.rows[:, COLUMNS.index(name)]
 
     def vector(self, name: str) -> FloatArray:
-        """Return the three columns of `tip`, `force` or `torque`, shape (n_frames, 3). A view."""
+        """Return the three columns of `tip`, `force` and the like, shape (n_frames, 3). A view."""
         first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
         return self.rows[:, first : first + 3]
+
+    @property
+    def is_audited(self) -> bool:
+        """Whether it is known where the work of the blade went."""
+        return len(self) > 0 and bool(np.isfinite(self.column("residual_j")[-1]))
 
 
 def read_forces(path: Path) -> Recording:

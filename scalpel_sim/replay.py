@@ -28,7 +28,8 @@ in base64. Only the number of frames that are kept hangs on it."""
 
 CAPTION = (
     "Skin: red-brown, with vessels. Bright red: what the blade has laid open. Arrow: the force "
-    "that the blade feels. Drag to turn, scroll to zoom."
+    "that the blade feels; blue lines: of each contact, thirty times as long. Drag "
+    "to turn, scroll to zoom."
 )
 
 

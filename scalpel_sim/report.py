@@ -6,6 +6,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from scalpel_sim.account import TERMS
 from scalpel_sim.summary import COMPLETE, STAGES, Summary
 from scalpel_sim.table_1 import TABLE_1
 
@@ -121,6 +122,29 @@ def print_table(summary: Summary, console: Console) -> None:
         )
     row("other (arm, bridge)", f"{summary.share['other']:.1%}")
     console.print(table)
+    if summary.energies_j is not None:
+        console.print(_account(summary.energies_j, summary.residual_of_work))
+
+
+def _account(energies: dict[str, float], residual_of_work: float | None) -> Table:
+    """Return where the work of the blade went; shares are of that work, and add up to 100 %."""
+    work = energies["work_of_blade"]
+    table = Table(title="where the work of the blade went", title_justify="left", show_header=False)
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column(justify="right")
+
+    def row(label: str, energy: float, share: float | None) -> None:
+        shown = "" if share is None else f"{share:.2%}"
+        table.add_row(label, f"{energy * MJ_PER_J:.4f} mJ", shown)
+
+    row("work of the blade", work, 1.0 if work else None)
+    table.add_section()
+    for term in TERMS:
+        if energies[term.name]:
+            row(term.label, energies[term.name], energies[term.name] / work if work else None)
+    row("not accounted for", energies["residual"], residual_of_work)
+    return table
 
 
 def _piece(piece: dict[str, Any]) -> str:

@@ -106,7 +106,7 @@ def perform(
     with unwritten:
         outputs.write_replay(replay)
     with unwritten:  # last: the plotter may still be loading
-        outputs.write_plot(simulation.title)
+        outputs.write_plots(simulation.title)
     outputs.close()
 
     kept = f"{outputs.folder} holds what was done"

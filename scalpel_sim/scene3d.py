@@ -11,14 +11,17 @@ was ever set, and waits for a reply to each command.
 """
 
 import base64
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
+from scalpel_sim.account import TERMS
 from scalpel_sim.draping import TriangleMesh
-from tissue.types import FloatArray, IntArray
+from scalpel_sim.force_parts import ForceParts
+from tissue.types import Energies, FloatArray, IntArray
 
 # Typed arrays as MessagePack extensions. Source: msgpack-lite, the decoder inside meshcat's viewer.
 _EXTENSION = {"int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
@@ -43,6 +46,9 @@ class Look(NamedTuple):
     """PNG pictures by the name of the property that holds them, for instance `map`."""
 
 
+NO_VECTORS = np.zeros((0, 3))
+
+
 class Readings(NamedTuple):
     """Numbers that are shown beside the picture, and the force that is shown in it."""
 
@@ -55,6 +61,14 @@ class Readings(NamedTuple):
     cut_area: float
     """[m2]."""
     n_tetrahedra: int
+    contact_points: FloatArray = NO_VECTORS
+    """Where the tissue acts on the blade [m], world frame, shape (n_contacts, 3)."""
+    contact_forces: FloatArray = NO_VECTORS
+    """What it does there [N], world frame, shape (n_contacts, 3)."""
+    parts: ForceParts | None = None
+    """What the force is made of."""
+    energies: Energies | None = None
+    """Where the work of the blade went; None without an audit."""
 
 
 class Scene3D:
@@ -132,6 +146,11 @@ class Scene3D:
             cut_area=readings.cut_area,
             tetrahedra=readings.n_tetrahedra,
             newton_length=newton_length,
+            contacts=_pack(
+                np.hstack([readings.contact_points, readings.contact_forces]), "float32"
+            ),
+            parts=[] if readings.parts is None else [math.hypot(*part) for part in readings.parts],
+            account=_account(readings.energies),
         )
 
     def take(self) -> bytes:
@@ -141,6 +160,16 @@ class Scene3D:
 
     def _add(self, command: str, **fields: Any) -> None:
         self._commands.append({"type": command, **fields})
+
+
+def _account(energies: Energies | None) -> list[dict[str, Any]]:
+    """Return the terms of an account with their names and colours, in the table's order."""
+    if energies is None:
+        return []
+    return [
+        {"label": term.label, "colour": term.colour, "joules": float(getattr(energies, term.name))}
+        for term in TERMS
+    ]
 
 
 def _pack(array: FloatArray | IntArray, kind: str, *, normalized: bool = False) -> dict[str, Any]:

@@ -10,7 +10,9 @@ import numpy as np
 from bridge.link import TissueLink
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.planning import STROKES
+from scalpel_sim.scalpel import SCALPEL
 from scalpel_sim.stroke import Stroke, from_csv
+from tissue.blade_shape import BladeShape
 from tissue.border import checked_threads
 from tissue.material import Material
 from tissue.mesh_io import read_mesh
@@ -25,7 +27,12 @@ SCHEMES = ("stellar", "paper")
 
 ARMS = ("auto", "touch", "premium")
 
-PHANTOM = Material(young_modulus=10e3, density=1000.0, toughness=20.0)
+PHANTOM = Material(
+    young_modulus=10e3,
+    density=1000.0,
+    toughness=20.0,
+    blade_friction=PRESETS["gelatin"].blade_friction.value,
+)
 """A soft gel phantom. toughness / young_modulus = 2 mm: the length by which the blade drags the
 tissue along before the tissue parts. It must be small against the body, or the blade draws the
 body after itself instead of cutting it."""
@@ -65,6 +72,11 @@ def check_relaxation(name: str, threads: int) -> None:
     checked_threads(threads)
 
 
+def has_account(relaxation: str, threads: int) -> bool:
+    """Whether the energy can be accounted for: where all nodes move together, on one thread."""
+    return relaxation == "global" and threads == 1
+
+
 @dataclass(frozen=True)
 class Scene:
     """A body and what is to be done to it. Lengths in metres, tissue frame."""
@@ -91,6 +103,10 @@ class Scene:
     """[m/s2], along -z."""
     floor: float | None = None
     """Height of a floor on which loose pieces land [m], tissue frame; None: they fall for ever."""
+    blade: BladeShape | None = SCALPEL
+    """The blade as a body; None: a line, as in the paper."""
+    audit: bool = False
+    """Whether an account of the energy is kept. Frames take a fifth to a third longer."""
     stroke: str = "straight"
     """A name known to `scalpel_sim.stroke`, or a CSV file."""
     speed: float = 0.06
@@ -103,10 +119,15 @@ class Scene:
 
         Raises:
             UsageError: stretch, gravity or speed is out of range; there is no such scheme or
-                relaxation.
+                relaxation; an audit of what has none.
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
+        if self.audit and not has_account(self.relaxation, self.threads):
+            raise UsageError(
+                "--audit needs --relaxation global and --threads 1, not "
+                f"{self.relaxation} and {self.threads}; leave it away, or them"
+            )
         if not -0.5 <= self.stretch <= 1.0:
             raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")
         if not 0.0 <= self.gravity <= 100.0:
@@ -118,7 +139,11 @@ class Scene:
         """Return the numbers and names of the scene, for a report."""
         found = {field.name: getattr(self, field.name) for field in fields(self)}
         del found["name"], found["mesh"]
-        return found | {"material": asdict(self.material), "quality": asdict(self.quality)}
+        return found | {
+            "material": asdict(self.material),
+            "quality": asdict(self.quality),
+            "blade": None if self.blade is None else asdict(self.blade),
+        }
 
 
 SCENES = {
@@ -134,16 +159,19 @@ SCENES = {
             "slab",
             "the paper's Figure 10: 4 x 6 x 4 cells, 576 tetrahedra",
             lambda: grid((4, 6, 4), (0.04, 0.06, 0.04)),
+            blade=None,
         ),
         Scene(
             "grid2",
             "the paper's Figure 12 a: 2 x 2 x 2 cells, 48 tetrahedra",
             lambda: grid((2, 2, 2), (0.04, 0.04, 0.04)),
+            blade=None,
         ),
         Scene(
             "grid7",
             "the paper's Figure 12 b: 7 x 7 x 7 cells, 2,058 tetrahedra",
             lambda: grid((7, 7, 7), (0.04, 0.04, 0.04)),
+            blade=None,
         ),
     )
 }

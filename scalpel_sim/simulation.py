@@ -12,6 +12,7 @@ from bridge.fixtures import Fixture
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink
 from scalpel_sim.arm import Arm
+from scalpel_sim.frame_row import row_of
 from scalpel_sim.recording import Recording
 from scalpel_sim.stroke import Stroke
 from scalpel_sim.touching import Touching
@@ -102,22 +103,17 @@ class Simulation:
             picture(self)
         drawn = time.perf_counter()
 
-        result = self.result
         self.recording.append(
-            (
+            row_of(
                 self.time,
-                *segment.tip,
-                *self.wrench.force,
-                *self.wrench.torque,
-                result.cut_area,
-                result.n_tetrahedra,
-                result.anchored_length,
-                result.work_of_blade,
-                result.profile.collision,
-                result.profile.topology,
-                result.profile.relaxation,
-                drawn - framed,
-                framed - start,
+                segment,
+                self.wrench,
+                self.bridge.wrench_raw,
+                self.result,
+                self.result.profile,
+                self.frame,
+                picture_seconds=drawn - framed,
+                frame_seconds=framed - start,
             )
         )
         self.wall_seconds += time.perf_counter() - start

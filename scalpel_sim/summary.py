@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.recording import Recording
+from scalpel_sim.recording import ACCOUNT, Recording
 from scalpel_sim.version import version
 from tissue.quality import QualityReport
 from tissue.types import Piece
@@ -51,6 +51,11 @@ class Summary(NamedTuple):
     force_mean_n: float
     """Mean of its magnitude over the frames in which the blade felt any."""
     work_of_blade_j: float
+    energies_j: dict[str, float] | None
+    """Where it went: see `tissue.types.Energies`, and `residual`, which is not accounted for. None
+    without an audit."""
+    residual_of_work: float | None
+    """The residual over the work of the blade; None without an audit, or without work."""
     share: dict[str, float]
     """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link).
     They sum to 1."""
@@ -85,6 +90,8 @@ def summarise(
     felt = force[force > 0.0]
     frame_times = recording.column("frame_s")
     median, slow = np.percentile(frame_times, (50, 99)) if n else (np.inf, np.inf)
+    energies = final_energies(recording)
+    work = float(recording.column("work_of_blade_j")[-1]) if n else 0.0
     return Summary(
         scene=scene,
         status=status,
@@ -103,7 +110,9 @@ def summarise(
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
-        work_of_blade_j=float(recording.column("work_of_blade_j")[-1]) if n else 0.0,
+        work_of_blade_j=work,
+        energies_j=energies,
+        residual_of_work=energies["residual"] / work if energies and work else None,
         share=shares(recording, wall_seconds),
         counters=counters,
         touched=touched,
@@ -142,6 +151,14 @@ def quality_figures(report: QualityReport) -> dict[str, float]:
         "frequency_growth": report.frequency_growth,
         "substep_growth": report.substep_growth,
     }
+
+
+def final_energies(recording: Recording) -> dict[str, float] | None:
+    """Return where the work of the blade went by the last frame [J]; None without an audit."""
+    if not recording.is_audited:
+        return None
+    names = ("work_of_blade_j", *ACCOUNT)
+    return {name.removesuffix("_j"): float(recording.column(name)[-1]) for name in names}
 
 
 def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:

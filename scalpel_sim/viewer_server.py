@@ -34,7 +34,10 @@ LAST_PORT = 7099
 FAREWELL = 1.0
 """How long the last picture may take to reach the pages [s] before the process ends."""
 
-CAPTION = "Bright red: what the blade has laid open. Drag to turn, scroll to zoom."
+CAPTION = (
+    "Bright red: what the blade has laid open. Blue: the force of each contact. Drag to turn, "
+    "scroll to zoom."
+)
 
 
 class Inbox:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tissue.blade_shape import BladeShape
 from tissue.boundary import fixed_nodes
 from tissue.jit import cache_directory
 from tissue.shapes import grid
@@ -26,7 +27,7 @@ def warm_up() -> None:
     that this did not do.
     """
     mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
-    tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"))
+    tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"), blade=BladeShape(), audit=True)
     tissue.settle()
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 0.6, N_STEPS):

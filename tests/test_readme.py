@@ -14,6 +14,12 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = dict(enumerate(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)))
 
 
+def block_about(word: str) -> str:
+    """The only block of code that has a word in it."""
+    (block,) = (code for code in BLOCKS.values() if word in code)
+    return block
+
+
 def printed(code: str, capsys) -> str:
     exec(compile(code, "README.md", "exec"), {})
     return capsys.readouterr().out
@@ -40,7 +46,14 @@ def test_a_body_is_cut_along_a_given_surface(capsys):
 
 
 def test_a_clamp_in_the_way_of_the_blade_is_met(capsys):
-    assert re.search(r"'blade, clamp': \d+", printed(BLOCKS[3], capsys))
+    assert re.search(r"'blade, clamp': \d+", printed(block_about("clamp"), capsys))
+
+
+def test_the_forces_of_a_step_are_there_with_the_account_of_its_energy(capsys):
+    found = printed(block_about("energies"), capsys)
+    assert float(re.search(r"press with ([\d.]+) N", found).group(1)) > 0.1
+    assert int(re.search(r"cutting took (\d+)%", found).group(1)) > 50
+    assert abs(float(re.search(r"not accounted for: (-?[\d.]+)%", found).group(1))) < 0.5
 
 
 def test_every_file_that_a_run_writes_is_explained():

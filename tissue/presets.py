@@ -42,6 +42,8 @@ class Preset(NamedTuple):
     """[J/m2]."""
     damping_ratio: Figure
     """Of bending and stretching, at both ends of `DAMPING_BAND`: half the loss tangent."""
+    blade_friction: Figure
+    """Coulomb's coefficient on the steel of a blade."""
 
     @property
     def material(self) -> Material:
@@ -51,6 +53,7 @@ class Preset(NamedTuple):
             poisson_ratio=self.poisson_ratio.value,
             density=self.density.value,
             toughness=self.toughness.value,
+            blade_friction=self.blade_friction.value,
             law=self.law,
         )
         low, high = DAMPING_BAND
@@ -73,6 +76,13 @@ LIKE_LIVER = Figure(
     "",
     is_confirmed=False,
 )
+ON_STEEL = Figure(
+    0.2,
+    "needles in tissue and phantoms: 0.122 to 0.341, less under pressure, more at speed; a sled of "
+    "steel on wet bowel 0.007 to 0.054",
+    "ASME MSEC 2021, V001T03A008; Tribology Letters 51:377 (2013)",
+)
+RUBBER_ON_STEEL = Figure(0.2, "assumed to be that of wet tissue", "", is_confirmed=False)
 
 PRESETS = {
     preset.name: preset
@@ -100,6 +110,7 @@ PRESETS = {
                 "1.16 and 1.97 kPa and 7.3 Pa s has a loss tangent of 0.35 at 10 Hz",
                 "Asbach et al. 2008, Magn. Reson. Med. 60:373",
             ),
+            ON_STEEL,
         ),
         Preset(
             "kidney",
@@ -110,6 +121,7 @@ PRESETS = {
             Figure(1050.0, "table of tissues", "Mech. Mater. 2012, table 3", is_confirmed=False),
             Figure(164.0, "no measurement found: that of liver", "", is_confirmed=False),
             LIKE_LIVER,
+            ON_STEEL,
         ),
         Preset(
             "skin",
@@ -130,6 +142,7 @@ PRESETS = {
                 LIU,
             ),
             LIKE_LIVER,
+            ON_STEEL,
         ),
         Preset(
             "fat",
@@ -150,6 +163,7 @@ PRESETS = {
                 is_confirmed=False,
             ),
             LIKE_LIVER,
+            ON_STEEL,
         ),
         Preset(
             "muscle",
@@ -165,6 +179,7 @@ PRESETS = {
             Figure(1050.0, "table of tissues", ICRU),
             Figure(550.0, "notched tension, porcine: 550 to 8000, the lowest taken", LIU),
             LIKE_LIVER,
+            ON_STEEL,
         ),
         Preset(
             "gelatin",
@@ -190,6 +205,7 @@ PRESETS = {
                 "shear between plates, a softer gel: loss tangent 0.06 to 0.14, 20 to 200 Hz",
                 "Okamoto et al. 2011",
             ),
+            ON_STEEL,
         ),
         Preset(
             "silicone",
@@ -216,6 +232,7 @@ PRESETS = {
                 "PNAS 2019, PMC6442615",
                 is_confirmed=False,
             ),
+            RUBBER_ON_STEEL,
         ),
     )
 }

@@ -12,6 +12,8 @@ const EXPOSURE = 1.0;
 const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: its filter is what makes shadows soft
 const WIRE_COLOUR = 0xffe4d8;
 const ARROW_COLOUR = 0xffb000;
+const CONTACT_COLOUR = 0x12509e;
+const CONTACT_MAGNIFIED = 30; // a cut has some thirty contacts along its edge
 const FORCE_WORTH_AN_ARROW = 0.02; // [N]; below it the arrow would be a speck
 
 // A decoded packet keeps its geometries, so that a replay uploads each of them once.
@@ -22,6 +24,7 @@ class Picture {
         this.looks = new Map();
         this.wires = new Map();
         this.wireframe = false;
+        this.showsContacts = true;
         this.prepare();
         const ofMeshcat = this.viewer.handle_command.bind(this.viewer);
         const own = {
@@ -56,7 +59,9 @@ class Picture {
         this.lamp.shadow.radius = 5;
         this.rim = new THREE.DirectionalLight(RIM.colour, RIM.intensity);
         this.arrow = forceArrow();
-        viewer.scene.add(this.sky, this.lamp, this.lamp.target, this.rim, this.rim.target, this.arrow);
+        this.contacts = contactLines();
+        viewer.scene.add(this.sky, this.lamp, this.lamp.target, this.rim, this.rim.target);
+        viewer.scene.add(this.arrow, this.contacts);
         viewer.gui.domElement.id = "scene-tree";
         new ResizeObserver(() => viewer.set_3d_pane_size()).observe(viewer.dom_element);
     }
@@ -170,7 +175,14 @@ class Picture {
             this.arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), force.normalize());
             this.arrow.point(length, 0.1 * readings.newton_length / 0.15);
         }
+        this.contacts.point(readings.contacts.array, CONTACT_MAGNIFIED * readings.newton_length);
+        this.contacts.visible = this.showsContacts;
         this.onReadings({ ...readings, newtons });
+    }
+
+    setContacts(on) {
+        this.showsContacts = this.contacts.visible = on;
+        this.viewer.set_dirty();
     }
 }
 
@@ -206,6 +218,27 @@ function forceArrow() {
         head.position.z = length - tip / 2;
     };
     return arrow;
+}
+
+// A line at each contact: `point(contacts, scale)` takes rows of a point and a force.
+function contactLines() {
+    const material = new THREE.LineBasicMaterial({
+        color: CONTACT_COLOUR, depthTest: false, transparent: true,
+    });
+    const lines = new THREE.LineSegments(new THREE.BufferGeometry(), material);
+    lines.name = "contacts";
+    lines.frustumCulled = false; // they move, and are few
+    lines.renderOrder = 1;
+    lines.point = (contacts, scale) => {
+        const ends = contacts.slice();
+        for (let i = 0; i < ends.length; i += 6) {
+            for (const axis of [0, 1, 2]) ends[i + 3 + axis] = ends[i + axis] + scale * ends[i + 3 + axis];
+        }
+        lines.geometry.dispose();
+        lines.geometry = new THREE.BufferGeometry();
+        lines.geometry.setAttribute("position", new THREE.BufferAttribute(ends, 3));
+    };
+    return lines;
 }
 
 // What steel and wet tissue mirror: a grey room with lamps under its ceiling. Painted, not rendered,

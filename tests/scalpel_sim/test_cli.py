@@ -14,12 +14,15 @@ import numpy as np
 import pytest
 
 from scalpel_sim.cli import command_line
-from scalpel_sim.outputs import NAMES
+from scalpel_sim.outputs import ENERGY_PLOT, NAMES
 from scalpel_sim.recording import read_forces
 from tissue.presets import PRESETS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
 FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
+
+UNAUDITED = set(NAMES) - {ENERGY_PLOT}
+"""The files of a run without an account of its energy."""
 
 WRONG_USE = {
     "an unknown command": (["rnu"], "Did you mean .run."),
@@ -66,6 +69,46 @@ WRONG_USE = {
         "below 0.5",
     ),
     "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
+    "a blade of negative thickness": (
+        ["run", "slab", "--blade-thickness", "-1"],
+        "thickness is -1",
+    ),
+    "a blade with the bevel of a hammer": (["run", "slab", "--blade-bevel", "80"], "80 degrees"),
+    "bevels that do not fit": (["run", "slab", "--blade-thickness", "0.01"], "only 0.006 m high"),
+    "an edge that is no number": (["run", "slab", "--blade-edge-radius", "nan"], "edge_radius"),
+    "a bevel of a line": (
+        ["run", "organ", "--blade-thickness", "0", "--blade-bevel", "10"],
+        "--blade-bevel is about a blade with faces",
+    ),
+    "friction on a line": (
+        ["run", "slab", "--blade-friction", "0.2"],
+        "add --blade-thickness 0.0004",
+    ),
+    "what blunts an edge that has no radius": (
+        ["run", "organ", "--work-to-rupture", "1e4", "--blade-edge-radius", "0"],
+        "add --blade-edge-radius",
+    ),
+    "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "blade_friction is -0.1"),
+    "a skin that costs less than nothing": (
+        ["run", "slab", "--skin-toughness", "-1"],
+        "skin_toughness is -1",
+    ),
+    "a toughness that is never twice itself": (
+        ["run", "slab", "--toughness-speed", "0"],
+        "toughness_speed is 0",
+    ),
+    "an account of nodes at different instants": (
+        ["run", "slab", "--audit", "--relaxation", "local"],
+        "--audit needs --relaxation global",
+    ),
+    "an account by two threads": (
+        ["run", "slab", "--audit", "--threads", "2"],
+        "--audit needs --relaxation global and --threads 1",
+    ),
+    "a blade for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],
+        "--blade-thickness belongs to the tissue",
+    ),
     "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
     "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
     "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
@@ -230,6 +273,30 @@ def test_a_named_material_reaches_the_tissue_with_what_is_changed_about_it(files
     assert (material["law"], material["toughness"]) == ("neo_hookean", 7.0)
 
 
+def test_a_blade_on_the_command_line_has_faces_that_the_tissue_presses_and_rubs(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.8", "--json", "--blade-thickness", "0.002"]
+    assert command_line([*words, "--blade-bevel", "20", "--blade-friction", "0.3"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["settings"]["blade"]["thickness"] == 0.002
+    assert summary["settings"]["blade"]["bevel_angle"] == pytest.approx(np.radians(20.0))
+    assert summary["energies_j"]["friction"] > 1e-5
+    assert abs(summary["residual_of_work"]) < 0.005
+    table = read_forces(Path("out/grid2/forces.csv"))
+    for name in ("pressing_force", "friction_force"):
+        assert np.linalg.norm(table.vector(name), axis=1).max() > 5e-3
+
+
+def test_a_tougher_skin_on_the_command_line_is_a_peak_of_force(files, capsys):
+    peaks = []
+    for skin in ("0", "40"):
+        words = ["run", "grid2", "--seconds", "0.6", "--json", "--no-audit", "--stretch", "0"]
+        assert command_line([*words, "--skin-toughness", skin]) == 0
+        summary = json.loads(capsys.readouterr().out)
+        assert summary["energies_j"] is None
+        peaks.append(summary["force_peak_n"])
+    assert peaks[1] > 1.2 * peaks[0]  # not all of the edge breaks in at once
+
+
 def test_materials_are_listed_with_their_sources(capsys):
     assert command_line(["materials"]) == 0
     told = capsys.readouterr().out
@@ -322,7 +389,7 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
     assert command_line(["run", "grid2", "--seconds", "0.9", "-q", "--out", str(here)]) == 0
     key = str(tmp_path / "link.key")
     assert command_line(["key", key]) == 0
-    server = start("serve", "grid2", "--port", "0", "--key", key)
+    server = start("serve", "grid2", "--audit", "--port", "0", "--key", key)
     try:
         address = re.search(r"127\.0\.0\.1:\d+", server.stdout.readline()).group()
         words = ["run", "--connect", address, "--seconds", "0.9", "-q", "--out", str(there)]
@@ -333,17 +400,19 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
         server.send_signal(signal.SIGINT)
         server.communicate(timeout=60)
     assert server.returncode == 0
-    ours, theirs = (read_forces(folder / "forces.csv").rows for folder in (here, there))
+    ours, theirs = (read_forces(folder / "forces.csv") for folder in (here, there))
     timed = 5  # columns of wall times at the end
-    assert ours[:, 10].max() > 0.0  # something was cut
-    assert np.array_equal(ours[:, :-timed], theirs[:, :-timed])
+    assert ours.column("cut_area_m2").max() > 0.0
+    assert ours.is_audited  # so that no number is a NaN
+    assert np.array_equal(ours.rows[:, :-timed], theirs.rows[:, :-timed])
     assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
     assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
 
 
 @pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
 def test_the_arm_cuts_the_organ_in_two(tmp_path, stroke):
-    assert command_line(["run", "organ", "--stroke", stroke, "-q", "--out", str(tmp_path)]) == 0
+    words = ["run", "organ", "--no-audit", "--stroke", stroke, "-q", "--out", str(tmp_path)]
+    assert command_line(words) == 0
     assert json.loads((tmp_path / "summary.json").read_text())["pieces"] == 2
 
 
@@ -357,7 +426,7 @@ def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
     url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", said).group(1)
     with urllib.request.urlopen(url, timeout=10) as page:
         assert "grid2: straight stroke" in page.read().decode()
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(NAMES)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(UNAUDITED)
     program.send_signal(signal.SIGINT)
     out, _ = program.communicate(timeout=30)
     assert program.returncode == 0

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from scalpel_sim.account import TERMS
+from scalpel_sim.energy_plot import OPACITY, plot_energies
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.outputs import (
+    ENERGY_PLOT,
     FORCES,
     FRAMES_PER_FLUSH,
     INITIAL,
@@ -16,6 +19,7 @@ from scalpel_sim.outputs import (
     Outputs,
     summary_json,
 )
+from scalpel_sim.plot import LIMITED, PARTS, plot_forces
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.recording import COLUMNS, Recording
 from scalpel_sim.report import print_table
@@ -23,7 +27,7 @@ from scalpel_sim.summary import Summary, summarise
 from tissue.pieces import pieces_of
 from tissue.quality import Measures, QualityReport
 from tissue.shapes import grid
-from tissue.types import Snapshot
+from tissue.types import Energies, Snapshot
 
 DT = 1e-3
 QUALITY = QualityReport(
@@ -57,10 +61,11 @@ def plotter():
 
 def recorded(n_frames: int) -> Recording:
     """A recording in which everything is random, but for times that sum to less than the wall's."""
+    untimed = COLUMNS.index("cd_s") - 1
     rng = np.random.default_rng(0)
     recording = Recording(1)
     for i in range(n_frames):
-        recording.append((i * DT, *rng.normal(size=13), *rng.uniform(0.0, 1e-5, 5)))
+        recording.append((i * DT, *rng.normal(size=untimed), *rng.uniform(0.0, 1e-5, 5)))
     return recording
 
 
@@ -161,11 +166,80 @@ def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):
     image = pytest.importorskip("PIL.Image")
     outputs = Outputs(tmp_path, plotter)
     outputs.write_forces(recorded(50), all_rows=True)
-    outputs.write_plot("block: straight stroke")
+    outputs.write_plots("block: straight stroke")
     with image.open(tmp_path / PLOT) as picture:
         pixels = np.asarray(picture.convert("RGB"))
     assert pixels.shape[0] > 500 and pixels.shape[1] > 800
     assert (pixels == (0x22, 0x22, 0x22)).all(axis=2).sum() > 500  # the magnitude's line
+
+
+def test_the_plot_shows_what_the_force_is_made_of_and_where_the_device_limits_it(tmp_path):
+    plain, limited = still(), still()
+    for name in ("force_z_n", "tissue_force_z_n"):
+        plain.column(name)[:] = limited.column(name)[:] = 2.0
+    limited.column("tissue_force_z_n")[50:] = 4.0
+    edge = still()
+    edge.column("edge_force_x_n")[:] = 1.0
+    plot_forces(plain, "plain", tmp_path / "plain.png")
+    plot_forces(limited, "limited", tmp_path / "limited.png")
+    plot_forces(edge, "edge", tmp_path / "edge.png")
+    assert n_of_colour(tmp_path / "plain.png", LIMITED) < n_of_colour(
+        tmp_path / "limited.png", LIMITED
+    )
+    (_, _, edge_colour), *_ = PARTS
+    assert n_of_colour(tmp_path / "edge.png", edge_colour) > 500
+
+
+def test_an_account_gets_a_picture_in_which_heights_are_energies(tmp_path):
+    recording = still()
+    recording.column("work_of_blade_j")[:] = 3e-3
+    recording.column("cutting_j")[:] = 2e-3
+    recording.column("damping_j")[:] = 1e-3
+    plot_energies(recording, "block", tmp_path / ENERGY_PLOT)
+    cutting, damping = (
+        n_of_colour(tmp_path / ENERGY_PLOT, seen_through(colour_of(name)))
+        for name in ("cutting", "damping")
+    )
+    assert cutting > 10_000
+    assert cutting == pytest.approx(2 * damping, rel=0.1)
+
+
+def test_without_an_account_there_is_no_picture_of_it(tmp_path):
+    recording = still()
+    recording.column("residual_j")[:] = np.nan
+    with Plotter() as plotter:
+        outputs = Outputs(tmp_path, plotter)
+        outputs.write_forces(recording, all_rows=True)
+        outputs.write_plots("block: straight stroke")
+    assert (tmp_path / PLOT).exists() and not (tmp_path / ENERGY_PLOT).exists()
+
+
+def still(n_frames: int = 100) -> Recording:
+    """A recording of nothing, to put something in."""
+    recording = Recording()
+    for i in range(n_frames):
+        recording.append([i * DT] + [0.0] * (len(COLUMNS) - 2) + [1e-4])
+    return recording
+
+
+def n_of_colour(path: Path, colour: str) -> int:
+    """How many pixels of a picture are nearly of a colour."""
+    image = pytest.importorskip("PIL.Image")
+    with image.open(path) as picture:
+        pixels = np.asarray(picture.convert("RGB"), int)
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(pixels - wanted).max(axis=2) <= 3).sum())
+
+
+def colour_of(name: str) -> str:
+    return next(term.colour for term in TERMS if term.name == name)
+
+
+def seen_through(colour: str) -> str:
+    """What a colour of the stack looks like on white."""
+    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    seen = (round(OPACITY * channel + (1.0 - OPACITY) * 255) for channel in channels)
+    return "#" + "".join(f"{channel:02x}" for channel in seen)
 
 
 def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
@@ -208,6 +282,35 @@ def test_the_summary_has_the_trade_between_path_error_and_time_step():
     assert found["tetrahedra_growth"] == pytest.approx(1.5)
     assert found["frequency_growth"] == pytest.approx(3.0)
     assert found["substep_growth"] == pytest.approx(4.0)
+
+
+def test_the_summary_tells_where_the_work_went_and_what_is_missing():
+    recording = still()
+    for name, energy in (("work_of_blade_j", 4e-3), ("cutting_j", 3e-3), ("residual_j", 1e-5)):
+        recording.column(name)[-1] = energy
+    summary = summary_of(recording)
+    assert summary.energies_j["work_of_blade"] == 4e-3
+    assert summary.energies_j["cutting"] == 3e-3
+    assert set(Energies._fields) | {"residual"} == set(summary.energies_j)
+    assert summary.residual_of_work == pytest.approx(0.0025)
+
+
+def test_without_an_audit_the_summary_does_not_pretend_to_know():
+    recording = still()
+    recording.column("residual_j")[:] = np.nan
+    summary = summary_of(recording)
+    assert summary.energies_j is None and summary.residual_of_work is None
+    json.loads(summary_json(summary))
+
+
+def test_the_table_has_a_row_for_each_term_of_the_account():
+    console = Console(record=True, width=100)
+    recording = still()
+    recording.column("work_of_blade_j")[-1] = 4e-3
+    recording.column("friction_j")[-1] = 1e-3
+    print_table(summary_of(recording), console)
+    (row,) = [line for line in console.export_text().splitlines() if "friction on" in line]
+    assert "1.0000 mJ" in row and "25.00%" in row
 
 
 def test_the_shares_sum_to_one():

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from scalpel_sim import replay as replay_module
+from scalpel_sim.force_parts import ForceParts
 from scalpel_sim.model_shapes import body_poses
 from scalpel_sim.replay import BYTES_PER_TRIANGLE, ReplayWriter
 from tests.browser import WINDOW, local_file, new_tab, pixels, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
+from tissue.types import Energies
 
 N_PIXELS = WINDOW["width"] * WINDOW["height"]
 
@@ -83,6 +85,31 @@ def test_the_page_plays_the_cut_by_itself_and_asks_nobody_for_anything(tab, tmp_
     assert tab.text_content("#force") == "1.00 N"
     tab.click("#play")
     assert not tab.evaluate("player.isPlaying")
+
+
+@pytest.mark.browser
+def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp_path):
+    model, data = little_arm()
+    felt = readings(0.0)._replace(
+        contact_points=np.array([[0.0, 0.0, 0.08], [0.01, 0.0, 0.08]]),
+        contact_forces=np.array([[0.0, -0.5, 0.0], [0.0, -0.5, 0.1]]),
+        parts=ForceParts(np.array([0.0, -0.6, 0.8]), np.zeros(3), np.array([0.2, 0.0, 0.0])),
+        energies=Energies(*np.zeros(12))._replace(cutting=3e-3, friction=1e-3, elastic=-2e-3),
+    )
+    replay = ReplayWriter(model, frame=FRAME)
+    replay.add(0.0, cut_tissue()[0], body_poses(data), felt)
+    replay.write(tmp_path / "replay.html")
+    tab.goto(local_file(tmp_path / "replay.html"))
+    tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
+    ends = tab.evaluate("[...picture.contacts.geometry.attributes.position.array]")
+    start, end, _, other = np.reshape(ends, (4, 3))
+    assert start == pytest.approx([0.0, 0.0, 0.08])
+    assert (end - start)[1] < 0.0 and (other[2] - 0.08) / (end - start)[1] == pytest.approx(-0.2)
+    assert tab.text_content("#parts") == "1.00 · 0.00 · 0.20 N"
+    bars = tab.evaluate("[...document.querySelectorAll('#account span')].map((s) => s.title)")
+    assert bars == ["cutting: toughness x area: 3.00 mJ", "friction on the blade: 1.00 mJ"]
+    tab.uncheck("#contacts")
+    assert not tab.evaluate("picture.contacts.visible")
 
 
 @pytest.fixture(scope="module")

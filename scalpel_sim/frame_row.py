@@ -1,0 +1,68 @@
+"""One frame as a row of `forces.csv`: see `scalpel_sim.recording.COLUMNS`."""
+
+import numpy as np
+
+from bridge.frames import TissueFrame
+from scalpel_sim.force_parts import force_parts
+from scalpel_sim.recording import N_OF_ACCOUNT
+from tissue.types import BladeSegment, Energies, Profile, StepResult, Wrench
+
+UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Of a symmetric matrix, in the order of the columns."""
+
+NO_ACCOUNT = (np.nan,) * N_OF_ACCOUNT
+"""What is not known without an audit."""
+
+
+def row_of(
+    time: float,
+    blade: BladeSegment,
+    felt: Wrench,
+    raw: Wrench,
+    result: StepResult,
+    profile: Profile,
+    frame: TissueFrame,
+    *,
+    picture_seconds: float,
+    frame_seconds: float,
+) -> tuple[float, ...]:
+    """Return the row of one frame.
+
+    Args:
+        time: Simulated time at which it began [s].
+        blade: Where the blade is at its end, world frame.
+        felt: What the arm felt in it, world frame.
+        raw: The same before any limit of the device.
+        result: What the tissue said last, tissue frame.
+        profile: Wall times of its stages in this frame.
+        frame: Where the tissue lies in the world.
+        picture_seconds: Wall time of pictures [s].
+        frame_seconds: Wall time of all else [s].
+    """
+    parts = force_parts(result.contacts, frame.vectors_to_tissue(blade.forward))
+    stiffness = frame.rotation @ result.stiffness[:3, :3] @ frame.rotation.T
+    return (
+        time,
+        *blade.tip.tolist(),
+        *felt.force.tolist(),
+        *felt.torque.tolist(),
+        *raw.force.tolist(),
+        *raw.torque.tolist(),
+        *(frame.vectors_to_world(np.stack(parts)).ravel().tolist()),
+        *(float(stiffness[at]) for at in UPPER),
+        result.cut_area,
+        result.n_tetrahedra,
+        result.anchored_length,
+        result.work_of_blade,
+        *_account(result.energies),
+        profile.collision,
+        profile.topology,
+        profile.relaxation,
+        picture_seconds,
+        frame_seconds,
+    )
+
+
+def _account(energies: Energies | None) -> tuple[float, ...]:
+    """Return where the work of the blade went, and what is not accounted for [J]."""
+    return NO_ACCOUNT if energies is None else (*energies[1:], energies.residual)
