@@ -1,14 +1,16 @@
 """Times a step over TCP against the same step in process: python benchmarks/round_trip.py.
 
-The tissue is small and lives in a second process, as with `scalpel-sim serve`: at rest without a
-blade, with a blade that hangs above it, with one that it holds, whose contacts travel too; and the
-same with a key. What the link adds includes what it costs the step to find its data gone from the
-cache, after a process that slept. Run it on an idle machine, from the repository.
+The tissue is small and lives in a second process, as with `scalpel-sim serve`. First the link
+alone, with the smallest question that there is: how many pieces the body has. Then steps: at rest
+without a blade, with a blade that hangs above, with one that it holds, whose contacts travel too; and all
+with a key. What the link adds to a step includes what it costs the step that its data have left the
+cache, for the other process has used it since. Run it on an idle machine, from the repository.
 """
 
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from contextlib import closing
 
 import numpy as np
@@ -55,13 +57,14 @@ def main() -> None:
             address = server.stdout.readline().strip()
             links[name] = TcpLink(address, key=KEY if options else None)
         above, within = upright(0.5 * SIDE, SIDE), upright(0.3 * SIDE, -SIDE)
-        report("no blade", {name: times(link, None) for name, link in links.items()})
+        report("link alone", {name: times(link.n_pieces) for name, link in links.items()})
+        report("no blade", {name: times(stepping(link, None)) for name, link in links.items()})
         for what, pose in (("a blade above", above), ("a blade held", within)):
             for link in links.values():
                 draw_in(link, pose)
             sweep = BladeSweep(pose, pose)
             print(f"{what}: {len(link.step(sweep, DT).contacts.point)} contacts")
-            report(what, {name: times(link, sweep) for name, link in links.items()})
+            report(what, {name: times(stepping(link, sweep)) for name, link in links.items()})
     finally:
         for link in links.values():
             with closing(link):
@@ -87,14 +90,19 @@ def draw_in(link: TissueLink, pose: BladeSegment) -> None:
         before = after
 
 
-def times(link: TissueLink, sweep: BladeSweep | None) -> FloatArray:
-    """Return how long each step took [µs], shape (N_STEPS,)."""
+def stepping(link: TissueLink, sweep: BladeSweep | None) -> Callable[[], object]:
+    """Return what does a step."""
+    return lambda: link.step(sweep, DT)
+
+
+def times(ask: Callable[[], object]) -> FloatArray:
+    """Return how long each answer took [µs], shape (N_STEPS,)."""
     for _ in range(N_WARM_UP):
-        link.step(sweep, DT)
+        ask()
     taken = np.empty(N_STEPS)
     for i in range(N_STEPS):
         begin = time.perf_counter()
-        link.step(sweep, DT)
+        ask()
         taken[i] = time.perf_counter() - begin
     return taken * MICROSECONDS
 
