@@ -2,9 +2,10 @@
 
 The tissue is small and lives in a second process, as with `scalpel-sim serve`. First the link
 alone, with the smallest question that there is: how many pieces the body has. Then steps: at rest
-without a blade, with a blade that hangs above, with one that it holds, whose contacts travel too; and all
-with a key. What the link adds to a step includes what it costs the step that its data have left the
-cache, for the other process has used it since. Run it on an idle machine, from the repository.
+without a blade, with a blade that hangs above, with one that it holds, whose contacts travel too;
+and all with a key. What the link adds to a step includes what it costs the step that its data have
+left the cache, for the other process has used it since. Run it on an idle machine, from the
+repository.
 """
 
 import subprocess
