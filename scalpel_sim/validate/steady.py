@@ -1,6 +1,7 @@
 """Steady cutting: the force is toughness times depth, whatever the speed, the mesh and the law."""
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from scalpel_sim.validate.block import (
     COARSE,
     FINE,
+    MIDDLE,
     THICKNESS,
     Record,
     block,
@@ -15,7 +17,7 @@ from scalpel_sim.validate.block import (
     rubber,
     through,
 )
-from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
+from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Scene, Source, within
 from tissue.material import Law, Material
 
 STIFF_ENOUGH = 30e3
@@ -27,6 +29,23 @@ RIPPLE = 0.10
 """How much it may swing, as its standard deviation over its mean."""
 MOST_APART = 0.05
 """How much the two meshes may differ."""
+PLACES = ((MIDDLE, 0.05), (0.0187, 0.1), (0.0225, 0.1))
+"""Where it is cut, across [m], and how fast [m/s]: between planes of both meshes."""
+SPRINGS_GIVE = Known(
+    0.75,
+    1.0,
+    "under law springs, tissue ahead of the edge gives way by itself where it is strained most, "
+    "and part of the work goes into its motion and not into area: the force is up to a fifth low "
+    "and swings, from 20 J/m² on at this stiffness. Law neo_hookean does not",
+)
+SPRINGS_APART = SPRINGS_GIVE._replace(low=-0.1, high=0.1)
+SPRINGS_SWING = SPRINGS_GIVE._replace(low=0.0, high=0.25)
+TOUGH = Known(
+    0.92,
+    1.08,
+    "60 J/m² drag 2 mm of tissue along, nearly a node of the finer mesh: a few percent of the work "
+    "go into tissue that gives way by itself",
+)
 
 
 class Steady(NamedTuple):
@@ -39,48 +58,56 @@ class Steady(NamedTuple):
     """Standard deviation over mean."""
 
 
-def cut(material: Material, cells: tuple[int, int, int], speed: float) -> Steady:
-    """Cut through the block and return what resisted while it was steady."""
-    record = lead(block(material, cells), through(speed))
+def cut(material: Material, cells: tuple[int, int, int], place: float, speed: float) -> Steady:
+    """Cut through the block and return what resisted while it was steady.
+
+    Args:
+        material: Of the block.
+        cells: Of its mesh.
+        place: Where, across [m].
+        speed: [m/s].
+    """
+    record = lead(block(material, cells), through(speed, x=place))
     force = record.of_steady(record.resistance)
     return Steady(record, float(force.mean()), float(force.std() / force.mean()))
 
 
-def judge(name: str, measured: Steady, toughness: float) -> list[Line]:
-    """Return the lines of a steady cut through a body of that toughness [J/m2]."""
-    theory = toughness * THICKNESS
+def judge(name: str, measured: Sequence[Steady], law: Law, toughness: float) -> list[Line]:
+    """Return the lines of steady cuts of one body of that toughness [J/m2]: the worst of them."""
+    shares = [each.force / (toughness * THICKNESS) for each in measured]
+    worst = max(shares, key=lambda share: abs(share - 1.0))
+    ripple = max(each.ripple for each in measured)
+    force_known = SPRINGS_GIVE if law == "springs" else TOUGH if toughness > 20.0 else None
+    ripple_known = SPRINGS_SWING if law == "springs" else None
     return [
-        Line(f"{name}: force / (toughness × depth)", measured.force / theory, *within(NEAR)),
-        Line(f"{name}: ripple", measured.ripple, 0.0, RIPPLE),
+        Line(f"{name}: force / (toughness × depth)", worst, *within(NEAR), known=force_known),
+        Line(f"{name}: ripple", ripple, 0.0, RIPPLE, known=ripple_known),
     ]
 
 
 def measure(quick: bool) -> Findings:
-    """Cut with three toughnesses, two speeds, two meshes and both laws."""
+    """Cut with three toughnesses, two speeds, two meshes and both laws, in several places."""
     toughnesses = (20.0,) if quick else (5.0, 20.0, 60.0)
-    speeds = (0.1,) if quick else (0.05, 0.1)
+    places = PLACES[1:2] if quick else PLACES
     laws: tuple[Law, ...] = ("neo_hookean", "springs")
     lines, curves = [], []
-    for law, toughness, speed in itertools.product(laws, toughnesses, speeds):
+    for law, toughness in itertools.product(laws, toughnesses):
         material = rubber(law, young_modulus=STIFF_ENOUGH, toughness=toughness)
-        forces = []
+        means = []
         for cells in (COARSE, FINE):
-            measured = cut(material, cells, speed)
-            forces.append(measured.force)
-            lines += judge(_name(law, toughness, speed, cells), measured, toughness)
-            if law == "neo_hookean" and speed == speeds[0]:
-                curves += _curves(measured.record, toughness, cells)
-        apart = forces[1] / forces[0] - 1.0
-        name = f"{law}, {toughness:g} J/m², {speed * 1e3:g} mm/s: fine over coarse mesh, less 1"
-        lines.append(Line(name, apart, -MOST_APART, MOST_APART))
-    title = f"Steady cut through {THICKNESS * 1e3:g} mm"
+            measured = [cut(material, cells, *place) for place in places]
+            means.append(np.mean([each.force for each in measured]))
+            name = f"{law}, {toughness:g} J/m², {' × '.join(map(str, cells))} cells"
+            lines += judge(name, measured, law, toughness)
+            if law == "neo_hookean":
+                curves += _curves(measured[0].record, toughness, cells)
+        apart = float(means[1] / means[0] - 1.0)
+        name = f"{law}, {toughness:g} J/m²: force in the fine over that in the coarse mesh, less 1"
+        known = SPRINGS_APART if law == "springs" and toughness > 20.0 else None
+        lines.append(Line(name, apart, -MOST_APART, MOST_APART, known=known))
+    title = f"Steady cuts through {THICKNESS * 1e3:g} mm of neo-Hookean solid"
     plot = Plot(title, "edge along the block [mm]", "force [N]", curves)
     return Findings(lines, [plot])
-
-
-def _name(law: str, toughness: float, speed: float, cells: tuple[int, int, int]) -> str:
-    count = " × ".join(map(str, cells))
-    return f"{law}, {toughness:g} J/m², {speed * 1e3:g} mm/s, {count} cells"
 
 
 def _curves(record: Record, toughness: float, cells: tuple[int, int, int]) -> list[Curve]:
@@ -100,7 +127,8 @@ SCENE = Scene(
         "An upright edge is led through a block that is held left and right, and the mean force "
         "while it is in with its whole length is compared with toughness × depth: all work goes "
         "into area. It must depend on neither speed nor mesh, else a policy learns the mesh. "
-        "Ripple is the standard deviation over the mean."
+        "Each figure is the worst of three cuts between the planes of the mesh, at 50 and 100 mm/s; "
+        "ripple is the standard deviation over the mean."
     ),
     measure=measure,
     sources=[

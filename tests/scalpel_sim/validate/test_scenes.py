@@ -19,21 +19,22 @@ def verdicts(lines):
 @pytest.fixture(scope="module")
 def steady_cut():
     material = rubber(young_modulus=steady.STIFF_ENOUGH, toughness=TOUGHNESS)
-    return steady.cut(material, COARSE, 0.1)
+    return steady.cut(material, COARSE, *steady.PLACES[1])
 
 
 def test_a_steady_cut_passes_with_its_own_toughness(steady_cut):
-    assert verdicts(steady.judge("a cut", steady_cut, TOUGHNESS)) == {PASS}
+    assert verdicts(steady.judge("it", [steady_cut], "neo_hookean", TOUGHNESS)) == {PASS}
 
 
 @pytest.mark.parametrize("wrong", [0.9, 1.1])
 def test_a_steady_cut_fails_with_a_toughness_ten_percent_off(steady_cut, wrong):
-    force, ripple = steady.judge("a cut", steady_cut, wrong * TOUGHNESS)
+    force, ripple = steady.judge("it", [steady_cut], "neo_hookean", wrong * TOUGHNESS)
     assert force.verdict == FAIL and ripple.verdict == PASS
 
 
 def test_a_force_that_ripples_fails(steady_cut):
-    assert steady.judge("a cut", steady_cut._replace(ripple=0.2), TOUGHNESS)[1].verdict == FAIL
+    both = [steady_cut, steady_cut._replace(ripple=0.2)]  # the worst of them counts
+    assert steady.judge("it", both, "neo_hookean", TOUGHNESS)[1].verdict == FAIL
 
 
 def test_slicing_at_45_degrees_passes_and_would_fail_as_pressing():
