@@ -1,4 +1,4 @@
-"""The command line: `scalpel-sim run`, `view`, `serve`, `key`, `bench`, `materials`, `figure`."""
+"""The command line: `scalpel-sim run`, `view`, `serve`, `bench`, `validate`, and the others."""
 
 import json
 import sys
@@ -23,6 +23,7 @@ from scalpel_sim.errors import (
 from scalpel_sim.options import Body, FigureNumber, Motion, SceneName, Talk
 from scalpel_sim.plotter import Plotter
 from scalpel_sim.stop_signals import StopSignals
+from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
 
 if TYPE_CHECKING:  # imported where they are used: `--help` should not wait for a compiler
@@ -167,6 +168,7 @@ def key(file: Path, /, *, talk: Talk = Talk()) -> None:
 
 
 app.command(bench)
+app.command(validate)
 
 
 @app.command

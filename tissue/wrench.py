@@ -106,7 +106,8 @@ def _report_edge(report: Report, tool: Tool, body: Body, edge: Edge) -> None:
         gives = scale(1.0 if anchors.slips[k] else 0.0, axpy(-dot(d, frame[2]), frame[2], d))
         _add_stiffness(report, lever, anchors.stiffness[k], gives)
         across = dot(force, forward)
-        _add_contact(report, b, forward, across, axpy(-across, forward, force), anchors.cut[k])
+        at = sub(b, surplus)  # where the force acts: the contacts add up to the torque as well
+        _add_contact(report, at, forward, across, axpy(-across, forward, force), anchors.cut[k])
 
 
 @kernel

@@ -1,0 +1,32 @@
+import math
+
+import pytest
+
+from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Known, Line, within
+
+EXPLAINED = Known(0.5, 0.9, "the reason")
+
+
+@pytest.mark.parametrize(
+    ("figure", "known", "verdict"),
+    [
+        (1.0, None, PASS),
+        (0.95, None, PASS),
+        (0.94, None, FAIL),
+        (1.06, None, FAIL),
+        (0.80, EXPLAINED, KNOWN),
+        (0.40, EXPLAINED, FAIL),
+        (1.06, EXPLAINED, FAIL),
+        (1.00, EXPLAINED, PASS),
+        (math.nan, EXPLAINED, FAIL),
+        (math.inf, None, FAIL),
+    ],
+)
+def test_a_line_passes_within_its_bounds_and_is_known_within_what_is_explained(
+    figure, known, verdict
+):
+    assert Line("a figure", figure, *within(0.05), known=known).verdict == verdict
+
+
+def test_within_is_a_share_of_what_is_asked():
+    assert within(0.1, 164.0) == pytest.approx((147.6, 180.4))
