@@ -22,28 +22,31 @@ class TissueFrame:
     """The tissue's axes in the world as columns, shape (3, 3)."""
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     """The tissue's origin in the world [m], shape (3,)."""
+    _is_turned: bool = field(init=False, repr=False, default=True)
+    """Whether the rotation does anything: it mostly does not, and is left out of the 1 kHz then."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotation(self.rotation, "the tissue's rotation"))
         object.__setattr__(self, "origin", finite(self.origin, (3,), "the tissue's origin"))
+        object.__setattr__(self, "_is_turned", bool((self.rotation != np.eye(3)).any()))
         self.rotation.setflags(write=False)
         self.origin.setflags(write=False)
 
     def points_to_tissue(self, points: FloatArray) -> FloatArray:
         """Return world points in the tissue frame [m], shape (..., 3)."""
-        return (points - self.origin) @ self.rotation
+        return self.vectors_to_tissue(points - self.origin)
 
     def points_to_world(self, points: FloatArray) -> FloatArray:
         """Return points of the tissue frame in the world [m], shape (..., 3)."""
-        return points @ self.rotation.T + self.origin
+        return self.vectors_to_world(points) + self.origin
 
     def vectors_to_tissue(self, vectors: FloatArray) -> FloatArray:
         """Return world vectors (directions, forces, velocities) in the tissue frame, (..., 3)."""
-        return vectors @ self.rotation
+        return vectors @ self.rotation if self._is_turned else vectors.copy()
 
     def vectors_to_world(self, vectors: FloatArray) -> FloatArray:
         """Return vectors of the tissue frame in the world, shape (..., 3)."""
-        return vectors @ self.rotation.T
+        return vectors @ self.rotation.T if self._is_turned else vectors.copy()
 
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
@@ -62,16 +65,12 @@ class TissueFrame:
         )
 
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
-        """Return a wrench of the tissue frame in the world; its point is the same point.
-
-        What is infinite may become NaN. The coupling refuses both, so it is no news for a terminal.
-        """
-        with np.errstate(invalid="ignore"):
-            return Wrench(
-                self.vectors_to_world(wrench.force),
-                self.vectors_to_world(wrench.torque),
-                self.points_to_world(wrench.point),
-            )
+        """Return a wrench of the tissue frame in the world; its point is the same point."""
+        return Wrench(
+            self.vectors_to_world(wrench.force),
+            self.vectors_to_world(wrench.torque),
+            self.points_to_world(wrench.point),
+        )
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture that stands in the world in the tissue frame."""

@@ -99,6 +99,18 @@ class Motion:
     "How fast the blade is led [m/s]."
     arm: str | None = None
     "touch, premium, or auto: the first that reaches."
+    tissue_every: int | None = None
+    """Ask the tissue once in so many milliseconds; in between its last answer and its local
+    stiffness are felt [default: 1]."""
+    coupling: str | None = None
+    """rigid [default]: the arm's blade is the one that cuts; virtual: a spring and a damper are
+    between them, and the arm feels nothing stiffer."""
+    coupling_stiffness: float | None = None
+    "Stiffness of a virtual coupling [N/m; default: 700]."
+    coupling_damping: float | None = None
+    "Damping of a virtual coupling [N s/m; default: twice what is stable by rule]."
+    passivity: bool | None = None
+    "Damp what would give the arm energy out of nothing [default: yes]. It is counted either way."
     seconds: float | None = None
     "How long to simulate [s]; else the stroke and 0.3 s more."
     seed: int = 0

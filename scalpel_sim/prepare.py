@@ -50,4 +50,13 @@ def prepare(
         frame.rotation.T, frame.points_to_tissue(np.zeros(3))
     )  # as the tissue sees it
     standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
-    return Simulation(placement.arm(), stroke, link, frame, standing)
+    return Simulation(
+        placement.arm(),
+        stroke,
+        link,
+        frame,
+        standing,
+        tissue_every=scene.tissue_every,
+        coupling=scene.virtual_coupling(),
+        passivity=scene.passivity,
+    )

@@ -168,7 +168,19 @@ def load_kernels(talk: Talk) -> None:
 
 def _given(motion: Motion) -> dict[str, Any]:
     """Return what of the motion is a field of the scene."""
-    return {"stroke": motion.stroke, "speed": motion.speed, "arm": motion.arm}
+    return {
+        name: getattr(motion, name)
+        for name in (
+            "stroke",
+            "speed",
+            "arm",
+            "tissue_every",
+            "coupling",
+            "coupling_stiffness",
+            "coupling_damping",
+            "passivity",
+        )
+    }
 
 
 def _folder(motion: Motion, scene: Scene) -> Path:

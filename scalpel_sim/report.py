@@ -62,6 +62,28 @@ def _add_springs(row: Callable[[str, str], None], springs: dict[str, float]) -> 
     row("springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}")
 
 
+SATURATIONS = {
+    "force_limited": "force above the device's limit",
+    "torque_limited": "torque above the device's limit",
+    "slew_limited": "force changed too fast for the device",
+    "absurd": "absurd answers",
+    "silent": "tissue silent for 10 ms",
+    "faded": "force faded or ramped",
+}
+"""What the bridge counts of what came between tissue and arm, and what the table calls it."""
+
+
+def _add_counters(row: Callable[[str, str], None], counters: dict[str, Any]) -> None:
+    """Add what came between the tissue and the arm, where anything did."""
+    for name, label in SATURATIONS.items():
+        if counters.get(name):
+            row(label, f"{counters[name]:,} frames")
+    passivity = counters.get("passivity", {})
+    if passivity.get("frames"):
+        away = passivity["injected_away"] * MJ_PER_J
+        row("damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ")
+
+
 def print_table(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
     paper = PAPER.get(summary.scene)
@@ -107,6 +129,7 @@ def print_table(summary: Summary, console: Console) -> None:
     for pair, frames in summary.touched.items():
         row(f"met: {pair}", f"{frames:,} frames")
     row("work of the blade", f"{summary.work_of_blade_j * MJ_PER_J:.2f} mJ")
+    _add_counters(row, summary.counters)
     row(
         "frames/s, median",
         f"{summary.frame_rate_median:,.0f}",

@@ -95,7 +95,7 @@ def perform(
         tetrahedra_final=body.n_tetrahedra if result is None else result.n_tetrahedra,
         pieces=pieces,
         quality=quality,
-        counters=simulation.bridge.counters._asdict(),
+        counters=simulation.bridge.counters.as_numbers(),
         touched=simulation.touching.frames,
         settings=settings,
     )

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from bridge.link import TissueLink
+from bridge.local_model import MOST_FRAMES_PER_ANSWER
+from bridge.virtual_coupling import VirtualCoupling
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.planning import STROKES
 from scalpel_sim.scalpel import SCALPEL
@@ -24,6 +26,8 @@ from tissue.types import TetrahedralMesh
 
 SCHEMES = ("stellar", "paper")
 """As `tissue.scheme` has them, which is not imported here: it takes the compiler along."""
+
+COUPLINGS = ("rigid", "virtual")
 
 ARMS = ("auto", "touch", "premium")
 
@@ -113,13 +117,23 @@ class Scene:
     """Of the blade's tip [m/s]."""
     arm: str = "auto"
     """`touch`, `premium`, or `auto`: the first of them that reaches."""
+    tissue_every: int = 1
+    """Frames of the arm in which the tissue is asked once."""
+    coupling: str = "rigid"
+    """Between the arm's blade and the one that cuts: `rigid` (they are one), or `virtual`."""
+    coupling_stiffness: float | None = None
+    """Of a virtual coupling [N/m]; None: its usual one."""
+    coupling_damping: float | None = None
+    """Of a virtual coupling [N s/m]; None: what its stiffness takes to be stable."""
+    passivity: bool = True
+    """Whether what would give the arm energy out of nothing is damped."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that mean nothing.
 
         Raises:
-            UsageError: stretch, gravity or speed is out of range; there is no such scheme or
-                relaxation; an audit of what has none.
+            UsageError: stretch, gravity, speed or a number of the coupling is out of range; there
+                is no such scheme, relaxation or coupling; an audit of what has none.
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
@@ -128,12 +142,37 @@ class Scene:
                 "--audit needs --relaxation global and --threads 1, not "
                 f"{self.relaxation} and {self.threads}; leave it away, or them"
             )
+        self.virtual_coupling()
+        if not 1 <= self.tissue_every <= MOST_FRAMES_PER_ANSWER:
+            raise UsageError(
+                f"the tissue is to be asked every {self.tissue_every} frames; it must be 1 to "
+                f"{MOST_FRAMES_PER_ANSWER}"
+            )
         if not -0.5 <= self.stretch <= 1.0:
             raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")
         if not 0.0 <= self.gravity <= 100.0:
             raise UsageError(f"gravity is {self.gravity} m/s2; it must lie between 0 and 100")
         if not 0.0 < self.speed <= 1.0:
             raise UsageError(f"speed is {self.speed} m/s; it must be above 0 and at most 1")
+
+    def virtual_coupling(self) -> VirtualCoupling | None:
+        """Return what is between the arm's blade and the one that cuts; None where they are one.
+
+        Raises:
+            UsageError: there is no such coupling, or it has no such stiffness or damping.
+        """
+        if self.coupling not in COUPLINGS:
+            raise unknown("coupling", self.coupling, COUPLINGS)
+        asked = {"stiffness": self.coupling_stiffness, "damping": self.coupling_damping}
+        given: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+        if self.coupling == "virtual":
+            try:
+                return VirtualCoupling(**given)
+            except ValueError as error:
+                raise UsageError(str(error)) from None
+        for name in given:
+            raise UsageError(f"--coupling-{name} is for --coupling virtual; a rigid one has none")
+        return None
 
     def settings(self) -> dict[str, Any]:
         """Return the numbers and names of the scene, for a report."""

@@ -11,14 +11,18 @@ from bridge.bridge import Bridge
 from bridge.fixtures import Fixture
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink
+from bridge.virtual_coupling import VirtualCoupling
 from scalpel_sim.arm import Arm
 from scalpel_sim.frame_row import row_of
 from scalpel_sim.recording import Recording
 from scalpel_sim.stroke import Stroke
 from scalpel_sim.touching import Touching
-from tissue.types import BladeSegment, StepResult, Wrench
+from tissue.types import BladeSegment, Profile, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
+
+AT_REST = Profile(0.0, 0.0, 0.0)
+"""Of a frame in which the tissue was not asked."""
 
 EveryFrame = Callable[["Simulation"], bool | None]
 """Called after each frame; a run ends early where it returns True."""
@@ -36,6 +40,9 @@ class Simulation:
         link: The tissue.
         frame: Where the tissue lies in the world.
         fixtures: What stands around it in the world, beside the arm's table: see `touching`.
+        tissue_every: Frames in which the tissue is asked once, for all of them.
+        coupling: Between the arm's blade and the one that cuts; None where they are one.
+        passivity: Whether what would give the arm energy out of nothing is damped.
     """
 
     def __init__(
@@ -45,12 +52,23 @@ class Simulation:
         link: TissueLink,
         frame: TissueFrame,
         fixtures: Iterable[Fixture] = (),
+        *,
+        tissue_every: int = 1,
+        coupling: VirtualCoupling | None = None,
+        passivity: bool = True,
     ) -> None:
         self.arm = arm
         self.stroke = stroke
         self.link = link
         self.frame = frame
-        self.bridge = Bridge(link, frame, arm.limits)
+        self.bridge = Bridge(
+            link,
+            frame,
+            arm.limits,
+            tissue_every=tissue_every,
+            coupling=coupling,
+            passivity=passivity,
+        )
         self.wrench = NO_WRENCH
         """What the blade felt in the last frame, world frame."""
         self.touching = Touching(arm, fixtures)
@@ -75,7 +93,7 @@ class Simulation:
 
     @property
     def result(self) -> StepResult:
-        """What the tissue did in the last frame, tissue frame."""
+        """What the tissue did when it was last asked, tissue frame."""
         result = self.bridge.result
         if result is None:
             raise RuntimeError("no frame has been done yet: call step() or run() first")
@@ -103,6 +121,7 @@ class Simulation:
             picture(self)
         drawn = time.perf_counter()
 
+        profile = self.result.profile if self.bridge.answered else AT_REST
         self.recording.append(
             row_of(
                 self.time,
@@ -110,7 +129,7 @@ class Simulation:
                 self.wrench,
                 self.bridge.wrench_raw,
                 self.result,
-                self.result.profile,
+                profile,
                 self.frame,
                 picture_seconds=drawn - framed,
                 frame_seconds=framed - start,

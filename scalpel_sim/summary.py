@@ -59,7 +59,7 @@ class Summary(NamedTuple):
     share: dict[str, float]
     """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link).
     They sum to 1."""
-    counters: dict[str, int]
+    counters: dict[str, Any]
     """What the bridge had to do: broad-phase rejections, saturations and the like."""
     touched: dict[str, int]
     """In how many frames a part of the arm met what it must not: "PART, FIXTURE OR PART"."""
@@ -80,7 +80,7 @@ def summarise(
     tetrahedra_final: int,
     pieces: Sequence[Piece] | None,
     quality: QualityReport | None,
-    counters: dict[str, int],
+    counters: dict[str, Any],
     touched: dict[str, int],
     settings: dict[str, Any],
 ) -> Summary:

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from bridge.poses import motion
 from scalpel_sim.body import make_tissue
 from scalpel_sim.prepare import prepare
 from scalpel_sim.scenes import SCENES, Scene, changed
@@ -28,6 +29,8 @@ class Run(NamedTuple):
     results: list[StepResult]
     joint_force_errors: FloatArray
     """Per frame [N m]: MuJoCo's generalised force of the wrench, less J^T w."""
+    applied: FloatArray
+    """The force on the blade that MuJoCo integrates in each frame [N], shape (n_frames, 3)."""
 
     def every(self, name: str) -> FloatArray:
         return np.array([getattr(result, name) for result in self.results])
@@ -48,14 +51,16 @@ def run(scene: Scene, seconds_after: float = 0.2, *, frictionless: bool = False)
         model.tendon_frictionloss[:] = 0.0
     results: list[StepResult] = []
     errors: list[float] = []
+    applied: list[FloatArray] = []
 
     def note(simulation: Simulation) -> None:
         results.append(simulation.result)
         errors.append(joint_force_error(simulation))
+        applied.append(data.xfrc_applied[simulation.arm.blade.body_id, :3].copy())
 
     simulation.run(simulation.stroke.duration + seconds_after, note)
     assert np.isfinite(data.qpos).all()
-    return Run(simulation, results, np.array(errors))
+    return Run(simulation, results, np.array(errors), np.array(applied))
 
 
 def joint_force_error(simulation: Simulation) -> float:
@@ -104,6 +109,76 @@ def test_the_wrench_acts_at_the_tip_and_is_what_the_tissue_said(cut):
     said = np.array([result.wrench.point for result in cut.results])
     tips = simulation.frame.points_to_tissue(simulation.recording.vector("tip"))
     assert np.abs(said - tips)[held].max() < 1e-12
+
+
+def test_35_in_each_step_the_impulse_on_the_arm_is_that_on_the_tissue(cut):
+    """What MuJoCo integrates, against what the tissue's nodes were pushed by."""
+    dt = cut.simulation.dt
+    on_tissue = dt * cut.every("force_on_tissue")
+    assert np.abs(dt * cut.applied + on_tissue).max() < 1e-10
+    assert np.abs(on_tissue).max() > 1e-4
+    assert cut.simulation.bridge.counters.impulse_written_off == 0.0
+
+
+@pytest.mark.parametrize(
+    ("stroke", "error"),
+    [
+        ("straight", 1e-6),
+        ("slanted", 1e-6),
+        # Where the blade turns, the tissue counts the work of what is about to slip at the edge,
+        # and its torque at where it holds: 3e-8 J in a step at most.
+        ("curved", 5e-4),
+    ],
+)
+def test_35_the_blade_does_the_same_work_on_both_sides(stroke, error):
+    """The way of the arm's blade times what it feels of that way; and what the tissue counts."""
+    simulation = prepare(changed(SCENES["grid2"], stroke=stroke))
+    poses: list[BladeSegment] = []
+    by_arm, by_tissue = [0.0], [0.0]
+
+    def note(simulation: Simulation) -> None:
+        poses.append(simulation.arm.blade.segment())
+        if len(poses) > 1:
+            wrench, way = simulation.wrench, motion(poses[-2], poses[-1])
+            # The torque is about the tip at the end; about where it was on the mean, half of the
+            # way is its lever.
+            of_tip = way[:3] + 0.5 * np.cross(way[3:], way[:3])
+            by_arm.append(-float(wrench.force @ of_tip + wrench.torque @ way[3:]))
+            by_tissue.append(simulation.result.work_of_blade)
+
+    simulation.run(simulation.stroke.duration, note)
+    assert by_tissue[-1] > 0.01
+    assert np.abs(by_arm[1:] - np.diff(by_tissue)).max() < 1e-6
+    assert sum(by_arm) == pytest.approx(by_tissue[-1], rel=error)
+
+
+@pytest.mark.parametrize("every", [5, 10, 33])
+def test_a_cut_that_is_asked_about_every_few_frames_is_the_cut(every, cut):
+    """Same pieces, same area, and the same impulse to 1.5 %: see the README for the peaks."""
+    seldom = run(changed(SCENES["grid2"], tissue_every=every))
+    assert seldom.simulation.link.n_pieces() == 2
+    assert seldom.results[-1].cut_area == pytest.approx(cut.results[-1].cut_area, rel=0.01)
+    impulses = [
+        found.simulation.recording.vector("force").sum(axis=0) * found.simulation.dt
+        for found in (cut, seldom)
+    ]
+    assert np.linalg.norm(impulses[1] - impulses[0]) < 0.015 * np.linalg.norm(impulses[0])
+    profile = seldom.simulation.recording.column("rx_s")
+    asked = np.arange(len(profile)) % every == 0
+    assert (profile[asked] > 0.0).all() and not profile[~asked].any()
+
+
+def test_a_cut_through_a_virtual_coupling_is_the_cut(cut):
+    """Only that the blade that cuts stays behind the arm's, by force over stiffness."""
+    soft = run(changed(SCENES["grid2"], coupling="virtual"))
+    assert soft.simulation.link.n_pieces() == 2
+    assert soft.results[-1].cut_area == pytest.approx(cut.results[-1].cut_area, rel=0.01)
+    steady = (cut.every("cut_area") > 5e-4) & (cut.every("cut_area") < 1e-3)
+    forces = [
+        np.linalg.norm(found.simulation.recording.vector("force")[steady], axis=1).mean()
+        for found in (cut, soft)
+    ]
+    assert forces[1] == pytest.approx(forces[0], rel=0.02)
 
 
 def test_nothing_is_felt_out_of_contact(cut):

@@ -1,4 +1,7 @@
+import itertools
 import math
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -8,7 +11,9 @@ from bridge.coupling import CouplingError, DeviceLimits
 from bridge.fixtures import FixtureBox
 from bridge.frames import TissueFrame
 from bridge.link import InProcessLink
+from bridge.virtual_coupling import VirtualCoupling
 from tests.bridge.bits import bits
+from tests.bridge.walls import Wall
 from tissue.blade_shape import BladeShape
 from tissue.material import Material
 from tissue.shapes import grid
@@ -180,6 +185,168 @@ def test_a_tissue_that_diverged_ends_the_run_instead_of_reaching_the_arm(
     bridge = Bridge(DivergedLink(block(), lambda result: spoil(result, bad)))
     with pytest.raises(CouplingError, match="finite"):
         bridge.step(upright(0.009, 0.0), DT)
+
+
+WALL_AT, BACK = np.array([0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
+
+
+def in_and_out(upright, n_frames=330, depth=2e-3):
+    """Poses of a blade that goes into a wall at y = 0 and out again, at up to 40 mm/s."""
+    way = 0.5 * (depth + 1e-3) * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, n_frames))) - 1e-3
+    return [upright(0.0, y) for y in way]
+
+
+class Counting(Wall):
+    """A wall that notes what it is asked."""
+
+    def __init__(self, stiffness=500.0):
+        super().__init__(WALL_AT, BACK, stiffness)
+        self.asked = []
+
+    def step(self, sweep, dt):
+        self.asked.append((sweep, dt))
+        return super().step(sweep, dt)
+
+
+def test_a_tissue_that_is_asked_every_ten_frames_lives_as_long_and_goes_the_same_way(upright):
+    wall = Counting()
+    bridge = Bridge(wall, tissue_every=10)
+    poses = in_and_out(upright, 101)
+    for pose in poses:
+        bridge.step(pose, DT)
+    assert sum(dt for _, dt in wall.asked) == pytest.approx(0.101)
+    for (before, _), (after, _) in itertools.pairwise(wall.asked):
+        assert np.array_equal(before.t1.tip, after.t0.tip)
+    assert np.array_equal(wall.asked[-1][0].t1.tip, poses[-1].tip)
+    assert bridge.counters.answers == 11
+
+
+def test_a_blade_that_holds_tissue_goes_straight_and_one_that_may_meet_it_as_the_arm_went(upright):
+    wall = Counting()
+    bridge = Bridge(wall, tissue_every=10)
+    for pose in in_and_out(upright, 101):
+        bridge.step(pose, DT)
+    steps = np.array([dt for _, dt in wall.asked])
+    inside = np.array([sweep.t0.tip[1] > 0.0 for sweep, _ in wall.asked])
+    assert steps[~inside] == pytest.approx(DT)
+    assert (~inside).sum() > 10
+    # Once it holds as much as before: nine frames at once, and the last one, which is felt.
+    n_straight = np.isclose(steps[inside], 9 * DT).sum()
+    assert n_straight >= 4
+    assert np.isclose(steps[inside], DT).sum() == len(steps[inside]) - n_straight
+
+
+def test_the_tissue_answers_in_the_first_frame_and_then_in_every_fifth(upright):
+    bridge = Bridge(Counting(), tissue_every=5)
+    answered = []
+    for pose in in_and_out(upright, 16):
+        bridge.step(pose, DT)
+        answered.append(bridge.answered)
+    assert np.flatnonzero(answered).tolist() == [0, 5, 10, 15]
+
+
+@pytest.mark.parametrize("every", [1, 5, 10, 33])
+@pytest.mark.parametrize(
+    "coupling", [None, VirtualCoupling(stiffness=5e3)], ids=["rigid", "virtual"]
+)
+def test_the_impulse_that_the_arm_feels_is_that_on_the_tissue(upright, every, coupling):
+    """From before a contact to after it; momentum has gone nowhere else."""
+    wall = Counting()
+    bridge = Bridge(wall, tissue_every=every, coupling=coupling, passivity=False)
+    poses = in_and_out(upright) + [upright(0.0, -1e-3)] * (2 * every)
+    felt = DT * np.sum([bridge.step(pose, DT).force for pose in poses], axis=0)
+    missing = np.linalg.norm(felt - wall.impulse)
+    assert np.abs(wall.impulse[1]) > 0.1
+    assert missing < 0.003 * np.abs(wall.impulse[1])
+    # Half a dozen frames of a few dozen are missing at most where nothing was written off.
+    assert missing <= bridge.counters.impulse_written_off + 1e-12
+
+
+def test_a_wall_that_is_asked_every_ten_frames_is_felt_nearly_as_if_it_were_asked_in_each(upright):
+    """Held without its stiffness, what is felt is five frames old on the mean."""
+
+    def forces(every, told):
+        bridge = Bridge(Wall(WALL_AT, BACK, 500.0, told), tissue_every=every)
+        return np.array([bridge.step(pose, DT).force[1] for pose in in_and_out(upright)])
+
+    always = forces(1, 1.0)
+    off, held_off = (np.abs(forces(10, told) - always).mean() for told in (1.0, 0.0))
+    assert always.min() < -0.9
+    assert off < 0.015 and held_off > 1.5 * off
+
+
+def test_a_virtual_coupling_keeps_the_blade_that_cuts_out_of_a_wall(upright):
+    wall = Counting(stiffness=20e3)
+    bridge = Bridge(wall, coupling=VirtualCoupling(stiffness=700.0))
+    for _ in range(100):
+        felt = bridge.step(upright(0.0, 2e-3), DT)
+    # 20 kN/m and 700 N/m in a row, 2 mm pressed in.
+    assert felt.force[1] == pytest.approx(-2e-3 / (1.0 / 700.0 + 1.0 / 20e3), rel=1e-3)
+    assert wall.asked[-1][0].t1.tip[1] == pytest.approx(-felt.force[1] / 20e3, rel=1e-3)
+
+
+@pytest.mark.parametrize("coupling", [None, VirtualCoupling()], ids=["rigid", "virtual"])
+def test_what_is_felt_between_two_answers_turns_with_the_tissue(upright, coupling):
+    turned = TissueFrame(
+        np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([0.3, -0.1, 0.2])
+    )
+    bridges = [
+        Bridge(Counting(), frame, tissue_every=10, coupling=coupling)
+        for frame in (TissueFrame(), turned)
+    ]
+    for pose in in_and_out(upright):
+        straight, felt = (
+            bridge.step(posed, DT)
+            for bridge, posed in zip(bridges, (pose, turned.segment_to_world(pose)), strict=True)
+        )
+        wanted = turned.wrench_to_world(straight)
+        for name in ("force", "torque", "point"):
+            assert getattr(felt, name) == pytest.approx(getattr(wanted, name), abs=1e-9)
+    assert bridges[0].counters.answers == 33
+
+
+@pytest.mark.parametrize("every", [0, -1, 1.5, 101])
+def test_a_tissue_that_is_asked_too_seldom_or_never_is_refused(every):
+    with pytest.raises(ValueError, match=f"every {every} frames; .* from 1 to 100"):
+        Bridge(Counting(), tissue_every=every)
+
+
+class Silent(Counting):
+    """A tissue that stops answering, and comes back when it is woken."""
+
+    def __init__(self):
+        super().__init__()
+        self.is_awake = threading.Event()
+        self.is_awake.set()
+
+    def step(self, sweep, dt):
+        assert self.is_awake.wait(10.0)
+        return super().step(sweep, dt)
+
+
+def wait_for(bridge, upright, condition):
+    for _ in range(1000):
+        felt = bridge.step(upright(0.0, 2e-3), DT)
+        if condition():
+            return felt
+        time.sleep(1e-3)
+    raise AssertionError("the tissue never answered")
+
+
+def test_an_arm_that_cannot_wait_feels_a_silent_tissue_fade_and_come_back_by_a_ramp(upright):
+    tissue = Silent()
+    bridge = Bridge(tissue, waits=False, passivity=False)
+    felt = wait_for(bridge, upright, lambda: bridge.counters.answers > 50)
+    assert felt.force[1] == pytest.approx(-1.0, rel=0.1)
+    tissue.is_awake.clear()
+    sizes = [-bridge.step(upright(0.0, 2e-3), DT).force[1] for _ in range(550)]
+    assert sizes[30] > 0.9 and 0.0 < sizes[300] < 0.6 and sizes[-1] == 0.0
+    assert bridge.counters.silent > 500 and bridge.counters.faded > 450
+    tissue.is_awake.set()
+    n_answers = bridge.counters.answers
+    back = wait_for(bridge, upright, lambda: bridge.counters.answers > n_answers)
+    assert -0.1 < back.force[1] < 0.0
+    assert bridge.counters.silent < bridge.counters.frames
 
 
 UP = np.array([0.0, 0.0, 1.0])

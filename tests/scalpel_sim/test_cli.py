@@ -48,6 +48,21 @@ WRONG_USE = {
         "--fix left,right",
     ),
     "an unknown arm": (["run", "slab", "--arm", "tuch"], "Did you mean 'touch'"),
+    "an unknown coupling": (["run", "slab", "--coupling", "virtal"], "Did you mean 'virtual'"),
+    "a stiffness of a coupling that has none": (
+        ["run", "slab", "--coupling-stiffness", "500"],
+        "--coupling-stiffness is for --coupling virtual",
+    ),
+    "a coupling that pulls the wrong way": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
+        "stiffness is -1.0; it must be positive",
+    ),
+    "a coupling without damping": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
+        "damping is 0.0; it must be positive",
+    ),
+    "a tissue that is never asked": (["run", "slab", "--tissue-every", "0"], "it must be 1 to 100"),
+    "a tissue that is asked too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
     "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
@@ -263,6 +278,26 @@ def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
     assert command_line(words) == 0
     material = json.loads(capsys.readouterr().out)["settings"]["material"]
     assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
+    how = [
+        "--tissue-every",
+        "10",
+        "--coupling",
+        "virtual",
+        "--coupling-stiffness",
+        "900",
+        "--no-passivity",
+    ]
+    line = ["run", "grid2", "--seconds", "0.5", "--json", "--out", "soft"]
+    assert command_line([*line, *how]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    settings, counters = summary["settings"], summary["counters"]
+    assert (settings["tissue_every"], settings["coupling"]) == (10, "virtual")
+    assert (settings["coupling_stiffness"], settings["passivity"]) == (900.0, False)
+    assert (counters["frames"], counters["answers"]) == (500, 50)
+    assert set(counters["passivity"]) == {"energy", "least_energy", "injected_away", "frames"}
 
 
 def test_a_named_material_reaches_the_tissue_with_what_is_changed_about_it(files, capsys):

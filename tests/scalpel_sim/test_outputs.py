@@ -1,6 +1,8 @@
 import csv
 import json
+import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -69,7 +71,7 @@ def recorded(n_frames: int) -> Recording:
     return recording
 
 
-def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
+def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any) -> Summary:
     return summarise(
         recording,
         scene="block",
@@ -81,7 +83,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0) -> Summary:
         tetrahedra_final=8,
         pieces=PIECES,
         quality=QUALITY,
-        counters={},
+        counters=counters,
         touched={},
         settings={"stroke": "straight"},
     )
@@ -273,6 +275,18 @@ def test_the_table_has_a_row_for_each_piece():
     print_table(summary_of(recorded(10)), console)
     text = console.export_text()
     assert "piece 1, loose" in text and "piece 2, held" in text
+
+
+def test_the_table_tells_what_came_between_the_tissue_and_the_arm():
+    console = Console(record=True, width=100)
+    passivity = {"energy": 0.0, "least_energy": -5e-7, "injected_away": 2e-3, "frames": 12}
+    print_table(
+        summary_of(recorded(10), force_limited=1234, silent=0, passivity=passivity), console
+    )
+    text = console.export_text()
+    assert re.search("force above the device's limit.*1,234 frames", text)
+    assert re.search("damped for passivity.*12 frames, 2 mJ", text)
+    assert "silent" not in text
 
 
 def test_the_summary_has_the_trade_between_path_error_and_time_step():

@@ -1,0 +1,116 @@
+"""Poses of a blade: which there can be, how two of them differ, and where a motion carries one."""
+
+import math
+
+import numpy as np
+
+from tissue.types import BladeSegment, FloatArray
+
+SHORTEST_EDGE = 1e-6
+"""[m]. A shorter cutting edge has no direction that a swept box could be aligned with."""
+
+LARGEST_COSINE = 0.99
+"""Of the angle between `forward` and the edge. `forward` should be across the edge (0); nearer than
+eight degrees to it, the plane of the blade is a matter of rounding."""
+
+UNIT_TOLERANCE = 1e-6
+"""How far the length of `forward` may be from 1: what single precision leaves."""
+
+
+def check_pose(segment: BladeSegment) -> None:
+    """Refuse what no arm in its senses sends.
+
+    Raises:
+        ValueError: the pose is not finite, or has no plane.
+    """
+    tx, ty, tz = segment.tip.tolist()
+    hx, hy, hz = segment.heel.tolist()
+    fx, fy, fz = segment.forward.tolist()
+    ex, ey, ez = tx - hx, ty - hy, tz - hz
+    length, forward_length = math.hypot(ex, ey, ez), math.hypot(fx, fy, fz)
+    if not math.isfinite(length + forward_length):
+        raise ValueError(f"the blade's pose is not finite: {segment}")
+    if length < SHORTEST_EDGE:
+        raise ValueError(f"the cutting edge is {length} m long; at least {SHORTEST_EDGE} m")
+    if abs(forward_length - 1.0) > UNIT_TOLERANCE:
+        raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
+    cosine = abs(ex * fx + ey * fy + ez * fz) / length
+    if cosine > LARGEST_COSINE:
+        raise ValueError(
+            f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
+            "degrees apart"
+        )
+
+
+def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
+    """Return how a blade moved: translation of the tip [m] and rotation vector [rad], shape (6,).
+
+    The rotation is the one that carries edge and flat from the one pose to the other; by less than
+    half a turn.
+    """
+    a, b = _axes(before), _axes(after)
+    # The sum over the three axes of a x b is twice the sine, along the axis of rotation; that of
+    # a . b is one more than twice the cosine.
+    sx = sy = sz = trace = 0.0
+    for (ax, ay, az), (bx, by, bz) in zip(a, b, strict=True):
+        sx += ay * bz - az * by
+        sy += az * bx - ax * bz
+        sz += ax * by - ay * bx
+        trace += ax * bx + ay * by + az * bz
+    sine = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
+    half = 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 0.0 else 0.5
+    x, y, z = before.tip.tolist()
+    u, v, w = after.tip.tolist()
+    return np.array((u - x, v - y, w - z, half * sx, half * sy, half * sz))
+
+
+def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
+    """Return the pose to which `motion` leads: translation of the tip, and rotation about it."""
+    tip = segment.tip + by[:3]
+    angle = math.hypot(*by[3:].tolist())
+    if angle == 0.0:
+        return BladeSegment(tip, segment.heel + by[:3], segment.forward)
+    rotation = _rotation(by[3:], angle)
+    forward = rotation @ segment.forward
+    return BladeSegment(
+        tip,
+        tip + rotation @ (segment.heel - segment.tip),
+        forward / math.hypot(*forward.tolist()),
+    )
+
+
+def half_length(segment: BladeSegment) -> float:
+    """Return half the length of the edge [m]."""
+    return 0.5 * math.hypot(*(segment.tip - segment.heel).tolist())
+
+
+def _rotation(vector: FloatArray, angle: float) -> FloatArray:
+    """Return the matrix of a rotation vector of that length (Rodrigues), shape (3, 3)."""
+    x, y, z = (vector / angle).tolist()
+    s, c = math.sin(angle), math.cos(angle)
+    d = 1.0 - c
+    return np.array(
+        (
+            (c + d * x * x, d * x * y - s * z, d * x * z + s * y),
+            (d * x * y + s * z, c + d * y * y, d * y * z - s * x),
+            (d * x * z - s * y, d * y * z + s * x, c + d * z * z),
+        )
+    )
+
+
+_Axis = tuple[float, float, float]
+
+
+def _axes(segment: BladeSegment) -> tuple[_Axis, _Axis, _Axis]:
+    """Return unit vectors along the edge, forward across it, and normal to the flat."""
+    tx, ty, tz = segment.tip.tolist()
+    hx, hy, hz = segment.heel.tolist()
+    ex, ey, ez = hx - tx, hy - ty, hz - tz
+    size = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
+    ex, ey, ez = ex * size, ey * size, ez * size
+    fx, fy, fz = segment.forward.tolist()
+    along = ex * fx + ey * fy + ez * fz
+    fx, fy, fz = fx - along * ex, fy - along * ey, fz - along * ez
+    size = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz)
+    fx, fy, fz = fx * size, fy * size, fz * size
+    return (ex, ey, ez), (fx, fy, fz), (ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx)
