@@ -180,7 +180,7 @@ def _find_points(contact: ContactState, body: Body) -> None:
         met = _point_triangle(contact, _corners(x, nodes), nodes)
         if met.is_through:
             weights = Weights(1.0, met.b + met.c - 1.0, -met.b, -met.c)
-            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0)
+            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0, contact.start)
 
 
 @kernel
@@ -261,7 +261,7 @@ def _find_edges(contact: ContactState, body: Body) -> None:
         met = _edge_edge(contact, _edges(x, nodes), nodes)
         if met.is_through:
             weights = Weights(1.0 - met.s, met.s, met.t - 1.0, -met.t)
-            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0)
+            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0, contact.start)
 
 
 @kernel
@@ -291,7 +291,7 @@ def _find_on_floor(contact: ContactState, body: Body) -> None:
         if body.positions[node, 2] < contact.floor - contact.touch:
             nodes, weights = (node, node, node, node), Weights(1.0, 0.0, 0.0, 0.0)
             up = Vec3(0.0, 0.0, 1.0)
-            add_contact(contact.contacts, body, nodes, weights, up, contact.floor)
+            add_contact(contact.contacts, body, nodes, weights, up, contact.floor, contact.start)
 
 
 @kernel
