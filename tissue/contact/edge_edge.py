@@ -70,22 +70,19 @@ def crossing_of(at: Edges) -> Crossing:
 
 
 @inlined
-def way_of_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> float:
-    """Which way round the lines ab and cd overlap: the first thing to look at.
+def do_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
+    """Whether the lines ab and cd face each other and overlap: the first thing to look at.
 
-    1 where cross(ab, cd) leads from the second edge to the first as they should lie, -1 where it
-    leads back, 0 where the edges do not face each other or are apart.
+    Signs alone: cross(ab, cd) leads along one edge's normal and against the other's, and along it
+    the edges lie the wrong way round. No branches, for nobody could foretell them.
     """
     normal = cross(sub(at.b, at.a), sub(at.d, at.c))
     towards = dot(normal, outward)
     away = dot(normal, other_outward)
-    if away > 0.0 > towards:
-        way = 1.0
-    elif away < 0.0 < towards:
-        way = -1.0
-    else:
-        return 0.0
-    return way if way * dot(normal, sub(at.a, at.c)) < 0.0 else 0.0
+    apart = dot(normal, sub(at.a, at.c))
+    return ((away > 0.0) & (towards < 0.0) & (apart < 0.0)) | (
+        (away < 0.0) & (towards > 0.0) & (apart > 0.0)
+    )
 
 
 @kernel
@@ -114,10 +111,10 @@ def edge_edge(
         nothing_yet: Depth that is none [m].
     """
     outside = EdgeEdge(False, outward, 0.0, 0.0)
-    way = way_of_overlap(t1, outward, other_outward)
-    if way == 0.0:
+    if not do_overlap(t1, outward, other_outward):
         return outside
     now = crossing_of(t1)
+    way = 1.0 if dot(now.normal, other_outward) > 0.0 else -1.0
     if not (now.is_one and is_inner(now.s) and is_inner(now.t)):
         return outside
     depth = -way * now.gap

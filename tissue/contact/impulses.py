@@ -9,7 +9,8 @@ Contacts act at both ends of a Runge-Kutta step:
 - before it, contacts that lasted give half of the impulse that they gave in the last step. Where
   nothing changes this is half of what is needed, the other half follows at the end, and nodes that
   are pressed neither move nor show a speed (the leapfrog's way to split a force);
-- after it, positions are corrected, in the metric of the masses, to where no gap is negative;
+- after it, positions are corrected, in the metric of the masses, to where no gap is negative; of
+  what sides overlapped before the step only a little, for it would be work that nobody paid for;
 - then velocities, by impulses that stop the approach and nothing more (plastic impact), or that
   take back what was given too much before. No contact ever pulls.
 
@@ -65,6 +66,9 @@ class Contacts(Arrays):
     """Sum of squared weight over mass [1/kg], shape (capacity,)."""
     share: FloatArray
     """Weight over mass of each node, 0 where it is fixed [1/kg]; shape (capacity, 4)."""
+    bearable: FloatArray
+    """Gap that is left for the steps to come, for it was there before; not positive [m]. Shape
+    (capacity,)."""
     shift: FloatArray
     """Correction of positions along the normal [kg m], shape (capacity,)."""
     closing: FloatArray
@@ -86,12 +90,12 @@ class Contacts(Arrays):
     """Corrections that moved something so far, shape (1,)."""
     count: IntArray
     """Shape (1,)."""
-    most_push: float
-    """The most by which two sides are pushed apart in a step [m]."""
+    recovery: float
+    """How much of an overlap that was there before is undone in a step [m]."""
 
 
-def new_contacts(n_nodes: int, capacity: int, most_push: float) -> Contacts:
-    """Return no contacts, with room for that many; see `Contacts` for `most_push` [m]."""
+def new_contacts(n_nodes: int, capacity: int, recovery: float) -> Contacts:
+    """Return no contacts, with room for that many; see `Contacts` for `recovery` [m]."""
     return Contacts(
         node=np.zeros((capacity, 4), np.int64),
         weight=np.zeros((capacity, 4)),
@@ -99,6 +103,7 @@ def new_contacts(n_nodes: int, capacity: int, most_push: float) -> Contacts:
         floor=np.zeros(capacity),
         mobility=np.zeros(capacity),
         share=np.zeros((capacity, 4)),
+        bearable=np.zeros(capacity),
         shift=np.zeros(capacity),
         closing=np.zeros(capacity),
         drag=np.zeros((capacity, 3)),
@@ -110,13 +115,13 @@ def new_contacts(n_nodes: int, capacity: int, most_push: float) -> Contacts:
         moved=np.zeros(n_nodes, np.int64),
         clock=np.zeros(1, np.int64),
         count=np.zeros(1, np.int64),
-        most_push=most_push,
+        recovery=recovery,
     )
 
 
 def grown_contacts(contacts: Contacts, n_nodes: int, capacity: int) -> Contacts:
     """Return the contacts with room for that many."""
-    names = set(Contacts.__annotations__) - {"known", "moved", "clock", "count", "most_push"}
+    names = set(Contacts.__annotations__) - {"known", "moved", "clock", "count", "recovery"}
     return contacts.replaced(
         **{name: grown(getattr(contacts, name), capacity) for name in names},
         known=new_known_contacts(capacity),
@@ -215,8 +220,12 @@ def add_contact(
     weights: Weights,
     normal: Vec3,
     floor: float,
+    start: FloatArray,
 ) -> None:
-    """Add a contact and push it apart, unless it is there already or nothing in it can move."""
+    """Add a contact and push it apart, unless it is there already or nothing in it can move.
+
+    `start` is where the nodes were before the step [m].
+    """
     k = contacts.count[0]
     if k == len(contacts.shift) or is_known(contacts.known, contacts.node, nodes):
         return
@@ -234,6 +243,7 @@ def add_contact(
     for x in range(3):
         contacts.drag[k, x] = 0.0
         contacts.friction[k, x] = 0.0
+    bear(contacts, k, start)
     note_move(contacts, k, _push(contacts, body, k) > 0.0)
 
 
@@ -247,11 +257,15 @@ def difference(contacts: Contacts, k: int, values: FloatArray) -> Vec3:
 
 
 @kernel
-def gap(contacts: Contacts, body: Body, k: int) -> float:
+def gap(contacts: Contacts, positions: FloatArray, k: int) -> float:
     """Distance of the two sides along the normal [m], negative where they overlap."""
-    return (
-        dot(vec3(contacts.normal, k), difference(contacts, k, body.positions)) - contacts.floor[k]
-    )
+    return dot(vec3(contacts.normal, k), difference(contacts, k, positions)) - contacts.floor[k]
+
+
+@kernel
+def bear(contacts: Contacts, k: int, start: FloatArray) -> None:
+    """Note how much of a gap contact `k` may leave, from where its nodes were before the step."""
+    contacts.bearable[k] = min(gap(contacts, start, k) + contacts.recovery, 0.0)
 
 
 @kernel
@@ -270,8 +284,8 @@ def _apply(contacts: Contacts, k: int, correction: Vec3, values: FloatArray) -> 
 def _push(contacts: Contacts, body: Body, k: int) -> float:
     """Close the gap of contact `k`, or what of its correction is too much; return the move [m]."""
     before = contacts.shift[k]
-    now = max(before - gap(contacts, body, k) / contacts.mobility[k], 0.0)
-    now = min(now, contacts.most_push / contacts.mobility[k])
+    too_little = contacts.bearable[k] - gap(contacts, body.positions, k)
+    now = max(before + too_little / contacts.mobility[k], 0.0)
     if now == before:
         return 0.0
     contacts.shift[k] = now
@@ -360,7 +374,7 @@ def stop_approach(
         small: Change of the gap at which the sweeps end [m].
     """
     for k in range(contacts.count[0]):
-        contacts.closing[k] = max(gap(contacts, body, k), 0.0) / seconds
+        contacts.closing[k] = max(gap(contacts, body.positions, k), 0.0) / seconds
     begin_sweeps(contacts)
     for _ in range(SWEEPS):
         most = 0.0

@@ -19,9 +19,9 @@ from tissue.contact.distance import distance_of_edges, distance_to_triangle
 from tissue.contact.edge_edge import (
     EdgeEdge,
     Edges,
+    do_overlap,
     edge_edge,
     face_the_same_way,
-    way_of_overlap,
 )
 from tissue.contact.faces import N_FACES, NONE
 from tissue.contact.impulses import add_contact, have_moved_since
@@ -50,7 +50,7 @@ from tissue.contact.pairs import (
 from tissue.contact.point_triangle import Corners, PointTriangle, is_under, point_triangle
 from tissue.contact.state import EPOCH, ContactState
 from tissue.geometry import Weights
-from tissue.jit import kernel
+from tissue.jit import inlined, kernel
 from tissue.types import FloatArray
 from tissue.vec3 import Vec3, add, cross, dot, store, sub, vec3
 
@@ -137,25 +137,25 @@ def _find_points(contact: ContactState, body: Body) -> None:
     last = _look(contact, POINTS)
     hits.count[0] = 0
     measure(contact, body)
-    k = 0
-    while k < pairs.counts[N_NEAR]:
+    for k in range(pairs.counts[N_NEAR]):
+        hits.may_be[k] = is_under(_corners(x, nodes_of(pairs.node, k)))
+    for k in range(pairs.counts[N_NEAR] - 1, -1, -1):  # backwards: another takes a place behind
+        is_turn = is_its_turn(motion, k)
+        if not (hits.may_be[k] or is_turn):
+            continue
         if is_dead_point(candidates, k):
             drop_pair(pairs, k)
             continue
         nodes = nodes_of(pairs.node, k)
-        if not _is_due(contact, nodes, last):
-            k += 1
-            continue
         now = _corners(x, nodes)
-        if is_under(now) and _point_triangle(contact, now, nodes).is_through:
+        may_be = hits.may_be[k] and _is_due(contact, nodes, last)
+        if may_be and _point_triangle(contact, now, nodes).is_through:
             _note_hit(contact, nodes)
-        elif is_its_turn(motion, k):
-            apart = _apart(now)
-            if not is_near(motion, apart):
-                note_distance(motion, pairs, k, apart)
-                make_far(pairs, k)
-                continue
-        k += 1
+            continue
+        if is_turn and not is_near(motion, _apart(now)):
+            note_distance(motion, pairs, k, _apart(now))
+            make_far(pairs, k)
+    k = pairs.counts[N_NEAR]
     until = horizon(motion, touch)
     while k < pairs.counts[N_PAIRS]:
         if pairs.wake[k] > until:
@@ -180,7 +180,7 @@ def _find_points(contact: ContactState, body: Body) -> None:
         met = _point_triangle(contact, _corners(x, nodes), nodes)
         if met.is_through:
             weights = Weights(1.0, met.b + met.c - 1.0, -met.b, -met.c)
-            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0)
+            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0, contact.start)
 
 
 @kernel
@@ -197,7 +197,7 @@ def _apart(at: Corners) -> float:
     return distance_to_triangle(at) - rim_of(at.a, at.b, at.c)
 
 
-@kernel
+@inlined
 def _corners(x: FloatArray, nodes: Nodes) -> Corners:
     return Corners(vec3(x, nodes[0]), vec3(x, nodes[1]), vec3(x, nodes[2]), vec3(x, nodes[3]))
 
@@ -218,25 +218,27 @@ def _find_edges(contact: ContactState, body: Body) -> None:
     last = _look(contact, EDGES)
     hits.count[0] = 0
     measure(contact, body)
-    k = 0
-    while k < pairs.counts[N_NEAR]:
+    for k in range(pairs.counts[N_NEAR]):
+        nodes = nodes_of(pairs.node, k)
+        outward, other_outward = _outward(contact.normal, nodes)
+        hits.may_be[k] = do_overlap(_edges(x, nodes), outward, other_outward)
+    for k in range(pairs.counts[N_NEAR] - 1, -1, -1):  # backwards: another takes a place behind
+        is_turn = is_its_turn(motion, k)
+        if not (hits.may_be[k] or is_turn):
+            continue
         if is_dead_edge(candidates, k):
             drop_pair(pairs, k)
             continue
         nodes = nodes_of(pairs.node, k)
-        if not _is_due(contact, nodes, last):
-            k += 1
-            continue
         now = _edges(x, nodes)
-        if _edge_edge(contact, now, nodes).is_through:
+        may_be = hits.may_be[k] and _is_due(contact, nodes, last)
+        if may_be and _edge_edge(contact, now, nodes).is_through:
             _note_hit(contact, nodes)
-        elif is_its_turn(motion, k):
-            apart = distance_of_edges(now)
-            if not is_near(motion, apart):
-                note_distance(motion, pairs, k, apart)
-                make_far(pairs, k)
-                continue
-        k += 1
+            continue
+        if is_turn and not is_near(motion, distance_of_edges(now)):
+            note_distance(motion, pairs, k, distance_of_edges(now))
+            make_far(pairs, k)
+    k = pairs.counts[N_NEAR]
     until = horizon(motion, touch)
     while k < pairs.counts[N_PAIRS]:
         if pairs.wake[k] > until:
@@ -261,22 +263,27 @@ def _find_edges(contact: ContactState, body: Body) -> None:
         met = _edge_edge(contact, _edges(x, nodes), nodes)
         if met.is_through:
             weights = Weights(1.0 - met.s, met.s, met.t - 1.0, -met.t)
-            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0)
+            add_contact(contact.contacts, body, nodes, weights, met.normal, 0.0, contact.start)
 
 
-@kernel
+@inlined
 def _edges(x: FloatArray, nodes: Nodes) -> Edges:
     return Edges(vec3(x, nodes[0]), vec3(x, nodes[1]), vec3(x, nodes[2]), vec3(x, nodes[3]))
+
+
+@inlined
+def _outward(normal: FloatArray, nodes: Nodes) -> tuple[Vec3, Vec3]:
+    """Out of the body at both edges."""
+    outward = add(vec3(normal, nodes[0]), vec3(normal, nodes[1]))
+    return outward, add(vec3(normal, nodes[2]), vec3(normal, nodes[3]))
 
 
 @kernel
 def _edge_edge(contact: ContactState, now: Edges, nodes: Nodes) -> EdgeEdge:
     """Whether one edge went through the other and neither is inside out."""
-    normal = contact.normal
-    outward = add(vec3(normal, nodes[0]), vec3(normal, nodes[1]))
-    other_outward = add(vec3(normal, nodes[2]), vec3(normal, nodes[3]))
+    outward, other_outward = _outward(contact.normal, nodes)
     if (
-        way_of_overlap(now, outward, other_outward) == 0.0
+        not do_overlap(now, outward, other_outward)
         or face_the_same_way(outward, other_outward)
         or _is_tangled(contact, nodes)
     ):
@@ -291,7 +298,7 @@ def _find_on_floor(contact: ContactState, body: Body) -> None:
         if body.positions[node, 2] < contact.floor - contact.touch:
             nodes, weights = (node, node, node, node), Weights(1.0, 0.0, 0.0, 0.0)
             up = Vec3(0.0, 0.0, 1.0)
-            add_contact(contact.contacts, body, nodes, weights, up, contact.floor)
+            add_contact(contact.contacts, body, nodes, weights, up, contact.floor, contact.start)
 
 
 @kernel

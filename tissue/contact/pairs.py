@@ -11,7 +11,7 @@ import numpy as np
 from tissue.arrays import Arrays
 from tissue.contact.point_triangle import RIM
 from tissue.jit import kernel
-from tissue.types import FloatArray, IntArray
+from tissue.types import BoolArray, FloatArray, IntArray
 
 Nodes = tuple[int, int, int, int]
 """A node and the corners of a triangle, or the ends of two edges."""
@@ -123,6 +123,9 @@ def nodes_of(node: IntArray, k: int) -> Nodes:
 class Hits(Arrays):
     """Pairs of which one side went through the other."""
 
+    may_be: BoolArray
+    """Scratch: whether each near pair may be one, shape (capacity,)."""
+
     node: IntArray
     """See `Nodes`; shape (capacity, 4)."""
     count: IntArray
@@ -131,7 +134,11 @@ class Hits(Arrays):
 
 def new_hits(capacity: int) -> Hits:
     """Return none, with room for that many."""
-    return Hits(node=np.zeros((capacity, 4), np.int64), count=np.zeros(1, np.int64))
+    return Hits(
+        may_be=np.zeros(capacity, np.bool_),
+        node=np.zeros((capacity, 4), np.int64),
+        count=np.zeros(1, np.int64),
+    )
 
 
 @kernel

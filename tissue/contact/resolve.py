@@ -10,6 +10,7 @@ from tissue.contact.candidates import (
 from tissue.contact.edge_edge import Edges, crossing_of, is_inner
 from tissue.contact.impulses import (
     Contacts,
+    bear,
     follow,
     gap,
     know_contacts,
@@ -78,6 +79,7 @@ def resolve(contact: ContactState, body: Body, seconds: float) -> bool:
     look_at_faces(contact, body)
     for k in range(contacts.count[0]):
         _follow(contacts, body, k)
+        bear(contacts, k, contact.start)
     know_contacts(contacts)
     contact.looked[:] = -1
     for _ in range(PASSES):
@@ -147,7 +149,7 @@ def _remember_depths(contact: ContactState, body: Body) -> None:
     """Note how deep nodes are left in what they touch: so they are found again."""
     contacts, epoch = contact.contacts, contact.state[EPOCH]
     for k in range(contacts.count[0]):
-        left = max(-gap(contacts, body, k), 0.0)
+        left = max(-gap(contacts, body.positions, k), 0.0)
         contact.totals[PENETRATION] = max(contact.totals[PENETRATION], left)
         for q in range(4):
             node = contacts.node[k, q]
