@@ -70,7 +70,7 @@ class Bridge:
             tissue.material.wave_speed,
             map(frame.fixture_to_tissue, fixtures),
             blade=tissue.blade,
-            chunks=link.chunks,
+            chunks=link.chunks if waits else None,  # to ask for them is to wait
         )
         self._inquiry = Inquiry(link, waits)
         self._model = LocalModel(gives_way=coupling is None)
