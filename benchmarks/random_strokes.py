@@ -71,7 +71,8 @@ def main() -> int:
     tissue = make_tissue(replace(scene, material=material, relaxation=relaxation, floor=-0.02))
     random = np.random.default_rng(options.seed)
     table = Table(title=f"organ, law {material.law}, relaxation {relaxation}")
-    for name in ("stroke", "tetrahedra", "pieces", "substeps/ms", "CPU ms/ms", "fastest [m/s]"):
+    names = ("stroke", "tetrahedra", "pieces", "substeps/ms", "contacts")
+    for name in (*names, "CPU ms/ms", "fastest [m/s]"):
         table.add_column(name, justify="right")
     console = Console()
     is_stable, swiftest = True, 0.0
@@ -85,8 +86,9 @@ def main() -> int:
                 if n % 20 == 0:
                     swiftest = max(swiftest, fastest(tissue))
             for _ in range(50):
-                tissue.step(None, DT)
-            row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps)
+                result = tissue.step(None, DT)
+            pressed = result.touch.n_contacts
+            row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps, pressed)
             spent = (thread_time() - began) / (n + 50) / DT
             table.add_row(*map(str, row), f"{spent:.2f}", f"{swiftest:.2f}")
             print(*row, f"{spent:.2f} {swiftest:.2f}", file=sys.stderr)

@@ -45,7 +45,7 @@ class Wandering:
         self.body = build_body(grid((2, 1, 1), (0.001, 0.0005, 0.0005)), None, None)
         self.n = len(self.body.positions)
         self.pairs, self.motion = new_pairs(8), new_motion(self.n, LITTLE)
-        self.speeds = np.where(np.arange(self.n) < fast, 3e-4, 4e-5)
+        self.speeds = np.where(np.arange(self.n) < fast, 3e-4, 2e-5)
         self.motion.seen[:] = self.body.positions
         for _ in range(8):
             nodes = tuple(self.random.choice(self.n, 4, replace=False).tolist())
@@ -75,7 +75,7 @@ def test_no_pair_sleeps_through_what_may_have_gone_through(seed, fast):
     wandering = Wandering(seed, fast)
     pairs, motion = wandering.pairs, wandering.motion
     n_slept = n_met = 0
-    for _ in range(150):
+    for _ in range(400):
         moved = wandering.go()
         until = horizon(motion, TOUCH)
         for k in range(8):
