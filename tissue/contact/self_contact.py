@@ -55,9 +55,9 @@ TOUCH = 1e-6
 thousands above rounding. Without it a node left on a triangle might be on either side of it."""
 
 SETTLED = 3e-5
-"""Correction below which sweeps end, per mean node size: a tenth of a micrometre. Smaller: all sweeps
-are always done, for less than shows; at 1e-5 a body with 2,900 contacts cost half as much again as
-at 1e-4. Larger: nodes that are pressed tremble."""
+"""Correction below which sweeps end, per mean node size: a tenth of a micrometre. Smaller: all
+sweeps are always done, for less than shows; at 1e-5 a body with 2,900 contacts cost half as much
+again as at 1e-4. Larger: nodes that are pressed tremble."""
 
 RECOVERY = 0.01
 """How much of an overlap that was there before a Runge-Kutta step is undone in it, per mean node
