@@ -33,7 +33,7 @@ def validate(
     Args:
         out: Folder for validation.json, validation.md and the plots.
         only: Only this scene; may be given several times. steady, symmetry, rate, slicing,
-            puncture, reaction, audit, liver, gel.
+            puncture, reaction, audit, coupling, liver, gel.
         quick: A few lines of each scene, in half a minute instead of some five.
     """
     from scalpel_sim.outputs import check_folder

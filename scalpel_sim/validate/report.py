@@ -1,5 +1,6 @@
 """What a validation found, for a person: a table on the console, and a page of Markdown."""
 
+import math
 from collections.abc import Sequence
 
 from rich.console import Console
@@ -38,6 +39,8 @@ def asked(line: Line) -> str:
     """Return the bounds of a line."""
     if line.low == line.high:
         return f"{line.low:g}"
+    if math.isinf(line.high):
+        return f"at least {line.low:.4g}"
     if line.low == 0.0:
         return f"at most {line.high:.4g}"
     if line.low == -line.high:

@@ -1,6 +1,7 @@
 """All that a validation found, counted, and as JSON."""
 
 import json
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -60,14 +61,17 @@ def _scene(done: Done) -> dict[str, Any]:
 
 
 def _line(line: Line) -> dict[str, Any]:
-    """Return a line; a figure that is no number becomes null, which JSON has."""
-    finite = line.figure == line.figure and abs(line.figure) != float("inf")
+    """Return a line; what is no number becomes null, which JSON has."""
     return {
         "name": line.name,
-        "figure": line.figure if finite else None,
+        "figure": _finite(line.figure),
         "unit": line.unit,
-        "low": line.low,
-        "high": line.high,
+        "low": _finite(line.low),
+        "high": _finite(line.high),
         "verdict": line.verdict,
         "why": line.known.why if line.known and line.verdict == KNOWN else "",
     }
+
+
+def _finite(number: float) -> float | None:
+    return number if math.isfinite(number) else None

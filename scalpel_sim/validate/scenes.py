@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from scalpel_sim.errors import unknown
 from scalpel_sim.validate import (
     audit,
+    coupling,
     gel,
     liver,
     puncture,
@@ -18,7 +19,7 @@ from scalpel_sim.validate.findings import Scene
 
 SCENES: dict[str, Scene] = {
     module.SCENE.name: module.SCENE
-    for module in (steady, symmetry, rate, slicing, puncture, reaction, audit, liver, gel)
+    for module in (steady, symmetry, rate, slicing, puncture, reaction, audit, coupling, liver, gel)
 }
 
 

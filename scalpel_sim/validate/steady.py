@@ -127,8 +127,8 @@ SCENE = Scene(
         "An upright edge is led through a block that is held left and right, and the mean force "
         "while it is in with its whole length is compared with toughness × depth: all work goes "
         "into area. It must depend on neither speed nor mesh, else a policy learns the mesh. "
-        "Each figure is the worst of three cuts between the planes of the mesh, at 50 and 100 mm/s; "
-        "ripple is the standard deviation over the mean."
+        "Each figure is the worst of three cuts between the planes of the mesh, at 50 and 100 "
+        "mm/s; ripple is the standard deviation over the mean."
     ),
     measure=measure,
     sources=[

@@ -51,4 +51,5 @@ def test_bounds_read_as_what_is_asked():
     assert asked(Line("", 0.0, 0.0, 0.0)) == "0"
     assert asked(Line("", 0.0, 0.0, 1e-9, "N")) == "at most 1e-09"
     assert asked(Line("", 0.0, -0.005, 0.005)) == "± 0.005"
+    assert asked(Line("", 0.0, -1.0, math.inf)) == "at least -1"
     assert figure(Line("", 0.123456, 0.0, 1.0, "N m")) == "0.1235 N m"

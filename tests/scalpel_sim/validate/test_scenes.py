@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.validate import audit, gel, puncture, reaction, slicing, steady, symmetry
+from scalpel_sim.validate import audit, coupling, gel, puncture, reaction, slicing, steady, symmetry
 from scalpel_sim.validate.block import COARSE, block, lead, rubber, through
 from scalpel_sim.validate.findings import FAIL, PASS
 from scalpel_sim.validate.scenes import SCENES, chosen
@@ -77,6 +77,11 @@ def test_a_withdrawal_that_cuts_or_pushes_fails():
     assert verdicts(puncture.judge_out("it", found, 0.4)) == {PASS}
     for wrong in ({"back": -0.02}, {"area": 1e-9}, {"besides": 0.2}):
         assert FAIL in verdicts(puncture.judge_out("it", found._replace(**wrong), 0.4))
+
+
+def test_a_coupling_that_makes_energy_fails():
+    assert coupling.judge("taps", 10, -5e-7).verdict == PASS
+    assert coupling.judge("taps", 10, -2e-6).verdict == FAIL
 
 
 def test_the_toughness_of_gelatine_is_as_published():
