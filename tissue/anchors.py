@@ -138,6 +138,32 @@ def edge_frame(edge: Edge, when: float) -> tuple[Vec3, Vec3, Vec3]:
     return along, forward, cross(forward, along)
 
 
+class Turning(NamedTuple):
+    """Where the blade is and how it stands at an instant, and at both ends of the step."""
+
+    tip: Vec3
+    now: tuple[Vec3, Vec3, Vec3]
+    t0: tuple[Vec3, Vec3, Vec3]
+    t1: tuple[Vec3, Vec3, Vec3]
+
+
+@kernel
+def turning_at(edge: Edge, when: float) -> Turning:
+    """See `Turning`; the frames are those of `edge_frame`."""
+    tip = lerp(when, edge.tip_t0, edge.tip_t1)
+    return Turning(tip, edge_frame(edge, when), edge_frame(edge, 0.0), edge_frame(edge, 1.0))
+
+
+@kernel
+def travel_of(edge: Edge, turning: Turning, at: Vec3) -> Vec3:
+    """How far the point of the blade that is at `at` at that instant goes in the step [m]."""
+    r = sub(at, turning.tip)
+    travel = sub(edge.tip_t1, edge.tip_t0)
+    travel = axpy(dot(r, turning.now[0]), sub(turning.t1[0], turning.t0[0]), travel)
+    travel = axpy(dot(r, turning.now[1]), sub(turning.t1[1], turning.t0[1]), travel)
+    return axpy(dot(r, turning.now[2]), sub(turning.t1[2], turning.t0[2]), travel)
+
+
 @kernel
 def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int) -> Vec3:
     """Where the material point of anchor `k` is now [m]."""
@@ -184,7 +210,8 @@ def pull(
     n = len(anchors.state)
     seconds = share * dt
     totals = anchors.totals
-    frame = edge_frame(edge, when)
+    turning = turning_at(edge, when)
+    frame = turning.now
     for k in range(n):
         if anchors.state[k] != ANCHORED:
             continue
@@ -206,11 +233,11 @@ def pull(
         totals[IMPULSE] -= seconds * force.x
         totals[IMPULSE + 1] -= seconds * force.y
         totals[IMPULSE + 2] -= seconds * force.z
-        travel = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
-        totals[WORK_OF_BLADE] += share * dot(force, travel)
         # The surplus is about to slip and holds nothing: without it the force points along the way
         # from anchor to blade, so that the torques on the two cancel as well.
-        torque = cross(sub(b, surplus), force)
+        at = sub(b, surplus)
+        totals[WORK_OF_BLADE] += share * dot(force, travel_of(edge, turning, at))
+        torque = cross(at, force)
         totals[IMPULSE_TORQUE] -= seconds * torque.x
         totals[IMPULSE_TORQUE + 1] -= seconds * torque.y
         totals[IMPULSE_TORQUE + 2] -= seconds * torque.z

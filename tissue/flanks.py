@@ -27,6 +27,8 @@ from tissue.anchors import (
     WORK_OF_FRICTION,
     Edge,
     edge_frame,
+    travel_of,
+    turning_at,
 )
 from tissue.arrays import Arrays
 from tissue.blade_shape import BladeShape
@@ -224,7 +226,7 @@ def press_flanks(
     if flanks.count[0] == 0:
         return
     frame = blade_frame(edge, when)
-    start, end = blade_frame(edge, 0.0), blade_frame(edge, 1.0)
+    turning = turning_at(edge, when)
     seconds = share * dt
     for i in range(flanks.count[0]):
         for q in range(POINTS):
@@ -249,15 +251,7 @@ def press_flanks(
             totals[IMPULSE_TORQUE] -= seconds * torque.x
             totals[IMPULSE_TORQUE + 1] -= seconds * torque.y
             totals[IMPULSE_TORQUE + 2] -= seconds * torque.z
-            travel = sub(_on_blade(end, at), _on_blade(start, at))
-            totals[WORK_OF_BLADE] += share * dot(force, travel)
-
-
-@kernel
-def _on_blade(frame: tuple[Vec3, Vec3, Vec3, Vec3, float], at: Vec3) -> Vec3:
-    """Where a point of the blade is, from its coordinates on it [m]."""
-    tip, along, forward, normal, _ = frame
-    return axpy(at.z, normal, axpy(-at.y, forward, axpy(at.x, along, tip)))
+            totals[WORK_OF_BLADE] += share * dot(force, travel_of(edge, turning, p))
 
 
 @kernel
