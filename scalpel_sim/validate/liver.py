@@ -141,9 +141,10 @@ SCENE = Scene(
         "liver and nothing is fitted. The force rises with depth until the capsule parts, and then "
         "stays, as in experiments; the second time only the uncut rest and friction resist. "
         "Not reproduced: the saw-tooth of real liver, which loads and lets go by turns "
-        "(Chanthasopeephan et al.); a continuum of one toughness has its mean. There is no "
-        "published curve here point by point: only figures of texts that could be looked up are "
-        "compared."
+        "(Chanthasopeephan et al.); a continuum of one toughness has its mean, and the "
+        "dips here are those of the mesh, where the blade goes from element to element. There "
+        "is no published curve here point by point: only figures of texts that could be looked up "
+        "are compared."
     ),
     measure=measure,
     sources=[
