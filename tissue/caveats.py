@@ -8,8 +8,8 @@ from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 TOUGHEST = {"springs": 0.3, "neo_hookean": 2.0}
 """Toughness over Young's modulus, in mean node sizes, up to which the cutting force is within 6 %
 of that of the toughness, or 9 % with springs. Springs between the planes of the mesh were measured
-2 % low at 0.14, 6 to 9 % at 0.3 to 0.6 and 20 % at 0.8 to 1.7 (along a plane 1 % at 0.84); tetrahedra 3 % at 1.27, 5 % at
-2.0 and 16 % at 2.5."""
+2 % low at 0.14, 6 to 9 % at 0.3 to 0.6 and 20 % at 0.8 to 1.7 (along a plane 1 % at 0.84);
+tetrahedra 3 % at 1.27, 5 % at 2.0 and 16 % at 2.5."""
 
 HOW_LOW = {"springs": 20, "neo_hookean": 15}
 """Percent by which it was below it at most, beyond that."""

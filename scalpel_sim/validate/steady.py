@@ -21,7 +21,7 @@ from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Sc
 from tissue.material import Law, Material
 
 STIFF_ENOUGH = 30e3
-"""Young's modulus [Pa] at which all three toughnesses are within what tetrahedra bear on both meshes
+"""Young's modulus [Pa] at which tetrahedra bear all three toughnesses on both meshes
 (`tissue.caveats.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4 mm. Springs
 bear the least of them."""
 NEAR = 0.05
