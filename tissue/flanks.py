@@ -93,6 +93,8 @@ class Flanks(Arrays):
     """Scratch: the row that each had, or -1; shape (capacity,)."""
     before: FloatArray
     """Scratch: the state before, shape (3 * capacity, 4)."""
+    faces_before: FloatArray
+    """Scratch: side, area and energy of each row before, shape (capacity, 3)."""
     outward: IntArray
     """`surface.OUTWARD`."""
     count: IntArray
@@ -129,6 +131,7 @@ def _rows(capacity: int) -> dict[str, np.ndarray]:
         "found": np.zeros(capacity, np.int64),
         "known_as": np.zeros(capacity, np.int64),
         "before": np.zeros((POINTS * capacity, 4)),
+        "faces_before": np.zeros((capacity, 3)),
     }
 
 
