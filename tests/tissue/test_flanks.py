@@ -203,6 +203,20 @@ def test_a_known_face_keeps_what_it_holds(pressed):
     np.testing.assert_allclose(pressed.press(dragged), before, rtol=1e-9)
 
 
+def test_to_look_again_at_what_trembles_under_the_blade_gives_it_no_energy(pressed):
+    edge = edge_at(0.0108)
+    pressed.slide(edge)
+    pressed.body.positions[:, 1] *= 1.1  # its faces are larger now
+    pressed.slide(edge)
+    before = pressed.totals[RELEASED]
+    areas = pressed.flanks.area[: pressed.flanks.count[0]].copy()
+    held = pressed.flanks.energy[: pressed.flanks.count[0]] > 0.0
+    assert held.any()
+    pressed.find(edge)
+    assert pressed.totals[RELEASED] == pytest.approx(before, abs=1e-18)
+    np.testing.assert_array_equal(pressed.flanks.area[: len(areas)][held], areas[held])
+
+
 def test_nodes_beside_the_blade_count_as_stiffer(pressed):
     rows = np.zeros_like(pressed.body.rest)
     add_flank_stiffness(pressed.flanks, rows)
