@@ -57,6 +57,8 @@ class Obstacles:
 
     def met_by(self, other: fcl.CollisionObject) -> tuple[str, ...]:
         """Return the names of those that meet an object which is not one of them, in order."""
+        if not self._objects:
+            return ()
         met: set[int] = set()
         self._manager.collide(other, met, _collect)
         if not met:

@@ -19,6 +19,7 @@ from tissue.geometry import (
 )
 from tissue.jit import kernel
 from tissue.resistance import Resistance, toughness_at
+from tissue.tally import new_totals, push_blade, push_node
 from tissue.types import BoolArray, FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
@@ -70,18 +71,7 @@ class Anchors(Arrays):
     stiffness: FloatArray
     """[N/m], shape (n,)."""
     totals: FloatArray
-    """What has been counted, shape (N_TOTALS,): see the places below."""
-
-
-IMPULSE, IMPULSE_TORQUE, TISSUE_IMPULSE = 0, 3, 6
-"""Of the tissue on the blade [N s] and [N m s] about the origin, and on the tissue; three each."""
-
-WORK_OF_BLADE, WORK_OF_CUTTING, WORK_OF_BREAKING, RELEASED = 9, 10, 11, 12
-"""[J]; [J]; what breaking the skin took beyond the area that was cut [J]; and the energy of anchors
-that let go, less that of new ones [J]."""
-WORK_OF_FRICTION = 13
-"""What sliding along the faces of the blade took [J]."""
-N_TOTALS = 14
+    """What was counted, of the faces of the blade too: see `tissue.tally`; shape (N_TOTALS,)."""
 
 
 def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
@@ -100,7 +90,7 @@ def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
         cut=np.zeros(n),
         length=length,
         stiffness=ANCHOR_STIFFNESS * young_modulus * length,
-        totals=np.zeros(N_TOTALS),
+        totals=new_totals(),
     )
 
 
@@ -223,24 +213,11 @@ def pull(
         force = scale(anchors.stiffness[k], sub(d, surplus))
         for q in range(4):
             node = body.tetrahedra[anchors.tetrahedron[k], q]
-            w = anchors.weights[k, q]
-            external[node, 0] += w * force.x
-            external[node, 1] += w * force.y
-            external[node, 2] += w * force.z
-            totals[TISSUE_IMPULSE] += seconds * w * force.x
-            totals[TISSUE_IMPULSE + 1] += seconds * w * force.y
-            totals[TISSUE_IMPULSE + 2] += seconds * w * force.z
-        totals[IMPULSE] -= seconds * force.x
-        totals[IMPULSE + 1] -= seconds * force.y
-        totals[IMPULSE + 2] -= seconds * force.z
+            push_node(external, totals, node, anchors.weights[k, q], force, seconds)
         # The surplus is about to slip and holds nothing: without it the force points along the way
         # from anchor to blade, so that the torques on the two cancel as well.
         at = sub(b, surplus)
-        totals[WORK_OF_BLADE] += share * dot(force, travel_of(edge, turning, at))
-        torque = cross(at, force)
-        totals[IMPULSE_TORQUE] -= seconds * torque.x
-        totals[IMPULSE_TORQUE + 1] -= seconds * torque.y
-        totals[IMPULSE_TORQUE + 2] -= seconds * torque.z
+        push_blade(totals, at, force, travel_of(edge, turning, at), share, seconds)
 
 
 @kernel

@@ -1,11 +1,6 @@
 """Where the work of the blade goes: `Audit` keeps the account of a body."""
 
 from tissue.anchors import (
-    RELEASED,
-    WORK_OF_BLADE,
-    WORK_OF_BREAKING,
-    WORK_OF_CUTTING,
-    WORK_OF_FRICTION,
     Edge,
 )
 from tissue.body import Body
@@ -18,6 +13,13 @@ from tissue.energies import (
     potential_energy,
 )
 from tissue.relaxation.audited import Audited
+from tissue.tally import (
+    RELEASED,
+    WORK_OF_BLADE,
+    WORK_OF_BREAKING,
+    WORK_OF_CUTTING,
+    WORK_OF_FRICTION,
+)
 from tissue.tool import Tool
 from tissue.types import Energies
 from tissue.vec3 import Vec3

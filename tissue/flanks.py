@@ -20,11 +20,6 @@ where it is and rises with the slope of the bevel. Else the wedge would push fro
 import numpy as np
 
 from tissue.anchors import (
-    IMPULSE,
-    IMPULSE_TORQUE,
-    TISSUE_IMPULSE,
-    WORK_OF_BLADE,
-    WORK_OF_FRICTION,
     Edge,
     edge_frame,
     travel_of,
@@ -36,8 +31,13 @@ from tissue.body import Body, grown
 from tissue.jit import kernel
 from tissue.material import Material
 from tissue.surface import OUTWARD
+from tissue.tally import (
+    WORK_OF_FRICTION,
+    push_blade,
+    push_node,
+)
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, add, axpy, cross, dot, lerp, scale, sub, vec3
+from tissue.vec3 import Vec3, add, axpy, dot, lerp, scale, sub, vec3
 
 FLANK_STIFFNESS = 2.0
 """Stiffness of a face of the blade, as pressure per depth, over Young's modulus per node size. It
@@ -240,21 +240,8 @@ def press_flanks(
                 continue
             for corner in range(3):
                 w = CORNER if corner == q else OTHER
-                node = flanks.node[i, corner]
-                external[node, 0] += w * force.x
-                external[node, 1] += w * force.y
-                external[node, 2] += w * force.z
-                totals[TISSUE_IMPULSE] += seconds * w * force.x
-                totals[TISSUE_IMPULSE + 1] += seconds * w * force.y
-                totals[TISSUE_IMPULSE + 2] += seconds * w * force.z
-            totals[IMPULSE] -= seconds * force.x
-            totals[IMPULSE + 1] -= seconds * force.y
-            totals[IMPULSE + 2] -= seconds * force.z
-            torque = cross(p, force)
-            totals[IMPULSE_TORQUE] -= seconds * torque.x
-            totals[IMPULSE_TORQUE + 1] -= seconds * torque.y
-            totals[IMPULSE_TORQUE + 2] -= seconds * torque.z
-            totals[WORK_OF_BLADE] += share * dot(force, travel_of(edge, turning, p))
+                push_node(external, totals, flanks.node[i, corner], w, force, seconds)
+            push_blade(totals, p, force, travel_of(edge, turning, p), share, seconds)
 
 
 @kernel

@@ -5,9 +5,6 @@ import math
 import numpy as np
 
 from tissue.anchors import (
-    IMPULSE,
-    IMPULSE_TORQUE,
-    TISSUE_IMPULSE,
     Edge,
     is_engaged,
     new_anchors,
@@ -25,6 +22,11 @@ from tissue.resistance import resistance_of
 from tissue.slipping import SEARCH, relocate
 from tissue.star import LARGEST_STAR, Visits
 from tissue.survey import Survey, boxes_meet
+from tissue.tally import (
+    IMPULSE,
+    IMPULSE_TORQUE,
+    TISSUE_IMPULSE,
+)
 from tissue.tetrahedron_grid import build_grid, list_appended, list_moved, no_grid
 from tissue.tool import Tool, release_edge
 from tissue.types import BladeContacts, FloatArray, Wrench

@@ -5,7 +5,6 @@ import numpy as np
 from tissue.anchors import (
     ANCHORED,
     FREE,
-    RELEASED,
     RETRACTED,
     Anchors,
     Edge,
@@ -27,6 +26,9 @@ from tissue.rotation import mean_rotation, turned_back
 from tissue.slipping import find, put
 from tissue.slit import behind_edge, in_slit
 from tissue.star import Visits
+from tissue.tally import (
+    RELEASED,
+)
 from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, norm, sub, vec3

@@ -8,10 +8,7 @@ from tissue.anchors import (
     ANCHORED,
     FREE,
     LEFT,
-    RELEASED,
     RETRACTED,
-    WORK_OF_BREAKING,
-    WORK_OF_CUTTING,
     Anchors,
     Edge,
     anchor_position,
@@ -33,6 +30,11 @@ from tissue.jit import kernel
 from tissue.resistance import Resistance
 from tissue.rotation import to_material
 from tissue.star import Visits
+from tissue.tally import (
+    RELEASED,
+    WORK_OF_BREAKING,
+    WORK_OF_CUTTING,
+)
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 

@@ -8,8 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.anchors import (
-    WORK_OF_BLADE,
-    WORK_OF_CUTTING,
     Edge,
     anchored_length,
 )
@@ -51,6 +49,10 @@ from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 from tissue.stellar_scheme import StellarScheme
 from tissue.surface import boundary_surface
 from tissue.survey import Survey, survey, survey_of
+from tissue.tally import (
+    WORK_OF_BLADE,
+    WORK_OF_CUTTING,
+)
 from tissue.tetrahedron_grid import build_grid
 from tissue.tool import begin_step, clear_tool
 from tissue.touched import touched_nodes

@@ -1,9 +1,6 @@
 """The blade in the tissue: its edge, which cuts, and its faces, which part what is cut."""
 
 from tissue.anchors import (
-    RELEASED,
-    WORK_OF_BLADE,
-    WORK_OF_BREAKING,
     Anchors,
     Edge,
     add_stiffness,
@@ -27,6 +24,11 @@ from tissue.jit import kernel
 from tissue.resistance import Resistance
 from tissue.slipping import slip
 from tissue.star import Visits
+from tissue.tally import (
+    RELEASED,
+    WORK_OF_BLADE,
+    WORK_OF_BREAKING,
+)
 from tissue.types import FloatArray, IntArray
 
 

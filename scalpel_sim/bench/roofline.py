@@ -6,7 +6,7 @@ larger of the two times is the least that such a step could take; its share of w
 take is the figure of merit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -121,7 +121,10 @@ def _of_step(
         )
 
     medians = [_median(samples) for samples in rounds]
-    per_spring: Callable[[float], float] = lambda s: GIGA * s / n  # noqa: E731
+
+    def per_spring(seconds: float) -> float:
+        return GIGA * seconds / n
+
     return [
         of_times(
             "roofline", "Runge-Kutta step", size, "time per spring", "ns/spring", rounds,

@@ -85,7 +85,9 @@ def balance(tissue: Tissue, places: list[BladeSegment]) -> Balance:
         )
         largest = np.maximum(largest, [np.abs(wrench.force).max(), np.abs(torque).max()])
     columns = np.array(rows, dtype=np.float64).T
-    return Balance(*columns, largest=(float(largest[0]), float(largest[1])))  # type: ignore[misc]
+    forces, of_momentum, of_moment, of_contacts, mesh_changed = columns
+    most = (float(largest[0]), float(largest[1]))
+    return Balance(forces, of_momentum, of_moment, of_contacts, mesh_changed, most)
 
 
 def _momenta(tissue: Tissue) -> tuple[FloatArray, FloatArray]:

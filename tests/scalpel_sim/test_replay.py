@@ -106,6 +106,8 @@ def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp
     assert start == pytest.approx([0.0, 0.0, 0.08])
     assert (end - start)[1] < 0.0 and (other[2] - 0.08) / (end - start)[1] == pytest.approx(-0.2)
     assert tab.text_content("#parts") == "1.00 · 0.00 · 0.20 N"
+    right = "(s) => document.querySelector(s).getBoundingClientRect().right"
+    assert tab.evaluate(right, "#parts") < tab.evaluate(right, "#readings")
     bars = tab.evaluate("[...document.querySelectorAll('#account span')].map((s) => s.title)")
     assert bars == ["cutting: toughness x area: 3.00 mJ", "friction on the blade: 1.00 mJ"]
     tab.uncheck("#contacts")

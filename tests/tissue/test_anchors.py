@@ -7,15 +7,8 @@ from tests.tissue.kernels_of import springs_of, tool_with
 from tissue.anchors import (
     ANCHORED,
     FREE,
-    IMPULSE,
-    IMPULSE_TORQUE,
     LEFT,
-    RELEASED,
     RETRACTED,
-    TISSUE_IMPULSE,
-    WORK_OF_BLADE,
-    WORK_OF_BREAKING,
-    WORK_OF_CUTTING,
     Edge,
     anchor_position,
     anchored_length,
@@ -35,6 +28,15 @@ from tissue.rotation import rotation_of, to_material
 from tissue.shapes import grid
 from tissue.slipping import find, put, slip
 from tissue.star import LARGEST_STAR, no_visits
+from tissue.tally import (
+    IMPULSE,
+    IMPULSE_TORQUE,
+    RELEASED,
+    TISSUE_IMPULSE,
+    WORK_OF_BLADE,
+    WORK_OF_BREAKING,
+    WORK_OF_CUTTING,
+)
 from tissue.tetrahedron_grid import build_grid
 from tissue.tool import frequency_with_tool
 from tissue.vec3 import Vec3, vec3

@@ -7,13 +7,6 @@ import numpy as np
 import pytest
 
 from tissue.anchors import (
-    IMPULSE,
-    IMPULSE_TORQUE,
-    N_TOTALS,
-    RELEASED,
-    TISSUE_IMPULSE,
-    WORK_OF_BLADE,
-    WORK_OF_FRICTION,
     Edge,
 )
 from tissue.blade_shape import BladeShape
@@ -35,6 +28,15 @@ from tissue.flanks import (
 from tissue.material import Material
 from tissue.shapes import grid
 from tissue.star import no_visits
+from tissue.tally import (
+    IMPULSE,
+    IMPULSE_TORQUE,
+    N_TOTALS,
+    RELEASED,
+    TISSUE_IMPULSE,
+    WORK_OF_BLADE,
+    WORK_OF_FRICTION,
+)
 from tissue.tetrahedron_grid import build_grid
 from tissue.vec3 import Vec3, cross, vec3
 
