@@ -53,7 +53,9 @@ def let_go(
 ) -> None:
     """Free the samples that backed off and then went elsewhere: into tissue not cut yet.
 
-    A blade that backs off, goes deeper and then forward again cuts below its old slit.
+    A blade that backs off, goes deeper and then forward again cuts below its old slit: the path of
+    its samples begins anew. That of a sample beside one that holds goes on from where it was, or
+    the tissue between would stay whole.
     """
     n = len(anchors.state)
     any_retracted = False
@@ -72,7 +74,14 @@ def let_go(
             continue
         if find(body, visits, p, anchors.tetrahedron[k], queue).inside:
             anchors.state[k] = FREE
-            path.known[k] = False
+            path.known[k] = _is_beside_anchored(anchors, k)
+
+
+@kernel
+def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
+    """Whether the sample before or behind sample `k` is anchored."""
+    state = anchors.state
+    return (k > 0 and state[k - 1] == ANCHORED) or (k + 1 < len(state) and state[k + 1] == ANCHORED)
 
 
 @kernel

@@ -21,8 +21,9 @@ from tissue.anchors import (
 )
 from tissue.body import CUT, OUTER, build_body, walk
 from tissue.geometry import Matrix3
-from tissue.holding import meet, seize
+from tissue.holding import let_go, meet, seize
 from tissue.material import Material
+from tissue.path import new_path
 from tissue.resistance import resistance_of
 from tissue.rotation import rotation_of, to_material
 from tissue.shapes import grid
@@ -180,6 +181,18 @@ def test_a_blade_that_backs_off_feels_nothing_and_bites_again_where_it_was(held)
 def test_a_blade_that_backs_off_and_goes_aside_beyond_reach_is_free(held):
     held.slip(edge_at(0.003, x=0.019))
     assert (held.anchors.state == FREE).all()
+
+
+@pytest.mark.parametrize(("first", "goes_on"), [(N - 1, True), (0, False)])
+def test_the_path_of_a_sample_let_go_goes_on_beside_one_that_holds_and_else_begins_anew(
+    held, first, goes_on
+):
+    path = new_path(N)
+    path.known[:] = True
+    held.anchors.state[first:] = RETRACTED
+    let_go(held.anchors, held.body, held.visits, path, edge_at(0.012), 1.0, held.queue)
+    assert (held.anchors.state[first:] == FREE).all()
+    assert path.known[N - 1] == goes_on
 
 
 def test_letting_go_is_counted_as_released_energy(held):
