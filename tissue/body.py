@@ -15,6 +15,7 @@ from tissue.geometry import barycentric_in, smallest_weight
 from tissue.hanging import Hanging, behind, grown_hanging, is_open, n_behind, nothing_hanging
 from tissue.jit import kernel
 from tissue.predicates import Lattice, lattice_around
+from tissue.simd import room_for_points
 from tissue.types import BoolArray, FloatArray, IntArray, TetrahedralMesh
 from tissue.vec3 import Vec3
 
@@ -98,10 +99,10 @@ def build_body(
     node_tetrahedron = np.zeros(n, dtype=np.int64)
     node_tetrahedron[tetrahedra[::-1]] = np.arange(len(tetrahedra))[::-1, None]
     return Body(
-        rest=rest.copy(),
+        rest=grown(rest, n),
         lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
-        positions=rest.copy() if positions is None else positions.copy(),
-        velocities=np.zeros_like(rest),
+        positions=grown(rest if positions is None else positions, n),
+        velocities=room_for_points(n),
         masses=np.zeros(n),
         fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
         off_path=np.zeros(n),
@@ -117,7 +118,11 @@ def build_body(
 
 def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
     """Return a copy of `array` with `capacity` rows, the new ones filled with `fill`."""
-    larger = np.full((capacity, *array.shape[1:]), fill, dtype=array.dtype)
+    if array.shape[1:] == (3,) and array.dtype == np.float64:
+        larger = room_for_points(capacity)
+        larger[len(array) :] = fill
+    else:
+        larger = np.full((capacity, *array.shape[1:]), fill, dtype=array.dtype)
     larger[: len(array)] = array
     return larger
 

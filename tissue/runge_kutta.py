@@ -23,7 +23,7 @@ from tissue.contact.resolve import prepare, resolve
 from tissue.contact.state import IS_AWAKE, IS_PENDING, ContactState
 from tissue.elastic import Elastic, Surroundings, deform, internal_force, viscous_force
 from tissue.jit import inlined, kernel
-from tissue.simd import Point, point, point_of, store_point, times
+from tissue.simd import Point, point, point_of, room_for_points, store_point, times
 from tissue.star import Visits
 from tissue.tool import Tool, act, give_way
 from tissue.types import FloatArray, IntArray
@@ -69,7 +69,7 @@ class Stages(Arrays):
 
 def new_stages(n_nodes: int) -> Stages:
     """Return scratch for that many nodes."""
-    return Stages(**{name: np.zeros((n_nodes, 3)) for name in Stages.__annotations__})
+    return Stages(**{name: room_for_points(n_nodes) for name in Stages.__annotations__})
 
 
 def largest_stable_step(frequency: float, retardation_time: float, viscous_damping: float) -> float:

@@ -4,13 +4,18 @@ import numpy as np
 import pytest
 
 from tissue import simd
+from tissue.body import grown
 from tissue.jit import kernel
+from tissue.relaxation.hierarchical import new_trails
+from tissue.runge_kutta import Stages
+from tissue.shapes import grid
 from tissue.simd import (
     eight_points,
     lanes,
     load,
     point,
     point_of,
+    room_for_points,
     spread,
     square_root,
     store,
@@ -18,6 +23,7 @@ from tissue.simd import (
     summed,
     times,
 )
+from tissue.tissue import Tissue
 
 pytestmark = pytest.mark.kernel
 
@@ -69,7 +75,18 @@ def test_eight_points_are_gathered_and_summed_up():
     np.testing.assert_allclose(out[0], POINTS[OF[1:9]].sum(axis=0), rtol=1e-14)
 
 
-def test_nothing_behind_the_last_row_is_read_or_written():
+def test_all_arrays_whose_rows_are_gathered_have_room_behind_the_last():
+    tissue = Tissue(grid((1, 1, 1), (0.01, 0.01, 0.01)), relaxation="hierarchical")
+    body, stages = tissue._body, tissue._stages
+    arrays = [body.rest, body.positions, body.velocities, new_trails(5).origins]
+    arrays += [getattr(stages, name) for name in Stages.__annotations__]
+    arrays += [room_for_points(7), grown(room_for_points(7), 9)]
+    for array in arrays:
+        end, room = array.ctypes.data + array.nbytes, array.base.ctypes.data + array.base.nbytes
+        assert room - end >= 8
+
+
+def test_nothing_behind_the_last_row_is_read_or_written_of_a_single_point():
     points = np.full((3, 4), np.nan)
     points[:, :3] = 1.0
     rows = np.full((2, 3), 7.0)

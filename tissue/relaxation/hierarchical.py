@@ -33,6 +33,7 @@ from tissue.simd import (
     load,
     point,
     point_of,
+    room_for_points,
     spread,
     square_root,
     store,
@@ -78,7 +79,7 @@ class Trails(Arrays):
 def new_trails(n_nodes: int) -> Trails:
     """Return trails of that many nodes."""
     return Trails(
-        origins=np.zeros((n_nodes, 3)),
+        origins=room_for_points(n_nodes),
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
         seen=aligned(N_SEEN * LARGEST_ROW),
