@@ -236,6 +236,20 @@ def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
     assert np.ptp(behind[:, 0]) < 0.4e-3
 
 
+def test_the_faces_of_the_blade_do_not_press_the_skin_that_it_goes_through():
+    """In cells of 20 mm there is no lip beside the blade before it is through."""
+    run = Run(
+        upright(end=0.036),
+        SCALPEL,
+        (2, 2, 1),
+        law="springs",
+        poisson_ratio=0.25,
+        blade_friction=0.3,
+    )
+    early, late = run.steady(begin=0.01, end=0.015), run.steady(begin=0.03, end=0.036)
+    assert late == pytest.approx(early, rel=0.02)
+
+
 def test_an_audit_of_another_relaxation_is_refused():
     with pytest.raises(ValueError, match="audit"):
         Tissue(grid((2, 2, 2), SIZE), audit=True, relaxation="local")

@@ -36,9 +36,10 @@ from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 SIDE, AREA, ENERGY = 0, 1, 2
 """Places in `Flanks.faces_before`."""
 
-LEAST_COSINE = 0.05
-"""Between the normals of a face and of the blade. A face that the blade stands on (below 3 degrees)
-has no side; the edge presses it."""
+LEAST_COSINE = 0.5
+"""Between the normals of a face and of the blade, for a face that is beside the blade. The edge
+presses the others, such as the skin that it goes through. With 0.05 that skin, once tilted by three
+degrees, was pressed aside whole: the force on a blade rose by a third to a half on its way."""
 
 
 @kernel
