@@ -28,6 +28,7 @@ from tissue.contact.grid import take as take_out
 from tissue.contact.motion import Motion, begin_motion
 from tissue.contact.pairs import CLOSING, N_PAIRS, Pairs, add_pair, drop_pair, new_pairs
 from tissue.contact.point_triangle import RIM, Corners
+from tissue.contact.ridges import across, is_ridge
 from tissue.jit import kernel
 from tissue.surface import OUTWARD
 from tissue.types import FloatArray, IntArray
@@ -51,7 +52,8 @@ OUT, IN = 0, 1
 class Candidates(Arrays):
     """What may touch, and the pairs. Faces go by their places in `Faces`, edges by 3 * place + k.
 
-    An edge belongs to the face that has it from its lower node to its higher.
+    An edge belongs to the face that has it from its lower node to its higher. Of cuts, only ridges
+    are paired.
     """
 
     node: IntArray
@@ -80,6 +82,10 @@ class Candidates(Arrays):
     """Whether it is to be looked at: of a cut, or skin near another piece."""
     generation: IntArray
     """How often each face was sought anew, shape (capacity,)."""
+    has_edge: IntArray
+    """Whether each edge belongs to its face, and is of skin or a ridge; shape (3 * capacity,)."""
+    listed: IntArray
+    """The update in which each face was to be sought anew, shape (capacity,)."""
     dirty: IntArray
     """Scratch: faces to be sought anew, shape (capacity,)."""
     low: FloatArray
@@ -114,13 +120,14 @@ def new_candidates(n_nodes: int, capacity: int, size: float) -> Candidates:
     """
     buckets = 1 << (4 * capacity - 1).bit_length()
     of_nodes = ("node", "around", "cut_around", "node_generation", "marked")
-    of_faces = ("state", "is_cut", "is_near", "generation", "dirty")
+    of_faces = ("state", "is_cut", "is_near", "generation", "listed", "dirty")
     return Candidates(
         **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
         place=np.full(n_nodes, -1, np.int64),
         reference=np.zeros((n_nodes, 3)),
         **{name: np.zeros(capacity, np.int64) for name in of_faces},
         known=np.full(capacity, -1, np.int64),
+        has_edge=np.zeros(3 * capacity, np.int64),
         triangle=np.zeros((capacity, 3), np.int64),
         low=np.zeros((capacity, 3)),
         high=np.zeros((capacity, 3)),
@@ -221,7 +228,7 @@ def renew_candidates(
         _take_in(candidates, motion, faces, body, candidates.dirty[i])
     move = max(move, _renew_references(candidates, body, start))
     for i in range(counts[N_DIRTY]):
-        _measure_boxes(candidates, candidates.dirty[i])
+        _measure_boxes(candidates, faces, body, candidates.dirty[i])
     return _pair(candidates, faces, body, margin + CLOSING * move)
 
 
@@ -305,8 +312,32 @@ def _list_dirty(candidates: Candidates, faces: Faces, body: Body, reach: float) 
             has_changed = has_changed or is_near != (candidates.state[at] == IN)
             candidates.is_near[at] = is_near
         if has_changed or (candidates.state[at] == IN and _has_marked(candidates, at)):
-            dirty[counts[N_DIRTY]] = at
-            counts[N_DIRTY] += 1
+            _list(candidates, at)
+    for i in range(counts[N_DIRTY]):
+        at = dirty[i]
+        if candidates.known[at] != faces.generation[at] and faces.face[at] != NONE:
+            _list_beside(candidates, faces, body, faces.face[at])
+
+
+@kernel
+def _list(candidates: Candidates, at: int) -> None:
+    candidates.dirty[candidates.counts[N_DIRTY]] = at
+    candidates.counts[N_DIRTY] += 1
+    candidates.listed[at] = candidates.counts[N_UPDATES]
+
+
+@kernel
+def _list_beside(candidates: Candidates, faces: Faces, body: Body, face: int) -> None:
+    """List the faces beside one that changed, too: their edges may be ridges now, or no more."""
+    for k in range(3):
+        other = across(body, face // 4, face % 4, k, candidates.outward)[0]
+        at = faces.place[other // 4, other % 4] if other >= 0 else -1
+        if (
+            at >= 0
+            and candidates.state[at] == IN
+            and candidates.listed[at] != candidates.counts[N_UPDATES]
+        ):
+            _list(candidates, at)
 
 
 @kernel
@@ -317,7 +348,7 @@ def _take_out(candidates: Candidates, faces: Faces, body: Body, at: int) -> None
         return
     take_out(candidates.triangles, at, _box(candidates.low, candidates.high, at))
     for k in range(3):
-        if _owns_edge(candidates, at, k):
+        if candidates.has_edge[3 * at + k] == 1:
             edge = 3 * at + k
             take_out(candidates.edges, edge, _box(candidates.edge_low, candidates.edge_high, edge))
     if candidates.known[at] == faces.generation[at] and candidates.is_near[at] == 1:
@@ -414,10 +445,19 @@ def rim_of(a: Vec3, b: Vec3, c: Vec3) -> float:
 
 
 @kernel
-def _measure_boxes(candidates: Candidates, at: int) -> None:
-    """Write the boxes of a triangle with its rim, and of its edges, from the nodes' references."""
+def _measure_boxes(candidates: Candidates, faces: Faces, body: Body, at: int) -> None:
+    """Write the boxes of a triangle with its rim, and of its edges, from the nodes' references.
+
+    And which of its edges are to be paired.
+    """
     if candidates.state[at] == OUT:
         return
+    t, f = faces.face[at] // 4, faces.face[at] % 4
+    for k in range(3):
+        owns = _owns_edge(candidates, at, k)
+        is_skin = candidates.is_cut[at] == 0
+        has_edge = owns and (is_skin or is_ridge(body, t, f, k, candidates.outward))
+        candidates.has_edge[3 * at + k] = 1 if has_edge else 0
     x, triangle = candidates.reference, candidates.triangle
     i, j, k = triangle[at, 0], triangle[at, 1], triangle[at, 2]
     rim = rim_of(vec3(x, i), vec3(x, j), vec3(x, k))
@@ -445,7 +485,9 @@ def _pair(candidates: Candidates, faces: Faces, body: Body, reach: float) -> boo
         if not _pair_triangle(candidates, faces, body, at, reach):
             return False
         for k in range(3):
-            if _owns_edge(candidates, at, k) and not _pair_edge(candidates, faces, at, k, reach):
+            if candidates.has_edge[3 * at + k] == 1 and not _pair_edge(
+                candidates, faces, at, k, reach
+            ):
                 return False
     return True
 

@@ -99,8 +99,8 @@ def edge_edge(
 ) -> EdgeEdge:
     """Tell whether ab went through cd, from outside to inside, between t0 and t1.
 
-    They did if they now overlap by no more than they have moved. What overlaps by more has always
-    done so: two edges of one body on either side of it.
+    They did if they now overlap and did not before, at the same places and along the same normal.
+    What overlapped then has always done so: two edges of one body on either side of it.
 
     Args:
         t0: Before the step.
@@ -120,10 +120,10 @@ def edge_edge(
     depth = -way * now.gap
     if not depth > nothing_yet:
         return outside
-    moved = sub(between(t1, now.s, now.t), between(t0, now.s, now.t))
-    if depth > slack + norm(moved):
+    normal = scale(way, now.normal)
+    if not dot(normal, between(t0, now.s, now.t)) >= -slack:
         return outside
-    return EdgeEdge(True, scale(way, now.normal), now.s, now.t)
+    return EdgeEdge(True, normal, now.s, now.t)
 
 
 @kernel

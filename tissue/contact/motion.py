@@ -11,7 +11,7 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.body import Body, grown
-from tissue.contact.pairs import CLOSING, CLOSING_OF_NODES, N_PAIRS, Nodes, Pairs, nodes_of
+from tissue.contact.pairs import CLOSING, CLOSING_OF_NODES, N_PAIRS, Nodes, Pairs, nodes_of_pair
 from tissue.jit import kernel
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import dot, store, sub, vec3
@@ -27,12 +27,13 @@ STEPS_TO_REST = 64
 trembles is slow at each turn, and whenever a node becomes restless all pairs are gone through."""
 
 
-NEAR = 2.0
-"""Distance of a near pair, as a share of what a restless node moves."""
+NEAR = 8.0
+"""Distance of a near pair, as a share of what a restless node moves. Larger: more pairs are looked
+at always, at a few nanoseconds each; smaller: more are asked one by one, at ten times that."""
 
-STEPS_NEAR = 8
-"""Runge-Kutta steps after which it is found out anew how far a near pair is apart: this costs more
-than to look whether it touches."""
+STEPS_NEAR = 32
+"""Runge-Kutta steps after which it is found out anew how far a near pair is apart: this costs some
+ten times as much as to look whether it may touch."""
 
 
 class Motion(Arrays):
@@ -43,15 +44,14 @@ class Motion(Arrays):
     way: FloatArray
     """How far each node has gone since it was new [m], shape (node capacity,)."""
     reach: FloatArray
-    """How far each node may have come from where something touched it: how far it moved in this
-    step, and how deep it was left in the last [m]; shape (node capacity,)."""
+    """How far each node has moved in this step [m], shape (node capacity,)."""
     restless_until: IntArray
     """The measurement at which each node may rest, shape (node capacity,)."""
     number: IntArray
     """Of the step, and of nodes that have become restless in it; shape (2,)."""
     whole: FloatArray
     """Of nodes that are not restless: sum of the largest motions, each time that they were
-    measured; the largest reach; and how large that is at most [m]. Shape (3,)."""
+    measured; how far one has moved in this step at most; and how far one may [m]. Shape (3,)."""
 
 
 def new_motion(n_nodes: int, little: float) -> Motion:
@@ -103,9 +103,6 @@ def measure_motion(
     start: FloatArray,
     nodes: IntArray,
     n: int,
-    depth: FloatArray,
-    depth_epoch: IntArray,
-    last_epoch: int,
 ) -> float:
     """Measure how far the first `n` of `nodes` have moved; return how far in this step at most [m].
 
@@ -115,9 +112,6 @@ def measure_motion(
         start: Where they were before the Runge-Kutta step [m].
         nodes: Nodes of faces.
         n: How many.
-        depth: How deep each was left in what it touches [m] ...
-        depth_epoch: ... in which step ...
-        last_epoch: ... if that was the last.
     """
     whole, number = motion.whole, motion.number
     largest_way = 0.0
@@ -134,17 +128,14 @@ def measure_motion(
         d = sub(p, vec3(start, node))
         move = math.sqrt(dot(d, d))
         largest_move = move if not move <= largest_move else largest_move
-        reach = move
-        if depth_epoch[node] == last_epoch:
-            reach += depth[node]
-        motion.reach[node] = reach
-        if not reach <= whole[LITTLE]:
+        motion.reach[node] = move
+        if not move <= whole[LITTLE]:
             if not is_restless(motion, node):
                 number[N_NEW] += 1
             motion.restless_until[node] = number[STEP] + STEPS_TO_REST
         if not is_restless(motion, node):
             largest_way = max(largest_way, way)
-            largest_reach = max(largest_reach, reach)
+            largest_reach = max(largest_reach, move)
     whole[WAY] += largest_way
     whole[MOVE] = largest_reach
     return largest_move
@@ -166,18 +157,18 @@ def has_restless(motion: Motion, nodes: Nodes) -> bool:
 def wake_restless(motion: Motion, pairs: Pairs) -> None:
     """Let pairs with a restless node go by the ways of their nodes."""
     for k in range(pairs.counts[N_PAIRS]):
-        if has_restless(motion, nodes_of(pairs.node, k)):
+        if has_restless(motion, nodes_of_pair(pairs, k)):
             pairs.wake[k] = -np.inf
 
 
 @kernel
-def horizon(motion: Motion, touch: float) -> float:
+def horizon(motion: Motion, slack: float) -> float:
     """Pairs that are to be looked at have their `wake` at most at this [m].
 
-    What went through is no deeper than both sides moved in this step and were before. `touch` is a
-    distance that is none [m].
+    What went through is no deeper than both sides moved in this step, and were before it: `slack`
+    at most [m].
     """
-    return CLOSING * motion.whole[WAY] + 2.0 * (motion.whole[MOVE] + touch)
+    return CLOSING * motion.whole[WAY] + 2.0 * motion.whole[MOVE] + slack
 
 
 @kernel
@@ -187,18 +178,18 @@ def is_near(motion: Motion, distance: float) -> bool:
 
 
 @kernel
-def is_its_turn(motion: Motion, k: int) -> bool:
-    """Whether it is to be found out again in this step how far the near pair `k` is apart."""
-    return (motion.number[STEP] + k) % STEPS_NEAR == 0
+def whose_turn(motion: Motion) -> int:
+    """Of each `STEPS_NEAR` near pairs the one that is to be found out anew in this step."""
+    return motion.number[STEP] % STEPS_NEAR
 
 
 @kernel
-def can_touch(motion: Motion, pairs: Pairs, k: int, touch: float) -> bool:
+def can_touch(motion: Motion, pairs: Pairs, k: int, slack: float) -> bool:
     """Whether pair `k` may touch by the ways of its nodes; if not, it sleeps for what is left."""
-    a, b, c, d = nodes_of(pairs.node, k)
+    a, b, c, d = nodes_of_pair(pairs, k)
     way, reach = motion.way, motion.reach
     apart = pairs.wake_by_nodes[k] - CLOSING_OF_NODES * (way[a] + way[b] + way[c] + way[d])
-    if apart <= reach[a] + reach[b] + reach[c] + reach[d] + 2.0 * touch:
+    if apart <= reach[a] + reach[b] + reach[c] + reach[d] + slack:
         return True
     _sleep(motion, pairs, k, apart)
     return False
@@ -207,7 +198,7 @@ def can_touch(motion: Motion, pairs: Pairs, k: int, touch: float) -> bool:
 @kernel
 def note_distance(motion: Motion, pairs: Pairs, k: int, distance: float) -> None:
     """Let pair `k`, that far apart [m], sleep until it may touch."""
-    a, b, c, d = nodes_of(pairs.node, k)
+    a, b, c, d = nodes_of_pair(pairs, k)
     way = motion.way
     pairs.wake_by_nodes[k] = distance + CLOSING_OF_NODES * (way[a] + way[b] + way[c] + way[d])
     _sleep(motion, pairs, k, distance)
@@ -215,7 +206,7 @@ def note_distance(motion: Motion, pairs: Pairs, k: int, distance: float) -> None
 
 @kernel
 def _sleep(motion: Motion, pairs: Pairs, k: int, distance: float) -> None:
-    if has_restless(motion, nodes_of(pairs.node, k)):
+    if has_restless(motion, nodes_of_pair(pairs, k)):
         pairs.wake[k] = -np.inf
     else:
         pairs.wake[k] = distance + CLOSING * motion.whole[WAY]

@@ -10,8 +10,10 @@ import numpy as np
 
 from tissue.arrays import Arrays
 from tissue.contact.point_triangle import RIM
-from tissue.jit import kernel
-from tissue.types import BoolArray, FloatArray, IntArray
+from tissue.jit import inlined, kernel
+from tissue.simd import eight_points, filled
+from tissue.types import FloatArray, IntArray, SlotArray
+from tissue.vec3 import Vec3
 
 Nodes = tuple[int, int, int, int]
 """A node and the corners of a triangle, or the ends of two edges."""
@@ -31,8 +33,9 @@ N_NEAR, N_PAIRS = 0, 1
 class Pairs(Arrays):
     """Pairs of one kind: first those that are near, then the others; in no particular order."""
 
-    node: IntArray
-    """Their nodes, see `Nodes`; shape (capacity, 4)."""
+    node: SlotArray
+    """Their nodes, see `Nodes`: the first of all, then the second, third and fourth of all, so that
+    eight are read at a time; shape (4 * capacity,)."""
     item: IntArray
     """Node and place of a triangle, or two edges; shape (capacity, 2)."""
     generation: IntArray
@@ -50,7 +53,7 @@ class Pairs(Arrays):
 def new_pairs(capacity: int) -> Pairs:
     """Return no pairs, with room for that many."""
     return Pairs(
-        node=np.zeros((capacity, 4), np.int64),
+        node=np.zeros(4 * filled(capacity), np.int32),
         item=np.zeros((capacity, 2), np.int64),
         generation=np.zeros(capacity, np.int64),
         wake=np.zeros(capacity),
@@ -66,7 +69,7 @@ def add_pair(pairs: Pairs, nodes: Nodes, first: int, second: int, generation: in
     if k == len(pairs.wake):
         return False
     for q in range(4):
-        pairs.node[k, q] = nodes[q]
+        pairs.node[_place(pairs, k, q)] = nodes[q]
     pairs.item[k, 0] = first
     pairs.item[k, 1] = second
     pairs.generation[k] = generation
@@ -106,7 +109,8 @@ def make_far(pairs: Pairs, k: int) -> None:
 def _exchange(pairs: Pairs, i: int, j: int) -> None:
     node, item, generation = pairs.node, pairs.item, pairs.generation
     for q in range(4):
-        node[i, q], node[j, q] = node[j, q], node[i, q]
+        first, second = _place(pairs, i, q), _place(pairs, j, q)
+        node[first], node[second] = node[second], node[first]
     for q in range(2):
         item[i, q], item[j, q] = item[j, q], item[i, q]
     generation[i], generation[j] = generation[j], generation[i]
@@ -120,14 +124,38 @@ def nodes_of(node: IntArray, k: int) -> Nodes:
     return node[k, 0], node[k, 1], node[k, 2], node[k, 3]
 
 
+@kernel
+def _place(pairs: Pairs, k: int, q: int) -> int:
+    """Where node `q` of pair `k` is in `Pairs.node`."""
+    return q * (len(pairs.node) // 4) + k
+
+
+@kernel
+def nodes_of_pair(pairs: Pairs, k: int) -> Nodes:
+    """Return the nodes of pair `k`."""
+    node = pairs.node
+    return (
+        int(node[_place(pairs, k, 0)]),
+        int(node[_place(pairs, k, 1)]),
+        int(node[_place(pairs, k, 2)]),
+        int(node[_place(pairs, k, 3)]),
+    )
+
+
+@inlined
+def eight_corners(points: FloatArray, pairs: Pairs, k: int, q: int) -> Vec3:
+    """Return where the nodes `q` of pairs `k` to `k + 7` are: each coordinate is `Lanes`."""
+    x, y, z = eight_points(points, pairs.node, _place(pairs, k, q))
+    return Vec3(x, y, z)
+
+
 class Hits(Arrays):
     """Pairs of which one side went through the other."""
 
-    may_be: BoolArray
-    """Scratch: whether each near pair may be one, shape (capacity,)."""
-
     node: IntArray
     """See `Nodes`; shape (capacity, 4)."""
+    face: IntArray
+    """Places of the faces of both, in `Faces`; shape (capacity, 2)."""
     count: IntArray
     """Shape (1,)."""
 
@@ -135,17 +163,20 @@ class Hits(Arrays):
 def new_hits(capacity: int) -> Hits:
     """Return none, with room for that many."""
     return Hits(
-        may_be=np.zeros(capacity, np.bool_),
         node=np.zeros((capacity, 4), np.int64),
+        face=np.zeros((capacity, 2), np.int64),
         count=np.zeros(1, np.int64),
     )
 
 
 @kernel
-def add_hit(hits: Hits, nodes: Nodes) -> None:
-    """Add a pair."""
+def add_hit(hits: Hits, nodes: Nodes, face: int, other: int) -> None:
+    """Add a pair, of faces in these places."""
+    k = hits.count[0]
     for q in range(4):
-        hits.node[hits.count[0], q] = nodes[q]
+        hits.node[k, q] = nodes[q]
+    hits.face[k, 0] = face
+    hits.face[k, 1] = other
     hits.count[0] += 1
 
 
@@ -158,12 +189,20 @@ def sort_hits(hits: Hits) -> None:
         step = 3 * step + 1
     while step > 0:
         for i in range(step, n):
-            moved = nodes_of(hits.node, i)
+            moved, face, other = nodes_of(hits.node, i), hits.face[i, 0], hits.face[i, 1]
             j = i
             while j >= step and nodes_of(hits.node, j - step) > moved:
-                for q in range(4):
-                    hits.node[j, q] = hits.node[j - step, q]
+                _put(hits, j, nodes_of(hits.node, j - step))
+                hits.face[j, 0] = hits.face[j - step, 0]
+                hits.face[j, 1] = hits.face[j - step, 1]
                 j -= step
-            for q in range(4):
-                hits.node[j, q] = moved[q]
+            _put(hits, j, moved)
+            hits.face[j, 0] = face
+            hits.face[j, 1] = other
         step //= 3
+
+
+@kernel
+def _put(hits: Hits, k: int, nodes: Nodes) -> None:
+    for q in range(4):
+        hits.node[k, q] = nodes[q]

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from tissue.jit import inlined, kernel
-from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
+from tissue.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
 RIM = 0.01
 """How far outside a triangle, as a barycentric weight, a node still meets it. Between triangles
@@ -76,9 +76,9 @@ def is_under(at: Corners) -> bool:
 def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -> PointTriangle:
     """Tell whether p went through abc, from outside to inside, between t0 and t1.
 
-    It did if it is now under the triangle, and not deeper than it has moved; or if it went through
-    and out again beside it. A node of the same body that lies under the triangle, behind a corner
-    or in a thin wedge, moves with it, and is left alone.
+    It did if it was above the triangle's plane and is now under the triangle; or if it went through
+    and out again beside it. A node that was under the plane before went round the triangle, or is
+    one of the same body that lies behind a corner or in a thin wedge: it is left alone.
 
     Args:
         t0: Before the step.
@@ -96,14 +96,14 @@ def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -
     if not depth > nothing_yet:
         return outside
     b, c = weights_below(t1, area)
+    before = cross(sub(t0.b, t0.a), sub(t0.c, t0.a))
+    gap = dot(before, sub(t0.p, t0.a)) / norm(before)
     if is_within(b, c):
-        if depth > slack + norm(sub(from_point(t1, b, c), from_point(t0, b, c))):
+        if not gap >= -slack:
             return outside
+    elif not gap > 0.0:
+        return outside
     else:
-        before = cross(sub(t0.b, t0.a), sub(t0.c, t0.a))
-        gap = dot(before, sub(t0.p, t0.a)) / norm(before)
-        if not gap > 0.0:
-            return outside
         when = gap / (gap + depth)
         then = Corners(
             lerp(when, t0.p, t1.p),
@@ -116,13 +116,6 @@ def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -
             return outside
         b, c = into_triangle(b, c)
     return PointTriangle(True, scale(1.0 / double_area, area), b, c)
-
-
-@kernel
-def from_point(at: Corners, b: float, c: float) -> Vec3:
-    """Vector to p from the point of the triangle with those weights [m]."""
-    to_b = axpy(-b, sub(at.b, at.a), sub(at.p, at.a))
-    return axpy(-c, sub(at.c, at.a), to_b)
 
 
 @kernel

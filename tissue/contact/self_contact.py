@@ -9,10 +9,12 @@ nothing passes unseen as long as it moves less than its own element in a step, a
 from the start is left alone rather than torn apart.
 """
 
+from typing import Any
+
 import numpy as np
 
 from tissue.body import TETRAHEDRA, Body, grown
-from tissue.contact.candidates import grown_candidates, new_candidates
+from tissue.contact.candidates import Candidates, grown_candidates, new_candidates
 from tissue.contact.faces import (
     WITH_SKIN,
     collect_faces,
@@ -32,6 +34,7 @@ from tissue.contact.state import (
     FLOOR_IMPULSE,
     IS_AWAKE,
     IS_STALE,
+    N_STATES,
     N_TOTALS,
     N_TOUCHING,
     PENETRATION,
@@ -40,6 +43,7 @@ from tissue.contact.state import (
 )
 from tissue.cut import N_DIRTY, Change
 from tissue.pieces import label_pieces
+from tissue.simd import aligned, room_for_points
 from tissue.types import Touch
 
 MARGIN = 0.25
@@ -50,23 +54,35 @@ LITTLE = 1.0 / 64.0
 """How far a node moves in a Runge-Kutta step at most that is not restless, in margins. Larger: all
 pairs are looked at more often; smaller: more nodes are asked one by one."""
 
-TOUCH = 1e-6
-"""Distance that is none, per mean node size: thousands of times below what one could measure,
-thousands above rounding. Without it a node left on a triangle might be on either side of it."""
+TOUCH = 1e-4
+"""Distance that is none, and correction at which sweeps end, per mean node size: a third of a
+micrometre in an organ. Smaller: where lips of one cut lie node on node, each node presses on all
+triangles around the other, which say the same, and all sweeps are always done; at 1e-6 a body with
+3,000 contacts had 5,000, for less than shows. Larger: nodes that are pressed tremble."""
 
-SETTLED = 3e-5
-"""Correction below which sweeps end, per mean node size: a tenth of a micrometre. Smaller: all
-sweeps are always done, for less than shows; at 1e-5 a body with 2,900 contacts cost half as much
-again as at 1e-4. Larger: nodes that are pressed tremble."""
+SLACK = 0.01
+"""How deep a node may be left in what it touches, and be found again by the triangle beside as it
+slides there, per mean node size. Larger: what was always so is taken for contact, where lips are
+thin; smaller: a node that is pinched between two faces is lost."""
 
-RECOVERY = 0.01
-"""How much of an overlap that was there before a Runge-Kutta step is undone in it, per mean node
-size. It is work on the springs behind that nobody paid for. At 0.1 a node that was pinched between
-two faces went to and fro at 1 m/s without end, at 0.02 at 0.08 m/s, and here not at all; where
-nothing is undone, what overlaps does so for good."""
+RECOVERY = 1.0
+"""Speed at which an overlap is undone that was there before a Runge-Kutta step, in mean node sizes
+a second. It is work on the springs behind that nobody paid for, and a node that is pinched between
+two faces goes to and fro at about this speed without end. Where nothing is undone, what overlaps
+does so for good."""
 
 CAPACITY = 256
 """Faces that there is room for at first."""
+
+
+def _scratch(candidates: Candidates) -> dict[str, Any]:
+    """Return scratch of `ContactState` for these candidates."""
+    points, edges = candidates.point_triangle, candidates.edge_edge
+    return {
+        "signs": aligned(len(edges.node)),
+        "point_hits": new_hits(len(points.wake)),
+        "edge_hits": new_hits(len(edges.wake)),
+    }
 
 
 class SelfContact:
@@ -92,20 +108,20 @@ class SelfContact:
             candidates=candidates,
             motion=new_motion(n_nodes, float(LITTLE * MARGIN * node_size)),
             contacts=new_contacts(n_nodes, self._n_contacts(n_nodes), recovery),
-            normal=np.zeros((n_nodes, 3)),
-            hits=new_hits(len(candidates.edge_edge.wake)),
-            looked=np.zeros(2, np.int64),
+            normal=room_for_points(n_nodes),
+            **_scratch(candidates),
+            looked=np.zeros(1, np.int64),
             start=np.zeros((n_nodes, 3)),
             depth=np.zeros(n_nodes),
             depth_epoch=np.zeros(n_nodes, np.int64),
             tangled=np.zeros(n_nodes, np.int64),
-            state=np.zeros(4, np.int64),
+            state=np.zeros(N_STATES, np.int64),
             totals=np.zeros(N_TOTALS),
             friction=float(friction),
             floor=-np.inf if floor is None else float(floor),
             margin=float(MARGIN * node_size),
+            slack=float(SLACK * node_size),
             touch=float(TOUCH * node_size),
-            settled=float(SETTLED * node_size),
         )
         self.arrays.state[IS_AWAKE] = floor is not None
         self.look_for_pieces(body)
@@ -141,7 +157,6 @@ class SelfContact:
         if faces is not self.arrays.faces:
             self.arrays = self.arrays.replaced(faces=faces)
         state[IS_STALE] = max(int(state[IS_STALE]), CHANGED)
-        self.arrays.contacts.count[0] = 0  # their nodes may be others now
 
     def incision_ended(self, body: Body) -> None:
         """Let its lips touch; and where the body is in pieces now, their skin too."""
@@ -171,7 +186,7 @@ class SelfContact:
         candidates = new_candidates(n_nodes, self._capacity, self._cell)
         self.arrays = self.arrays.replaced(
             candidates=candidates,
-            hits=new_hits(len(candidates.edge_edge.wake)),
+            **_scratch(candidates),
             contacts=self._larger_contacts(n_nodes),
         )
 

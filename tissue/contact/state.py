@@ -8,7 +8,8 @@ from tissue.contact.motion import Motion
 from tissue.contact.pairs import Hits
 from tissue.types import FloatArray, IntArray
 
-IS_AWAKE, IS_STALE, IS_PENDING, EPOCH = 0, 1, 2, 3
+IS_AWAKE, IS_STALE, IS_PENDING, EPOCH, HAS_BEGUN = 0, 1, 2, 3, 4
+N_STATES = 5
 """Places in `ContactState.state`."""
 
 CHANGED, ANEW = 1, 2
@@ -39,12 +40,16 @@ class ContactState(Arrays):
     normal: FloatArray
     """Outward, weighted by area, of the nodes of faces after the step [m2]; shape (node capacity,
     3)."""
-    hits: Hits
+    signs: FloatArray
+    """Scratch: see `first_look`; shape (4 * capacity of pairs,)."""
+    point_hits: Hits
+    edge_hits: Hits
     looked: IntArray
-    """When points and edges were looked at last, by `Contacts.clock`; shape (2,)."""
+    """When pairs were looked at last in this step, by `Contacts.clock`, or -1; shape (1,)."""
     state: IntArray
     """Whether anything can touch; whether the candidates are out of date; whether a step is done
-    but for contact; number of the Runge-Kutta step. Shape (4,)."""
+    but for contact; number of the Runge-Kutta step; whether contact has begun with it, and there
+    was no room to go on. Shape (N_STATES,)."""
     totals: FloatArray
     """Since they were cleared: impulse of the floor on the body [N s], three; sum of the impulses
     that press faces together [N s]; greatest penetration left [m]; and the number of contacts that
@@ -55,7 +60,7 @@ class ContactState(Arrays):
     """Height of the floor [m], or -inf."""
     margin: float
     """Of the candidates [m]."""
+    slack: float
+    """How deep nodes may be left in what they touch, to be found again there by others [m]."""
     touch: float
-    """Distance that is none [m]."""
-    settled: float
-    """Correction that is none: what Gauss-Seidel leaves [m]."""
+    """Distance that is none, and correction that Gauss-Seidel leaves [m]."""

@@ -34,7 +34,8 @@ class Audited:
         share = (motion.end - motion.begin) / n
         for i in range(n):
             at = motion.begin + i * share
-            self._prepare(motion, at)
+            if motion.contact.is_awake:
+                prepare(motion.contact.arrays, motion.body)
             if i == 0 or motion.contact.is_awake:
                 self._power_now = self._power_of(motion, motion.body.velocities)
             self._step(motion, at, share)
@@ -64,12 +65,6 @@ class Audited:
         body, elastic = motion.body, motion.elasticity.arrays
         at = body.positions if positions is None else positions
         return dissipated_power(body, elastic, motion.surroundings, at, velocities, self._scratch)
-
-    def _prepare(self, motion: Motion, when: float) -> None:
-        if motion.contact.is_awake:
-            before = self._energy(motion, when)
-            prepare(motion.contact.arrays, motion.body)
-            self.contact += before - self._energy(motion, when)
 
     def _set_right(self, motion: Motion, seconds: float, when: float) -> None:
         if motion.contact.is_awake:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue.body import Body
-from tissue.contact.resolve import note_positions, prepare, prepare_listed
+from tissue.contact.resolve import note_positions, prepare
 from tissue.elastic import TETRAHEDRA_TOO
 from tissue.elasticity import Elasticity
 from tissue.relaxation.activity import (
@@ -167,7 +167,7 @@ class ByStiffness:
         if not contact.is_awake:
             self._is_prepared = False
         elif self._is_prepared:  # those that sleep are where they were
-            prepare_listed(contact.arrays, body, activity.listed, self.n_awake)
+            note_positions(contact.arrays, body, activity.listed, self.n_awake)
             if self._has_new_nodes:  # fixed ones among them are never listed
                 moved = self._moved
                 note_positions(contact.arrays, body, moved.nodes, int(moved.state[N_MOVED]))

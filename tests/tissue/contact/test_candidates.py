@@ -18,6 +18,7 @@ from tissue.contact.faces import (
     with_room,
 )
 from tissue.contact.motion import new_motion
+from tissue.contact.pairs import nodes_of_pair
 from tissue.shapes import grid
 from tissue.types import TetrahedralMesh
 
@@ -58,7 +59,11 @@ class Broad:
         pairs = getattr(self.found, name)
         is_dead = is_dead_point if name == "point_triangle" else is_dead_edge
         rows = range(pairs.counts[1])
-        alive = [tuple(pairs.node[k].tolist()) for k in rows if not is_dead(self.found, k)]
+        alive = [
+            tuple(int(node) for node in nodes_of_pair(pairs, k))
+            for k in rows
+            if not is_dead(self.found, k)
+        ]
         assert len(set(alive)) == len(alive)
         return set(alive)
 

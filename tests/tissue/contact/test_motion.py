@@ -25,7 +25,7 @@ from tissue.contact.pairs import (
     make_near,
     new_hits,
     new_pairs,
-    nodes_of,
+    nodes_of_pair,
     sort_hits,
 )
 from tissue.shapes import grid
@@ -55,17 +55,15 @@ class Wandering:
         start = self.body.positions.copy()
         step = self.random.normal(size=(self.n, 3)) * self.speeds[:, None]
         self.body.positions += step - 0.01 * (self.body.positions - self.body.rest)
-        nowhere = np.zeros(self.n)
-        never = np.full(self.n, -1)
         self.motion.number[STEP] += 1
         nodes = np.arange(self.n)
-        measure_motion(self.motion, self.body, start, nodes, self.n, nowhere, never, 0)
+        measure_motion(self.motion, self.body, start, nodes, self.n)
         if self.motion.number[N_NEW]:
             wake_restless(self.motion, self.pairs)
         return np.linalg.norm(self.body.positions - start, axis=1)
 
     def distance(self, k):
-        corners = (vec3(self.body.positions, node) for node in nodes_of(self.pairs.node, k))
+        corners = (vec3(self.body.positions, node) for node in nodes_of_pair(self.pairs, k))
         return distance_of_edges(Edges(*corners))
 
 
@@ -79,7 +77,7 @@ def test_no_pair_sleeps_through_what_may_have_gone_through(seed, fast):
         moved = wandering.go()
         until = horizon(motion, TOUCH)
         for k in range(8):
-            a, b, c, d = nodes_of(pairs.node, k)
+            a, b, c, d = nodes_of_pair(pairs, k)
             apart = wandering.distance(k)
             may_have_met = apart <= max(moved[a], moved[b]) + max(moved[c], moved[d])
             if pairs.wake[k] <= until and can_touch(motion, pairs, k, TOUCH):
@@ -96,7 +94,7 @@ def test_a_node_that_moves_much_is_restless_for_a_while_and_its_pairs_go_by_its_
     wandering.go()
     assert is_restless(wandering.motion, 0) and not is_restless(wandering.motion, 1)
     assert wandering.motion.whole[0] < LITTLE
-    with_it = (wandering.pairs.node == 0).any(axis=1)
+    with_it = (wandering.pairs.node.reshape(4, -1) == 0).any(axis=0)
     for k in range(8):
         note_distance(wandering.motion, wandering.pairs, k, 1.0)
     np.testing.assert_array_equal(np.isinf(wandering.pairs.wake), with_it)
@@ -113,10 +111,10 @@ def test_pairs_are_dropped_and_made_near_and_far_and_none_is_lost():
     assert not add_pair(pairs, (9, 9, 9, 9), 0, 0, 0)
     make_near(pairs, 3)
     make_near(pairs, 4)
-    assert sorted(pairs.node[:2, 0].tolist()) == [3, 4]
+    assert sorted(pairs.node[:2].tolist()) == [3, 4]
     make_far(pairs, 0)
     drop_pair(pairs, 0)
-    left = pairs.node[: pairs.counts[1], 0].tolist()
+    left = pairs.node[: pairs.counts[1]].tolist()
     assert pairs.counts.tolist() == [0, 4] and len(set(left)) == 4
     assert pairs.item[:4, 0].tolist() == pairs.generation[:4].tolist() == left
 
@@ -126,6 +124,7 @@ def test_hits_come_in_the_order_of_their_nodes():
     rows = [tuple(row) for row in random.integers(0, 6, (100, 4)).tolist()]
     hits = new_hits(100)
     for row in rows:
-        add_hit(hits, row)
+        add_hit(hits, row, row[0], row[3])
     sort_hits(hits)
     assert [tuple(row) for row in hits.node.tolist()] == sorted(rows)
+    np.testing.assert_array_equal(hits.face, hits.node[:, [0, 3]])

@@ -36,8 +36,9 @@ def test_a_node_that_comes_from_above_and_is_now_below_went_through():
         ([0.2, 0.3, -0.1], [0.2, 0.3, 0.1]),
         ([0.2, 0.3, -0.1], [0.2, 0.3, -0.1]),
         ([0.2, 0.3, -0.1], [0.21, 0.3, -0.11]),
+        ([-0.3, 0.3, -0.1], [0.2, 0.3, -0.1]),
     ],
-    ids=["stays above", "passes beside", "comes out", "lies below", "moves a little below"],
+    ids=["stays above", "passes beside", "comes out", "lies below", "moves below", "goes round"],
 )
 def test_any_other_node_did_not(p_t0, p_t1):
     assert not met(p_t0, p_t1).is_through
