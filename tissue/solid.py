@@ -84,6 +84,8 @@ class Solid(Arrays):
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray
     """Of each node in the bound on frequencies [1/kg^0.5]: see `solid_frequency`."""
+    weighed: FloatArray
+    """Mass of each node when it was given that weight [kg]."""
     dilatation: FloatArray
     """Of each node, for that bound [N/m3/kg^0.5]: see `solid_frequency`."""
     frequency_squared: FloatArray
@@ -93,6 +95,8 @@ class Solid(Arrays):
     ring_nodes: IntArray
     """Scratch of `solid_frequency`, shape (LARGEST_RING,)."""
     listed: IntArray
+    """Scratch of `solid_frequency`, shape (nodes,)."""
+    raised: IntArray
     """Scratch of `solid_frequency`, shape (nodes,)."""
     used: IntArray
     """Slots of the pool in use, shape (1,)."""
@@ -153,11 +157,13 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         corner=np.zeros(pool, dtype=np.int32),
         node_volume=np.zeros(n_nodes),
         weight=np.zeros(n_nodes),
+        weighed=np.zeros(n_nodes),
         dilatation=np.zeros(n_nodes),
         frequency_squared=np.zeros(n_nodes),
         ring=np.zeros((LARGEST_RING, 3)),
         ring_nodes=np.zeros(LARGEST_RING, dtype=np.int64),
         listed=np.zeros(n_nodes, dtype=np.int64),
+        raised=np.zeros(n_nodes, dtype=np.int64),
         used=np.zeros(1, dtype=np.int64),
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=aligned(WIDTH + capacity),
