@@ -69,7 +69,9 @@ class BroadPhase:
         self._blade = MovableBox()
         self._chunk_boxes = ChunkBoxes()
         self._tissue = MovableBox()
-        self._fixtures = Obstacles(fixture_objects(list(fixtures)))
+        standing = fixture_objects(list(fixtures))
+        self._has_fixtures = bool(standing)
+        self._fixtures = Obstacles(standing)
 
     def contacts(self, sweep: BladeSweep, dt: float, *, engaged: bool = False) -> Contacts:
         """Return what the blade can touch while it does `sweep` in `dt` [s].
@@ -79,6 +81,8 @@ class BroadPhase:
             dt: [s].
             engaged: Whether the blade holds tissue already, which it may drag out of any box.
         """
+        if engaged and not self._has_fixtures:
+            return Contacts(True, ())
         box = swept_blade(sweep, self._blade_shape)
         self._blade.place(box)
         fixtures = self._fixtures.met_by(self._blade.object)

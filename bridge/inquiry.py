@@ -33,8 +33,15 @@ class Answer(NamedTuple):
     """Which it lasted."""
     last_leg: Wrench
     """On the mean over the last leg; its point is the tip at the end."""
-    middle: BladeSegment
-    """Where the blade was in the middle of that."""
+    sweep: BladeSweep | None
+    """What the blade did in that; None: no blade near."""
+
+    @property
+    def middle(self) -> BladeSegment:
+        """Where the blade was in the middle of the last leg."""
+        if self.sweep is None:
+            return self.pose
+        return moved(self.sweep.t0, 0.5 * motion(*self.sweep))
 
 
 class Inquiry:
@@ -83,9 +90,8 @@ class Inquiry:
     def _step(self, legs: Sequence[Leg], pose: BladeSegment) -> Answer:
         results = [self._link.step(leg.sweep, min(leg.seconds, LONGEST_STEP)) for leg in legs]
         seconds = [leg.seconds for leg in legs]
-        sweep, last_leg = legs[-1].sweep, results[-1].wrench
-        middle = pose if sweep is None else moved(sweep.t0, 0.5 * motion(sweep.t0, sweep.t1))
-        return Answer(_together(results, seconds), pose, sum(seconds), last_leg, middle)
+        last_leg = results[-1].wrench
+        return Answer(_together(results, seconds), pose, sum(seconds), last_leg, legs[-1].sweep)
 
 
 def _together(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:

@@ -302,4 +302,4 @@ def anchored_length(anchors: Anchors) -> float:
 
 def is_engaged(anchors: Anchors) -> bool:
     """Whether any sample is in the tissue, pulling or backed off."""
-    return bool((anchors.state != FREE).any())
+    return bool(anchors.state.any())  # FREE is 0

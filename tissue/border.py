@@ -68,7 +68,7 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     Raises:
         ValueError: a number is not finite, the blade has no length, or it would cut along itself.
     """
-    points = []
+    points, ways = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
         parts = [np.asarray(part, dtype=np.float64) for part in segment]
         if any(part.shape != (3,) or not all(map(math.isfinite, part.tolist())) for part in parts):
@@ -92,11 +92,12 @@ def checked_edge(sweep: BladeSweep) -> Edge:
                 f"{[*forward]}, from tip to heel is {[x, y, z]}"
             )
         points += [tip, heel, forward]
+        ways.append((x, y, z))
     edge = Edge(*points)
-    expect_small_turn(
-        np.array([np.subtract(edge.heel_t0, edge.tip_t0), np.subtract(edge.heel_t1, edge.tip_t1)]),
-        np.array([edge.forward_t0, edge.forward_t1]),
-    )
+    (x, y, z), (u, v, w) = ways
+    (a, b, c), (f, g, h) = edge.forward_t0, edge.forward_t1
+    if not (x * u + y * v + z * w > 0.0 and a * f + b * g + c * h > 0.0):
+        expect_small_turn(np.array(ways), np.array([edge.forward_t0, edge.forward_t1]))
     return edge
 
 

@@ -14,7 +14,7 @@ from tissue.body import NODES, Body
 from tissue.cut import N_DIRTY, Change
 from tissue.flank_faces import blade_box, find_faces, forget_changed_faces, forget_faces
 from tissue.flanks import grown_flanks, new_flanks, with_more_rows
-from tissue.holding import let_go, meet, near_box, seize
+from tissue.holding import any_free_in_box, let_go, meet, seize
 from tissue.material import Material
 from tissue.path import Path
 from tissue.relaxation.moved import N_MOVED, Moved, forget_moved
@@ -148,20 +148,20 @@ class Grip:
         moved: Moved | None,
         edge: Edge,
         when: float,
-        box: Survey | None,
+        box: Survey,
         reach: float,
     ) -> None:
         """Anchor what came into the tissue, let go of what left it.
 
-        Samples that hold nothing are looked for anywhere in `box`, the body's; None where the edge
-        is in it already. `reach` [m]: see `tissue.slit.in_slit`.
+        Samples that hold nothing are looked for anywhere in `box`, the body's. `reach` [m]: see
+        `tissue.slit.in_slit`.
         """
         anchors, far = self.tool.anchors, FURTHEST_HOLD * self._node_size
         let_go(anchors, body, visits, path, edge, when, self._queue)
         seize(anchors, body, visits, edge, when, far, self.tool.resistance, self._queue)
-        if box is None or near_box(anchors, edge, when, box.low, box.high):
+        if any_free_in_box(anchors, edge, when, box.low, box.high):
             self._list_tetrahedra(body, visits, moved)
-            meet(anchors, body, self._grid, edge, when, reach)
+            meet(anchors, body, self._grid, edge, when, reach, box.low, box.high)
 
     def report(self, body: Body, edge: Edge) -> None:
         """Write what acts at the end of a step, for those below to read."""

@@ -1,7 +1,5 @@
 """How samples of the edge come to hold the tissue: by meeting it, or beside one that does."""
 
-import numpy as np
-
 from tissue.anchors import (
     ANCHORED,
     FREE,
@@ -130,11 +128,18 @@ def seize(
 
 @kernel
 def meet(
-    anchors: Anchors, body: Body, grid: TetrahedronGrid, edge: Edge, when: float, reach: float
+    anchors: Anchors,
+    body: Body,
+    grid: TetrahedronGrid,
+    edge: Edge,
+    when: float,
+    reach: float,
+    low: Vec3,
+    high: Vec3,
 ) -> None:
     """Anchor the free samples that have come into the tissue by themselves.
 
-    `reach` [m]: see `in_slit`.
+    `reach` [m]: see `in_slit`. The tissue lies between `low` and `high` [m].
     """
     n = len(anchors.state)
     along, forward, _ = edge_frame(edge, when)
@@ -142,6 +147,8 @@ def meet(
         if anchors.state[k] != FREE:
             continue
         b = sample_point(edge, k, n, when)
+        if not _in_box(b, low, high):
+            continue
         t = tetrahedron_at(body, grid, body.positions, b)
         if t >= 0:
             w = barycentric_in(b, body.positions, body.tetrahedra, t)
@@ -153,20 +160,15 @@ def meet(
 
 
 @kernel
-def near_box(anchors: Anchors, edge: Edge, when: float, low: Vec3, high: Vec3) -> bool:
-    """Whether the box of the free samples meets that from `low` to `high` [m]."""
+def any_free_in_box(anchors: Anchors, edge: Edge, when: float, low: Vec3, high: Vec3) -> bool:
+    """Whether a free sample lies in the box from `low` to `high` [m]."""
     n = len(anchors.state)
-    min_x = min_y = min_z = np.inf
-    max_x = max_y = max_z = -np.inf
     for k in range(n):
-        if anchors.state[k] == FREE:
-            b = sample_point(edge, k, n, when)
-            min_x = min(min_x, b.x)
-            min_y = min(min_y, b.y)
-            min_z = min(min_z, b.z)
-            max_x = max(max_x, b.x)
-            max_y = max(max_y, b.y)
-            max_z = max(max_z, b.z)
-    if min_x > high.x or min_y > high.y or min_z > high.z:
-        return False
-    return not (max_x < low.x or max_y < low.y or max_z < low.z)
+        if anchors.state[k] == FREE and _in_box(sample_point(edge, k, n, when), low, high):
+            return True
+    return False
+
+
+@kernel
+def _in_box(p: Vec3, low: Vec3, high: Vec3) -> bool:
+    return low.x <= p.x <= high.x and low.y <= p.y <= high.y and low.z <= p.z <= high.z

@@ -240,13 +240,14 @@ class Tissue:
         edge = NOWHERE if sweep is None else checked_edge(sweep)
         if not (math.isfinite(dt) and dt >= 0.0):
             raise ValueError(f"dt is {dt} s; it must be finite and not negative")
-        self._take(sweep)
+        self._take(None if sweep is None else edge)
         self._now = (edge, 0.0)
         begin_step(self._grip.tool, self._body, edge, dt)
         self._contact.begin()
         collision = topology = relaxation = 0.0
         n_substeps = 0
-        n_increments = self._n_increments(sweep)
+        travel = 0.0 if sweep is None else _travel(edge)
+        n_increments = self._n_parts(travel)  # so that the edge moves little in each
         for i in range(n_increments):
             begin, end = i / n_increments, (i + 1) / n_increments
             started = perf_counter()
@@ -263,7 +264,8 @@ class Tissue:
             relaxation += relaxed - started
             collision += collided - relaxed
             topology += perf_counter() - collided
-        if self._incising and not self._is_open and sweep is not None and self._rests(sweep, dt):
+        is_closed = self._incising and not self._is_open
+        if is_closed and sweep is not None and self._rests(travel, dt):
             started = perf_counter()
             self._open_up()
             topology += perf_counter() - started
@@ -430,9 +432,8 @@ class Tissue:
         """Anchor what came into the tissue, and trace the path of the edge through the material."""
         body, moved = self._body, self._relaxation.moved
         clear_tool(self._grip.tool, body, self._stages.external)
-        box = None if self._incising else self._box
         reach = EXPLAINED * self._snap_floor
-        self._grip.hold(body, self._visits, self._path, moved, edge, when, box, reach)
+        self._grip.hold(body, self._visits, self._path, moved, edge, when, self._box, reach)
         if not self._grip.is_engaged:
             self._end_incision()
             return
@@ -456,9 +457,9 @@ class Tissue:
         self._cut(self._scheme.rest)
         self._is_open = True
 
-    def _rests(self, sweep: BladeSweep, dt: float) -> bool:
-        """Whether the edge has rested for a while by the end of this step."""
-        travel = max(self._travel(sweep), path_travel(self._path))
+    def _rests(self, travel: float, dt: float) -> bool:
+        """Whether the edge, which went that far [m], has rested for a while by now."""
+        travel = max(travel, path_travel(self._path))
         if travel > RESTING_SPEED * self.node_size * dt:
             self._calm = 0.0
         else:
@@ -515,21 +516,9 @@ class Tissue:
         forget_path(self._path)
         self._incising = False
 
-    def _n_increments(self, sweep: BladeSweep | None) -> int:
-        """Return in how many parts the step is taken, so that the edge moves little in each."""
-        if sweep is None:
-            return 1
-        return self._n_parts(self._travel(sweep))
-
     def _n_parts(self, travel: float) -> int:
         """Return in how many parts the edge goes that far [m]."""
         return max(1, math.ceil(travel / (INCREMENT * self.node_size)))
-
-    @staticmethod
-    def _travel(sweep: BladeSweep) -> float:
-        """Return how far the edge moves [m]: the further of its two ends."""
-        t0, t1 = sweep
-        return max(math.dist(t1.tip, t0.tip), math.dist(t1.heel, t0.heel))
 
     def _measures(self) -> Measures:
         elasticity = self._elasticity
@@ -576,9 +565,9 @@ class Tissue:
 
     # arrays
 
-    def _take(self, sweep: BladeSweep | None) -> None:
+    def _take(self, edge: Edge | None) -> None:
         """Take the edge of this blade; another blade, or none, lets go of the tissue."""
-        length = 0.0 if sweep is None else float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip))
+        length = 0.0 if edge is None else math.dist(edge.tip_t1, edge.heel_t1)
         if self._grip.is_another(length):
             self._end_incision()
             self._grip.take(length, self._body, *self._now)
@@ -603,3 +592,8 @@ class Tissue:
         self._relaxation.grow(n_nodes, n_tetrahedra)
         self._stages = new_stages(n_nodes)
         self._nodes = np.zeros(n_nodes, dtype=np.int64)
+
+
+def _travel(edge: Edge) -> float:
+    """Return how far the edge moves [m]: the further of its two ends."""
+    return max(math.dist(edge.tip_t1, edge.tip_t0), math.dist(edge.heel_t1, edge.heel_t0))
