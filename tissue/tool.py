@@ -129,6 +129,36 @@ def release_edge(tool: Tool, body: Body, edge: Edge, when: float) -> None:
 
 
 @kernel
+def add_tool_frequency(
+    tool: Tool, body: Body, frequency_squared: FloatArray, scratch: FloatArray
+) -> None:
+    """Add what the blade adds to the bound on w^2 [1/s2] of each node that it acts on.
+
+    `scratch` as in `frequency_with_tool`.
+    """
+    anchors, flanks = tool.anchors, tool.flanks
+    add_stiffness(anchors, body, scratch)
+    add_flank_stiffness(flanks, scratch)
+    for k in range(len(anchors.state)):
+        for q in range(4):
+            _add_frequency(
+                body, frequency_squared, scratch, body.tetrahedra[anchors.tetrahedron[k], q]
+            )
+    for i in range(flanks.count[0]):
+        for corner in range(3):
+            _add_frequency(body, frequency_squared, scratch, flanks.node[i, corner])
+
+
+@kernel
+def _add_frequency(
+    body: Body, frequency_squared: FloatArray, scratch: FloatArray, node: int
+) -> None:
+    """Add the stiffness at a node to its bound, once: it is zero afterwards."""
+    frequency_squared[node] += scratch[node, 0] / body.masses[node]
+    scratch[node, 0] = 0.0
+
+
+@kernel
 def frequency_with_tool(
     tool: Tool, body: Body, frequency_squared: FloatArray, scratch: FloatArray
 ) -> float:

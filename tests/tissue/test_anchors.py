@@ -21,7 +21,7 @@ from tissue.anchors import (
 )
 from tissue.body import CUT, OUTER, build_body, walk
 from tissue.geometry import Matrix3
-from tissue.holding import let_go, meet, seize
+from tissue.holding import any_free_in_box, let_go, meet, seize
 from tissue.material import Material
 from tissue.path import new_path
 from tissue.resistance import resistance_of
@@ -46,6 +46,9 @@ pytestmark = pytest.mark.kernel
 
 BLOCK = grid((2, 4, 2), (0.02, 0.04, 0.02))
 STIFF, TOUGH = 10e3, 20.0
+BOX = (Vec3(0.0, 0.0, 0.0), Vec3(0.02, 0.04, 0.02))
+"""Lowest and highest corner of it [m]."""
+
 N = 5
 
 
@@ -67,7 +70,7 @@ class Held:
         self.tough = resistance_of(Material(toughness=TOUGH), None)
         self.forces = np.zeros_like(self.body.rest)
         grid = build_grid(self.body, self.body.positions, 0.0)
-        meet(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3)
+        meet(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3, *BOX)
 
     def pull(self, edge, toughness=TOUGH):
         x = self.body.positions
@@ -103,7 +106,9 @@ def test_the_samples_stand_for_the_whole_edge():
 def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     anchors = new_anchors(N, 0.016, STIFF)
     grid = build_grid(held.body, held.body.positions, 0.0)
-    meet(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3)
+    assert not any_free_in_box(anchors, edge_at(-0.001), 1.0, *BOX)
+    assert any_free_in_box(anchors, edge_at(0.001), 1.0, *BOX)
+    meet(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3, *BOX)
     assert not is_engaged(anchors)
     x = held.body.positions
     pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, held.tough, held.forces)

@@ -21,6 +21,7 @@ from tissue.relaxation.breadth_first import new_rings
 from tissue.relaxation.chebyshev import chebyshev, substep_limits
 from tissue.relaxation.levels import (
     MOST_STEPS,
+    find_bounds,
     find_listed_patch,
     find_near,
     find_zone,
@@ -32,7 +33,6 @@ from tissue.relaxation.moved import N_MOVED, Moved, grown_moved, none_moved, not
 from tissue.relaxation.options import LocalTimeStepping
 from tissue.relaxation.patches import N_FORCES, new_patch
 from tissue.strained import strain_frequencies
-from tissue.tool import frequency_with_tool
 from tissue.types import FloatArray, IntArray
 
 
@@ -123,17 +123,16 @@ class ByStiffness:
     def _divide(self, motion: Motion) -> tuple[int, int]:
         """Find the fine nodes; return the macro steps to take, and the substeps of each."""
         body, activity, zone = motion.body, self._activity, self._zone
-        springs, tool = motion.elasticity.arrays.springs, motion.tool
-        by_node = motion.elasticity.arrays.frequency_squared
+        elastic, tool, rings = motion.elasticity.arrays, motion.tool, self._options.rings
+        n_near = find_near(body, elastic.springs, tool, zone, max(rings - 1, 0))
+        wake_each(activity, body, elastic.springs, zone.fine, n_near)
+        n_near = n_near if rings > 0 else 0
         self._strain(motion)
-        n_near = find_near(body, springs, tool, zone, self._options.rings)
-        wake_each(activity, body, springs, zone.fine, n_near)
-        highest = frequency_with_tool(tool, body, by_node, motion.stages.external)
+        find_bounds(body, elastic, tool, activity, zone, motion.stages.external)
         n, p, limit = plan(
             activity,
             body.fixed,
-            by_node,
-            highest,
+            zone.bound,
             n_near,
             motion.span,
             motion.surroundings.retardation_time,
@@ -141,7 +140,7 @@ class ByStiffness:
             self._limits,
             self._n_above,
         )
-        find_zone(motion.elasticity.arrays, activity, zone, n_near, limit)
+        find_zone(elastic, activity, zone, n_near, limit)
         return n, p
 
     def _strain(self, motion: Motion) -> None:
@@ -158,8 +157,10 @@ class ByStiffness:
         version = int(self._activity.counts[VERSION])
         if version != self._listed_version:
             self._listed_version = version
-            elastic = motion.elasticity.arrays
-            find_listed_patch(self._listed, elastic, self._activity, self._around_listed)
+            elastic, activity = motion.elasticity.arrays, self._activity
+            activity.listed[: self.n_awake].sort()  # as memory is
+            find_listed_patch(self._listed, elastic, activity, self._around_listed)
+            self._listed.sort()
 
     def _prepare(self, motion: Motion) -> None:
         """Let contact note where the nodes are before the step."""

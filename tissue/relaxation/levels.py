@@ -13,7 +13,7 @@ from tissue.relaxation.focus import find_held
 from tissue.relaxation.local_time_stepping import Zone
 from tissue.relaxation.patches import Patch, find_patch, reach_of
 from tissue.springs import Springs
-from tissue.tool import Tool
+from tissue.tool import Tool, add_tool_frequency
 from tissue.types import BoolArray, FloatArray
 
 SAFETY = 0.8
@@ -31,7 +31,6 @@ def plan(
     activity: Activity,
     fixed: BoolArray,
     frequency_squared: FloatArray,
-    highest: float,
     n_near: int,
     span: float,
     retardation_time: float,
@@ -47,8 +46,7 @@ def plan(
     Args:
         activity: The nodes.
         fixed: Which nodes do not move.
-        frequency_squared: Bound on w^2 of each [1/s2].
-        highest: Bound on w^2 of those that the blade acts on, with what it adds [1/s2].
+        frequency_squared: Bound on w^2 of each, with what the blade adds [1/s2].
         n_near: Fine nodes anyway, around the blade.
         span: What is to be divided [s].
         retardation_time: Damping along springs [s].
@@ -56,6 +54,7 @@ def plan(
         limits: Scratch, shape (MOST_STEPS + 1,).
         n_above: Scratch, shape (MOST_STEPS + 1,).
     """
+    highest = 0.0
     for k in range(activity.counts[N_LISTED]):
         if not fixed[activity.listed[k]]:
             highest = max(highest, frequency_squared[activity.listed[k]])
@@ -107,6 +106,25 @@ def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -
 
 
 @kernel
+def find_bounds(
+    body: Body,
+    elastic: Elastic,
+    tool: Tool,
+    activity: Activity,
+    zone: Zone,
+    scratch: FloatArray,
+) -> None:
+    """Write the bounds of the listed nodes to `zone.bound` [1/s2], with what the blade adds.
+
+    All nodes that it acts on are listed, but for those that are fixed. `scratch`: see
+    `add_tool_frequency`.
+    """
+    for k in range(activity.counts[N_LISTED]):
+        zone.bound[activity.listed[k]] = elastic.frequency_squared[activity.listed[k]]
+    add_tool_frequency(tool, body, zone.bound, scratch)
+
+
+@kernel
 def find_near(body: Body, springs: Springs, tool: Tool, zone: Zone, n_rings: int) -> int:
     """Write the nodes that the blade acts on, and rings around, to `zone.fine`; return how many.
 
@@ -136,7 +154,7 @@ def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, lim
         add_focus(rings, zone.fine[k])
     for k in range(activity.counts[N_LISTED]):
         node = activity.listed[k]
-        if activity.state[node] == AWAKE and elastic.frequency_squared[node] > limit:
+        if activity.state[node] == AWAKE and zone.bound[node] > limit:
             add_focus(rings, node)
     reach = reach_of(elastic)
     search(rings, elastic.springs, reach)

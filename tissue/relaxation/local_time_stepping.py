@@ -1,9 +1,10 @@
 """Local time stepping: small elements take substeps, their neighbours do not (heir of section 5.2).
 
 Leap-frog with steps of H for the whole body, and p substeps for the fine nodes: those whose
-frequency bound exceeds what H bears, and those in rings around the blade. It differs from the
-paper's hierarchy in that both ends of a spring see each other at the same times: linear momentum is
-kept to rounding, the equilibrium is that of all nodes moved together, the order is 2.
+frequency bound, with what the blade adds, exceeds what H bears; and the rings around the blade that
+were asked for. It differs from the paper's hierarchy in that both ends of a spring see each other
+at the same times: linear momentum is kept to rounding, the equilibrium is that of all nodes moved
+together, the order is 2.
 
     V <- V + 2 e_p / H,   x <- x + H V                       V: velocity half a step ago
 
@@ -41,10 +42,11 @@ from tissue.relaxation.breadth_first import (
 from tissue.relaxation.chebyshev import Chebyshev
 from tissue.relaxation.patches import Patch, deform_patch, new_patch
 from tissue.simd import Point, point, point_of, store_point, times
+from tissue.spring_forces import damping_force
 from tissue.springs import Springs
 from tissue.tool import Tool, act, clear_tool
 from tissue.types import FloatArray, IntArray
-from tissue.vec3 import axpy, dot, store, sub, vec3
+from tissue.vec3 import axpy, dot, scale, store, sub, vec3
 
 
 class Zone(Arrays):
@@ -56,6 +58,8 @@ class Zone(Arrays):
     """What the nodes in the rings feel of the fine ones."""
     fine: IntArray
     """Scratch for the list of fine nodes, shape (capacity,)."""
+    bound: FloatArray
+    """Bound on w^2 of every listed node, with what the blade adds [1/s2]; shape (capacity,)."""
     start: FloatArray
     """Positions of the fine nodes at the begin of the step [m]."""
     way: FloatArray
@@ -75,13 +79,14 @@ def new_zone(n_nodes: int, n_tetrahedra: int) -> Zone:
         rings=new_rings(n_nodes),
         patch=new_patch(n_nodes, n_tetrahedra),
         fine=np.zeros(n_nodes, np.int64),
+        bound=np.zeros(n_nodes),
         **{name: np.zeros((n_nodes, 3)) for name in of_nodes},
     )
 
 
 def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
     """Return the zone with room for that many nodes and tetrahedra, its patch empty."""
-    of_nodes = ("fine", "start", "way", "way_before", "steady", "accelerations")
+    of_nodes = ("fine", "bound", "start", "way", "way_before", "steady", "accelerations")
     larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
     patch = new_patch(n_nodes, n_tetrahedra)
     return zone.replaced(rings=grown_rings(zone.rings, n_nodes), patch=patch, **larger)
@@ -109,7 +114,7 @@ def macro_step(
     Args:
         body: Positions and velocities are written.
         elastic: What the forces inside the body follow from.
-        tool: Acts in every substep; all nodes that it acts on should be fine.
+        tool: Acts in every substep.
         edge: The cutting edge over the whole time step of length `dt` [s].
         activity: Only awake nodes move.
         listed: What the listed nodes feel.
@@ -125,12 +130,13 @@ def macro_step(
     h = share * dt
     springs = elastic.springs
     deform_patch(listed, elastic, body.positions)
-    _accelerate_coarse(body, elastic, activity, zone, surroundings)
-    _begin_fine(body, springs, zone, surroundings)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
         act(tool, body, edge, body.positions, at, part, dt, external)
-        if m > 0:
+        if m == 0:
+            _accelerate_coarse(body, elastic, activity, zone, external, surroundings)
+            _begin_fine(body, springs, zone, surroundings)
+        else:
             deform_patch(zone.patch, elastic, body.positions)
         _substep(body, elastic, activity, zone, chebyshev, external, h, m)
     clear_tool(tool, body, external)
@@ -142,8 +148,14 @@ def macro_step(
 
 @kernel
 def _accelerate_coarse(
-    body: Body, elastic: Elastic, activity: Activity, zone: Zone, surroundings: Surroundings
+    body: Body,
+    elastic: Elastic,
+    activity: Activity,
+    zone: Zone,
+    external: FloatArray,
+    surroundings: Surroundings,
 ) -> None:
+    """Accelerations of the nodes that feel no fine one move: they are the same in all substeps."""
     gravity = point_of(*surroundings.gravity)
     time = surroundings.retardation_time
     for k in range(activity.counts[N_LISTED]):
@@ -151,6 +163,7 @@ def _accelerate_coarse(
         if body.fixed[node] or ring_of(zone.rings, node) != UNREACHED:
             continue
         force = internal_force(elastic, node, body.positions, body.velocities, time)
+        force = force + point(external, node)
         store_point(zone.accelerations, node, gravity + times(1.0 / body.masses[node], force))
 
 
@@ -165,7 +178,10 @@ def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surround
         if rings.ring[node] == 0:
             store_point(zone.start, node, point(body.positions, node))
         elif time > 0.0:
-            force = _coarse_damping(springs, body, rings, node)
+            if rings.ring[node] > 1:  # no neighbour is fine
+                force = damping_force(springs, node, body.positions, body.velocities, 1.0)
+            else:
+                force = _coarse_damping(springs, body, rings, node)
             steady = steady + times(time / body.masses[node], force)
         store_point(zone.steady, node, steady)
         store_point(zone.way, node, nowhere)
@@ -216,11 +232,11 @@ def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kic
         node = activity.listed[k]
         if activity.state[node] != AWAKE:
             continue
-        gain = times(kick * h, point(zone.accelerations, node))
+        gain = scale(kick * h, vec3(zone.accelerations, node))
         if ring_of(zone.rings, node) != UNREACHED:
-            gain = times(2.0 * kick / h, point(zone.way, node))
-        v = times(half * half, point(body.velocities, node)) + times(half, gain)
-        store_point(body.velocities, node, v)
+            gain = scale(2.0 * kick / h, vec3(zone.way, node))
+        v = axpy(half * half, vec3(body.velocities, node), scale(half, gain))
+        store(body.velocities, node, v)
 
 
 @kernel
@@ -256,8 +272,8 @@ def _drift(body: Body, activity: Activity, zone: Zone, h: float) -> None:
         node = activity.listed[k]
         if activity.state[node] == AWAKE:
             is_fine = ring_of(zone.rings, node) == 0
-            x = point(zone.start, node) if is_fine else point(body.positions, node)
-            store_point(body.positions, node, x + times(h, point(body.velocities, node)))
+            x = vec3(zone.start, node) if is_fine else vec3(body.positions, node)
+            store(body.positions, node, axpy(h, vec3(body.velocities, node), x))
 
 
 @kernel

@@ -54,8 +54,10 @@ class LocalTimeStepping:
         ValueError: a setting is none that it can have.
     """
 
-    rings: int = 1
-    """Rings of nodes around those that the blade holds that take substeps as well."""
+    rings: int = 0
+    """Rings of nodes that take substeps however soft they are, the first of which are those that
+    the blade holds. At 0 only nodes do that are too stiff for the step, with what the blade adds to
+    the stiffness of those that it holds."""
     sleep: bool = True
     """Whether nodes at rest sleep until they are pulled, so that a step costs what moves."""
     stabilisation: float = 1.0

@@ -13,6 +13,7 @@ from tissue.relaxation.levels import (
     MOST_STEPS,
     SAFETY,
     coarse_limit,
+    find_bounds,
     find_near,
     find_zone,
     n_substeps,
@@ -25,17 +26,17 @@ pytestmark = pytest.mark.kernel
 NETWORK = block(3)
 BODY, SPRINGS = NETWORK.body, NETWORK.springs
 N_NODES = len(BODY.rest)
+ROOM = (N_NODES, len(BODY.tetrahedra))
 LIMITS = substep_limits()
 
 
-def divided(frequencies, span, highest=0.0, n_near=0):
+def divided(frequencies, span, n_near=0):
     """Return the plan for a body whose nodes have these bounds on w [1/s]."""
-    activity = all_asleep(N_NODES)
-    wake_all(activity, BODY, SPRINGS)
+    activity = awake()
     scratch = np.zeros((2, MOST_STEPS + 1))
     squared = np.array(frequencies) ** 2
     still = np.zeros(N_NODES, dtype=bool)
-    return plan(activity, still, squared, highest**2, n_near, span, 0.0, LIMITS, *scratch)
+    return plan(activity, still, squared, n_near, span, 0.0, LIMITS, *scratch)
 
 
 def test_a_body_that_bears_the_step_takes_one():
@@ -62,7 +63,18 @@ def test_a_few_stiff_nodes_take_substeps_and_the_others_do_not():
 
 
 def test_what_anchors_add_counts():
-    assert divided(np.full(N_NODES, 1000.0), 1e-3, highest=4000.0, n_near=4)[:2] == (1, 4)
+    """To the bound of each node that they pull on, and to no other."""
+    elastic, tool, activity, zone = elastic_of(SPRINGS), held_tool(), awake(), new_zone(*ROOM)
+    elastic.frequency_squared[:] = 1e6
+    scratch = np.zeros((N_NODES, 3))
+    find_bounds(BODY, elastic, tool, activity, zone, scratch)
+    added = zone.bound - 1e6
+    expected = np.zeros(N_NODES)
+    stiffness, weights = tool.anchors.stiffness[0], tool.anchors.weights[0]
+    expected[BODY.tetrahedra[5]] = stiffness * weights / BODY.masses[BODY.tetrahedra[5]]
+    free = ~BODY.fixed
+    np.testing.assert_allclose(added[free], expected[free], rtol=1e-9)
+    assert not scratch.any()
 
 
 @pytest.mark.parametrize("phase", [0.5, 1.5, 3.0, 10.0, 50.0])
@@ -84,17 +96,28 @@ def test_the_coarse_limit_is_that_of_leap_frog_with_lagging_dampers(retardation_
     assert roots.real.min() == pytest.approx(-1.0, abs=1e-6)
 
 
-def test_fine_are_the_nodes_at_the_blade_and_those_that_are_stiff():
+def held_tool():
+    """Return a blade one of whose samples holds the middle of a tetrahedron."""
     anchors = new_anchors(2, 0.01, 10e3)
     anchors.state[0] = ANCHORED
     anchors.tetrahedron[0] = 5
-    elastic = elastic_of(SPRINGS)
-    activity, zone = all_asleep(N_NODES), new_zone(N_NODES, len(BODY.tetrahedra))
+    anchors.weights[0] = 0.25
+    return tool_with(anchors)
+
+
+def awake():
+    """Return the activity of a body all of whose nodes are awake."""
+    activity = all_asleep(N_NODES)
     wake_all(activity, BODY, SPRINGS)
+    return activity
+
+
+def test_fine_are_the_nodes_at_the_blade_and_those_that_are_stiff():
+    elastic, activity, zone = elastic_of(SPRINGS), awake(), new_zone(*ROOM)
     held = [int(i) for i in BODY.tetrahedra[5] if not BODY.fixed[i]]
     stiff = int(np.flatnonzero(~BODY.fixed)[-1])
-    elastic.frequency_squared[stiff] = 2.0
-    n_near = find_near(BODY, SPRINGS, tool_with(anchors), zone, 0)
+    zone.bound[stiff] = 2.0
+    n_near = find_near(BODY, SPRINGS, held_tool(), zone, 0)
     assert sorted(zone.fine[:n_near].tolist()) == sorted(held)
     find_zone(elastic, activity, zone, n_near, 1.0)
     fine = [i for i in found(zone.rings) if ring_of(zone.rings, i) == 0]
