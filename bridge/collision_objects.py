@@ -51,10 +51,6 @@ class Obstacles:
         self._manager.registerObjects([thing for _, thing in objects.values()])
         self._manager.setup()
 
-    def moved(self) -> None:
-        """Take note that its objects have moved."""
-        self._manager.update()
-
     def met_by(self, other: fcl.CollisionObject) -> tuple[str, ...]:
         """Return the names of those that meet an object which is not one of them, in order."""
         if not self._objects:

@@ -2,15 +2,16 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import fcl
 import numpy as np
 
-from bridge.collision_objects import MovableBox, Obstacles, fixture_objects
-from bridge.fixtures import Fixture
+from bridge.collision_objects import MovableBox, fixture_objects, meet
+from bridge.fixtures import Fixture, bounds_of
 from bridge.parts import Part
-from bridge.swept_box import SweptBox, box_around
-from tissue.types import FloatArray
+from bridge.swept_box import TOUCHING_MARGIN, SweptBox, box_around
+from tissue.types import BoolArray, FloatArray
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
@@ -38,21 +39,21 @@ class Collisions:
         self._parts = tuple(parts)
         self._shapes = [part.geometry() for part in parts]
         self._objects = [fcl.CollisionObject(shape, fcl.Transform()) for shape in self._shapes]
-        self._fixtures = Obstacles(fixture_objects(list(fixtures)))
-        each = list(zip(parts, self._shapes, self._objects, strict=True))
-        self._links = Obstacles(
-            {
-                part.name: (shape, thing)
-                for part, shape, thing in each
-                if part.may_meet_instrument and not part.is_instrument
-            }
-        )
+        standing = list(fixtures)
+        self._fixtures = fixture_objects(standing)
         self._half_extents = np.array([part.half_extents for part in parts]).reshape(-1, 3)
         self._reach = np.linalg.norm(self._half_extents, axis=1)
         self._half_thickness = self._half_extents.min(axis=1, initial=np.inf)
         self._positions: FloatArray | None = None
         self._axes = np.zeros((0, 3, 3))
         self._way = MovableBox()
+        self._pairs = self._possible_pairs()
+        self._first = np.array([pair.part for pair in self._pairs], np.int64)
+        self._second = np.array([pair.other for pair in self._pairs], np.int64)
+        bounds = [bounds_of(fixture) for fixture in standing]
+        self._boxes = np.zeros((len(self._parts) + len(standing), 2, 3))
+        if bounds:
+            self._boxes[len(self._parts) :] = bounds
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -77,31 +78,61 @@ class Collisions:
             )
         if not math.isfinite(positions.sum() + axes.sum()):
             raise ValueError("the pose of a part of the arm is not finite")
-        for thing, position, turned in zip(self._objects, positions, axes, strict=True):
-            thing.setTransform(fcl.Transform(turned, position))
-        self._links.moved()
         is_fast = self._is_fast(positions, axes)
-        pairs: list[tuple[str, str]] = []
-        for i, part in enumerate(self._parts):
+        met = []
+        for k in self._near(positions, axes, is_fast):
+            i, other = self._pairs[k].part, self._pairs[k].other
+            for part in (i, other):
+                if part < n:
+                    self._objects[part].setTransform(fcl.Transform(axes[part], positions[part]))
             thing = self._objects[i]
             if is_fast[i]:
                 self._way.place(self._way_of(i, positions[i], axes[i]))
                 thing = self._way.object
-            if part.may_meet_fixtures:
-                pairs += [(part.name, other) for other in self._fixtures.met_by(thing)]
-            if part.is_instrument:
-                pairs += [(part.name, other) for other in self._links.met_by(thing)]
+            if meet(thing, self._pairs[k].object):
+                met.append((self._parts[i].name, self._pairs[k].name))
         self._positions, self._axes = positions.copy(), axes.copy()
-        return tuple(pairs)
+        return tuple(met)
 
-    def _is_fast(self, positions: FloatArray, axes: FloatArray) -> list[bool]:
+    def _possible_pairs(self) -> list["_Pair"]:
+        """Return all pairs that it would be news of if they met."""
+        links = [
+            (j, part)
+            for j, part in enumerate(self._parts)
+            if part.may_meet_instrument and not part.is_instrument
+        ]
+        pairs = []
+        for i, part in enumerate(self._parts):
+            if part.may_meet_fixtures:
+                for j, (name, (_, thing)) in enumerate(self._fixtures.items(), len(self._parts)):
+                    pairs.append(_Pair(i, j, name, thing))
+            if part.is_instrument:
+                pairs += [_Pair(i, j, link.name, self._objects[j]) for j, link in links]
+        return pairs
+
+    def _near(self, positions: FloatArray, axes: FloatArray, is_fast: BoolArray) -> list[int]:
+        """Return the pairs whose boxes along the world's axes meet, and those of fast parts.
+
+        Nearly all are apart, and to ask the library about each took longer than a step of a small
+        body.
+        """
+        n = len(self._parts)
+        half = (np.abs(axes) @ self._half_extents[:, :, None])[:, :, 0] + TOUCHING_MARGIN
+        self._boxes[:n, 0] = positions - half
+        self._boxes[:n, 1] = positions + half
+        low, high = self._boxes[:, 0], self._boxes[:, 1]
+        first, second = self._first, self._second
+        apart = (low[first] > high[second]) | (low[second] > high[first])
+        return np.flatnonzero(~apart.any(axis=1) | is_fast[first]).tolist()
+
+    def _is_fast(self, positions: FloatArray, axes: FloatArray) -> BoolArray:
         """Return which parts have gone farther than half of their thickness since the last look."""
         if self._positions is None:
-            return [False] * len(self._parts)
+            return np.zeros(len(self._parts), np.bool_)
         moved = np.sqrt(np.square(positions - self._positions).sum(axis=1))
         # No point of it has moved farther by turning: |R1 - R0| |x| bounds |R1 x - R0 x|.
         turned = np.sqrt(np.square(axes - self._axes).sum(axis=(1, 2))) * self._reach
-        return (moved + turned > self._half_thickness).tolist()
+        return moved + turned > self._half_thickness
 
     def _way_of(self, i: int, position: FloatArray, axes: FloatArray) -> SweptBox:
         """Return a box around a part at the last look, now, and between.
@@ -119,3 +150,15 @@ class Collisions:
         return box_around(
             np.concatenate((before, now)), axes, 0.5 * chord * float(np.tan(0.25 * angle))
         )
+
+
+class _Pair(NamedTuple):
+    """A part, and what it may meet."""
+
+    part: int
+    other: int
+    """A part's number; that of a fixture, after all parts."""
+    name: str
+    """Of the other."""
+    object: fcl.CollisionObject
+    """The other."""

@@ -72,3 +72,11 @@ class FixtureMesh:
 
 
 Fixture = FixtureBox | FixtureMesh
+
+
+def bounds_of(fixture: Fixture) -> FloatArray:
+    """Return the lowest and the highest corner of a fixture [m], shape (2, 3)."""
+    if isinstance(fixture, FixtureBox):
+        half = 0.5 * np.abs(fixture.rotation) @ fixture.size
+        return np.array([fixture.centre - half, fixture.centre + half])
+    return np.array([fixture.positions.min(axis=0), fixture.positions.max(axis=0)])

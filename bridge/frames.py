@@ -48,6 +48,13 @@ class TissueFrame:
         """Return vectors of the tissue frame in the world, shape (..., 3)."""
         return vectors @ self.rotation.T if self._is_turned else vectors.copy()
 
+    def matrix_to_world(self, matrix: FloatArray) -> FloatArray:
+        """Return a matrix that maps vectors of the tissue frame, such as a stiffness, in the world.
+
+        Shape (3, 3).
+        """
+        return self.rotation @ matrix @ self.rotation.T if self._is_turned else matrix.copy()
+
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
         return BladeSegment(

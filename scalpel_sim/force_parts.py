@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from tissue.types import BladeContacts, FloatArray
 
 EDGE_COSINE = 0.9
@@ -31,8 +33,5 @@ def force_parts(contacts: BladeContacts, forward: FloatArray) -> ForceParts:
     is_edge = contacts.normal @ forward > EDGE_COSINE
     is_face = ~is_edge
     edge = (pressing + contacts.friction)[is_edge]
-    return ForceParts(
-        -edge.sum(axis=0),
-        -pressing[is_face].sum(axis=0),
-        -contacts.friction[is_face].sum(axis=0),
-    )
+    total = np.add.reduce  # `sum`, which takes twice as long to get there
+    return ForceParts(-total(edge), -total(pressing[is_face]), -total(contacts.friction[is_face]))

@@ -1,5 +1,7 @@
 """One frame as a row of `forces.csv`: see `scalpel_sim.recording.COLUMNS`."""
 
+from operator import itemgetter
+
 import numpy as np
 
 from bridge.frames import TissueFrame
@@ -7,8 +9,8 @@ from scalpel_sim.force_parts import force_parts
 from scalpel_sim.recording import N_OF_ACCOUNT
 from tissue.types import BladeSegment, Energies, Profile, StepResult, Wrench
 
-UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Of a symmetric matrix, in the order of the columns."""
+UPPER = itemgetter(0, 4, 8, 1, 2, 5)
+"""Of a symmetric matrix of nine numbers, in the order of the columns."""
 
 NO_ACCOUNT = (np.nan,) * N_OF_ACCOUNT
 """What is not known without an audit."""
@@ -40,7 +42,7 @@ def row_of(
         frame_seconds: Wall time of all else [s].
     """
     parts = force_parts(result.contacts, frame.vectors_to_tissue(blade.forward))
-    stiffness = frame.rotation @ result.stiffness[:3, :3] @ frame.rotation.T
+    stiffness = frame.matrix_to_world(result.stiffness[:3, :3])
     return (
         time,
         *blade.tip.tolist(),
@@ -48,8 +50,8 @@ def row_of(
         *felt.torque.tolist(),
         *raw.force.tolist(),
         *raw.torque.tolist(),
-        *(frame.vectors_to_world(np.stack(parts)).ravel().tolist()),
-        *(float(stiffness[at]) for at in UPPER),
+        *(frame.vectors_to_world(np.array(parts)).ravel().tolist()),
+        *UPPER(stiffness.ravel().tolist()),
         result.cut_area,
         result.n_tetrahedra,
         result.anchored_length,

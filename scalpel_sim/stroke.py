@@ -2,6 +2,7 @@
 
 import csv
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -59,6 +60,7 @@ class Stroke:
         _check(given, tips, heels, forwards)
         self.times = given - given[0]
         """[s], from 0; shape (n,)."""
+        self._instants: list[float] = self.times.tolist()
         edges = tips - heels
         lengths = np.linalg.norm(edges, axis=1)
         self.blade_length = float(lengths[0])
@@ -76,9 +78,9 @@ class Stroke:
 
     def pose(self, t: float) -> BladeSegment:
         """Return the blade's pose at time `t` [s]. It rests before the start and after the end."""
-        t = min(max(t, 0.0), self.duration)
-        i = min(int(np.searchsorted(self.times, t, side="right")) - 1, len(self._spins) - 1)
-        s = (t - self.times[i]) / (self.times[i + 1] - self.times[i])
+        t = min(max(t, 0.0), self._instants[-1])
+        i = min(bisect_right(self._instants, t) - 1, len(self._spins) - 1)
+        s = (t - self._instants[i]) / (self._instants[i + 1] - self._instants[i])
         middle = self._middles[i] + s * (self._middles[i + 1] - self._middles[i])
         quaternion, axes = self._rotations[i].copy(), np.empty(9)
         mujoco.mju_quatIntegrate(quaternion, self._spins[i], s)

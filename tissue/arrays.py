@@ -39,8 +39,15 @@ class ArraysType(types.Type):
         for name, field in self.fields:
             if name == attribute:
                 return place
-            place += 1 + (field.ndim if isinstance(field, types.Array) else 0)
+            place += _n_words(field)
         raise KeyError(attribute)
+
+
+def _n_words(field: types.Type) -> int:
+    """Return how long the entry of a field is in the table, in words of 8 bytes."""
+    if isinstance(field, types.Array):
+        return 1 + field.ndim
+    return len(field) if isinstance(field, types.NamedUniTuple) else 1
 
 
 class Arrays:
@@ -136,6 +143,9 @@ def _getattr(context: Any, builder: Any, struct: ArraysType, table: Any, attribu
         return builder.inttoptr(word(0), ir.IntType(64).as_pointer())
     if field == types.float64:
         return builder.bitcast(word(0), ir.DoubleType())
+    if isinstance(field, types.NamedUniTuple):  # of floats: see `tissue.anchors.Edge`
+        numbers = [builder.bitcast(word(i), ir.DoubleType()) for i in range(len(field))]
+        return context.make_tuple(builder, field, numbers)
     itemsize = context.get_abi_sizeof(context.get_data_type(field.dtype))
     shape = [word(1 + i) for i in range(field.ndim)]
     strides = [ir.Constant(ir.IntType(64), itemsize)]

@@ -71,13 +71,14 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     points, ways = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
         parts = [np.asarray(part, dtype=np.float64) for part in segment]
-        if any(part.shape != (3,) or not all(map(math.isfinite, part.tolist())) for part in parts):
+        rows = [part.tolist() for part in parts]
+        if any(part.shape != (3,) for part in parts) or not all(map(_is_finite, rows)):
             raise ValueError(
-                f"the blade at the {when} of the step is {[part.tolist() for part in parts]}; tip, "
-                "heel and forward are three finite numbers each"
+                f"the blade at the {when} of the step is {rows}; tip, heel and forward are three "
+                "finite numbers each"
             )
         # Plain floats: with arrays of three these checks cost more than a step of a small body.
-        tip, heel, forward = (Vec3(*part.tolist()) for part in parts)
+        tip, heel, forward = (Vec3(*row) for row in rows)
         x, y, z = heel.x - tip.x, heel.y - tip.y, heel.z - tip.z
         u, v, w = forward
         length = math.hypot(x, y, z)
@@ -99,6 +100,11 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     if not (x * u + y * v + z * w > 0.0 and a * f + b * g + c * h > 0.0):
         expect_small_turn(np.array(ways), np.array([edge.forward_t0, edge.forward_t1]))
     return edge
+
+
+def _is_finite(row: list[float]) -> bool:
+    """Whether all are. A sum is, if all its parts are, and costs less than asking each."""
+    return math.isfinite(sum(row)) or all(map(math.isfinite, row))
 
 
 def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:

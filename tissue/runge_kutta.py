@@ -14,6 +14,8 @@ Nystroem's form (Collatz, chapter 2: the paper's reference [4]):
 Elastic forces are evaluated three times a step, damping four times.
 """
 
+from bisect import bisect_right
+
 import numpy as np
 
 from tissue.anchors import Edge
@@ -44,6 +46,10 @@ STABILITY_LIMIT = np.array(
 )
 """Where the method is stable for x'' = -w^2 x - 2 zeta w x' (the tests measure it). Between 0.05
 and 0.5 the limit is higher; the table stays at its lowest."""
+
+_RATIOS = STABILITY_LIMIT[:, 0].tolist()
+_INVERSES = (1.0 / STABILITY_LIMIT[:, 1]).tolist()
+"""The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
 
 SAFETY = 0.8
 """Share of the stable step that is used. Springs in strong compression are stiffer than at rest;
@@ -85,8 +91,9 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     if ratio > table[-1, 0]:
         limit = table[-1, 1] * table[-1, 0] / ratio
     else:
-        # The limit falls nearly as 1 / ratio: a line between its entries would be above it.
-        limit = 1.0 / float(np.interp(ratio, table[:, 0], 1.0 / table[:, 1]))
+        i = max(bisect_right(_RATIOS, ratio, hi=len(_RATIOS) - 1) - 1, 0)
+        share = (ratio - _RATIOS[i]) / (_RATIOS[i + 1] - _RATIOS[i])
+        limit = 1.0 / (_INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i]))
     return limit / frequency
 
 

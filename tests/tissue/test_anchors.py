@@ -150,7 +150,9 @@ def test_an_edge_that_goes_faster_is_held_harder(held):
     )
     fast = edge_at(0.009 + 5.0 * THRESHOLD)
     slow = edge_at(0.009 + 5.0 * THRESHOLD - 1e-4)
-    edge = Edge(*slow[:3], *fast[3:])
+    edge = Edge(
+        slow.tip_t0, slow.heel_t0, slow.forward_t0, fast.tip_t1, fast.heel_t1, fast.forward_t1
+    )
     measure_speeds(held.anchors, edge, 1e-3)  # 0.1 mm in 1 ms
     np.testing.assert_allclose(held.anchors.speed, 0.1, rtol=1e-9)
     held.slip(edge)

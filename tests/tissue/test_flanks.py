@@ -184,7 +184,8 @@ def test_the_force_is_the_slope_of_the_energy(pressed):
     xs = np.linspace(0.0112, 0.0108, 201)
     for a, b in itertools.pairwise(xs):
         end, start = edge_at(b), edge_at(a)
-        moving = Edge(start.tip_t0, start.heel_t0, start.forward_t0, *end[3:])
+        after = (end.tip_t1, end.heel_t1, end.forward_t1)
+        moving = Edge(start.tip_t0, start.heel_t0, start.forward_t0, *after)
         at_half = pressed.totals
         press_flanks(
             pressed.flanks, moving, pressed.body.positions, 0.5, 1.0, 1.0, pressed.forces, at_half
