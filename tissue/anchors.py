@@ -7,6 +7,7 @@ material until it does not. What the anchors cut is what the cutter cuts, and th
 slipping is the toughness times the area, exactly.
 """
 
+from array import array
 from typing import NamedTuple
 
 import numpy as np
@@ -66,9 +67,10 @@ class Edge(Arrays):
     ) -> None:
         self.tip_t0, self.heel_t0, self.forward_t0 = tip_t0, heel_t0, forward_t0
         self.tip_t1, self.heel_t1, self.forward_t1 = tip_t1, heel_t1, forward_t1
-        points = (tip_t0, heel_t0, forward_t0, tip_t1, heel_t1, forward_t1)
-        self._table = np.array(points, np.float64)
-        self.address = self._table.ctypes.data
+        # An array of Python's own is made in half the time of one of NumPy.
+        before, after = (*tip_t0, *heel_t0, *forward_t0), (*tip_t1, *heel_t1, *forward_t1)
+        self._numbers = array("d", before + after)
+        self.address = self._numbers.buffer_info()[0]
 
 
 class Anchors(Arrays):

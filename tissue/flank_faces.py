@@ -33,6 +33,9 @@ from tissue.tetrahedron_grid import TetrahedronGrid, cell_along
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 
+N_AROUND, CELLS, COUNTS = 0, 1, 7
+"""Places in `Flanks.searched`."""
+
 SIDE, AREA, ENERGY = 0, 1, 2
 """Places in `Flanks.faces_before`."""
 
@@ -71,6 +74,7 @@ def forget_faces(flanks: Flanks, totals: FloatArray) -> None:
 @kernel
 def forget_changed_faces(flanks: Flanks, dirty: IntArray, n: int) -> None:
     """Let the faces of the first `n` of `dirty`, tetrahedra that were cut, count as new."""
+    forget_cells(flanks)
     for i in range(n):
         for f in range(4):
             flanks.place[4 * dirty[i] + f] = -1
@@ -92,13 +96,53 @@ def find_faces(
     Where there is none the old faces stay as they were.
     """
     low, high = blade_box(flanks, edge, when, margin)
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    if _are_other_cells(flanks.searched, grid, low, high):
+        flanks.searched[N_AROUND] = _open_faces(flanks, body, visits, grid)
+    if flanks.searched[N_AROUND] < 0:
+        return False
     frame = blade_frame(edge, when)
     n = 0
-    for i in range(cell_along(grid, low.x, 0), cell_along(grid, high.x, 0) + 1):
-        for j in range(cell_along(grid, low.y, 1), cell_along(grid, high.y, 1) + 1):
-            for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):
+    for i in range(flanks.searched[N_AROUND]):
+        face = flanks.around[i]
+        if _is_near(flanks, body, frame, face // 4, face % 4, margin):
+            flanks.found[n] = face
+            n += 1
+    _take_over(flanks, body, frame, n, totals)
+    return True
+
+
+@kernel
+def forget_cells(flanks: Flanks) -> None:
+    """Let the faces around the blade be looked for anew: the mesh or the grid is another."""
+    flanks.searched[N_AROUND] = -1
+
+
+@kernel
+def _are_other_cells(searched: IntArray, grid: TetrahedronGrid, low: Vec3, high: Vec3) -> bool:
+    """Write which cells the box from `low` to `high` [m] meets; return whether they were others.
+
+    Or whether they list others now. A blade goes for many steps through the same cells.
+    """
+    are_others = searched[N_AROUND] < 0
+    for c in range(3):
+        first, last = cell_along(grid, low[c], c), cell_along(grid, high[c], c)
+        are_others = are_others or searched[CELLS + c] != first or searched[CELLS + 3 + c] != last
+        searched[CELLS + c], searched[CELLS + 3 + c] = first, last
+    for k in range(len(grid.counts)):
+        are_others = are_others or searched[COUNTS + k] != grid.counts[k]
+        searched[COUNTS + k] = grid.counts[k]
+    return are_others
+
+
+@kernel
+def _open_faces(flanks: Flanks, body: Body, visits: Visits, grid: TetrahedronGrid) -> int:
+    """Write the open faces in those cells to `flanks.around`; return how many, -1 without room."""
+    visits.epoch[0] += 1
+    epoch, cells = visits.epoch[0], flanks.searched
+    n = 0
+    for i in range(cells[CELLS], cells[CELLS + 3] + 1):
+        for j in range(cells[CELLS + 1], cells[CELLS + 4] + 1):
+            for k in range(cells[CELLS + 2], cells[CELLS + 5] + 1):
                 entry = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
                 while entry >= 0:
                     t = grid.entry[entry]
@@ -107,15 +151,12 @@ def find_faces(
                         continue
                     visits.tetrahedra[t] = epoch
                     for f in range(4):
-                        if is_open(body.links[t, f]) and _is_near(
-                            flanks, body, frame, t, f, margin
-                        ):
-                            if n == len(flanks.face):
-                                return False
-                            flanks.found[n] = 4 * t + f
+                        if is_open(body.links[t, f]):
+                            if n == len(flanks.around):
+                                return -1
+                            flanks.around[n] = 4 * t + f
                             n += 1
-    _take_over(flanks, body, frame, n, totals)
-    return True
+    return n
 
 
 @kernel

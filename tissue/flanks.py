@@ -87,6 +87,11 @@ class Flanks(Arrays):
     """Of a face against the blade, friction too [J]; shape (capacity,)."""
     place: IntArray
     """Where each face of each tetrahedron is in these rows, or -1; shape (4 * n_tets,)."""
+    around: IntArray
+    """Open faces in the cells of the grid that the blade's box met last, shape (capacity,)."""
+    searched: IntArray
+    """How many those are, -1 where they must be looked for anew; the first and the last cell along
+    each axis; and what the grid listed then: see `flank_faces`; shape (9,)."""
     found: IntArray
     """Scratch of a search: the faces found, shape (capacity,)."""
     known_as: IntArray
@@ -116,6 +121,7 @@ def new_flanks(
         place=np.full(0 if thin else 4 * n_tetrahedra, -1, np.int64),
         outward=OUTWARD,
         count=np.zeros(1, np.int64),
+        searched=np.full(9, -1, np.int64),
         **_rows(0 if thin else 64),
     )
 
@@ -128,6 +134,7 @@ def _rows(capacity: int) -> dict[str, np.ndarray]:
         "area": np.zeros(capacity),
         "state": np.zeros((POINTS * capacity, 4)),
         "energy": np.zeros(capacity),
+        "around": np.zeros(capacity, np.int64),
         "found": np.zeros(capacity, np.int64),
         "known_as": np.zeros(capacity, np.int64),
         "before": np.zeros((POINTS * capacity, 4)),

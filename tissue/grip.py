@@ -12,7 +12,13 @@ from tissue.anchors import (
 from tissue.blade_shape import BladeShape
 from tissue.body import NODES, Body
 from tissue.cut import N_DIRTY, Change
-from tissue.flank_faces import blade_box, find_faces, forget_changed_faces, forget_faces
+from tissue.flank_faces import (
+    blade_box,
+    find_faces,
+    forget_cells,
+    forget_changed_faces,
+    forget_faces,
+)
 from tissue.flanks import grown_flanks, new_flanks, with_more_rows
 from tissue.holding import any_free_in_box, let_go, meet, seize
 from tissue.material import Material
@@ -210,6 +216,7 @@ class Grip:
             forget_moved(moved)
         if not has_room:
             self._grid = build_grid(body, body.positions, GRID_MARGIN * self._node_size)
+            forget_cells(self.tool.flanks)
 
 
 def _per_second(dt: float) -> float:

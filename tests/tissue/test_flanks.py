@@ -11,7 +11,7 @@ from tissue.anchors import (
 )
 from tissue.blade_shape import BladeShape
 from tissue.body import build_body
-from tissue.flank_faces import find_faces, forget_faces
+from tissue.flank_faces import find_faces, forget_cells, forget_faces
 from tissue.flanks import (
     POINTS,
     add_flank_stiffness,
@@ -67,6 +67,10 @@ class Pressed:
 
     def find(self, edge, margin=2e-3):
         tetrahedra = build_grid(self.body, self.body.positions, 0.0)
+        forget_cells(self.flanks)
+        self.look(tetrahedra, edge, margin)
+
+    def look(self, tetrahedra, edge, margin=2e-3):
         where = (self.body, self.visits, tetrahedra, edge, 1.0, margin, self.totals)
         while not find_faces(self.flanks, *where):
             self.flanks = with_more_rows(self.flanks)
@@ -257,3 +261,20 @@ def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
 def test_a_blade_that_cannot_be_is_refused_by_name(wrong, why):
     with pytest.raises(ValueError, match=why):
         BladeShape(**wrong)
+
+
+def test_a_blade_that_stays_in_its_cells_finds_what_a_search_anew_would():
+    """To and fro by less than a cell, into another one, and away."""
+    pressed = Pressed()
+    kept = build_grid(pressed.body, pressed.body.positions, 0.5e-3)
+    numbers = []
+    for x in (0.0115, 0.0113, 0.0109, 0.0131, 0.0045, 0.0115):
+        faces = []
+        for anew in (False, True):
+            if anew:
+                forget_cells(pressed.flanks)
+            pressed.look(kept, edge_at(x))
+            faces.append(pressed.flanks.face[: pressed.flanks.count[0]].tolist())
+        assert faces[0] == faces[1]
+        numbers.append(len(faces[0]))
+    assert 0 < numbers.count(0) < len(numbers)
