@@ -21,7 +21,7 @@ from tissue.geometry import (
 )
 from tissue.jit import kernel
 from tissue.resistance import Resistance, toughness_at
-from tissue.tally import new_totals, push_blade, push_node
+from tissue.tally import keep_tally, new_totals, push_blade, push_node, tally_of
 from tissue.types import BoolArray, FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
 
@@ -229,7 +229,7 @@ def pull(
     """
     n = len(anchors.state)
     seconds = share * dt
-    totals = anchors.totals
+    tally = tally_of(anchors.totals)
     turning = turning_at(edge, when)
     frame = turning.now
     for k in range(n):
@@ -243,11 +243,12 @@ def pull(
         force = scale(anchors.stiffness[k], sub(d, surplus))
         for q in range(4):
             node = body.tetrahedra[anchors.tetrahedron[k], q]
-            push_node(external, totals, node, anchors.weights[k, q], force, seconds)
+            tally = push_node(external, tally, node, anchors.weights[k, q], force, seconds)
         # The surplus is about to slip and holds nothing: without it the force points along the way
         # from anchor to blade, so that the torques on the two cancel as well.
         at = sub(b, surplus)
-        push_blade(totals, at, force, travel_of(edge, turning, at), share, seconds)
+        tally = push_blade(tally, at, force, travel_of(edge, turning, at), share, seconds)
+    keep_tally(anchors.totals, tally)
 
 
 @kernel
@@ -330,6 +331,10 @@ def anchored_length(anchors: Anchors) -> float:
     return length
 
 
+@kernel
 def is_engaged(anchors: Anchors) -> bool:
     """Whether any sample is in the tissue, pulling or backed off."""
-    return bool(anchors.state.any())  # FREE is 0
+    engaged = False
+    for k in range(len(anchors.state)):
+        engaged = engaged or anchors.state[k] != FREE
+    return engaged

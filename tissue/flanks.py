@@ -33,8 +33,10 @@ from tissue.material import Material
 from tissue.surface import OUTWARD
 from tissue.tally import (
     WORK_OF_FRICTION,
+    keep_tally,
     push_blade,
     push_node,
+    tally_of,
 )
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, add, axpy, dot, lerp, scale, sub, vec3
@@ -52,6 +54,9 @@ CORNER, OTHER = 2.0 / 3.0, 1.0 / 6.0
 LATE, STUCK_ALONG, STUCK_BEHIND, SPEED = 0, 1, 2, 3
 """Places in `Flanks.state`: by how much the bevel begins late [m]; where on the blade friction
 would be zero [m], two of them; and how fast the point slid last [m/s]."""
+
+CLEAR = 1e-9
+"""[m] beyond the thickness of the blade from which a face is not looked at: above any rounding."""
 
 END_SLOPE = 0.5
 """Of the blade's back and ends against its plane. Steeper ends would let go of the tissue within
@@ -238,7 +243,10 @@ def press_flanks(
     frame = blade_frame(edge, when)
     turning = turning_at(edge, when)
     seconds = share * dt
+    tally = tally_of(totals)
     for i in range(flanks.count[0]):
+        if _is_clear(flanks, frame, positions, i):
+            continue
         for q in range(POINTS):
             p = face_point(flanks, positions, i, q)
             at = in_blade(frame, p)
@@ -247,8 +255,27 @@ def press_flanks(
                 continue
             for corner in range(3):
                 w = CORNER if corner == q else OTHER
-                push_node(external, totals, flanks.node[i, corner], w, force, seconds)
-            push_blade(totals, p, force, travel_of(edge, turning, p), share, seconds)
+                tally = push_node(external, tally, flanks.node[i, corner], w, force, seconds)
+            tally = push_blade(tally, p, force, travel_of(edge, turning, p), share, seconds)
+    keep_tally(totals, tally)
+
+
+@kernel
+def _is_clear(
+    flanks: Flanks,
+    frame: tuple[Vec3, Vec3, Vec3, Vec3, float],
+    positions: FloatArray,
+    i: int,
+) -> bool:
+    """Whether a face is farther from the plane of the blade than the blade is thick anywhere."""
+    tip, _, _, normal, _ = frame
+    side = flanks.side[i]
+    reach = side * dot(tip, normal) + flanks.half_thickness + CLEAR
+    return (
+        side * dot(vec3(positions, flanks.node[i, 0]), normal) > reach
+        and side * dot(vec3(positions, flanks.node[i, 1]), normal) > reach
+        and side * dot(vec3(positions, flanks.node[i, 2]), normal) > reach
+    )
 
 
 @kernel

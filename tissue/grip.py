@@ -20,7 +20,7 @@ from tissue.flank_faces import (
     forget_faces,
 )
 from tissue.flanks import grown_flanks, new_flanks, with_more_rows
-from tissue.holding import any_free_in_box, let_go, meet, seize
+from tissue.holding import hold_on, meet
 from tissue.material import Material
 from tissue.path import Path
 from tissue.relaxation.moved import N_MOVED, Moved, forget_moved
@@ -163,9 +163,8 @@ class Grip:
         `tissue.slit.in_slit`.
         """
         anchors, far = self.tool.anchors, FURTHEST_HOLD * self._node_size
-        let_go(anchors, body, visits, path, edge, when, self._queue)
-        seize(anchors, body, visits, edge, when, far, self.tool.resistance, self._queue)
-        if any_free_in_box(anchors, edge, when, box.low, box.high):
+        around = (far, self.tool.resistance, box.low, box.high, self._queue)
+        if hold_on(anchors, body, visits, path, edge, when, *around):
             self._list_tetrahedra(body, visits, moved)
             meet(anchors, body, self._grid, edge, when, reach, box.low, box.high)
 

@@ -83,6 +83,30 @@ def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
 
 
 @kernel
+def hold_on(
+    anchors: Anchors,
+    body: Body,
+    visits: Visits,
+    path: Path,
+    edge: Edge,
+    when: float,
+    far: float,
+    resistance: Resistance,
+    low: Vec3,
+    high: Vec3,
+    queue: IntArray,
+) -> bool:
+    """Let go and seize; return whether a free sample is in the box of the tissue and may `meet` it.
+
+    The tissue lies between `low` and `high` [m]. One call in place of three, which would take
+    longer to make than the work in them.
+    """
+    let_go(anchors, body, visits, path, edge, when, queue)
+    seize(anchors, body, visits, edge, when, far, resistance, queue)
+    return any_free_in_box(anchors, edge, when, low, high)
+
+
+@kernel
 def seize(
     anchors: Anchors,
     body: Body,

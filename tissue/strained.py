@@ -60,10 +60,12 @@ def strain_frequencies(
     bound_both_frequencies(elastic, nodes, n)
     for i in range(n):
         node = nodes[i]
-        growth = 1.0
-        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            growth = max(growth, solid.growth[solid.around[slot]])
-        elastic.frequency_squared[node] += (growth - 1.0) * solid.frequency_squared[node]
+        growth = lanes(1.0)
+        first = solid.first[node]
+        for slot in range(first, first + solid.count[node], WIDTH):
+            growth = larger(growth, gathered(solid.growth, solid.around, slot))
+        more = largest(growth) - 1.0
+        elastic.frequency_squared[node] += more * solid.frequency_squared[node]
 
 
 @inlined
