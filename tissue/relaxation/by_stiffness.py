@@ -27,7 +27,7 @@ from tissue.relaxation.levels import (
     find_zone,
     plan,
 )
-from tissue.relaxation.local_time_stepping import grown_zone, macro_step, new_zone
+from tissue.relaxation.local_time_stepping import grown_zone, macro_steps, new_zone
 from tissue.relaxation.motion import Motion, end_step
 from tissue.relaxation.moved import N_MOVED, Moved, grown_moved, none_moved, note_moved
 from tissue.relaxation.options import LocalTimeStepping
@@ -88,30 +88,38 @@ class ByStiffness:
         n, p = self._divide(motion)
         share = (motion.end - motion.begin) / n
         coefficients = chebyshev(p, self._options.stabilisation)
-        for i in range(n):
-            at = motion.begin + i * share
+        done = 0
+        while done < n:
             self._prepare(motion)
             self._renew_patch(motion)
-            macro_step(
+            done = macro_steps(
                 body,
                 elastic,
                 motion.tool,
                 motion.edge,
+                motion.visits,
                 activity,
                 self._listed,
                 zone,
                 coefficients,
                 motion.stages.external,
                 motion.surroundings,
+                motion.reach,
+                motion.queue,
                 motion.dt,
-                at,
+                motion.begin,
                 share,
                 0.5 if self._starts else 1.0,
+                done,
+                # What touches is set right, and what has begun to move kicked, after each step.
+                done + 1 if contact.is_awake or self._starts else n,
+                not contact.is_awake,
             )
             self._starts = False
-            end_step(motion, share * motion.dt, at + share)
-            wake_pulled(activity, body, elastic.springs, zone.accelerations)
             if contact.is_awake:
+                at = motion.begin + (done - 1) * share
+                end_step(motion, share * motion.dt, at + share)
+                wake_pulled(activity, body, elastic.springs, zone.accelerations)
                 wake_touching(activity, body, elastic.springs, contact.arrays.contacts)
         note_moved(self._moved, activity.listed, self.n_awake)
         if self._options.sleep:

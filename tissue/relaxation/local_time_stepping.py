@@ -30,7 +30,7 @@ from tissue.arrays import Arrays
 from tissue.body import Body, grown
 from tissue.elastic import Elastic, Surroundings, internal_force
 from tissue.jit import kernel
-from tissue.relaxation.activity import AWAKE, N_LISTED, Activity
+from tissue.relaxation.activity import AWAKE, N_LISTED, VERSION, Activity, wake_pulled
 from tissue.relaxation.breadth_first import (
     N_FOUND,
     UNREACHED,
@@ -44,7 +44,8 @@ from tissue.relaxation.patches import Patch, deform_patch, new_patch
 from tissue.simd import Point, point, point_of, store_point, times
 from tissue.spring_forces import damping_force
 from tissue.springs import Springs
-from tissue.tool import Tool, act, clear_tool
+from tissue.star import Visits
+from tissue.tool import Tool, act, clear_tool, give_way
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import axpy, dot, scale, store, sub, vec3
 
@@ -90,6 +91,62 @@ def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
     larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
     patch = new_patch(n_nodes, n_tetrahedra)
     return zone.replaced(rings=grown_rings(zone.rings, n_nodes), patch=patch, **larger)
+
+
+@kernel
+def macro_steps(
+    body: Body,
+    elastic: Elastic,
+    tool: Tool,
+    edge: Edge,
+    visits: Visits,
+    activity: Activity,
+    listed: Patch,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    surroundings: Surroundings,
+    reach: float,
+    queue: IntArray,
+    dt: float,
+    begin: float,
+    share: float,
+    kick: float,
+    first: int,
+    end: int,
+    is_free: bool,
+) -> int:
+    """Take macro steps from `first` to before `end`; return the next one.
+
+    Where nothing touches (`is_free`), what the blade does not hold gives way after each, and what
+    is pulled wakes: `listed` must then be found anew before another step. `visits`, `reach` and
+    `queue`: see `tissue.tool.give_way`; the rest: see `macro_step`.
+    """
+    version = activity.counts[VERSION]
+    for i in range(first, end):
+        at = begin + i * share
+        macro_step(
+            body,
+            elastic,
+            tool,
+            edge,
+            activity,
+            listed,
+            zone,
+            chebyshev,
+            external,
+            surroundings,
+            dt,
+            at,
+            share,
+            kick,
+        )
+        if is_free:
+            give_way(tool, body, visits, edge, external, at + share, share * dt, reach, queue)
+            wake_pulled(activity, body, elastic.springs, zone.accelerations)
+            if activity.counts[VERSION] != version:
+                return i + 1
+    return end
 
 
 @kernel
