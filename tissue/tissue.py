@@ -40,7 +40,7 @@ from tissue.quality import CutQuality, Measures, QualityReport
 from tissue.relaxation.all_together import AllTogether
 from tissue.relaxation.choice import relaxation_of
 from tissue.relaxation.motion import Motion
-from tissue.relaxation.options import Relaxing, checked_relaxation
+from tissue.relaxation.options import LocalTimeStepping, Relaxing, checked_relaxation
 from tissue.relaxation.settling import settle
 from tissue.runge_kutta import new_stages
 from tissue.scheme import Scheme, checked_scheme
@@ -178,7 +178,8 @@ class Tissue:
         self._is_open = False
         self._calm = 0.0
 
-        self._elasticity = Elasticity(self.material, self._body, self._visits)
+        is_local = isinstance(relaxing, LocalTimeStepping)
+        self._elasticity = Elasticity(self.material, self._body, self._visits, is_tight=is_local)
         self.node_size = mean_node_size(self._body, self._visits, self._around)
         self._grip = Grip(blade, self.material, self.node_size, n_tetrahedra)
         warn_of_toughness(self.material, self.node_size)

@@ -78,7 +78,8 @@ def test_the_stages_of_a_frame_take_no_longer_than_the_frame():
     assert (stages <= rows.column("frame_s")).all()
     assert (rows.column("rd_s") > 0.0).all()
     in_all = rows.column("frame_s").sum() + rows.column("rd_s").sum()
-    assert in_all == pytest.approx(simulation.wall_seconds, rel=0.1)
+    # What is left is the recording itself: a tenth of a frame of so small a body.
+    assert 0.75 * simulation.wall_seconds < in_all <= simulation.wall_seconds
 
 
 def test_there_is_no_result_before_the_first_frame():

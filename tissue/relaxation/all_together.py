@@ -7,7 +7,7 @@ from tissue.elasticity import Elasticity
 from tissue.relaxation.audited import Audited
 from tissue.relaxation.motion import Motion
 from tissue.relaxation.threads import Threads
-from tissue.runge_kutta import relax
+from tissue.runge_kutta import SAFETY, relax
 from tissue.tool import frequency_with_tool
 from tissue.types import IntArray
 
@@ -39,7 +39,9 @@ class AllTogether:
         near = frequency_with_tool(motion.tool, motion.body, by_node, motion.stages.external)
         done = 0
         while True:
-            highest = max(elasticity.highest_frequency_squared(motion.body), near)
+            # The bound of the strained body is so wide of the truth that it needs no safety on top.
+            strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body)
+            highest = max(elasticity.frequency_squared, near, strained)
             step = elasticity.stable_step(highest, motion.surroundings)
             n = max(1, math.ceil(motion.span / step))
             if not elasticity.follows_strain or n <= STEPS_BETWEEN_LOOKS:
