@@ -162,7 +162,7 @@ def springs_as_asked(scene: Scene, body: Body) -> tuple[Scene, dict[str, Any]]:
 def load_kernels(talk: Talk) -> None:
     """Load the kernels; where they must be compiled first, say why nothing seems to happen."""
     if not talk.quiet and not kernels_are_compiled():
-        say("compiling kernels, first run only (a little over a minute)")
+        say("compiling kernels, first run only (about a minute)")
     warm_up()
 
 
