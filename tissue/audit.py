@@ -1,8 +1,6 @@
 """Where the work of the blade goes: `Audit` keeps the account of a body."""
 
-from tissue.anchors import (
-    Edge,
-)
+from tissue.anchors import Edge
 from tissue.body import Body
 from tissue.elastic import Elastic, elastic_energy
 from tissue.energies import (

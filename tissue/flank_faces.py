@@ -6,9 +6,7 @@ face that is new and already within the blade begins where it is (see `tissue.fl
 
 import numpy as np
 
-from tissue.anchors import (
-    Edge,
-)
+from tissue.anchors import Edge
 from tissue.body import Body
 from tissue.flanks import (
     LATE,
@@ -26,9 +24,7 @@ from tissue.flanks import (
 from tissue.hanging import is_open
 from tissue.jit import kernel
 from tissue.star import Visits
-from tissue.tally import (
-    RELEASED,
-)
+from tissue.tally import RELEASED
 from tissue.tetrahedron_grid import TetrahedronGrid, cell_along
 from tissue.types import FloatArray, IntArray
 from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3

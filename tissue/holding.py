@@ -24,9 +24,7 @@ from tissue.rotation import mean_rotation, turned_back
 from tissue.slipping import find, put
 from tissue.slit import behind_edge, in_slit
 from tissue.star import Visits
-from tissue.tally import (
-    RELEASED,
-)
+from tissue.tally import RELEASED
 from tissue.tetrahedron_grid import TetrahedronGrid, tetrahedron_at
 from tissue.types import IntArray
 from tissue.vec3 import Vec3, add, norm, sub, vec3

@@ -6,9 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from tissue.anchors import (
-    Edge,
-)
+from tissue.anchors import Edge
 from tissue.blade_shape import BladeShape
 from tissue.body import build_body
 from tissue.flank_faces import find_faces, forget_cells, forget_faces
