@@ -5,7 +5,7 @@
 writes `mesh_study.md` and `mesh_study.png`. A square bar, 8 times as long as thick, of n cells
 through its thickness (Kuhn's six tetrahedra each), is clamped at one end. Its sag is that under its
 own weight. Everything is at small strain and follows from the stiffness matrix of
-`tissue.stiffness`, which a test holds against the forces that the engine computes
+`tissue.elasticity.stiffness_matrix`, which a test holds against the forces that the engine computes
 (tests/test_mechanics.py).
 """
 
@@ -20,10 +20,8 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.stiffness import masses, stiffness_matrix
-from tissue.types import FloatArray
+from tissue import FloatArray, Material, block
+from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
 SLENDERNESS = 8
 """Length over thickness."""
@@ -82,7 +80,7 @@ class Bar:
         self.material = model.material
         self.thickness = thickness
         self.length = SLENDERNESS * thickness
-        self.mesh = grid((SLENDERNESS * n, n, n), (self.length, thickness, thickness))
+        self.mesh = block((SLENDERNESS * n, n, n), (self.length, thickness, thickness))
         x = self.mesh.positions[:, 0]
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
@@ -276,7 +274,7 @@ on to elements of no size, with an error that falls as the square of their size.
 
 - **Springs** converge too, but to a material of their own: on this mesh of cells, Young's modulus
   1.03 of what was asked for, Poisson's ratio 0.03, and half the shear modulus along the axes, which
-  torsion feels. `--spring-error` and `tissue.calibration` tell it for any mesh.
+  torsion feels. `--spring-error` and `tissue.elasticity.spring_calibration` tell it for any mesh.
 - **Plain** linear tetrahedra lock, the more the less compressible they are. The engine does not use
   them: it averages the dilatation over nodes, and Poisson's ratio hardly matters any more. What is
   left is how stiff linear tetrahedra are in bending.

@@ -19,7 +19,7 @@ from rich.table import Table
 from tests import bodies, incisions, judged
 from tests.incisions import Incision
 from tests.judged import Verdict
-from tissue.types import TetrahedralMesh
+from tissue import TetrahedralMesh
 
 KINDS = (*incisions.KINDS, "two that cross", "three planes")
 

@@ -16,11 +16,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.body import make_tissue
-from scalpel_sim.scenes import SCENES
-from tissue.relaxation.options import BY_NAME
-from tissue.tissue import Tissue, TissueError
-from tissue.types import BladeSegment, BladeSweep
+from scalpel_sim import SCENES
+from scalpel_sim.scene_body import make_tissue
+from tissue import BladeSegment, BladeSweep, Tissue, TissueError
+from tissue.integrators.options import BY_NAME
 
 DT = 1e-3
 """[s]."""

@@ -16,12 +16,8 @@ from contextlib import closing
 
 import numpy as np
 
-from bridge.link import InProcessLink, TissueLink
-from bridge.server import serve
-from bridge.tcp import TcpLink
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, FloatArray
+from bridge import InProcessLink, TcpLink, TissueLink, serve
+from tissue import BladeSegment, BladeSweep, FloatArray, Tissue, block
 
 DT = 1e-4
 """[s]. One Runge-Kutta step of the cell."""
@@ -77,7 +73,7 @@ def main() -> None:
 
 def cell() -> Tissue:
     """Return one cell of six tetrahedra, held by its lowest nodes, at rest."""
-    mesh = grid((1, 1, 1), (SIDE, SIDE, SIDE))
+    mesh = block((1, 1, 1), (SIDE, SIDE, SIDE))
     return Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0, gravity=(0.0, 0.0, 0.0))
 
 

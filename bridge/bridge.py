@@ -5,19 +5,19 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bridge.broad_phase import BroadPhase
+from bridge.collision.broad_phase import BroadPhase
+from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
-from bridge.coupling import Coupling, CouplingError, DeviceLimits
-from bridge.fixtures import Fixture
+from bridge.coupling.coupling import Coupling, CouplingError, DeviceLimits
+from bridge.coupling.impulse import ImpulseDebt
+from bridge.coupling.local_model import MOST_FRAMES_PER_ANSWER, LocalModel
+from bridge.coupling.passivity import Travel
+from bridge.coupling.query import Answer, Inquiry, Leg
+from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
-from bridge.impulse import ImpulseDebt
-from bridge.inquiry import Answer, Inquiry, Leg
 from bridge.link import TissueLink
-from bridge.local_model import MOST_FRAMES_PER_ANSWER, LocalModel
-from bridge.passivity import Travel
 from bridge.poses import check_pose, half_length, motion
-from bridge.virtual_coupling import Proxy, VirtualCoupling
-from tissue.types import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
+from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
 
 
 class Bridge:

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from bridge.passivity import PassivityCounters
+from bridge.coupling.passivity import PassivityCounters
 
 
 class Counters(NamedTuple):

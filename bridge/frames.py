@@ -4,9 +4,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from bridge.checks import finite, rotation
-from bridge.fixtures import Fixture, FixtureBox
-from tissue.types import BladeSegment, FloatArray, Wrench
+from bridge.collision.fixtures import Fixture, FixtureBox
+from bridge.input_checks import finite, rotation
+from tissue import BladeSegment, FloatArray, Wrench
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from tissue.blade_shape import BladeShape
-from tissue.material import Material
-from tissue.quality import QualityReport
-from tissue.types import BladeSweep, Chunks, FloatArray, Snapshot, StepResult, Surface
+from tissue import (
+    BladeShape,
+    BladeSweep,
+    Chunks,
+    CutReport,
+    FloatArray,
+    Material,
+    Snapshot,
+    StepResult,
+    Surface,
+)
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
-    from tissue.tissue import Tissue
+    from tissue import Tissue
 
 
 class LinkError(ConnectionError):
@@ -56,9 +63,9 @@ class TissueLink(Protocol):
         """Return the boundary triangles, for a picture."""
 
     def n_pieces(self) -> int:
-        """Return the number of connected pieces; `tissue.pieces.pieces_of` tells more."""
+        """Return the number of connected pieces; `tissue.mesh.pieces.pieces_of` tells more."""
 
-    def quality(self) -> QualityReport:
+    def quality(self) -> CutReport:
         """Return the path error of the cuts so far, and what they did to elements and time step."""
 
     def close(self) -> None:
@@ -104,7 +111,7 @@ class InProcessLink:
         """See `TissueLink.n_pieces`."""
         return self._tissue.n_pieces()
 
-    def quality(self) -> QualityReport:
+    def quality(self) -> CutReport:
         """See `TissueLink.quality`."""
         return self._tissue.quality()
 

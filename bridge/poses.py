@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tissue.types import BladeSegment, FloatArray
+from tissue import BladeSegment, FloatArray
 
 SHORTEST_EDGE = 1e-6
 """[m]. A shorter cutting edge has no direction that a swept box could be aligned with."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tissue.types import FloatArray, Wrench
+from tissue import FloatArray, Wrench
 
 ORIGIN = np.zeros(3)
 

@@ -1,1 +1,9 @@
-"""A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it. World frame."""
+"""A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it. World frame.
+
+The public names are those that `__init__.pyi` lists. Each is loaded when it is first used, so that
+`import scalpel_sim` alone loads no compiler.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,16 +4,16 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from bridge.link import LinkError
-from scalpel_sim import outputs as files
+from bridge import LinkError
 from scalpel_sim.errors import Interrupted, RunError, one_line
-from scalpel_sim.outputs import Outputs
-from scalpel_sim.pictures import add_to, into_replay
-from scalpel_sim.replay import ReplayWriter
+from scalpel_sim.output import run_folder as files
+from scalpel_sim.output.run_folder import Outputs
+from scalpel_sim.output.summary import COMPLETE, Summary, summarise
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
-from scalpel_sim.summary import COMPLETE, Summary, summarise
-from tissue.pieces import pieces_of
+from scalpel_sim.viewer.pictures import add_to, into_replay
+from scalpel_sim.viewer.replay import ReplayWriter
+from tissue.mesh.pieces import pieces_of
 
 log = logging.getLogger(__name__)
 

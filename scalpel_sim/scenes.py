@@ -7,25 +7,27 @@ from typing import Any
 
 import numpy as np
 
-from bridge.link import TissueLink
-from bridge.local_model import MOST_FRAMES_PER_ANSWER
-from bridge.virtual_coupling import VirtualCoupling
+from bridge import TissueLink, VirtualCoupling
+from bridge.coupling.local_model import MOST_FRAMES_PER_ANSWER
+from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.errors import UsageError, unknown
-from scalpel_sim.planning import STROKES
-from scalpel_sim.scalpel import SCALPEL
-from scalpel_sim.stroke import Stroke, from_csv
-from tissue.blade_shape import BladeShape
-from tissue.border import checked_threads
-from tissue.material import Material
-from tissue.mesh_io import read_mesh
-from tissue.presets import PRESETS
-from tissue.quality import CutQuality
-from tissue.relaxation.options import BY_NAME
-from tissue.shapes import grid, organ
-from tissue.types import TetrahedralMesh
+from scalpel_sim.strokes.planning import STROKES
+from scalpel_sim.strokes.stroke import Stroke, from_csv
+from tissue import (
+    MATERIALS,
+    BladeShape,
+    CutSettings,
+    Material,
+    TetrahedralMesh,
+    block,
+    liver_lobe,
+    read_mesh,
+)
+from tissue.input_checks import checked_threads
+from tissue.integrators.options import BY_NAME
 
 SCHEMES = ("stellar", "paper")
-"""As `tissue.scheme` has them, which is not imported here: it takes the compiler along."""
+"""As `tissue.cutting.scheme` has them, which is not imported here: it takes the compiler along."""
 
 COUPLINGS = ("rigid", "virtual")
 
@@ -35,18 +37,18 @@ PHANTOM = Material(
     young_modulus=10e3,
     density=1000.0,
     toughness=20.0,
-    blade_friction=PRESETS["gelatin"].blade_friction.value,
+    blade_friction=MATERIALS["gelatin"].blade_friction.value,
 )
 """A soft gel phantom. toughness / young_modulus = 2 mm: the length by which the blade drags the
 tissue along before the tissue parts. It must be small against the body, or the blade draws the
 body after itself instead of cutting it."""
 
-PARENCHYMA = replace(PRESETS["liver"].material, toughness=10.0)
+PARENCHYMA = replace(MATERIALS["liver"].material, toughness=10.0)
 """A liver in all but its toughness, which is well below the 164 J/m2 of liver with its vessels: so
 that toughness / young_modulus is 2 mm here too, and one stroke goes through. With that of liver the
 blade would drag it along by 35 mm first (`--material liver`)."""
 
-AS_USUAL = CutQuality()
+AS_USUAL = CutSettings()
 """How closely cuts follow the blade, unless it is said otherwise."""
 
 STANDARD_GRAVITY = 9.81
@@ -91,8 +93,9 @@ class Scene:
     mesh: Callable[[], TetrahedralMesh]
     material: Material = PHANTOM
     fixed: str = "left,right"
-    """Which nodes do not move: names of sides, a box, or `none`; see `tissue.boundary`."""
-    quality: CutQuality = AS_USUAL
+    """Which nodes do not move: names of sides, a box, or `none`; see
+    `tissue.boundary_conditions`."""
+    quality: CutSettings = AS_USUAL
     """How closely cuts follow the blade, against how small the elements get."""
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
@@ -112,7 +115,7 @@ class Scene:
     audit: bool = False
     """Whether an account of the energy is kept. Frames take a fifth to a third longer."""
     stroke: str = "straight"
-    """A name known to `scalpel_sim.stroke`, or a CSV file."""
+    """A name known to `scalpel_sim.strokes.stroke`, or a CSV file."""
     speed: float = 0.06
     """Of the blade's tip [m/s]."""
     arm: str = "auto"
@@ -191,25 +194,25 @@ SCENES = {
         Scene(
             "organ",
             "an organ of some 5,000 tetrahedra, 90 x 60 x 30 mm",
-            organ,
+            liver_lobe,
             material=PARENCHYMA,
         ),
         Scene(
             "slab",
             "the paper's Figure 10: 4 x 6 x 4 cells, 576 tetrahedra",
-            lambda: grid((4, 6, 4), (0.04, 0.06, 0.04)),
+            lambda: block((4, 6, 4), (0.04, 0.06, 0.04)),
             blade=None,
         ),
         Scene(
             "grid2",
             "the paper's Figure 12 a: 2 x 2 x 2 cells, 48 tetrahedra",
-            lambda: grid((2, 2, 2), (0.04, 0.04, 0.04)),
+            lambda: block((2, 2, 2), (0.04, 0.04, 0.04)),
             blade=None,
         ),
         Scene(
             "grid7",
             "the paper's Figure 12 b: 7 x 7 x 7 cells, 2,058 tetrahedra",
-            lambda: grid((7, 7, 7), (0.04, 0.04, 0.04)),
+            lambda: block((7, 7, 7), (0.04, 0.04, 0.04)),
             blade=None,
         ),
     )
@@ -236,9 +239,9 @@ def material_called(name: str) -> Material:
     Raises:
         UsageError: there is none; the message says which there are.
     """
-    if name not in PRESETS:
-        raise unknown("material", name, PRESETS)
-    return PRESETS[name].material
+    if name not in MATERIALS:
+        raise unknown("material", name, MATERIALS)
+    return MATERIALS[name].material
 
 
 def mesh_scene(path: Path, scale: float = 1.0) -> Scene:

@@ -7,21 +7,17 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from bridge.bridge import Bridge
-from bridge.fixtures import Fixture
-from bridge.frames import TissueFrame
-from bridge.link import TissueLink
-from bridge.virtual_coupling import VirtualCoupling
-from scalpel_sim.arm import Arm
-from scalpel_sim.frame_row import row_of
-from scalpel_sim.recording import Recording
-from scalpel_sim.stroke import Stroke
-from scalpel_sim.touching import Touching
-from tissue.types import BladeSegment, Profile, StepResult, Wrench
+from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.collision_monitor import Touching
+from scalpel_sim.output.frame_row import row_of
+from scalpel_sim.output.recording import Recording
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
 
-AT_REST = Profile(0.0, 0.0, 0.0)
+AT_REST = StageTimes(0.0, 0.0, 0.0)
 """Of a frame in which the tissue was not asked."""
 
 EveryFrame = Callable[["Simulation"], bool | None]

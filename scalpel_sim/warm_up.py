@@ -7,12 +7,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tissue.blade_shape import BladeShape
-from tissue.boundary import fixed_nodes
-from tissue.jit import cache_directory
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
+from tissue import BladeSegment, BladeShape, BladeSweep, TetrahedralMesh, Tissue, block, fixed_nodes
+from tissue.core.jit import cache_directory
 
 SIDE = 0.02
 """Of the block that is cut [m]."""
@@ -31,7 +27,7 @@ def warm_up() -> None:
     A small block is settled, cut half through and looked at: the run that follows does nothing
     that this did not do.
     """
-    mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
+    mesh = block((2, 2, 2), (SIDE, SIDE, SIDE))
     if not kernels_are_compiled():
         with _motion_compiled_beside():
             places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
@@ -53,7 +49,7 @@ def warm_up() -> None:
 
 def move_two_pieces() -> None:
     """Let two pieces fall for a step, which may touch: forces, steps and contact."""
-    mesh = grid((2, 2, 2), (SIDE, SIDE, SIDE))
+    mesh = block((2, 2, 2), (SIDE, SIDE, SIDE))
     apart = np.vstack([mesh.positions, mesh.positions + 2.0 * SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
     Tissue(TetrahedralMesh(apart, both)).step(None, DT)

@@ -6,10 +6,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import Delaunay
 
-from tissue.mesh_io import read_mesh
-from tissue.shapes import grid
-from tissue.types import BoolArray, FloatArray, TetrahedralMesh
-from tissue.validation import checked, quality
+from tissue import BoolArray, FloatArray, TetrahedralMesh, block, read_mesh
+from tissue.mesh.validation import checked, quality
 
 FLAT = 1e-9
 """Quality of a tetrahedron that Delaunay makes of four points on the side of a box, at most."""
@@ -53,7 +51,7 @@ def jittered(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
     """
     random = np.random.default_rng(seed)
     while True:
-        lattice = grid((n, n, n), (size, size, size)).positions
+        lattice = block((n, n, n), (size, size, size)).positions
         spacing = size / n
         shift = random.uniform(-0.3, 0.3, lattice.shape) * spacing
         on_side = (lattice < 0.5 * spacing) | (lattice > size - 0.5 * spacing)
@@ -90,7 +88,7 @@ def jittered_grid(n: int, seed: int, size: float = 0.04, shift: float = 0.15) ->
         size: Edge of the box [m].
         shift: Of each coordinate at most, in cells.
     """
-    mesh = grid((n, n, n), (size, size, size))
+    mesh = block((n, n, n), (size, size, size))
     x = mesh.positions
     inner = ((x > 1e-6 * size) & (x < (1.0 - 1e-6) * size)).all(axis=1)
     random = np.random.default_rng(seed)
@@ -104,7 +102,7 @@ def body_centred(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
     No dihedral angle is less than 10 degrees: what a mesh generator makes.
     """
     random = np.random.default_rng(seed)
-    corners = grid((n, n, n), (size, size, size)).positions
+    corners = block((n, n, n), (size, size, size)).positions
     centres = (np.indices((n, n, n)).reshape(3, -1).T + 0.5) * size / n
     points = np.vstack([corners, centres])
     inner = ((points > 1e-6 * size) & (points < (1.0 - 1e-6) * size)).all(axis=1)
@@ -118,7 +116,7 @@ def body_centred(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
 def with_slivers(n: int, seed: int, size: float = 0.05) -> TetrahedralMesh:
     """Return a Delaunay mesh of a box whose flattest dihedral angle is 2 to 4 degrees."""
     random = np.random.default_rng(seed)
-    x = grid((n, n, n), (size, size, size)).positions
+    x = block((n, n, n), (size, size, size)).positions
     inside = (x > 1e-6 * size) & (x < (1.0 - 1e-6) * size)
     while True:
         shifts = random.uniform(-0.25, 0.25, x.shape) * size / n

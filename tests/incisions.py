@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tests.strokes import Stroke, pose
-from tissue.types import FloatArray, TetrahedralMesh
+from tissue import FloatArray, TetrahedralMesh
 
 N_PLACES = 60
 """Places of the edge on its way through the body; those of a curve are chords of it."""

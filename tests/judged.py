@@ -7,11 +7,10 @@ import numpy as np
 
 from tests import incisions, soundness, strokes
 from tests.incisions import Incision
-from tissue.body import Body
-from tissue.path import Path
-from tissue.star import Visits
-from tissue.tissue import Tissue
-from tissue.types import FloatArray, Snapshot, TetrahedralMesh
+from tissue import FloatArray, Snapshot, TetrahedralMesh, Tissue
+from tissue.cutting.blade_path import Path
+from tissue.mesh.body import Body
+from tissue.mesh.star import Visits
 
 
 class WatchedTissue(Tissue):

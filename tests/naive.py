@@ -5,8 +5,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from tissue.body import OUTER
-from tissue.types import FloatArray, IntArray
+from tissue import FloatArray, IntArray
+from tissue.mesh.body import OUTER
 
 
 def determinant(a, b, c, d) -> int:

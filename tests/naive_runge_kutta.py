@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
 """Of positions and velocities."""

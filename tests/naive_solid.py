@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tissue.solid import Law
-from tissue.types import FloatArray, IntArray, TetrahedralMesh
+from tissue import FloatArray, IntArray, TetrahedralMesh
+from tissue.elasticity.finite_elements import Law
 
 
 def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:

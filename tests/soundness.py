@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from tissue.body import NODES, TETRAHEDRA, Body
-from tissue.types import FloatArray, IntArray, Snapshot
+from tissue import FloatArray, IntArray, Snapshot
+from tissue.mesh.body import NODES, TETRAHEDRA, Body
 
 OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 

@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, FloatArray, StepResult, TetrahedralMesh
+from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, TetrahedralMesh, Tissue
 
 DT = 1e-3
 """A frame [s]."""

@@ -7,10 +7,8 @@ import pytest
 
 from tests import bodies, strokes
 from tests.tissue.kernels_of import row, springs_of
-from tissue.elastic import elastic_energy
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
+from tissue import Material, Tissue, block
+from tissue.elasticity.internal_forces import elastic_energy
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 SLAB = (0.04, 0.08, 0.02)
@@ -65,7 +63,7 @@ def test_a_free_undamped_body_keeps_its_energy():
 
 
 def test_a_falling_body_falls_by_half_g_t_squared():
-    mesh = grid((1, 1, 1), (0.02, 0.02, 0.02))
+    mesh = block((1, 1, 1), (0.02, 0.02, 0.02))
     tissue = Tissue(mesh, Material(viscous_damping=0.0))
     for _ in range(100):
         tissue.step(None, strokes.DT)
@@ -130,7 +128,7 @@ def test_force_on_the_tissue_plus_force_on_the_blade_is_zero_in_every_frame(audi
 
 
 def test_a_blade_out_of_contact_feels_exactly_nothing():
-    mesh = grid()
+    mesh = block()
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
     beside = strokes.upright(0.2, -0.01, 0.1, -0.01, 0.05)
     for result in strokes.make(tissue, beside):
@@ -143,7 +141,7 @@ def test_a_blade_out_of_contact_feels_exactly_nothing():
 
 def test_a_press_that_does_not_cut_springs_back():
     """Half a millimetre is less than toughness over anchor stiffness: the tissue only dents."""
-    mesh = grid()
+    mesh = block()
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
     slowly = {"low": -0.01, "high": 0.05, "speed": 0.02}
     press = strokes.make(tissue, strokes.upright(0.02, -0.0002, 0.0003, **slowly))
@@ -162,7 +160,7 @@ SOLID = {"law": "neo_hookean", "poisson_ratio": 0.45}
 
 def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02, relaxation="global", **law):
     """Cut a block held at both sides; return the frames in the middle of the cut."""
-    mesh = grid(cells, SLAB)
+    mesh = block(cells, SLAB)
     tissue = Tissue(
         mesh,
         Material(toughness=toughness, **law),
@@ -254,7 +252,7 @@ def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
 
 @pytest.mark.parametrize("toughness", [5.0, 20.0])
 def test_the_work_of_cutting_is_toughness_times_the_area_cut(toughness):
-    mesh = grid((6, 12, 3), SLAB)
+    mesh = block((6, 12, 3), SLAB)
     tissue = Tissue(
         mesh, Material(toughness=toughness), fixed=bodies.sides(mesh), gravity=NO_GRAVITY
     )
@@ -278,7 +276,7 @@ def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
 
 
 def test_mass_does_not_drift_over_many_cuts():
-    mesh = grid()
+    mesh = block()
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
     before = tissue.snapshot().masses.sum()
     for at in np.linspace(0.2, 0.8, 6):

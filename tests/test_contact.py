@@ -4,15 +4,12 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
+from tissue import Material, Snapshot, TetrahedralMesh, Tissue, block
 from tissue.contact.resolve import prepare
 from tissue.contact.state import CHANGED, IS_STALE
-from tissue.elastic import elastic_energy
-from tissue.material import Material
-from tissue.pieces import piece_of_tetrahedra, pieces_of
-from tissue.shapes import grid
-from tissue.surface import OUTWARD
-from tissue.tissue import Tissue
-from tissue.types import Snapshot, TetrahedralMesh
+from tissue.elasticity.internal_forces import elastic_energy
+from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
+from tissue.mesh.surface import OUTWARD
 
 ELEMENT = 0.01
 """Edge of a cell in all bodies of these tests [m]."""
@@ -113,8 +110,8 @@ PAIRS = {
 def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pair):
     """The upper one lies on the lower; gravity is such that it weighs 1 N."""
     cells, beside = PAIRS[pair]
-    lower = grid((6, 6, 2), SLAB)
-    mesh = joined(lower, grid(cells, SLAB), (*beside, SLAB[2] + 1e-3))
+    lower = block((6, 6, 2), SLAB)
+    mesh = joined(lower, block(cells, SLAB), (*beside, SLAB[2] + 1e-3))
     weight = 1.0 / (1000.0 * np.prod(SLAB))
     # A damped body rests sooner; where it rests is the same.
     tissue = Tissue(
@@ -135,7 +132,7 @@ def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pa
 
 def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_come_to_rest():
     """A block cut in two and squeezed between its held sides."""
-    mesh = grid((6, 4, 4), (0.06, 0.04, 0.04))
+    mesh = block((6, 4, 4), (0.06, 0.04, 0.04))
     sides = bodies.sides(mesh)
     tissue = Tissue(
         mesh, Material(toughness=2.0, viscous_damping=20.0), fixed=sides, gravity=NO_GRAVITY
@@ -165,7 +162,7 @@ def test_freshly_cut_lips_that_nothing_presses_feel_nothing(until):
 
 
 def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
-    mesh = grid((4, 6, 4), (0.04, 0.06, 0.04))
+    mesh = block((4, 6, 4), (0.04, 0.06, 0.04))
     tissue = incised(mesh, 0.0207, 0.03, material=Material(viscous_damping=20.0))
     assert tissue.n_pieces() == 1
     for _ in range(200):
@@ -195,7 +192,7 @@ def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
 
 
 def test_before_the_first_cut_contact_has_nothing_to_look_at():
-    mesh = grid((4, 4, 4), (0.04,) * 3)
+    mesh = block((4, 4, 4), (0.04,) * 3)
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
     assert not tissue._contact.is_awake
     tissue.step(None, strokes.DT)
@@ -206,7 +203,7 @@ def test_before_the_first_cut_contact_has_nothing_to_look_at():
 
 def falling(height=0.02, material=None, gravity=(0.0, 0.0, -9.81), **options):
     """Return a loose block some way above a floor at 0."""
-    mesh = grid((3, 3, 2), (0.03, 0.03, 0.02))
+    mesh = block((3, 3, 2), (0.03, 0.03, 0.02))
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, height]))
     return Tissue(lifted, material, gravity=gravity, floor=0.0, **options)
 
@@ -247,7 +244,7 @@ def energy(tissue: Tissue, gravity: float = 0.0) -> float:
 @pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])
 def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(closing, young):
     """Undamped, of unlike meshes, edges and corners first, at a third of their speed of sound."""
-    first, second = grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3)
+    first, second = block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3)
     mesh = joined(first, second, (0.007, 0.004, 0.032))
     tissue = Tissue(
         mesh, Material(young, viscous_damping=0.0, retardation_time=0.0), gravity=NO_GRAVITY
@@ -281,7 +278,7 @@ def test_the_energy_of_a_block_that_bounces_never_exceeds_what_it_fell_with():
 
 def test_crossed_beams_meet_edge_on_edge():
     """Each turned on its edge, so that no node comes near a face of the other."""
-    beam = grid((6, 1, 1), (0.06, 0.01, 0.01))
+    beam = block((6, 1, 1), (0.06, 0.01, 0.01))
     c = np.sqrt(0.5)
     on_edge = (beam.positions - [0.03, 0.005, 0.005]) @ np.array(
         [[1.0, 0.0, 0.0], [0.0, c, c], [0.0, -c, c]]
@@ -303,7 +300,7 @@ def test_crossed_beams_meet_edge_on_edge():
 
 
 def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
-    mesh = grid((4, 2, 2), (0.04, 0.02, 0.02))
+    mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
     tissue = Tissue(mesh, Material(toughness=0.5), fixed=mesh.positions[:, 0] <= 0.02, floor=-0.03)
     strokes.make(tissue, strokes.straight(mesh, 0.75))
     for _ in range(1000):
@@ -317,7 +314,9 @@ def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
 
 def test_contact_gives_the_same_bits_twice():
     def run():
-        mesh = joined(grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031))
+        mesh = joined(
+            block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
+        )
         tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
         results = [tissue.step(None, strokes.DT) for _ in range(100)]
         assert results[-1].touch.n_contacts > 0
@@ -329,7 +328,9 @@ def test_contact_gives_the_same_bits_twice():
 
 def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
     def run():
-        mesh = joined(grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031))
+        mesh = joined(
+            block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
+        )
         tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
         for _ in range(60):
             tissue.step(None, strokes.DT)
@@ -343,7 +344,7 @@ def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
 
 def lying(n_steps=300):
     """Return a small block that lies on a larger one."""
-    mesh = joined(grid((3, 3, 3), (0.03,) * 3), grid((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.0301))
+    mesh = joined(block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.0301))
     material = Material(viscous_damping=20.0)
     tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] == 0.0)
     for _ in range(n_steps):
@@ -384,7 +385,7 @@ def test_contacts_of_faces_that_changed_are_sought_anew_and_the_others_last():
 
 def cut_and_dropped(n_steps: int) -> Snapshot:
     """Cut a block in two, slanting, so that one lip slides down the other on to the floor."""
-    mesh = grid((4, 2, 2), (0.04, 0.02, 0.02))
+    mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
     fixed = mesh.positions[:, 0] == 0.0
     tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.01)
     strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
@@ -406,7 +407,7 @@ def test_to_look_at_every_pair_of_the_body_in_every_step_changes_no_bit(monkeypa
 
 @pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])
 def test_a_floor_that_is_none_or_in_the_body_is_refused(floor):
-    mesh = grid((1, 1, 1), (0.01,) * 3)
+    mesh = block((1, 1, 1), (0.01,) * 3)
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, 0.01]))
     with pytest.raises(ValueError, match="floor"):
         Tissue(lifted, floor=floor)

@@ -6,19 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.planning import plan
+from scalpel_sim.strokes.planning import plan
 from tests import bodies, soundness, strokes
-from tissue.material import Material
-from tissue.mesh_io import read_mesh
-from tissue.shapes import grid, organ
-from tissue.tissue import Tissue
-from tissue.types import TetrahedralMesh
+from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe, read_mesh
 
 CUBE = (0.04, 0.04, 0.04)
 
 MESHES = {
-    "grid 2x2x2": grid((2, 2, 2), CUBE),
-    "grid 4x6x4": grid(),
+    "grid 2x2x2": block((2, 2, 2), CUBE),
+    "grid 4x6x4": block(),
     "jittered 3, 0": bodies.jittered(3, 0),
     "jittered 3, 1": bodies.jittered(3, 1),
     "jittered 4, 0": bodies.jittered(4, 0),
@@ -55,7 +51,7 @@ def test_a_stroke_through_leaves_two_sound_pieces(mesh, stroke):
 
 @pytest.mark.parametrize("stroke", strokes.THROUGH)
 def test_an_organ_falls_into_two_sound_pieces(stroke):
-    mesh = organ()
+    mesh = liver_lobe()
     tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.08))
     before = tissue.snapshot()
     strokes.make(tissue, strokes.THROUGH[stroke](mesh))
@@ -90,8 +86,8 @@ def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
 
 
 def test_the_paper_s_slab_grows_to_at_most_850_tetrahedra():
-    for stroke in (strokes.straight(grid()), strokes.slanted(grid(), 0.2, 0.2)):
-        tissue = at_rest(grid())
+    for stroke in (strokes.straight(block()), strokes.slanted(block(), 0.2, 0.2)):
+        tissue = at_rest(block())
         assert tissue.n_tetrahedra == 576
         strokes.make(tissue, stroke)
         assert tissue.n_tetrahedra <= 850
@@ -99,22 +95,22 @@ def test_the_paper_s_slab_grows_to_at_most_850_tetrahedra():
 
 def test_a_plane_between_those_of_the_mesh_makes_28_tetrahedra_of_the_6_of_each_cell():
     """Two of the six are cut 2 to 2, into 6 each; four are cut 1 to 3, into 4 each."""
-    tissue = at_rest(grid())
-    strokes.make(tissue, strokes.straight(grid(), 0.41))
+    tissue = at_rest(block())
+    strokes.make(tissue, strokes.straight(block(), 0.41))
     assert tissue.n_tetrahedra == 576 + 24 * (28 - 6)
 
 
 def test_a_cut_along_a_plane_of_the_mesh_adds_no_tetrahedra_and_has_its_area():
-    tissue = at_rest(grid())
-    results = strokes.make(tissue, strokes.straight(grid()))
+    tissue = at_rest(block())
+    results = strokes.make(tissue, strokes.straight(block()))
     assert tissue.n_tetrahedra == 576
     assert results[-1].cut_area == pytest.approx(0.06 * 0.04, rel=1e-12)
     assert tissue.n_pieces() == 2
 
 
 DEGENERATE = {
-    "through nodes, along a plane of the mesh": strokes.straight(grid((2, 2, 2), CUBE)),
-    "a rounding error beside the plane": strokes.straight(grid((2, 2, 2), CUBE), 0.5 + 1e-13),
+    "through nodes, along a plane of the mesh": strokes.straight(block((2, 2, 2), CUBE)),
+    "a rounding error beside the plane": strokes.straight(block((2, 2, 2), CUBE), 0.5 + 1e-13),
     "along the diagonals of the cells": [
         strokes.pose((s, s, -0.01), (s, s, 0.05), (1.0, 1.0, 0.0))
         for s in strokes.along_y(-0.01, 0.09)
@@ -133,7 +129,7 @@ DEGENERATE = {
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_a_degenerate_stroke_cuts_like_any_other(name):
-    mesh = grid((2, 2, 2), CUBE)
+    mesh = block((2, 2, 2), CUBE)
     tissue = at_rest(
         mesh, fixed=bodies.sides(mesh, axis=2) if "edge to edge" in name else bodies.sides(mesh)
     )
@@ -143,7 +139,7 @@ def test_a_degenerate_stroke_cuts_like_any_other(name):
 
 
 def test_a_blade_that_does_not_move_cuts_nothing():
-    mesh = grid((2, 2, 2), CUBE)
+    mesh = block((2, 2, 2), CUBE)
     tissue = at_rest(mesh)
     still = [strokes.pose((0.018, 0.02, -0.01), (0.018, 0.02, 0.05), (0.0, 1.0, 0.0))] * 20
     results = strokes.make(tissue, still)
@@ -184,7 +180,7 @@ def test_an_incision_leaves_one_sound_piece(name, mesh):
 def test_a_blade_drawn_back_along_its_cut_cuts_nothing_more(x):
     there = strokes.upright(x, -0.01, 0.03, -0.01, 0.05)
     back = [*reversed(there)]
-    tissue = at_rest(grid())
+    tissue = at_rest(block())
     cut = strokes.make(tissue, there)[-1]
     back_out = strokes.make(tissue, back)[-1]
     assert back_out.cut_area == cut.cut_area
@@ -193,7 +189,7 @@ def test_a_blade_drawn_back_along_its_cut_cuts_nothing_more(x):
 
 def test_a_blade_drawn_back_in_its_cut_feels_nothing():
     there = strokes.upright(0.02, -0.01, 0.03, -0.01, 0.05)
-    tissue = at_rest(grid())
+    tissue = at_rest(block())
     strokes.make(tissue, there)
     results = strokes.make(tissue, [*reversed(there)])
     assert np.abs([r.wrench.force for r in results[20:]]).max() < 1e-15  # lips touch: rounding
@@ -231,10 +227,10 @@ def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
 
 
 def test_the_second_of_two_parallel_cuts_makes_a_third_piece():
-    tissue = at_rest(grid())
+    tissue = at_rest(block())
     before = tissue.snapshot()
-    strokes.make(tissue, strokes.straight(grid(), 0.3))
-    strokes.make(tissue, strokes.straight(grid(), 0.7))
+    strokes.make(tissue, strokes.straight(block(), 0.3))
+    strokes.make(tissue, strokes.straight(block(), 0.7))
     expect_sound(before, tissue, pieces=3)
 
 
@@ -261,7 +257,7 @@ def test_a_cut_in_a_stretched_and_turned_body_is_sound():
 def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
     def most_active(n):
         """A blade 10 mm long, in a body of n x 6 x n cells of 10 mm."""
-        mesh = grid((n, 6, n), (0.01 * n, 0.06, 0.01 * n))
+        mesh = block((n, 6, n), (0.01 * n, 0.06, 0.01 * n))
         tissue = at_rest(mesh)
         middle = 0.005 * n + 0.0013
         stroke = strokes.upright(middle, -0.005, 0.03, middle - 0.005, middle + 0.005)
@@ -273,7 +269,7 @@ def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
 
 def test_a_fine_mesh_grows_by_the_tetrahedra_along_the_cut():
     """Ten thousand tetrahedra, arrays that grow on the way, and a cut through the middle."""
-    mesh = grid((12, 12, 12), CUBE)
+    mesh = block((12, 12, 12), CUBE)
     tissue = at_rest(mesh)
     before = tissue.snapshot()
     strokes.make(tissue, strokes.slanted(mesh))

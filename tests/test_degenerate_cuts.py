@@ -5,12 +5,10 @@ import pytest
 
 from tests import bodies, incisions, soundness, strokes
 from tests.incisions import Incision
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import TetrahedralMesh
+from tissue import TetrahedralMesh, Tissue, block
 
 EDGE = 0.04
-CUBE = grid((4, 4, 4), (EDGE, EDGE, EDGE))
+CUBE = block((4, 4, 4), (EDGE, EDGE, EDGE))
 """Cells of 10 mm, six tetrahedra each around a diagonal from the lowest corner to the highest."""
 
 SIDE = EDGE**2
@@ -150,17 +148,17 @@ def test_a_cut_in_one_step_is_the_cut_in_many():
 
 
 SHAPES = {
-    "a sheet 100 times as wide as thick": grid((10, 10, 1), (0.1, 0.1, 0.001)),
-    "a sheet of cells 50 times as wide as high": grid((4, 4, 2), (0.1, 0.1, 0.001)),
-    "a rod": grid((1, 20, 1), (0.002, 0.04, 0.002)),
-    "a single cell": grid((1, 1, 1), (0.01, 0.01, 0.01)),
+    "a sheet 100 times as wide as thick": block((10, 10, 1), (0.1, 0.1, 0.001)),
+    "a sheet of cells 50 times as wide as high": block((4, 4, 2), (0.1, 0.1, 0.001)),
+    "a rod": block((1, 20, 1), (0.002, 0.04, 0.002)),
+    "a single cell": block((1, 1, 1), (0.01, 0.01, 0.01)),
     "a single tetrahedron": TetrahedralMesh(
         0.01 * bodies.unit_tetrahedron().positions, bodies.unit_tetrahedron().tetrahedra
     ),
     "two tetrahedra": TetrahedralMesh(
         0.01 * bodies.two_tetrahedra().positions, bodies.two_tetrahedra().tetrahedra
     ),
-    "the size of a cell": grid((3, 3, 3), (2e-5, 2e-5, 2e-5)),
+    "the size of a cell": block((3, 3, 3), (2e-5, 2e-5, 2e-5)),
     "slivers": bodies.with_slivers(4, 0),
 }
 

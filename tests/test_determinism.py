@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tissue.shapes import grid
-from tissue.tissue import Tissue
+from tissue import Tissue, block
 
-MESHES = {"grid": grid(), "jittered": bodies.jittered(4, 0), "fine": grid((8, 9, 10), (0.04,) * 3)}
+MESHES = {
+    "grid": block(),
+    "jittered": bodies.jittered(4, 0),
+    "fine": block((8, 9, 10), (0.04,) * 3),
+}
 """In the fine one the arrays grow during the cut."""
 
 

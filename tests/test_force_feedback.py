@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from bridge.poses import motion
-from scalpel_sim.body import make_tissue
-from scalpel_sim.prepare import prepare
-from scalpel_sim.scenes import SCENES, Scene, changed
-from scalpel_sim.simulation import Simulation
-from tissue.types import BladeSegment, BladeSweep, FloatArray, StepResult
+from scalpel_sim import SCENES, Scene, Simulation, prepare
+from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.scenes import changed
+from tissue import BladeSegment, BladeSweep, FloatArray, StepResult
 
 ACTION_IS_REACTION = 1e-9
 """[N]."""

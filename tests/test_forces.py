@@ -9,11 +9,7 @@ import numpy as np
 import pytest
 
 from tests.bodies import sides
-from tissue.blade_shape import BladeShape
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
+from tissue import BladeSegment, BladeShape, BladeSweep, Material, TetrahedralMesh, Tissue, block
 
 SIZE = np.array([0.04, 0.04, 0.02])
 DT = 1e-3
@@ -38,7 +34,7 @@ def upright(speed=0.05, x=0.0201, begin=-0.003, end=0.043, slice_ratio=0.0):
 
 def mirrored(cells):
     """Return a block whose halves are mirror images across x."""
-    half = grid((cells[0] // 2, *cells[1:]), SIZE * (0.5, 1.0, 1.0))
+    half = block((cells[0] // 2, *cells[1:]), SIZE * (0.5, 1.0, 1.0))
     other = half.positions * (-1.0, 1.0, 1.0) + (SIZE[0], 0.0, 0.0)
     points, place = np.unique(
         np.round(np.concatenate((half.positions, other)), 9), axis=0, return_inverse=True
@@ -52,7 +48,7 @@ class Run:
     """A stroke through a block, with its account."""
 
     def __init__(self, poses, blade=None, cells=(8, 8, 4), dt=DT, mesh=None, **material):
-        mesh = mesh or grid(cells, SIZE)
+        mesh = mesh or block(cells, SIZE)
         of_tissue = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
         self.tissue = Tissue(
             mesh, Material(**SOFT | material), blade=blade, audit=True, **of_tissue
@@ -206,7 +202,7 @@ def test_a_symmetric_cut_pushes_the_blade_to_no_side():
 
 def test_a_blade_pushed_sideways_is_pushed_back_with_a_torque():
     """Its flat goes 3 mm into the side of a block that is held at its far side."""
-    mesh = grid((6, 6, 3), SIZE)
+    mesh = block((6, 6, 3), SIZE)
     fixed = mesh.positions[:, 0] < 1e-9
     tissue = Tissue(mesh, Material(**SOFT), fixed=fixed, gravity=NO_GRAVITY, blade=SCALPEL)
     xs = 0.0403 - np.arange(0.0, 0.003, 2e-5)
@@ -252,13 +248,13 @@ def test_the_faces_of_the_blade_do_not_press_the_skin_that_it_goes_through():
 
 def test_an_audit_of_another_relaxation_is_refused():
     with pytest.raises(ValueError, match="audit"):
-        Tissue(grid((2, 2, 2), SIZE), audit=True, relaxation="local")
+        Tissue(block((2, 2, 2), SIZE), audit=True, relaxation="local")
 
 
 def test_an_audit_changes_nothing():
     poses = upright()[:300]
     with_audit = Run(poses, blade=SCALPEL).tissue.snapshot()
-    mesh = grid((8, 8, 4), SIZE)
+    mesh = block((8, 8, 4), SIZE)
     without = Tissue(mesh, Material(**SOFT), fixed=sides(mesh), gravity=NO_GRAVITY, blade=SCALPEL)
     for a, b in itertools.pairwise(poses):
         without.step(BladeSweep(a, b), DT)

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from tests import bodies, incisions, judged, soundness
 from tests.incisions import Incision
-from tissue.tissue import CutQuality, Tissue
-from tissue.types import TetrahedralMesh
+from tissue import TetrahedralMesh, Tissue
+from tissue.tissue import CutSettings
 
-EXACT = CutQuality(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
+EXACT = CutSettings(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 """Every crossing gets its own node: what is cut can be counted."""
 
 MADE = {
@@ -27,11 +27,11 @@ MADE = {
 GOOD = ("jittered grid", "Delaunay, 10 degrees")
 
 
-def at_rest(mesh: TetrahedralMesh, quality: CutQuality | None = None) -> Tissue:
+def at_rest(mesh: TetrahedralMesh, quality: CutSettings | None = None) -> Tissue:
     return Tissue(mesh, gravity=(0.0, 0.0, 0.0), quality=quality)
 
 
-def cut_along(mesh: TetrahedralMesh, *cuts: Incision, quality: CutQuality | None = None) -> Tissue:
+def cut_along(mesh: TetrahedralMesh, *cuts: Incision, quality: CutSettings | None = None) -> Tissue:
     """Return the body after those cuts."""
     tissue = at_rest(mesh, quality)
     for cut in cuts:
@@ -187,8 +187,8 @@ def flat_slit(mesh: TetrahedralMesh, seed: int) -> Incision:
 
 
 SLITS = {
-    "at the defaults within a tenth": (CutQuality(), 0.10),
-    "closer, without a guard, within 3 in 100": (CutQuality(snap=0.1, floor=0.1, guard=0.0), 0.03),
+    "at the defaults within a tenth": (CutSettings(), 0.10),
+    "closer, without a guard, within 3 in 100": (CutSettings(snap=0.1, floor=0.1, guard=0.0), 0.03),
 }
 
 
@@ -263,7 +263,7 @@ def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in
             tissue.incise(*incisions.incision(mesh, list(incisions.KINDS)[i], 10 * seed + i))
         after = tissue.snapshot()
         altitude = soundness.smallest_altitude(after.rest_positions, after.tetrahedra)
-        assert altitude >= (1.0 - 1e-9) * CutQuality().guard * tissue.node_size
+        assert altitude >= (1.0 - 1e-9) * CutSettings().guard * tissue.node_size
         growth.append(np.sqrt(tissue._elasticity.frequency_squared / before))
     assert np.median(growth) <= 6.0
     assert max(growth) <= 8.0

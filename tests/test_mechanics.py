@@ -1,6 +1,7 @@
 """The body against the theory of elasticity: 22 to 27 of the engine's acceptance tests, and more.
 
-Small strains are compared with `tissue.stiffness`, whose matrix is held against the engine's own
+Small strains are compared with `tissue.elasticity.stiffness_matrix`, whose matrix is held against
+the engine's own
 forces here; so what a fine bar does by the matrix (benchmarks/mesh_study.py) the engine does too.
 """
 
@@ -14,19 +15,22 @@ from scipy.sparse.linalg import cg
 from benchmarks.mesh_study import MODES, Bar, Model
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
-from tissue.body import NODES, TETRAHEDRA
-from tissue.cut import clear_changes
-from tissue.faces import sorted_faces
-from tissue.material import Material
-from tissue.neo_hookean import solid_energy
-from tissue.shapes import grid
-from tissue.solid import build_stars, build_tetrahedra, neo_hookean, no_solid, room_for_stars
-from tissue.star import LARGEST_STAR, no_visits
-from tissue.stellar import split_edge
-from tissue.stiffness import stiffness_matrix
-from tissue.tissue import Tissue
-from tissue.types import TetrahedralMesh
-from tissue.validation import signed_volumes
+from tissue import Material, TetrahedralMesh, Tissue, block
+from tissue.cutting.stellar_subdivision import split_edge
+from tissue.elasticity.finite_elements import (
+    build_stars,
+    build_tetrahedra,
+    neo_hookean,
+    no_solid,
+    room_for_stars,
+)
+from tissue.elasticity.neo_hookean import solid_energy
+from tissue.elasticity.stiffness_matrix import stiffness_matrix
+from tissue.mesh.body import NODES, TETRAHEDRA
+from tissue.mesh.changes import clear_changes
+from tissue.mesh.faces import sorted_faces
+from tissue.mesh.star import LARGEST_STAR, no_visits
+from tissue.mesh.validation import signed_volumes
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 UNDAMPED = Material(viscous_damping=0.0, retardation_time=0.0)
@@ -176,7 +180,7 @@ def test_25_a_body_that_is_turned_feels_no_force(material):
 @pytest.mark.parametrize(
     ("relaxation", "frame"), [("global", 1e-3), ("global", 1e-2), ("local", 1e-3)]
 )
-@pytest.mark.parametrize("mesh", [grid((3, 3, 3), (0.03,) * 3), RANDOM], ids=["cells", "random"])
+@pytest.mark.parametrize("mesh", [block((3, 3, 3), (0.03,) * 3), RANDOM], ids=["cells", "random"])
 def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(mesh, frame, relaxation):
     """In 2 s, in as many steps a frame as that takes."""
     size = mesh.positions.max()
@@ -281,7 +285,7 @@ def slit_compliance(n):
     Held on the left, pulled to the right; the slit is cut by the engine, from above.
     """
     size = 0.04
-    mesh = grid((n, n, n), (size, size, size))
+    mesh = block((n, n, n), (size, size, size))
     tissue = Tissue(mesh, SOLID, gravity=NO_GRAVITY)
     tips = [(size / 2.0, y, size / 2.0) for y in (-0.1 * size, 1.1 * size)]
     area = tissue.incise([[tip, (tip[0], tip[1], 1.1 * size)] for tip in tips], (0.0, 1.0, 0.0))
@@ -302,7 +306,7 @@ def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
 def test_a_slender_tower_bows_to_a_sudden_newton_and_stands_still_in_the_end(law):
     """10 x 10 x 60 mm: it bows by its own length, and swings. All of the newton is there at once,
     from one side, on its mass. Springs alone turn inside out."""
-    mesh = grid((2, 2, 12), (0.01, 0.01, 0.06))
+    mesh = block((2, 2, 12), (0.01, 0.01, 0.06))
     material = replace(LAWS[law], young_modulus=300e3, viscous_damping=20.0)
     tissue = Tissue(
         mesh,
@@ -322,7 +326,7 @@ def test_a_slender_tower_bows_to_a_sudden_newton_and_stands_still_in_the_end(law
 
 
 @pytest.mark.parametrize(("nu", "height"), [(0.35, 0.7), (0.45, 0.5)])
-@pytest.mark.parametrize("made", [lambda: grid((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+@pytest.mark.parametrize("made", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
 def test_springs_with_a_volume_term_do_not_collapse_in_a_block_that_is_pressed(made, nu, height):
     volumes = volumes_in_a_press(made(), replace(UNDAMPED, poisson_ratio=nu), height)
     assert volumes.min() > 0.0
@@ -333,7 +337,7 @@ def test_springs_alone_do():
     assert volumes_in_a_press(RANDOM, UNDAMPED, 0.7).min() < 0.0
 
 
-@pytest.mark.parametrize("made", [lambda: grid((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+@pytest.mark.parametrize("made", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
 def test_nor_do_tetrahedra(made):
     assert volumes_in_a_press(made(), SOLID, 0.6).min() > 0.0
 

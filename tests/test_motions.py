@@ -12,9 +12,7 @@ import pytest
 
 from tests import bodies, soundness, strokes
 from tests.strokes import Stroke, Y, Z, pose
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, FloatArray, TetrahedralMesh
+from tissue import BladeSegment, FloatArray, TetrahedralMesh, Tissue, block
 
 EDGE = 0.05
 SIDE = EDGE**2
@@ -24,7 +22,7 @@ X = 0.0262
 """Where the blade cuts along y: between the planes of nodes [m]."""
 
 MESHES = {
-    "grid": grid((5, 5, 5), (EDGE,) * 3),
+    "grid": block((5, 5, 5), (EDGE,) * 3),
     "jittered grid": bodies.jittered_grid(5, 1, EDGE),
     "Delaunay": bodies.body_centred(4, 1, EDGE),
 }

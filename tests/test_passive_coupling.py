@@ -10,17 +10,15 @@ import mujoco
 import numpy as np
 import pytest
 
-from bridge.bridge import Bridge
+from bridge import Bridge, VirtualCoupling
 from bridge.counters import Counters
-from bridge.virtual_coupling import VirtualCoupling
-from scalpel_sim.arm import Arm
-from scalpel_sim.hand import ACTUATORS
-from scalpel_sim.prepare import prepare
-from scalpel_sim.scenes import SCENES, changed
-from scalpel_sim.simulation import Simulation
-from scalpel_sim.stroke import Stroke
-from tests.bridge.walls import Wall
-from tissue.types import BladeSegment, FloatArray
+from scalpel_sim import SCENES, Simulation, prepare
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.hand import ACTUATORS
+from scalpel_sim.scenes import changed
+from scalpel_sim.strokes.stroke import Stroke
+from tests.bridge.coupling.walls import Wall
+from tissue import BladeSegment, FloatArray
 
 DT = 1e-3
 NEVER_LESS = -1e-6

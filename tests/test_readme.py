@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scalpel_sim.cli import command_line
-from scalpel_sim.outputs import NAMES
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.run_folder import NAMES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

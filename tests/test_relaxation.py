@@ -6,11 +6,8 @@ import pytest
 from tests import bodies, strokes
 from tests.test_conservation import NO_GRAVITY, SLAB, momentum
 from tests.test_determinism import fingerprint
-from tissue.material import Material
-from tissue.relaxation.activity import WAKE_ACCELERATION
-from tissue.relaxation.options import Hierarchical, LocalTimeStepping
-from tissue.shapes import grid
-from tissue.tissue import Tissue
+from tissue import Hierarchical, LocalTimeStepping, Material, Tissue, block
+from tissue.integrators.local.sleeping import WAKE_ACCELERATION
 
 LOCAL, HIERARCHICAL = LocalTimeStepping(), Hierarchical(updates=16, rings=3)
 NEVER_ASLEEP = LocalTimeStepping(sleep=False)
@@ -70,7 +67,7 @@ POKE = {"low": -0.01, "high": 0.05, "speed": 0.05}
 
 
 def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
-    mesh = grid((6, 6, 6), (0.04, 0.04, 0.04))
+    mesh = block((6, 6, 6), (0.04, 0.04, 0.04))
     pushed = []
     for how in (LOCAL, NEVER_ASLEEP):
         tissue = waited(mesh, LAWS["springs"], how)
@@ -85,7 +82,7 @@ def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
 
 
 def test_far_from_a_small_poke_a_large_body_sleeps_on():
-    mesh = grid((20, 6, 6), (0.4, 0.12, 0.12))
+    mesh = block((20, 6, 6), (0.4, 0.12, 0.12))
     tissue = Tissue(mesh, Material(viscous_damping=100.0), gravity=NO_GRAVITY, relaxation=LOCAL)
     for _ in range(100):
         tissue.step(None, strokes.DT)
@@ -97,7 +94,7 @@ def test_far_from_a_small_poke_a_large_body_sleeps_on():
 
 @pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
 def test_the_cutting_force_is_toughness_times_length(relaxation):
-    mesh = grid((6, 12, 3), SLAB)
+    mesh = block((6, 12, 3), SLAB)
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, relaxation=relaxation)
     stroke = strokes.upright(0.0213, -0.004, 0.06, -0.005, 0.025, 0.1)
     results = strokes.make(tissue, stroke)
@@ -159,7 +156,7 @@ def test_arrays_that_grow_change_nothing(relaxation):
 
 def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
     """Cut through, held at one side: the loose piece falls on the floor and comes to rest."""
-    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
     held = mesh.positions[:, 0] < 1e-6
     material = Material(viscous_damping=20.0, toughness=2.0)
     tissue = Tissue(mesh, material, fixed=held, floor=-0.004, relaxation=LOCAL)
@@ -179,7 +176,7 @@ def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
 
     Once they were thought to come from the origin, through everything on the way.
     """
-    mesh = grid((4, 4, 4), (0.04, 0.04, 0.04))
+    mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
     mesh = mesh._replace(positions=mesh.positions + 0.1)
     held = mesh.positions[:, 2] < 0.115
     material = Material(viscous_damping=20.0, toughness=2.0)

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.boundary import fixed_nodes
-from tissue.shapes import grid
+from tissue.boundary_conditions import fixed_nodes
+from tissue.core.array_types import FloatArray
+from tissue.shapes.block import block
 from tissue.tissue import Tissue, TissueError
-from tissue.types import BladeSegment, BladeSweep, FloatArray, StepResult, TetrahedralMesh
+from tissue.types import BladeSegment, BladeSweep, StepResult, TetrahedralMesh
 
 DT = 1e-3
 """Length of a frame [s]: 1 kHz, the rate of a haptic device."""
@@ -127,8 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.steps < 1:
         parser.error(f"--steps is {options.steps}; it must be at least 1")
     try:
-        mesh = grid(options.cells, options.size)
-        cut_through(grid((2, 2, 2)), 40)  # compiles, or loads what was compiled: not on the clock
+        mesh = block(options.cells, options.size)
+        cut_through(block((2, 2, 2)), 40)  # compiles, or loads what was compiled: not on the clock
         print(report(cut_through(mesh, options.steps)))
     except ValueError as error:
         parser.error(str(error))

@@ -63,7 +63,8 @@ class Material:
     mostly water and hardly compressible: 0.45 to 0.49."""
     spring_calibration: float = 1.0
     """Stiffness of the springs over what van Gelder's formula gives them. 1 unless a body was
-    measured on its own mesh: see `tissue.calibration.calibrated`. For the springs' law only."""
+    measured on its own mesh: see `tissue.elasticity.spring_calibration.calibrated`. For the
+    springs' law only."""
 
     def __post_init__(self) -> None:
         if self.law not in get_args(Law):

@@ -7,14 +7,32 @@ from time import perf_counter
 import numpy as np
 import numpy.typing as npt
 
-from tissue.anchors import (
+from tissue.blade.anchors import (
     Edge,
     anchored_length,
 )
-from tissue.audit import Audit
+from tissue.blade.forces import begin_step, clear_tool
+from tissue.blade.impulse_totals import (
+    WORK_OF_BLADE,
+    WORK_OF_CUTTING,
+)
+from tissue.blade.interaction import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE, Grip
+from tissue.blade.path_tracing import forget_path, trace_path
+from tissue.blade.prescribed_path import begin_path, prescribe_path
 from tissue.blade_shape import BladeShape
-from tissue.body import NODES, TETRAHEDRA, Body, build_body, grown_body
-from tissue.border import (
+from tissue.contact.self_contact import SelfContact
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.vec3 import Vec3
+from tissue.cut_settings import CutReport, CutSettings, MeshMeasures
+from tissue.cutting.blade_path import Path, new_path, path_travel, put_on_lattice, resampled
+from tissue.cutting.scheme import Scheme, checked_scheme
+from tissue.cutting.snapping import EXPLAINED
+from tissue.cutting.stellar_scheme import StellarScheme
+from tissue.cutting.workspace import SPARE_NODES, Quality
+from tissue.elasticity.elasticity import Elasticity
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.energy_audit import Audit
+from tissue.input_checks import (
     checked_audit,
     checked_edge,
     checked_edges,
@@ -24,56 +42,37 @@ from tissue.border import (
     checked_positions,
     checked_threads,
 )
-from tissue.caveats import warn_of_ratio, warn_of_toughness
-from tissue.chunks import ChunkNodes, chunk_nodes, chunks_of
-from tissue.contact.self_contact import SelfContact
-from tissue.cut import FULL, SPARE_NODES, Quality
-from tissue.elastic import Surroundings
-from tissue.elasticity import Elasticity
-from tissue.grip import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE, Grip
+from tissue.integrators.choice import relaxation_of
+from tissue.integrators.dynamic_relaxation import settle
+from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.options import LocalTimeStepping, Relaxing, checked_relaxation
+from tissue.integrators.runge_kutta import new_stages
+from tissue.integrators.stability import stable_step
+from tissue.integrators.step_context import Motion
 from tissue.material import Material
-from tissue.measures import lowest_altitude, path_error
-from tissue.path import Path, new_path, path_travel, put_on_lattice, resampled
-from tissue.pieces import label_pieces, piece_of_tetrahedra, pieces_of
-from tissue.prescribed import begin_path, prescribe_path
-from tissue.quality import CutQuality, Measures, QualityReport
-from tissue.relaxation.all_together import AllTogether
-from tissue.relaxation.choice import relaxation_of
-from tissue.relaxation.motion import Motion
-from tissue.relaxation.options import LocalTimeStepping, Relaxing, checked_relaxation
-from tissue.relaxation.settling import settle
-from tissue.runge_kutta import new_stages
-from tissue.scheme import Scheme, checked_scheme
-from tissue.snapping import EXPLAINED
-from tissue.star import LARGEST_STAR, Visits, mean_node_size, no_visits
-from tissue.stellar_scheme import StellarScheme
-from tissue.surface import boundary_surface
-from tissue.survey import Survey, survey, survey_of
-from tissue.tally import (
-    WORK_OF_BLADE,
-    WORK_OF_CUTTING,
-)
-from tissue.tetrahedron_grid import build_grid
-from tissue.tool import begin_step, clear_tool
-from tissue.touched import touched_nodes
-from tissue.trace import forget_path, trace_path
+from tissue.material_warnings import warn_of_ratio, warn_of_toughness
+from tissue.mesh.body import NODES, TETRAHEDRA, Body, build_body, grown_body
+from tissue.mesh.bounding_boxes import Survey, survey, survey_of
+from tissue.mesh.changes import FULL, touched_nodes
+from tissue.mesh.chunks import ChunkNodes, chunk_nodes, chunks_of
+from tissue.mesh.cut_error import lowest_altitude, path_error
+from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
+from tissue.mesh.point_location import build_grid
+from tissue.mesh.star import LARGEST_STAR, Visits, mean_node_size, no_visits
+from tissue.mesh.surface import boundary_surface
+from tissue.mesh.validation import expect_sound
 from tissue.types import (
     BladeSweep,
-    BoolArray,
     Chunks,
     Energies,
-    FloatArray,
-    IntArray,
     Piece,
-    Profile,
     SchemeStatistics,
     Snapshot,
+    StageTimes,
     StepResult,
     Surface,
     TetrahedralMesh,
 )
-from tissue.validation import expect_sound
-from tissue.vec3 import Vec3
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
@@ -112,20 +111,21 @@ class Tissue:
         floor: Height of a floor, for example a table, below the body [m]; None for no floor.
         quality: How closely cuts follow the blade, where the scheme lets one choose.
         scheme: How the mesh is cut: "stellar", or "paper" for that of Bielser, Maiwald and Gross,
-            with its limits (`tissue.paper_scheme`).
+            with its limits (`tissue.cutting.bielser_1998`).
         threads: How many threads share the loops over the body. The result is the same to the
             last bit; more than one pays from about 30,000 tetrahedra on, and only where no other
             program needs the cores.
         relaxation: How the motion is advanced: "global", all nodes together; "local", small
             elements in substeps and what rests asleep; "hierarchical", the paper's; or
-            `LocalTimeStepping` or `Hierarchical` with settings (`tissue.relaxation.options`).
+            `LocalTimeStepping` or `Hierarchical` with settings (`tissue.integrators.options`).
         blade: The body of the blade, whose faces part the tissue and rub on it; None for the
             paper's blade, a line that cuts.
         audit: Whether to keep an account of the energy (`StepResult.energies`), for a global
             relaxation. It takes about as long as the motion itself, and one thread.
 
     Raises:
-        MeshError: the mesh is broken, or would have to be repaired (`tissue.validation.checked`).
+        MeshError: the mesh is broken, or would have to be repaired
+            (`tissue.mesh.validation.checked`).
         ValueError: another argument does not fit the mesh, or is not finite.
     """
 
@@ -138,7 +138,7 @@ class Tissue:
         positions: FloatArray | None = None,
         gravity: Sequence[float] = (0.0, 0.0, -9.81),
         floor: float | None = None,
-        quality: CutQuality | None = None,
+        quality: CutSettings | None = None,
         scheme: str = "stellar",
         threads: int = 1,
         relaxation: str | Relaxing = "global",
@@ -159,14 +159,14 @@ class Tissue:
             self.material.retardation_time,
         )
         self._audit = Audit(self._surroundings.gravity) if audit else None
-        self._all_together = AllTogether(threads, self._audit.audited if self._audit else None)
+        self._all_together = GlobalStepper(threads, self._audit.audited if self._audit else None)
         self._body = build_body(
             mesh,
             checked_positions(positions, mesh.positions),
             checked_fixed(fixed, len(mesh.positions)),
         )
         if scheme == "paper":
-            from tissue.paper_scheme.records import with_room_to_hang
+            from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
 
             self._body = with_room_to_hang(self._body)
         n_nodes, n_tetrahedra = self.n_nodes, self.n_tetrahedra
@@ -184,12 +184,12 @@ class Tissue:
         self._grip = Grip(blade, self.material, self.node_size, n_tetrahedra)
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
-        quality = quality or CutQuality()
+        quality = quality or CutSettings()
         volume = self._body.masses.sum() / self.material.density
         self._snap_floor = float(quality.floor * self.node_size)
         self._scheme: Scheme
         if scheme == "paper":  # imported late: its kernels would cost every start 0.8 s
-            from tissue.paper_scheme.scheme import PaperScheme
+            from tissue.cutting.bielser_1998.scheme import PaperScheme
 
             self._scheme = PaperScheme(self._body, self.material.density, self.node_size)
         else:
@@ -270,7 +270,9 @@ class Tissue:
             started = perf_counter()
             self._open_up()
             topology += perf_counter() - started
-        return self._result(edge, sweep, dt, n_substeps, Profile(collision, topology, relaxation))
+        return self._result(
+            edge, sweep, dt, n_substeps, StageTimes(collision, topology, relaxation)
+        )
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
         """Cut along a given surface in the body at rest: no blade, no force, no time passes.
@@ -367,10 +369,10 @@ class Tissue:
         """Return the piece that each tetrahedron is in, shape (n_tets,): its place in `pieces`."""
         return piece_of_tetrahedra(self.snapshot())
 
-    def quality(self) -> QualityReport:
+    def quality(self) -> CutReport:
         """Return the path error of the cuts so far, and what they did to elements and time step."""
         error = path_error(self._body)
-        return QualityReport(
+        return CutReport(
             n_cut_nodes=error.n_nodes,
             path_error_mean=error.mean,
             path_error_largest=error.largest,
@@ -521,13 +523,13 @@ class Tissue:
         """Return in how many parts the edge goes that far [m]."""
         return max(1, math.ceil(travel / (INCREMENT * self.node_size)))
 
-    def _measures(self) -> Measures:
+    def _measures(self) -> MeshMeasures:
         elasticity = self._elasticity
-        return Measures(
+        return MeshMeasures(
             n_tetrahedra=self.n_tetrahedra,
             altitude=lowest_altitude(self._body),
             frequency=math.sqrt(elasticity.frequency_squared),
-            time_step=elasticity.stable_step(elasticity.frequency_squared, self._surroundings),
+            time_step=stable_step(elasticity, elasticity.frequency_squared, self._surroundings),
         )
 
     def _result(
@@ -536,7 +538,7 @@ class Tissue:
         sweep: BladeSweep | None,
         dt: float,
         n_substeps: int,
-        profile: Profile,
+        profile: StageTimes,
     ) -> StepResult:
         low, high, _ = self._box
         grip = self._grip

@@ -7,13 +7,8 @@ the start and the end of a step.
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-SlotArray = npt.NDArray[np.int32]
-"""Indices that the loops of the 1 kHz read: half the bytes."""
-BoolArray = npt.NDArray[np.bool_]
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
 
 
 class BladeSegment(NamedTuple):
@@ -106,7 +101,7 @@ class Energies(NamedTuple):
         return self.work_of_blade - sum(self[1:])
 
 
-class Profile(NamedTuple):
+class StageTimes(NamedTuple):
     """Wall time of the stages of one step [s], under the names of the paper's Table 1."""
 
     collision: float
@@ -117,7 +112,7 @@ class Profile(NamedTuple):
     """RX: forces, edge anchors, Runge-Kutta."""
 
 
-class Touch(NamedTuple):
+class BodyContacts(NamedTuple):
     """How the body touched itself and the floor in one step."""
 
     n_contacts: int
@@ -165,8 +160,8 @@ class StepResult(NamedTuple):
     """Work that slipping through the material took, since the start [J]: toughness times area."""
     n_substeps: int
     """Runge-Kutta steps taken in this step."""
-    touch: Touch
-    profile: Profile
+    touch: BodyContacts
+    profile: StageTimes
     energies: Energies | None
     """Where the work went; None without an audit."""
 

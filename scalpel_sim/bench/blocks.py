@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.errors import UsageError
-from tissue.shapes import grid
-from tissue.types import BoolArray, FloatArray, IntArray, TetrahedralMesh
+from tissue import BoolArray, FloatArray, IntArray, TetrahedralMesh, block
 
 Cells = tuple[int, int, int]
 
@@ -31,10 +30,10 @@ BLOCKS: dict[int, Cells] = {
 """Cells along x, y and z by the number of tetrahedra."""
 
 
-def block(n_tetrahedra: int) -> TetrahedralMesh:
+def block_mesh(n_tetrahedra: int) -> TetrahedralMesh:
     """Return the block of so many tetrahedra, one of `BLOCKS`."""
     cells = BLOCKS[n_tetrahedra]
-    mesh = grid(cells, [CELL * n for n in cells])
+    mesh = block(cells, [CELL * n for n in cells])
     off = np.random.default_rng(SEED).uniform(-JITTER, JITTER, mesh.positions.shape) * CELL
     on_skin = on_sides(mesh.positions, (0, 1, 2))
     return TetrahedralMesh(mesh.positions + np.where(on_skin[:, None], 0.0, off), mesh.tetrahedra)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from scalpel_sim.bench.watch import Watch, watching
-from scalpel_sim.console import talking
+from scalpel_sim.cli.console import talking
+from scalpel_sim.cli.options import Talk
 from scalpel_sim.errors import UsageError
-from scalpel_sim.options import Talk
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.bench.results import Findings, Results
@@ -149,8 +149,8 @@ def _run(benchmarks: Sequence[Measure], measuring: Measuring, talk: Talk) -> Non
     """Measure, and say, keep and compare what was found."""
     from scalpel_sim.bench.machine import load as machine_load
     from scalpel_sim.bench.results import as_json, load, results_of, save
-    from scalpel_sim.outputs import check_file
-    from scalpel_sim.ready import load_kernels
+    from scalpel_sim.cli.run_setup import load_kernels
+    from scalpel_sim.output.run_folder import check_file
 
     if not 1 <= measuring.runs <= MOST_ROUNDS:
         raise UsageError(f"--runs is {measuring.runs}; it must be from 1 to {MOST_ROUNDS}")

@@ -17,10 +17,7 @@ from scalpel_sim.bench.results import Figure, Findings, of_times
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, FloatArray
+from tissue import BladeSegment, BladeSweep, FloatArray, Material, Tissue, block
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -165,7 +162,7 @@ def _turn(cells: Cells, watch: Watch) -> Slit:
 
 def _run(cells: Cells) -> Slit:
     """Cut one fresh block."""
-    mesh = grid(cells, [CELL * n for n in cells])
+    mesh = block(cells, [CELL * n for n in cells])
     held = np.ones(len(mesh.positions), dtype=bool)
     tissue = Tissue(mesh, SHARP, fixed=held, gravity=(0.0, 0.0, 0.0))
     before = _edge(cells, 0.0)

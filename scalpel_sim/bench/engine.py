@@ -4,18 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import block, held
+from scalpel_sim.bench.blocks import block_mesh, held
 from scalpel_sim.bench.traffic import Traffic, traffic
-from tissue.body import NODES, Body
+from tissue import FloatArray, Law, Material, TetrahedralMesh, Tissue
 from tissue.contact.resolve import prepare, resolve
 from tissue.contact.state import ANEW, IS_STALE, N_TOUCHING
-from tissue.jit import kernel
-from tissue.material import Law, Material
-from tissue.relaxation.all_together import AllTogether
-from tissue.runge_kutta import accelerations
-from tissue.solid import neo_hookean
-from tissue.tissue import NOWHERE, Tissue
-from tissue.types import FloatArray, TetrahedralMesh
+from tissue.core.jit import kernel
+from tissue.elasticity.finite_elements import neo_hookean
+from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.runge_kutta import accelerations
+from tissue.mesh.body import NODES, Body
+from tissue.tissue import NOWHERE
 
 DT = 1e-3
 """Time step [s]: that of a haptic loop."""
@@ -66,9 +65,9 @@ class Loops:
         is_damped: bool = True,
         is_averaged: bool = True,
     ) -> None:
-        mesh = block(n_tetrahedra)
+        mesh = block_mesh(n_tetrahedra)
         self._is_damped = is_damped
-        self._all_together = AllTogether()
+        self._all_together = GlobalStepper()
         self._tissue = Tissue(
             mesh, material(law, is_damped=is_damped), fixed=held(mesh), relaxation="global"
         )
@@ -129,7 +128,7 @@ class Touching:
     """Time steps that the upper one has to come to rest."""
 
     def __init__(self, n_tetrahedra: int) -> None:
-        lower = block(n_tetrahedra)
+        lower = block_mesh(n_tetrahedra)
         height = float(np.ptp(lower.positions[:, 2]))
         upper = lower.positions + np.array([0.0, 0.0, height])
         mesh = TetrahedralMesh(

@@ -4,9 +4,9 @@ import numpy as np
 
 from scalpel_sim.bench.machine import Caches
 from scalpel_sim.bench.timing import Case
-from tissue.jit import kernel
-from tissue.simd import WIDTH, lanes, load, store
-from tissue.types import FloatArray
+from tissue import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.simd import WIDTH, lanes, load, store
 
 BYTES_PER_ELEMENT = 24
 """Of the triad: two doubles read, one written. The line that a store must fetch first is not

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import BLOCKS, CELL, block, held, up_to
+from scalpel_sim.bench.blocks import BLOCKS, CELL, block_mesh, held, up_to
 from scalpel_sim.bench.engine import DT, material
 from scalpel_sim.bench.machine import memory
 from scalpel_sim.bench.memory import that_fit
@@ -22,10 +22,16 @@ from scalpel_sim.bench.tables import compact, number, print_skipped
 from scalpel_sim.bench.timing import CPU
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
-from tissue.material import Law
-from tissue.relaxation.options import Hierarchical, LocalTimeStepping, Relaxing
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, FloatArray
+from tissue import (
+    BladeSegment,
+    BladeSweep,
+    FloatArray,
+    Hierarchical,
+    Law,
+    LocalTimeStepping,
+    Tissue,
+)
+from tissue.integrators.options import Relaxing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -116,7 +122,7 @@ def measure(
 
 def slit(n_tetrahedra: int, law: Law, relaxing: Relaxing) -> Frames:
     """Cut the slit into a fresh body at rest."""
-    mesh = block(n_tetrahedra)
+    mesh = block_mesh(n_tetrahedra)
     sharp = replace(material(law), toughness=SHARP)
     tissue = Tissue(mesh, sharp, fixed=held(mesh), gravity=(0.0, 0.0, 0.0), relaxation=relaxing)
     for _ in range(N_AT_REST):

@@ -15,7 +15,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 FOLDER = Path(__file__).parents[2] / "benchmarks" / "peers"
 """Where the engines' files are: in the repository, not in the installed package."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import block, edges_of, held, up_to
+from scalpel_sim.bench.blocks import block_mesh, edges_of, held, up_to
 from scalpel_sim.bench.engine import DENSITY, DT, LAWS, POISSON_RATIO, STIFFNESS, material
 from scalpel_sim.bench.peer_process import (
     FOLDER,
@@ -333,7 +333,7 @@ def ratio_to(name: str) -> str:
 
 def _body_file(folder: Path, size: int) -> Path:
     """Write the block for the other processes."""
-    mesh = block(size)
+    mesh = block_mesh(size)
     edges = edges_of(mesh)
     file = folder / "body.npz"
     np.savez(

@@ -9,8 +9,8 @@ import numpy as np
 
 from scalpel_sim.bench import machine
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.summary import versions
-from tissue.types import FloatArray
+from scalpel_sim.output.summary import versions
+from tissue import FloatArray
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -21,7 +21,7 @@ from scalpel_sim.bench.tables import print_figures
 from scalpel_sim.bench.timing import CPU, Case, interleaved
 from scalpel_sim.bench.traffic import Traffic
 from scalpel_sim.bench.watch import SILENT, Watch
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 SIZES = (6_000, 60_000, 600_000)
 """Of the blocks [tetrahedra]: in a core's own cache, in the shared one, in memory."""

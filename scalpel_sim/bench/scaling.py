@@ -16,7 +16,7 @@ from scalpel_sim.bench.results import Figure, Findings, of_times
 from scalpel_sim.bench.tables import print_figures
 from scalpel_sim.bench.timing import CPU, Case, interleaved
 from scalpel_sim.bench.watch import SILENT, Watch
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 SIZES = (576, 6_000, 60_000, 199_800, 600_000, 1_000_188)
 """Of the blocks [tetrahedra]."""

@@ -9,11 +9,11 @@ from scalpel_sim.bench.results import HIGHER, NEITHER, Figure, Findings, of_time
 from scalpel_sim.bench.tables import print_figures
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
-from scalpel_sim.prepare import prepare
-from scalpel_sim.recording import Recording
+from scalpel_sim.output.recording import Recording
+from scalpel_sim.output.summary import STAGES
+from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES, scene_called
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.summary import STAGES
 
 MS_PER_S = 1e3
 

@@ -22,18 +22,18 @@ from scalpel_sim.bench.results import (
 )
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
-from scalpel_sim.body import make_tissue
-from scalpel_sim.cuts import Cut, prepare_cut
-from scalpel_sim.model_shapes import body_poses, shapes_of
-from scalpel_sim.pictures import readings
-from scalpel_sim.recording import Recording
+from scalpel_sim.output.recording import Recording
+from scalpel_sim.output.summary import STAGES
+from scalpel_sim.output.table_1 import MACHINE, TABLE_1
+from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scenes import SCHEMES, Scene
 from scalpel_sim.simulation import Picture, Simulation
-from scalpel_sim.stage import Stage
-from scalpel_sim.summary import STAGES
-from scalpel_sim.table_1 import MACHINE, TABLE_1
-from scalpel_sim.viewer_messages import UPDATES_PER_SECOND
-from tissue.shapes import grid
+from scalpel_sim.strokes.cuts import Cut, prepare_cut
+from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
+from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
+from scalpel_sim.viewer.pictures import readings
+from scalpel_sim.viewer.scene_packets import Stage
+from tissue import block
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -162,7 +162,7 @@ def print_rows(rows: Sequence[Row], console: "Console") -> None:
 def _run(cells: Cells, scheme: str) -> Row:
     """Do one cut."""
     size = [CELL * n for n in cells]
-    scene = Scene("table1", "a grid of the paper", lambda: grid(cells, size), scheme=scheme)
+    scene = Scene("table1", "a grid of the paper", lambda: block(cells, size), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
     simulation = prepare_cut(Cut(scene, WAY, DEPTHS[cells]), tissue)

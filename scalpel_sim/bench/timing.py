@@ -8,7 +8,7 @@ import numpy as np
 
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 TURN = 0.1
 """How long a case runs in each round [s]: long against a time slice of the system, short against

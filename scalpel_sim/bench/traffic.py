@@ -1,13 +1,14 @@
 """What a Runge-Kutta step of springs must move and compute, counted stage by stage.
 
-Counted by hand from `tissue.spring_forces` and `tissue.runge_kutta`, as the loops are written: a
+Counted by hand from `tissue.elasticity.spring_forces` and `tissue.integrators.runge_kutta`, as the
+loops are written: a
 change of either is a change here. What a row gathers of its neighbours is not counted as bytes: the
 same sweep reads them anyway.
 """
 
 from typing import NamedTuple
 
-from tissue.simd import WIDTH
+from tissue.core.simd import WIDTH
 
 VECTOR = 24
 """Bytes of a position, velocity or force."""

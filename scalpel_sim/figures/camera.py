@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])
 

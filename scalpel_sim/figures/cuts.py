@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.cuts import Cut, prepare_cut
-from scalpel_sim.draping import TriangleMesh
-from scalpel_sim.model_shapes import Shape, body_poses, shapes_of
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
-from tissue.types import FloatArray, Snapshot, Surface
+from scalpel_sim.strokes.cuts import Cut, prepare_cut
+from scalpel_sim.viewer.draping import TriangleMesh
+from scalpel_sim.viewer.model_shapes import Shape, body_poses, shapes_of
+from tissue import FloatArray, Snapshot, Surface
 
 STRETCH = 0.3
 """How far the held sides are pulled apart, as a fraction: the paper's displacement boundary

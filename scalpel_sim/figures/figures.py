@@ -9,16 +9,16 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from scalpel_sim import textures
-from scalpel_sim.draping import drape
 from scalpel_sim.errors import RunError
 from scalpel_sim.figures.camera import Margins, View, framing
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, by, moments
 from scalpel_sim.figures.paint import Thing, paint, texture_of
 from scalpel_sim.figures.table import table_below
 from scalpel_sim.figures.wire import draw_mesh
-from scalpel_sim.stage import TILES_PER_BODY
-from tissue.types import FloatArray
+from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.draping import drape
+from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
+from tissue import FloatArray
 
 WHITE = (1.0, 1.0, 1.0)
 TOWARDS_EYE = np.array([0.9, -2.0, 1.9])

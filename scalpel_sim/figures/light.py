@@ -7,8 +7,8 @@ import numpy as np
 
 from scalpel_sim.figures.camera import View, look_along
 from scalpel_sim.figures.rasterise import rasterise
-from tissue.jit import kernel
-from tissue.types import FloatArray
+from tissue import FloatArray
+from tissue.core.jit import kernel
 
 N_LAMP, N_SKY = 32, 64
 """Directions that stand for the lamp and for the sky. Fewer, and shadows have steps."""

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import matplotlib.image
 import numpy as np
 
-from scalpel_sim.draping import TriangleMesh
 from scalpel_sim.figures.camera import View
 from scalpel_sim.figures.light import Lights, light_on, lights
 from scalpel_sim.figures.rasterise import Raster, rasterise
-from tissue.types import FloatArray, IntArray
+from scalpel_sim.viewer.draping import TriangleMesh
+from tissue import FloatArray, IntArray
 
 GAMMA = 2.2
 """Of the screen, nearly sRGB's: colours are mixed as light, and shown through this."""

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.jit import kernel
-from tissue.types import FloatArray, IntArray
+from tissue import FloatArray, IntArray
+from tissue.core.jit import kernel
 
 FLAT = 1e-12
 """Twice the area [pixels squared] up to which a triangle is seen edge-on, and shows nothing."""

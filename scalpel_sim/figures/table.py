@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from scalpel_sim.draping import TriangleMesh
-from tissue.types import FloatArray
+from scalpel_sim.viewer.draping import TriangleMesh
+from tissue import FloatArray
 
 REACH = 6.0
 """Half width, in diagonals of the body: as far as its shadow can be seen."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from scalpel_sim.figures.camera import View
 from scalpel_sim.figures.rasterise import draw_segments, rasterise
-from tissue.types import FloatArray, IntArray, Snapshot, Surface
+from tissue import FloatArray, IntArray, Snapshot, Surface
 
 PAPER = (1.0, 1.0, 1.0)
 SKIN_FACE, CUT_FACE = (0.955, 0.96, 0.97), (1.0, 0.86, 0.84)

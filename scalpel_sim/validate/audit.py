@@ -10,7 +10,7 @@ from scalpel_sim.validate.block import (
     MIDDLE,
     THICKNESS,
     Record,
-    block,
+    block_tissue,
     edge,
     lead,
     rubber,
@@ -18,8 +18,7 @@ from scalpel_sim.validate.block import (
 )
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene
 from scalpel_sim.validate.puncturing import in_and_out
-from tissue.blade_shape import BladeShape
-from tissue.types import BladeSegment, Energies, FloatArray
+from tissue import BladeSegment, BladeShape, Energies, FloatArray
 
 LARGEST_RESIDUAL = 0.005
 """Of the blade's work: the issue's bound."""
@@ -94,7 +93,7 @@ def measure(quick: bool) -> Findings:
             material = rubber(
                 toughness=stroke.toughness, skin_toughness=stroke.skin, blade_friction=FRICTION
             )
-            record = lead(block(material, blade=blade, audit=True), stroke.places)
+            record = lead(block_tissue(material, blade=blade, audit=True), stroke.places)
             kind = "line" if blade is None else f"scalpel, friction {FRICTION:g}"
             lines.append(judge(f"{name}, {kind}", record.energies))
             if blade and name in ("puncture", "slanted"):

@@ -7,19 +7,20 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade_shape import BladeShape
-from tissue.boundary import fixed_nodes
-from tissue.material import Law, Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import (
+from tissue import (
     BladeSegment,
+    BladeShape,
     BladeSweep,
     Energies,
     FloatArray,
+    Law,
+    Material,
     StepResult,
     TetrahedralMesh,
+    Tissue,
     Wrench,
+    block,
+    fixed_nodes,
 )
 
 SIZE = (0.04, 0.04, 0.02)
@@ -61,7 +62,7 @@ def rubber(
     )
 
 
-def block(
+def block_tissue(
     material: Material,
     cells: Sequence[int] = COARSE,
     *,
@@ -80,7 +81,7 @@ def block(
         mesh: The block, where it is not the usual grid.
         audit: Whether to keep the account of energy.
     """
-    mesh = mesh or grid(cells, SIZE)
+    mesh = mesh or block(cells, SIZE)
     return Tissue(
         mesh,
         material,

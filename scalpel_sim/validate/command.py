@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from scalpel_sim.console import say, talking
+from scalpel_sim.cli.console import say, talking
+from scalpel_sim.cli.options import Talk
 from scalpel_sim.errors import RunError
-from scalpel_sim.options import Talk
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.validate.findings import Scene
@@ -36,9 +36,9 @@ def validate(
             puncture, reaction, audit, coupling, liver, gel.
         quick: A few lines of each scene, in half a minute instead of some five.
     """
-    from scalpel_sim.outputs import check_folder
-    from scalpel_sim.ready import load_kernels
-    from scalpel_sim.summary import versions
+    from scalpel_sim.cli.run_setup import load_kernels
+    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.summary import versions
     from scalpel_sim.validate.results import as_json, counts
     from scalpel_sim.validate.scenes import chosen
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from scalpel_sim.hand import ACTUATORS
-from scalpel_sim.prepare import prepare
+from scalpel_sim.arm.hand import ACTUATORS
+from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES, changed
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.stroke import Stroke
+from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 LEAST = -1e-6
 """Energy that the arm may have got out beyond what it put in [J]: the issue's bound."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from tissue.types import FloatArray
+from tissue import FloatArray
 
 PASS, FAIL, KNOWN = "pass", "FAIL", "known"
 """Verdicts. `known` is a figure out of its bounds by no more than what is known and explained."""

@@ -9,17 +9,14 @@ from scalpel_sim.validate.block import (
     LENGTH,
     MIDDLE,
     THICKNESS,
-    block,
+    block_tissue,
     edge,
     lead,
     rubber,
     through,
 )
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
-from tissue.blade_shape import BladeShape
-from tissue.material import Material
-from tissue.presets import PRESETS
-from tissue.types import FloatArray
+from tissue import MATERIALS, BladeShape, FloatArray, Material
 
 SLOW_TOUGHNESS = 1.1
 """Of gelatine of 10 % by weight, cut slowly [J/m2]."""
@@ -50,7 +47,7 @@ def published(speed: float) -> float:
 def gelatine() -> Material:
     """Return the gelatine of the presets, with the law of toughness of the paper."""
     return replace(
-        PRESETS["gelatin"].material,
+        MATERIALS["gelatin"].material,
         toughness=SLOW_TOUGHNESS,
         toughness_exponent=SLOPE,
         toughness_speed=SLOW,
@@ -60,7 +57,7 @@ def gelatine() -> Material:
 def force_per_depth(speed: float) -> float:
     """Cut gelatine at that speed [m/s], and return force / depth [N/m]."""
     end = 0.75 * LENGTH if speed > 0.01 else 0.5 * LENGTH
-    record = lead(block(gelatine()), through(speed, begin=-0.001, end=end))
+    record = lead(block_tissue(gelatine()), through(speed, begin=-0.001, end=end))
     return float(record.of_steady(record.resistance).mean() / THICKNESS)
 
 
@@ -69,7 +66,7 @@ def slit(depth: float) -> float:
     material = rubber(young_modulus=PHANTOM_STIFFNESS, toughness=APPARENT)
     y = np.arange(-0.003, 0.75 * LENGTH, 0.1 * DT)
     places = [edge((MIDDLE, at, THICKNESS - depth), length=depth + 0.01) for at in y]
-    record = lead(block(material, held="bottom", blade=BladeShape()), places)
+    record = lead(block_tissue(material, held="bottom", blade=BladeShape()), places)
     return float(record.of_steady(record.resistance).mean() / depth)
 
 

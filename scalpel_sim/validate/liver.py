@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from scalpel_sim.validate.block import Record, block, lead
+from scalpel_sim.validate.block import Record, block_tissue, lead
 from scalpel_sim.validate.findings import (
     Band,
     Curve,
@@ -15,10 +15,7 @@ from scalpel_sim.validate.findings import (
     Source,
 )
 from scalpel_sim.validate.puncturing import into
-from tissue.blade_shape import BladeShape
-from tissue.material import Material
-from tissue.presets import PRESETS
-from tissue.shapes import grid
+from tissue import MATERIALS, BladeShape, Material, block
 
 SIZE, CELLS = (0.1, 0.08, 0.05), (10, 8, 5)
 """A piece of liver [m]."""
@@ -70,15 +67,15 @@ class Insertions(NamedTuple):
 
 def liver(friction: float) -> Material:
     """Return the liver of the presets, as stiff as where it is pressed hard."""
-    material = PRESETS["liver"].material
+    material = MATERIALS["liver"].material
     return replace(material, young_modulus=STIFFNESS, blade_friction=friction)
 
 
 def insert_twice(material: Material) -> Insertions:
     """Push a blade in, draw it out, and push it in again: what cutting took is the difference."""
-    mesh = grid(CELLS, SIZE)
+    mesh = block(CELLS, SIZE)
     blade = BladeShape(height=8e-3)
-    tissue = block(material, mesh=mesh, held="left,right,bottom", blade=blade, audit=True)
+    tissue = block_tissue(material, mesh=mesh, held="left,right,bottom", blade=blade, audit=True)
     middle = (0.5 * SIZE[0] + BESIDE, 0.5 * SIZE[1])
     down = into(EDGE, DEEP, SPEED, middle=middle, top=SIZE[2])
     first, _, second = (lead(tissue, way) for way in (down, down[::-1], down))

@@ -7,7 +7,7 @@ from scalpel_sim.validate.block import (
     FINE,
     THICKNESS,
     Record,
-    block,
+    block_tissue,
     lead,
     rubber,
 )
@@ -22,8 +22,7 @@ from scalpel_sim.validate.findings import (
     within,
 )
 from scalpel_sim.validate.puncturing import in_and_out
-from tissue.blade_shape import BladeShape
-from tissue.types import Energies
+from tissue import BladeShape, Energies
 
 NARROW = 0.001
 """Length of an edge all of which breaks in at once [m]: less than an element's."""
@@ -82,7 +81,7 @@ def stroke(length: float, skin: float, cells: tuple[int, int, int] = FINE) -> Re
         cells: Of the block.
     """
     material = rubber(toughness=TOUGHNESS, skin_toughness=skin * TOUGHNESS, blade_friction=FRICTION)
-    tissue = block(material, cells, held="left,right,bottom", blade=BladeShape(), audit=True)
+    tissue = block_tissue(material, cells, held="left,right,bottom", blade=BladeShape(), audit=True)
     return lead(tissue, in_and_out(length, DEEP, SPEED))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from scalpel_sim.validate.block import DT, LENGTH, MIDDLE, THICKNESS, edge
-from tissue.types import BladeSegment, FloatArray
+from tissue import BladeSegment, FloatArray
 
 ABOVE = 0.5e-3
 """How far above the block the edge begins [m]."""

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from scalpel_sim.validate.block import THICKNESS, block, lead, rubber, through
+from scalpel_sim.validate.block import THICKNESS, block_tissue, lead, rubber, through
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
-from tissue.blade_shape import BladeShape
+from tissue import BladeShape
 
 SLOW_TOUGHNESS, TWICE_AT, EXPONENT = 10.0, 0.1, 0.5
 """[J/m2], [m/s]."""
@@ -28,7 +28,7 @@ def force_at(speed: float) -> float:
         toughness_exponent=EXPONENT,
         toughness_speed=TWICE_AT,
     )
-    record = lead(block(material), through(speed))
+    record = lead(block_tissue(material), through(speed))
     return float(record.of_steady(record.resistance).mean())
 
 
@@ -36,7 +36,7 @@ def force_of(radius: float) -> float:
     """Cut through with an edge of that radius [m], and return the mean force [N]."""
     material = rubber(young_modulus=STIFFNESS, toughness=SLOW_TOUGHNESS, work_to_rupture=RUPTURE)
     thin = BladeShape(thickness=1e-5, edge_radius=radius)  # its faces push nothing apart
-    record = lead(block(material, blade=thin), through(TWICE_AT))
+    record = lead(block_tissue(material, blade=thin), through(TWICE_AT))
     return float(record.of_steady(record.resistance).mean())
 
 

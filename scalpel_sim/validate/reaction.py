@@ -6,12 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.validate.block import MIDDLE, block, edge, rubber
+from scalpel_sim.validate.block import MIDDLE, block_tissue, edge, rubber
 from scalpel_sim.validate.findings import Findings, Known, Line, Scene
-from tissue.blade_shape import BladeShape
-from tissue.material import Law
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, FloatArray
+from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray, Law, Tissue
 
 LARGEST = 1e-9
 """[N] and [N m]: the issue's bound."""
@@ -57,7 +54,7 @@ def cut(law: Law, n: int) -> Balance:
     """Cut a block that nothing holds, without drag: all that changes its motion is the blade."""
     material = rubber(law, toughness=10.0, blade_friction=0.3)
     material = replace(material, viscous_damping=0.0, density=HEAVY)
-    tissue = block(material, held="", blade=BladeShape())
+    tissue = block_tissue(material, held="", blade=BladeShape())
     return balance(tissue, wavy(n))
 
 

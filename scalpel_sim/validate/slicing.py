@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from scalpel_sim.validate.block import THICKNESS, Record, block, lead, rubber, through
+from scalpel_sim.validate.block import THICKNESS, Record, block_tissue, lead, rubber, through
 from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Scene, Source, within
 
 TOUGHNESS = 20.0
@@ -32,7 +32,7 @@ def normal_force(toughness: float, ratio: float) -> float:
 def cut(ratio: float, speed: float) -> Record:
     """Cut through the block while the edge is drawn down by `ratio` of its way."""
     material = rubber(young_modulus=STIFFNESS, toughness=TOUGHNESS)
-    return lead(block(material, held=HELD), through(speed, ratio=ratio))
+    return lead(block_tissue(material, held=HELD), through(speed, ratio=ratio))
 
 
 def judge(ratio: float, speed: float, record: Record, toughness: float) -> list[Line]:

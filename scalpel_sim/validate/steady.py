@@ -12,18 +12,18 @@ from scalpel_sim.validate.block import (
     MIDDLE,
     THICKNESS,
     Record,
-    block,
+    block_tissue,
     lead,
     rubber,
     through,
 )
 from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Scene, Source, within
-from tissue.material import Law, Material
+from tissue import Law, Material
 
 STIFF_ENOUGH = 30e3
 """Young's modulus [Pa] at which tetrahedra bear all three toughnesses on both meshes
-(`tissue.caveats.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4 mm. Springs
-bear the least of them."""
+(`tissue.material_warnings.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4
+mm. Springs bear the least of them."""
 NEAR = 0.05
 """How far the force may be off: the issue's bound."""
 RIPPLE = 0.10
@@ -68,7 +68,7 @@ def cut(material: Material, cells: tuple[int, int, int], place: float, speed: fl
         place: Where, across [m].
         speed: [m/s].
     """
-    record = lead(block(material, cells), through(speed, x=place))
+    record = lead(block_tissue(material, cells), through(speed, x=place))
     force = record.of_steady(record.resistance)
     return Steady(record, float(force.mean()), float(force.std() / force.mean()))
 

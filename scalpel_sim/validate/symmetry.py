@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from scalpel_sim.validate.block import COARSE, FINE, SIZE, block, lead, rubber, through
+from scalpel_sim.validate.block import COARSE, FINE, SIZE, block_tissue, lead, rubber, through
 from scalpel_sim.validate.findings import Findings, Known, Line, Scene
-from tissue.blade_shape import BladeShape
-from tissue.material import Law
-from tissue.shapes import grid
-from tissue.types import TetrahedralMesh
+from tissue import BladeShape, Law, TetrahedralMesh, block
 
 LARGEST = 0.05
 """Lateral force over cutting force: the specification's bound."""
@@ -27,7 +24,7 @@ NEAR = 1e-9
 
 def mirrored(cells: tuple[int, int, int]) -> TetrahedralMesh:
     """Return the block as two halves that are mirror images across x."""
-    half = grid((cells[0] // 2, *cells[1:]), (0.5 * SIZE[0], *SIZE[1:]))
+    half = block((cells[0] // 2, *cells[1:]), (0.5 * SIZE[0], *SIZE[1:]))
     other = half.positions * (-1.0, 1.0, 1.0) + (SIZE[0], 0.0, 0.0)
     rounded = np.round(np.concatenate((half.positions, other)) / NEAR) * NEAR
     points, place = np.unique(rounded, axis=0, return_inverse=True)
@@ -38,7 +35,7 @@ def mirrored(cells: tuple[int, int, int]) -> TetrahedralMesh:
 def lateral_share(law: Law, cells: tuple[int, int, int], blade: BladeShape | None) -> float:
     """Cut through the middle, and return the mean lateral force over the cutting force."""
     material = rubber(law, young_modulus=STIFFNESS, blade_friction=0.3)
-    tissue = block(material, mesh=mirrored(cells), blade=blade)
+    tissue = block_tissue(material, mesh=mirrored(cells), blade=blade)
     record = lead(tissue, through(0.1, x=0.5 * SIZE[0]))
     lateral = np.abs(record.of_steady(record.force[:, 0])).mean()
     return float(lateral / record.of_steady(record.resistance).mean())

@@ -7,15 +7,15 @@ import hypothesis
 import numpy as np
 import pytest
 
-from bridge.keys import KEY_VARIABLE
-from tissue.types import BladeSegment
+from bridge.tcp.keys import KEY_VARIABLE
+from tissue import BladeSegment
 
 # A busy machine is no fault of the code under test.
 hypothesis.settings.register_profile("no deadline", deadline=None)
 hypothesis.settings.load_profile("no deadline")
 
 ROOT = Path(__file__).parents[2]
-SERVE_BLOCK = Path(__file__).with_name("serve_block.py")
+SERVE_BLOCK = Path(__file__).with_name("tcp") / "serve_block.py"
 
 
 class ServerProcess:

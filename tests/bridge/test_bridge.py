@@ -6,28 +6,20 @@ import time
 import numpy as np
 import pytest
 
-from bridge.bridge import Bridge
-from bridge.coupling import CouplingError, DeviceLimits
-from bridge.fixtures import FixtureBox
-from bridge.frames import TissueFrame
-from bridge.link import InProcessLink
-from bridge.virtual_coupling import VirtualCoupling
+from bridge import Bridge, CouplingError, FixtureBox, InProcessLink, TissueFrame, VirtualCoupling
+from bridge.coupling.coupling import DeviceLimits
 from tests.bridge.bits import bits
-from tests.bridge.walls import Wall
-from tissue.blade_shape import BladeShape
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
+from tests.bridge.coupling.walls import Wall
+from tissue import BladeSegment, BladeShape, BladeSweep, Material, TetrahedralMesh, Tissue, block
 
 DT = 1e-3
 ABOVE = 0.1
 
 
 @pytest.fixture
-def block():
+def block_tissue():
     def make(size=(0.02, 0.02, 0.02)):
-        mesh = grid((3, 2, 2), size)
+        mesh = block((3, 2, 2), size)
         fixed = (mesh.positions[:, 0] == 0.0) | (mesh.positions[:, 0] == size[0])
         return Tissue(mesh, fixed=fixed, gravity=(0.0, 0.0, 0.0))
 
@@ -50,8 +42,8 @@ class DivergedLink(InProcessLink):
         return self._spoil(super().step(sweep, dt))
 
 
-def test_nothing_is_felt_out_of_contact_and_the_tissue_still_lives(block, upright):
-    tissue = Tissue(grid((1, 1, 1), (0.02, 0.02, 0.02)))
+def test_nothing_is_felt_out_of_contact_and_the_tissue_still_lives(block_tissue, upright):
+    tissue = Tissue(block((1, 1, 1), (0.02, 0.02, 0.02)))
     bridge = Bridge(InProcessLink(tissue))
     felt = [bridge.step(upright(0.01, 0.01, ABOVE), DT) for _ in range(20)]
     assert not any(w.force.any() or w.torque.any() for w in felt)
@@ -59,22 +51,24 @@ def test_nothing_is_felt_out_of_contact_and_the_tissue_still_lives(block, uprigh
     assert bridge.counters.frames == bridge.counters.rejected == 20
 
 
-def test_a_blade_that_is_drawn_into_the_block_is_pushed_back(block, upright):
-    bridge = Bridge(InProcessLink(block()))
+def test_a_blade_that_is_drawn_into_the_block_is_pushed_back(block_tissue, upright):
+    bridge = Bridge(InProcessLink(block_tissue()))
     felt = draw(bridge, upright, 60)
     assert felt[-1].force[1] < -0.01
     np.testing.assert_allclose(felt[-1].force, -bridge.result.force_on_tissue, atol=1e-9)
 
 
-def test_the_first_call_does_not_move_the_blade(block, upright):
+def test_the_first_call_does_not_move_the_blade(block_tissue, upright):
     # Anywhere but outside, a sweep from elsewhere would cut.
-    bridge = Bridge(InProcessLink(block()))
+    bridge = Bridge(InProcessLink(block_tissue()))
     bridge.step(upright(0.009, 0.01), DT)
     assert bridge.result.cut_area == 0.0
 
 
-def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(block, upright):
-    filtered, asked = block(), block()
+def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(
+    block_tissue, upright
+):
+    filtered, asked = block_tissue(), block_tissue()
     bridge = Bridge(InProcessLink(filtered))
     before, n_rejected = upright(0.009, -0.03), 0
     for i in range(400):  # in from one side, out at the other
@@ -93,7 +87,7 @@ def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(bl
 
 def horseshoe(blade):
     """Return a bar of soft tissue that is bent to half a ring around z, held by its middle."""
-    mesh = grid((12, 2, 3), (0.06, 0.01, 0.01))
+    mesh = block((12, 2, 3), (0.06, 0.01, 0.01))
     turn = np.pi * (1.0 - mesh.positions[:, 0] / 0.06)
     radius = 0.015 + mesh.positions[:, 1]
     bent = np.stack([radius * np.cos(turn), radius * np.sin(turn), mesh.positions[:, 2]], axis=1)
@@ -126,8 +120,8 @@ def test_in_the_hollow_of_a_body_the_broad_phase_is_strict_too(upright, blade):
     assert bits(filtered.snapshot()) == bits(asked.snapshot())
 
 
-def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block, upright):
-    bridge = Bridge(InProcessLink(block()))
+def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block_tissue, upright):
+    bridge = Bridge(InProcessLink(block_tissue()))
     draw(bridge, upright, 60)
     n_rejected = bridge.counters.rejected
     assert bridge.result.anchored_length > 0.0
@@ -136,12 +130,15 @@ def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block, uprigh
     assert bridge.counters.rejected == n_rejected
 
 
-def test_the_wrench_turns_with_the_tissue(block, upright):
+def test_the_wrench_turns_with_the_tissue(block_tissue, upright):
     s = math.sqrt(0.5)
     frame = TissueFrame(
         np.array([[s, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, s]]), np.array([0.3, -0.2, 0.1])
     )
-    straight, turned = Bridge(InProcessLink(block())), Bridge(InProcessLink(block()), frame)
+    straight, turned = (
+        Bridge(InProcessLink(block_tissue())),
+        Bridge(InProcessLink(block_tissue()), frame),
+    )
     for i in range(60):
         segment = upright(0.009, -0.002 + 0.1 * DT * i)
         felt = straight.step(segment, DT)
@@ -151,8 +148,8 @@ def test_the_wrench_turns_with_the_tissue(block, upright):
     np.testing.assert_allclose(felt_turned.point, frame.points_to_world(segment.tip), atol=1e-12)
 
 
-def test_the_arm_never_feels_more_than_its_device_can_exert(block, upright):
-    bridge = Bridge(InProcessLink(block()), limits=DeviceLimits(force=0.02))
+def test_the_arm_never_feels_more_than_its_device_can_exert(block_tissue, upright):
+    bridge = Bridge(InProcessLink(block_tissue()), limits=DeviceLimits(force=0.02))
     felt = draw(bridge, upright, 60)
     assert max(math.hypot(*w.force) for w in felt) <= 0.02
     assert bridge.counters.force_limited > 0
@@ -160,10 +157,10 @@ def test_the_arm_never_feels_more_than_its_device_can_exert(block, upright):
     np.testing.assert_allclose(np.cross(felt[-1].force, bridge.wrench_raw.force), 0.0, atol=1e-12)
 
 
-def test_the_fixtures_that_the_blade_meets_are_named_in_the_world(block, upright):
+def test_the_fixtures_that_the_blade_meets_are_named_in_the_world(block_tissue, upright):
     frame = TissueFrame(origin=np.array([0.0, 0.0, 0.05]))
     table = FixtureBox("table", np.array([1.0, 1.0, 0.02]), np.array([0.0, 0.0, 0.0]))
-    bridge = Bridge(InProcessLink(block()), frame, fixtures=[table])
+    bridge = Bridge(InProcessLink(block_tissue()), frame, fixtures=[table])
     bridge.step(upright(0.01, -0.1, 0.2), DT)
     assert bridge.touching == ()
     bridge.step(upright(0.01, -0.1, 0.0), DT)
@@ -180,9 +177,9 @@ def test_the_fixtures_that_the_blade_meets_are_named_in_the_world(block, upright
     ids=["force", "bounds"],
 )
 def test_a_tissue_that_diverged_ends_the_run_instead_of_reaching_the_arm(
-    block, upright, spoil, bad
+    block_tissue, upright, spoil, bad
 ):
-    bridge = Bridge(DivergedLink(block(), lambda result: spoil(result, bad)))
+    bridge = Bridge(DivergedLink(block_tissue(), lambda result: spoil(result, bad)))
     with pytest.raises(CouplingError, match="finite"):
         bridge.step(upright(0.009, 0.0), DT)
 
@@ -361,21 +358,23 @@ UP = np.array([0.0, 0.0, 1.0])
         (BladeSegment(np.zeros(3), UP, UP), "across the edge; they are 0 degrees apart"),
     ],
 )
-def test_a_blade_that_cannot_be_is_refused_before_the_tissue_hears_of_it(block, segment, why):
-    bridge = Bridge(InProcessLink(block()))
+def test_a_blade_that_cannot_be_is_refused_before_the_tissue_hears_of_it(
+    block_tissue, segment, why
+):
+    bridge = Bridge(InProcessLink(block_tissue()))
     with pytest.raises(ValueError, match=why):
         bridge.step(segment, DT)
     assert bridge.result is None
 
 
 @pytest.mark.parametrize("dt", [0.0, -1e-3, np.nan, np.inf])
-def test_a_frame_that_lasts_no_time_is_refused(block, upright, dt):
+def test_a_frame_that_lasts_no_time_is_refused(block_tissue, upright, dt):
     with pytest.raises(ValueError, match="must be positive and finite"):
-        Bridge(InProcessLink(block())).step(upright(0.0, 0.0), dt)
+        Bridge(InProcessLink(block_tissue())).step(upright(0.0, 0.0), dt)
 
 
-def test_the_link_describes_what_the_arm_side_needs(block):
-    tissue = block()
+def test_the_link_describes_what_the_arm_side_needs(block_tissue):
+    tissue = block_tissue()
     described = InProcessLink(tissue, "block").describe()
     assert described.scene == "block"
     assert (described.n_tetrahedra, described.n_nodes) == (72, 36)

@@ -3,9 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.fixtures import FixtureBox, FixtureMesh
-from bridge.frames import TissueFrame
-from tissue.types import BladeSegment, Wrench
+from bridge import FixtureBox, FixtureMesh, TissueFrame
+from tissue import BladeSegment, Wrench
 
 QUARTER_TURN_ABOUT_Z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 TURNED = TissueFrame(QUARTER_TURN_ABOUT_Z, np.array([1.0, 0.0, 0.0]))

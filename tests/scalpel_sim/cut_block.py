@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from tissue.faces import boundary_faces
-from tissue.shapes import grid
-from tissue.types import FloatArray, Surface
+from tissue import FloatArray, Surface, block
+from tissue.mesh.faces import boundary_faces
 
 
 def cut_block(gap: float, cells: tuple[int, int, int] = (4, 6, 4)) -> Surface:
@@ -12,7 +11,7 @@ def cut_block(gap: float, cells: tuple[int, int, int] = (4, 6, 4)) -> Surface:
 
     Without a gap it is whole: the faces in the middle are inside, and not part of the surface.
     """
-    mesh = grid(cells, (0.04, 0.06, 0.04))
+    mesh = block(cells, (0.04, 0.06, 0.04))
     middle = mesh.positions[:, 0].mean()
     is_right = mesh.positions[mesh.tetrahedra, 0].mean(axis=1) > middle
     n_nodes = len(mesh.positions)

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from bridge.frames import TissueFrame
-from scalpel_sim.scene3d import Readings
+from bridge import TissueFrame
+from scalpel_sim.viewer.scene3d import Readings
 
 MJCF = """
 <mujoco>

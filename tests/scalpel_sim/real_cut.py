@@ -5,10 +5,7 @@ import itertools
 
 import numpy as np
 
-from tissue.boundary import fixed_nodes
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, Surface
+from tissue import BladeSegment, BladeSweep, Surface, Tissue, block, fixed_nodes
 
 DT = 1e-3
 """[s]."""
@@ -26,7 +23,7 @@ def cut_tissue() -> tuple[Surface, Surface, Surface]:
 
     An upright blade goes through it from front to back, down the middle.
     """
-    mesh = grid()
+    mesh = block()
     sides = fixed_nodes(mesh, "left,right")
     tissue = Tissue(mesh, fixed=sides, positions=mesh.positions * [STRETCH, 1.0, 1.0])
     whole = halfway = tissue.surface()

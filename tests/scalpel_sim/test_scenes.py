@@ -1,4 +1,5 @@
-from scalpel_sim.scenes import SCENES, changed, material_called
+from scalpel_sim import SCENES
+from scalpel_sim.scenes import changed, material_called
 
 GRID2 = SCENES["grid2"]
 

@@ -4,17 +4,16 @@ import re
 import numpy as np
 import pytest
 
-from bridge.link import InProcessLink, LinkError
-from scalpel_sim.body import check, make_tissue, pulled_apart
+from bridge import InProcessLink, LinkError
+from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.outputs import ENERGY_PLOT, NAMES, Outputs
-from scalpel_sim.plotter import Plotter
-from scalpel_sim.prepare import prepare
-from scalpel_sim.recording import COLUMNS, read_forces
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.recording import COLUMNS, read_forces
+from scalpel_sim.output.run_folder import ENERGY_PLOT, NAMES, Outputs
 from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
-from scalpel_sim.scenes import DEFAULT_SCENE, SCENES, changed, scene_called, scene_of
-from scalpel_sim.simulation import Simulation
-from tissue.shapes import grid
+from scalpel_sim.scene_body import check, make_tissue, pulled_apart
+from scalpel_sim.scenes import DEFAULT_SCENE, changed, scene_called, scene_of
+from tissue import block
 
 GRID2 = SCENES["grid2"]
 UNAUDITED = set(NAMES) - {ENERGY_PLOT}
@@ -112,7 +111,7 @@ def test_a_scene_parts_before_it_is_dragged_far(name):
 
 
 def test_a_stretch_moves_held_sides_apart_and_nothing_else():
-    corners = grid((1, 1, 1), (0.1, 0.2, 0.3)).positions
+    corners = block((1, 1, 1), (0.1, 0.2, 0.3)).positions
     pulled = pulled_apart(corners, "left,right", 0.5)
     assert np.ptp(pulled, axis=0) == pytest.approx([0.15, 0.2, 0.3])
     assert pulled.mean(axis=0) == pytest.approx(corners.mean(axis=0))

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 
-from tissue.types import FloatArray, TetrahedralMesh
+from tissue import FloatArray, TetrahedralMesh
 
 
 def dihedral_angles(mesh: TetrahedralMesh) -> FloatArray:

@@ -4,23 +4,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.anchors import Anchors, new_anchors
-from tissue.body import NODES, Body, build_body, grown_body
-from tissue.cut import SPARE_NODES, Cut, Quality, new_change, new_work
-from tissue.elastic import Elastic, Surroundings
-from tissue.flanks import new_flanks
-from tissue.material import Material
-from tissue.path import new_path
-from tissue.resistance import resistance_of
-from tissue.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
-from tissue.sheet import new_sheet
-from tissue.solid import no_solid, room_for_stars, volume_term
-from tissue.springs import POOL_MARGIN, Springs, bound_frequencies, build_rows, no_springs
-from tissue.star import LARGEST_STAR, no_visits
+from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
+from tissue.blade.anchors import Anchors, new_anchors
+from tissue.blade.forces import Tool
+from tissue.blade.side_contact import new_flanks
+from tissue.blade.toughness import resistance_of
+from tissue.core.vec3 import Vec3
+from tissue.cutting.blade_path import new_path
+from tissue.cutting.cut_surface import new_sheet
+from tissue.cutting.workspace import SPARE_NODES, Cut, Quality, new_work
+from tissue.elasticity.finite_elements import no_solid, room_for_stars, volume_term
+from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.elasticity.springs import (
+    POOL_MARGIN,
+    Springs,
+    bound_frequencies,
+    build_rows,
+    no_springs,
+)
+from tissue.integrators.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
+from tissue.mesh.body import NODES, Body, build_body, grown_body
+from tissue.mesh.changes import new_change
+from tissue.mesh.star import LARGEST_STAR, no_visits
 from tissue.tissue import NOWHERE
-from tissue.tool import Tool
-from tissue.types import BoolArray, FloatArray, TetrahedralMesh
-from tissue.vec3 import Vec3
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 

@@ -6,11 +6,10 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from tests.tissue.kernels_of import springs_of
-from tissue.body import NODES, TETRAHEDRA, Body, build_body
-from tissue.jit import kernel
-from tissue.neo_hookean import solid_energy, solid_force, solid_forces
-from tissue.simd import store_point
-from tissue.solid import (
+from tissue import BoolArray, FloatArray, TetrahedralMesh
+from tissue.core.jit import kernel
+from tissue.core.simd import store_point
+from tissue.elasticity.finite_elements import (
     Law,
     Solid,
     build_stars,
@@ -21,9 +20,10 @@ from tissue.solid import (
     room_for_stars,
     volume_term,
 )
-from tissue.solid_frequency import bound_solid_frequencies
-from tissue.star import LARGEST_STAR, no_visits
-from tissue.types import BoolArray, FloatArray, TetrahedralMesh
+from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
+from tissue.mesh.body import NODES, TETRAHEDRA, Body, build_body
+from tissue.mesh.star import LARGEST_STAR, no_visits
 
 YOUNG_MODULUS = 10e3
 

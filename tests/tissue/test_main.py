@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
+from tissue import block
 from tissue.__main__ import cut_through, main
-from tissue.shapes import grid
 
 
 def test_a_block_is_cut_into_two_and_every_stage_has_its_time(capsys):
@@ -22,7 +22,7 @@ def test_a_block_is_cut_into_two_and_every_stage_has_its_time(capsys):
 
 
 def test_the_cut_area_is_that_of_the_leaning_blade_through_the_block():
-    cut = cut_through(grid(), 400)
+    cut = cut_through(block(), 400)
     assert cut.results[-1].cut_area == pytest.approx(0.06 * 0.04 * (1 + 0.25**2) ** 0.5, rel=0.15)
 
 

@@ -4,9 +4,7 @@ import math
 import numpy as np
 import pytest
 
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
+from tissue import Material, Tissue, block
 
 
 @pytest.mark.parametrize(
@@ -83,7 +81,7 @@ def test_a_damping_that_means_nothing_is_refused(arguments, told):
 
 def test_a_ratio_that_makes_time_steps_short_is_used_and_told(caplog):
     caplog.set_level(logging.WARNING, logger="tissue")
-    mesh = grid((1, 1, 1), (0.03, 0.03, 0.03))
+    mesh = block((1, 1, 1), (0.03, 0.03, 0.03))
     Tissue(mesh, Material(poisson_ratio=0.49))
     assert not caplog.records
     Tissue(mesh, Material(poisson_ratio=0.4999))

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tissue.material import Material
-from tissue.shapes import grid
-from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, TetrahedralMesh
-from tissue.validation import MeshError
+from tissue import BladeSegment, BladeSweep, Material, MeshError, TetrahedralMesh, Tissue, block
 
-MESH = grid((2, 2, 2), (0.04, 0.04, 0.04))
+MESH = block((2, 2, 2), (0.04, 0.04, 0.04))
 POSE = strokes.pose((0.02, 0.01, -0.01), (0.02, 0.01, 0.05), (0.0, 1.0, 0.0))
 
 
@@ -184,7 +180,7 @@ def test_a_step_says_where_its_time_went(tissue):
 
 
 def test_the_tetrahedron_of_the_tip_holds_the_tip():
-    mesh = grid((4, 6, 4), (0.04, 0.06, 0.04))
+    mesh = block((4, 6, 4), (0.04, 0.06, 0.04))
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
     stroke = strokes.upright(0.0217, -0.005, 0.03, 0.0183, 0.05)
     last = strokes.make(tissue, stroke)[-1]

@@ -10,8 +10,6 @@ import math
 
 import numpy as np
 
-from tissue.arrays import Arrays
-from tissue.body import NODES, Body, grown
 from tissue.contact.distance import distance_of_edges, distance_to_triangle
 from tissue.contact.edge_edge import Edges
 from tissue.contact.faces import (
@@ -22,17 +20,27 @@ from tissue.contact.faces import (
     may_touch,
     measure_pieces,
 )
-from tissue.contact.grid import Box, Grid, Search, boxes_near, clear_grid, new_grid, new_search
-from tissue.contact.grid import put as put_in
-from tissue.contact.grid import take as take_out
-from tissue.contact.motion import Motion, begin_motion
+from tissue.contact.feature_edges import across, is_ridge
+from tissue.contact.motion_bounds import Motion, begin_motion
 from tissue.contact.pairs import CLOSING, N_PAIRS, Pairs, add_pair, drop_pair, new_pairs
 from tissue.contact.point_triangle import RIM, Corners
-from tissue.contact.ridges import across, is_ridge
-from tissue.jit import kernel
-from tissue.surface import OUTWARD
-from tissue.types import FloatArray, IntArray
-from tissue.vec3 import Vec3, dot, store, sub, vec3
+from tissue.contact.spatial_hash import (
+    Box,
+    Grid,
+    Search,
+    boxes_near,
+    clear_grid,
+    new_grid,
+    new_search,
+)
+from tissue.contact.spatial_hash import put as put_in
+from tissue.contact.spatial_hash import take as take_out
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3, dot, store, sub, vec3
+from tissue.mesh.body import NODES, Body, grown
+from tissue.mesh.surface import OUTWARD
 
 N_NODES, N_DIRTY, N_UPDATES = 0, 1, 2
 """Places in `Candidates.counts`."""

@@ -7,8 +7,8 @@ import math
 
 from tissue.contact.edge_edge import Edges
 from tissue.contact.point_triangle import Corners
-from tissue.jit import inlined, kernel
-from tissue.vec3 import Vec3, axpy, cross, dot, norm, sub
+from tissue.core.jit import inlined, kernel
+from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub
 
 
 @kernel

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from tissue.jit import inlined, kernel
-from tissue.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
+from tissue.core.jit import inlined, kernel
+from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
 NEARLY_PARALLEL = 1e-3
 """Sine of the angle between edges below which they have no crossing to speak of. Their nodes meet

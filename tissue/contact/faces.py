@@ -5,11 +5,11 @@ While the body is whole these are the faces of cuts; once it is in pieces, the s
 
 import numpy as np
 
-from tissue.arrays import Arrays
-from tissue.body import CUT, OUTER, TETRAHEDRA, Body, grown
-from tissue.cut import N_DIRTY, Change
-from tissue.jit import kernel
-from tissue.types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.mesh.body import CUT, OUTER, TETRAHEDRA, Body, grown
+from tissue.mesh.changes import N_DIRTY, Change
 
 ROOM_FOR_FACES = 1 << 14
 """Faces that there is room for at first: those of several cuts, so that few steps must grow it."""

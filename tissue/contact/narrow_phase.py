@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.body import NODES, Body
 from tissue.contact.candidates import (
     N_NODES,
     Candidates,
@@ -18,6 +17,8 @@ from tissue.contact.candidates import (
     is_dead_point,
     rim_of,
 )
+from tissue.contact.constraints import add_contact, have_moved_since
+from tissue.contact.contact_table import is_known
 from tissue.contact.distance import distance_of_edges, distance_to_triangle
 from tissue.contact.edge_edge import (
     EdgeEdge,
@@ -27,15 +28,7 @@ from tissue.contact.edge_edge import (
     face_the_same_way,
 )
 from tissue.contact.faces import N_FACES, NONE
-from tissue.contact.first_look import (
-    look_at_edges,
-    look_at_points,
-    may_be_crossed,
-    may_be_under,
-)
-from tissue.contact.impulses import add_contact, have_moved_since
-from tissue.contact.known_contacts import is_known
-from tissue.contact.motion import (
+from tissue.contact.motion_bounds import (
     N_NEW,
     STEPS_NEAR,
     can_touch,
@@ -61,11 +54,18 @@ from tissue.contact.pairs import (
     sort_hits,
 )
 from tissue.contact.point_triangle import Corners, PointTriangle, point_triangle
+from tissue.contact.simd_prefilter import (
+    look_at_edges,
+    look_at_points,
+    may_be_crossed,
+    may_be_under,
+)
 from tissue.contact.state import EPOCH, ContactState
-from tissue.geometry import Weights
-from tissue.jit import inlined, kernel
-from tissue.types import FloatArray
-from tissue.vec3 import Vec3, add, cross, dot, store, sub, vec3
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
+from tissue.geometry.tetrahedron import Weights
+from tissue.mesh.body import NODES, Body
 
 POINTS, EDGES = 0, 1
 """Kinds of pairs."""

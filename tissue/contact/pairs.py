@@ -8,12 +8,12 @@ of them moves much.
 
 import numpy as np
 
-from tissue.arrays import Arrays
 from tissue.contact.point_triangle import RIM
-from tissue.jit import inlined, kernel
-from tissue.simd import eight_points, filled
-from tissue.types import FloatArray, IntArray, SlotArray
-from tissue.vec3 import Vec3
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import eight_points, filled
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3
 
 Nodes = tuple[int, int, int, int]
 """A node and the corners of a triangle, or the ends of two edges."""

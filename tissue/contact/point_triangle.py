@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from tissue.jit import inlined, kernel
-from tissue.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
+from tissue.core.jit import inlined, kernel
+from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
 RIM = 0.01
 """How far outside a triangle, as a barycentric weight, a node still meets it. Between triangles

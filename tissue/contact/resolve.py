@@ -1,14 +1,12 @@
 """Contact after a Runge-Kutta step: find what went through what, and set it right."""
 
-from tissue.body import NODES, Body
 from tissue.contact.candidates import (
     FARTHEST,
     clear,
     moves_as_tissue_does,
     renew_candidates,
 )
-from tissue.contact.edge_edge import Edges, crossing_of, is_inner
-from tissue.contact.impulses import (
+from tissue.contact.constraints import (
     Contacts,
     bear,
     begin_with_last,
@@ -19,7 +17,8 @@ from tissue.contact.impulses import (
     push_apart,
     stop_approach,
 )
-from tissue.contact.motion import STEP
+from tissue.contact.edge_edge import Edges, crossing_of, is_inner
+from tissue.contact.motion_bounds import STEP
 from tissue.contact.narrow_phase import find_contacts, is_tangled, look_at_faces, measure
 from tissue.contact.pairs import nodes_of
 from tissue.contact.point_triangle import Corners, is_within, under
@@ -34,10 +33,11 @@ from tissue.contact.state import (
     PRESSURE_IMPULSE,
     ContactState,
 )
-from tissue.geometry import Weights
-from tissue.jit import kernel
-from tissue.types import IntArray
-from tissue.vec3 import dot, scale, store, vec3
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.core.vec3 import dot, scale, store, vec3
+from tissue.geometry.tetrahedron import Weights
+from tissue.mesh.body import NODES, Body
 
 MANY = 1.0 / 16.0
 """Share of new contacts from which on all is looked at once more: a correction can push a node into

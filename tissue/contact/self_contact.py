@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from tissue.body import TETRAHEDRA, Body, grown
 from tissue.contact.candidates import Candidates, grown_candidates, new_candidates
+from tissue.contact.constraints import Contacts, grown_contacts, new_contacts
 from tissue.contact.faces import (
     WITH_SKIN,
     collect_faces,
@@ -25,8 +25,7 @@ from tissue.contact.faces import (
     renew_faces,
     with_room,
 )
-from tissue.contact.impulses import Contacts, grown_contacts, new_contacts
-from tissue.contact.motion import grown_motion, new_motion
+from tissue.contact.motion_bounds import grown_motion, new_motion
 from tissue.contact.pairs import new_hits
 from tissue.contact.state import (
     ANEW,
@@ -41,10 +40,11 @@ from tissue.contact.state import (
     PRESSURE_IMPULSE,
     ContactState,
 )
-from tissue.cut import N_DIRTY, Change
-from tissue.pieces import label_pieces
-from tissue.simd import aligned, room_for_points
-from tissue.types import Touch
+from tissue.core.simd import aligned, room_for_points
+from tissue.mesh.body import TETRAHEDRA, Body, grown
+from tissue.mesh.changes import N_DIRTY, Change
+from tissue.mesh.pieces import label_pieces
+from tissue.types import BodyContacts
 
 MARGIN = 0.25
 """How far apart candidates may be, per mean node size. Larger: more pairs, each to be looked at now
@@ -135,11 +135,11 @@ class SelfContact:
         """Begin to count anew."""
         self.arrays.totals[:] = 0.0
 
-    def touch(self, dt: float) -> Touch:
+    def touch(self, dt: float) -> BodyContacts:
         """Return what was counted, over the time `dt` [s]."""
         totals = self.arrays.totals
         per_second = 1.0 / dt if dt > 0.0 else 0.0
-        return Touch(
+        return BodyContacts(
             n_contacts=int(totals[N_TOUCHING]),
             penetration=float(totals[PENETRATION]),
             force=float(totals[PRESSURE_IMPULSE] * per_second),

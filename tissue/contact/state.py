@@ -1,12 +1,12 @@
 """`ContactState`: all that contact reads and writes, beside the body."""
 
-from tissue.arrays import Arrays
 from tissue.contact.candidates import Candidates
+from tissue.contact.constraints import Contacts
 from tissue.contact.faces import Faces
-from tissue.contact.impulses import Contacts
-from tissue.contact.motion import Motion
+from tissue.contact.motion_bounds import Motion
 from tissue.contact.pairs import Hits
-from tissue.types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.structs import Arrays
 
 IS_AWAKE, IS_STALE, IS_PENDING, EPOCH, HAS_BEGUN = 0, 1, 2, 3, 4
 N_STATES = 5

@@ -8,8 +8,8 @@ import pytest
 
 from scalpel_sim.bench import cut, kernels, local_frame, roofline, scaling, scenes, table1
 from scalpel_sim.bench.results import HIGHER, LOWER, NEITHER, load
-from scalpel_sim.cli import command_line
-from scalpel_sim.table_1 import TABLE_1
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.table_1 import TABLE_1
 
 
 def is_sane(figure):

@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console
 
 from scalpel_sim.bench import peers
-from scalpel_sim.bench.blocks import block, edges_of, held
+from scalpel_sim.bench.blocks import block_mesh, edges_of, held
 from scalpel_sim.bench.peer_process import Failed, NotInstalled, PeerProcess
-from tissue.tissue import Tissue
+from tissue import Tissue
 
 HERE = Path(sys.executable)
 
@@ -21,7 +21,7 @@ def body(tmp_path_factory):
 
 
 def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
-    mesh = block(576)
+    mesh = block_mesh(576)
     with np.load(body) as given:
         ours = Tissue(mesh, peers.material("springs"))
         assert given["masses"] == pytest.approx(ours.snapshot().masses)
@@ -37,7 +37,7 @@ def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
 
 
 def test_edges_have_the_volume_around_them_and_nodes_a_quarter_of_it():
-    edges = edges_of(block(576))
+    edges = edges_of(block_mesh(576))
     volume = 0.04 * 0.04 * 0.06
     assert edges.node_volumes.sum() == pytest.approx(volume)
     assert edges.volumes.sum() == pytest.approx(6 * volume)  # each tetrahedron has six edges

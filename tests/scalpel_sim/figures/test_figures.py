@@ -6,7 +6,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from scalpel_sim.cli import command_line
+from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
 from scalpel_sim.figures.wire import edges_of

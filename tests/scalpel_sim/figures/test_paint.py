@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.draping import TriangleMesh
 from scalpel_sim.figures.camera import Margins, framing
 from scalpel_sim.figures.light import light_on, lights
 from scalpel_sim.figures.paint import Thing, paint
 from scalpel_sim.figures.table import table_below
+from scalpel_sim.viewer.draping import TriangleMesh
 
 UP = np.array([0.0, 0.0, 1.0])
 LAMP = np.array([0.0, 0.0, 1.0])

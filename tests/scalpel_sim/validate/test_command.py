@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from scalpel_sim.cli import command_line
+from scalpel_sim.cli.app import command_line
 from scalpel_sim.validate import scenes
 from scalpel_sim.validate.findings import Findings, Line, Scene
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from scalpel_sim.validate import audit, coupling, gel, puncture, reaction, slicing, steady, symmetry
-from scalpel_sim.validate.block import COARSE, block, lead, rubber, through
+from scalpel_sim.validate.block import COARSE, block_tissue, lead, rubber, through
 from scalpel_sim.validate.findings import FAIL, PASS
 from scalpel_sim.validate.scenes import SCENES, chosen
-from tissue.types import Energies
+from tissue import Energies
 
 TOUGHNESS = 20.0
 
@@ -103,7 +103,7 @@ def test_an_edge_that_slices_is_in_with_its_whole_length_from_end_to_end():
 
 
 def test_a_record_has_a_row_for_each_step():
-    record = lead(block(rubber(), (2, 2, 1), audit=True), through(1.0))
+    record = lead(block_tissue(rubber(), (2, 2, 1), audit=True), through(1.0))
     assert record.force.shape == record.tip.shape == (43, 3)
     assert record.accounts.shape == (43, len(Energies._fields))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, naive
-from tissue.body import CUT, build_body
+from tissue import TetrahedralMesh, block
 from tissue.contact.candidates import N_DIRTY, is_dead_edge, is_dead_point, new_candidates
 from tissue.contact.candidates import renew_candidates as renew
 from tissue.contact.faces import (
@@ -17,10 +17,9 @@ from tissue.contact.faces import (
     new_faces,
     with_room,
 )
-from tissue.contact.motion import new_motion
+from tissue.contact.motion_bounds import new_motion
 from tissue.contact.pairs import nodes_of_pair
-from tissue.shapes import grid
-from tissue.types import TetrahedralMesh
+from tissue.mesh.body import CUT, build_body
 
 pytestmark = pytest.mark.kernel
 
@@ -30,7 +29,7 @@ CELL = 0.005
 
 def two_bodies(offset):
     """Return two small bodies that share no node."""
-    first, second = grid((2, 2, 1), (0.02, 0.02, 0.01)), bodies.unit_tetrahedron()
+    first, second = block((2, 2, 1), (0.02, 0.02, 0.01)), bodies.unit_tetrahedron()
     return TetrahedralMesh(
         np.vstack([first.positions, 0.01 * second.positions + offset]),
         np.vstack([first.tetrahedra, second.tetrahedra + len(first.positions)]),

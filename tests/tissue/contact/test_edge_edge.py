@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tissue.contact.edge_edge import Edges, edge_edge
-from tissue.vec3 import Vec3
+from tissue.core.vec3 import Vec3
 
 pytestmark = pytest.mark.kernel
 

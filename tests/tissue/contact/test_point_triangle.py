@@ -5,7 +5,7 @@ import pytest
 
 from tests import naive
 from tissue.contact.point_triangle import Corners, point_triangle
-from tissue.vec3 import Vec3
+from tissue.core.vec3 import Vec3
 
 pytestmark = pytest.mark.kernel
 

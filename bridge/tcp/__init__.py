@@ -1,0 +1,1 @@
+"""A tissue in another process: frames, messages, keys, server and client."""

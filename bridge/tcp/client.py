@@ -1,0 +1,227 @@
+"""A tissue in another process: the client's end of the TCP link."""
+
+import contextlib
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from bridge.link import LinkError, TissueDescription
+from bridge.tcp.address import is_loopback, parse_address
+from bridge.tcp.channel import Channel
+from bridge.tcp.messages.body import (
+    PIECES_BYTES,
+    snapshot_bytes,
+    surface_bytes,
+    unpack_pieces,
+    unpack_snapshot,
+    unpack_surface,
+)
+from bridge.tcp.messages.chunks import LARGEST_CHUNKS, unpack_chunks
+from bridge.tcp.messages.quality import QUALITY_BYTES, unpack_quality
+from bridge.tcp.messages.result import LARGEST_RESULT, unpack_result
+from bridge.tcp.messages.step import pack_step
+from bridge.tcp.messages.text import (
+    LARGEST_DESCRIPTION,
+    LARGEST_ERROR,
+    unpack_description,
+    unpack_error,
+)
+from bridge.tcp.seal import NONCE_BYTES, direction_keys, new_nonce
+from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, Kind, MessageError
+from tissue import BladeSweep, Chunks, CutReport, Snapshot, StepResult, Surface
+
+Value = TypeVar("Value")
+
+CONNECT_SECONDS = 5.0
+"""How long to wait for a connection [s]. On loopback it is there at once or not at all."""
+ANSWER_SECONDS = 60.0
+"""How long to wait for an answer [s]. A step takes a millisecond, but the first steps of a freshly
+installed server compile."""
+
+
+class TcpLink:
+    """A tissue that `bridge.tcp.server.serve` holds. Not to be shared between threads.
+
+    When the tissue refuses a request, the link stays; when the connection fails, it is closed.
+
+    Args:
+        address: "HOST:PORT".
+        timeout: How long to wait for an answer [s].
+        key: What both sides have (`keys.read_key`); None for a server on this machine without one.
+
+    Raises:
+        ValueError: the address is malformed, or another machine's, and there is no key.
+        LinkError: nobody listens there, another client holds the tissue, or the other side has
+            another key, or is not a tissue of this version.
+    """
+
+    def __init__(
+        self, address: str, timeout: float = ANSWER_SECONDS, *, key: bytes | None = None
+    ) -> None:
+        self._address = address
+        self._timeout = timeout
+        self._sequence = 0
+        self._channel = Channel()
+        self._socket: socket.socket | None = _connect(address, timeout, has_key=key is not None)
+        try:
+            if key is not None:
+                self._prove(key)
+            self.describe()
+        except LinkError:
+            self.close()
+            raise
+
+    def describe(self) -> TissueDescription:
+        """See `TissueLink.describe`."""
+        description = self._ask(Kind.HELLO, b"", LARGEST_DESCRIPTION, unpack_description)
+        self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
+        return description
+
+    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        """See `TissueLink.step`."""
+        result = self._ask(Kind.STEP, pack_step(sweep, dt), LARGEST_RESULT, unpack_result)
+        self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
+        return result
+
+    def snapshot(self) -> Snapshot:
+        """See `TissueLink.snapshot`."""
+        limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
+        return self._ask(Kind.SNAPSHOT, b"", limit, unpack_snapshot)
+
+    def chunks(self) -> Chunks:
+        """See `TissueLink.chunks`."""
+        return self._ask(Kind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
+
+    def surface(self) -> Surface:
+        """See `TissueLink.surface`."""
+        limit = surface_bytes(self._n_tetrahedra)
+        return self._ask(Kind.SURFACE, b"", limit, unpack_surface)
+
+    def n_pieces(self) -> int:
+        """See `TissueLink.n_pieces`."""
+        return self._ask(Kind.PIECES, b"", PIECES_BYTES, unpack_pieces)
+
+    def quality(self) -> CutReport:
+        """See `TissueLink.quality`."""
+        return self._ask(Kind.QUALITY, b"", QUALITY_BYTES, unpack_quality)
+
+    def close(self) -> None:
+        """See `TissueLink.close`."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _prove(self, key: bytes) -> None:
+        """Draw a nonce, hear the server's, and seal all that follows.
+
+        The server proves itself too: its next reply would not open if it had another key.
+        """
+        mine = new_nonce()
+        theirs = self._ask(Kind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=Kind.CHALLENGE)
+        keys = direction_keys(key, mine, theirs)
+        self._channel.seal(keys.to_server, keys.to_client, plain_error_may_come=True)
+
+    def _ask(
+        self,
+        kind: Kind,
+        payload: bytes,
+        limit: int,
+        unpack: Callable[[bytes], Value],
+        reply_kind: Kind | None = None,
+    ) -> Value:
+        """Send a request and return what its reply of at most `limit` bytes says."""
+        if self._socket is None:
+            raise LinkError(f"the link to the tissue at {self._address} is closed")
+        sequence = self._sequence
+        self._sequence = (sequence + 1) % (1 << 32)
+        try:
+            for message in self._channel.pack(kind, sequence, payload):
+                self._socket.sendall(message)
+            answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket)
+            if answer.kind == Kind.ERROR:
+                error = unpack_error(answer.payload)
+            elif answer.kind != (reply_kind or kind):
+                raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
+            else:
+                return unpack(answer.payload)
+        except TimeoutError as cause:
+            self.close()
+            raise LinkError(
+                f"the tissue at {self._address} did not answer within {self._timeout:g} s"
+            ) from cause
+        except (OSError, MessageError) as cause:
+            self.close()
+            raise LinkError(f"the link to the tissue at {self._address} broke: {cause}") from cause
+        raise LinkError(f"the tissue at {self._address} refused: {error}")
+
+    def _answer_to(self, sequence: int, limit: int, connection: socket.socket) -> Frame:
+        """Return the reply to the request of this number; drop replies to earlier ones."""
+        deadline = time.monotonic() + self._timeout
+        limit = min(limit, LARGEST_REPLY)
+        parts: list[bytes] = []
+        n_bytes = 0
+        while True:
+            frame = self._channel.take()
+            if frame is None:
+                if (
+                    time.monotonic() > deadline
+                ):  # each read has its own limit; this is for a trickle
+                    raise TimeoutError
+                data = connection.recv(READ_BYTES)
+                if not data:
+                    raise ConnectionResetError("the other side has gone")
+                self._channel.feed(data)
+            elif frame.sequence == sequence:  # else of a request that Ctrl-C interrupted
+                n_bytes += len(frame.payload)
+                if n_bytes > limit:
+                    raise MessageError(f"a reply of {n_bytes} bytes; at most {limit} are allowed")
+                if not (frame.kind & MORE or parts):
+                    return frame
+                parts.append(frame.payload)
+                if not frame.kind & MORE:
+                    return frame._replace(payload=b"".join(parts))
+
+
+def _checked_nonce(payload: bytes) -> bytes:
+    if len(payload) != NONCE_BYTES:
+        raise MessageError(f"a challenge of {len(payload)} bytes; wanted {NONCE_BYTES}")
+    return payload
+
+
+def _connect(address: str, timeout: float, *, has_key: bool) -> socket.socket:
+    """Return a connection that sends small messages at once.
+
+    Raises:
+        ValueError: the address is malformed, or another machine's, and there is no key.
+        LinkError: nobody can be reached there.
+    """
+    host, port = parse_address(address)
+    seconds = min(timeout, CONNECT_SECONDS)
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        if not has_key and not all(is_loopback(where) for *_, where in found):
+            raise ValueError(
+                f"{address} is another machine, and that takes a key: give the one that its "
+                "server has with --key FILE, or reach it through an SSH tunnel"
+            )
+        connection = _first_that_answers([where for *_, where in found], seconds)
+    except TimeoutError as cause:
+        raise LinkError(f"nobody answers at {address} within {seconds:g} s") from cause
+    except ConnectionRefusedError as cause:
+        raise LinkError(
+            f"no tissue is served at {address}; start one there with: scalpel-sim serve"
+        ) from cause
+    except OSError as cause:
+        raise LinkError(f"{address} cannot be reached: {cause.strerror or cause}") from cause
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.settimeout(timeout)
+    return connection
+
+
+def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
+    """Return a connection to one of the addresses of a host; raise what the last one gave."""
+    for where in addresses[:-1]:
+        with contextlib.suppress(OSError):
+            return socket.create_connection(where[:2], seconds)
+    return socket.create_connection(addresses[-1][:2], seconds)

@@ -1,0 +1,49 @@
+"""The reply that says how well the cuts follow the blade, and what they did to the mesh."""
+
+import struct
+
+from bridge.tcp.messages.counts import check_counts
+from bridge.tcp.wire import MessageError
+from tissue import CutReport, MeshMeasures
+
+_QUALITY = struct.Struct("<10d3q")
+QUALITY_BYTES = _QUALITY.size
+
+
+def pack_quality(report: CutReport) -> bytes:
+    """Return a reply: the floats of a report in the order of its fields, then its integers."""
+    return _QUALITY.pack(
+        report.path_error_mean,
+        report.path_error_largest,
+        report.node_size,
+        report.guard,
+        *report.initial[1:],
+        *report.now[1:],
+        report.n_cut_nodes,
+        report.initial.n_tetrahedra,
+        report.now.n_tetrahedra,
+    )
+
+
+def unpack_quality(payload: bytes) -> CutReport:
+    """Return the report in a reply.
+
+    Raises:
+        MessageError: the length is wrong, a number is negative or none, or there is no tetrahedron.
+    """
+    if len(payload) != _QUALITY.size:
+        raise MessageError(f"a quality report of {len(payload)} bytes; wanted {_QUALITY.size}")
+    numbers = _QUALITY.unpack(payload)
+    n_cut_nodes, n_initial, n_now = numbers[10:]
+    check_counts(n_cut_nodes, min(n_initial, n_now) - 1)
+    if not all(number >= 0.0 for number in numbers[:10]):  # infinite: a step of what cannot move
+        raise MessageError(f"a quality report of {numbers[:10]}")
+    return CutReport(
+        n_cut_nodes,
+        numbers[0],
+        numbers[1],
+        numbers[2],
+        numbers[3],
+        MeshMeasures(n_initial, *numbers[4:7]),
+        MeshMeasures(n_now, *numbers[7:10]),
+    )

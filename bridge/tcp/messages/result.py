@@ -1,0 +1,124 @@
+"""The reply to a step: what the tissue did to the blade, and what became of it."""
+
+import struct
+
+import numpy as np
+
+from bridge.tcp.messages.counts import check_counts
+from bridge.tcp.wire import MessageError
+from tissue import BladeContacts, BodyContacts, Energies, FloatArray, StageTimes, StepResult, Wrench
+
+MOST_CONTACTS = 1 << 16
+"""Of the blade: a thousand times what a scalpel has in an organ."""
+
+_HEAD = struct.Struct("<8q9d")
+_N_ALWAYS = 9 + 9 + 36 + 3 + 6 + 3
+"""Floats of the arrays that every reply has."""
+_N_EACH = 3 + 3 + 1 + 3 + 1
+"""Floats of each contact."""
+_N_ENERGIES = len(Energies._fields)
+LARGEST_RESULT = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * MOST_CONTACTS + _N_ENERGIES)
+"""[byte]."""
+
+
+def pack_result(result: StepResult) -> bytes:
+    """Return a reply: the integers of a result, its single floats, its arrays.
+
+    The contacts and the energies, of which there may be any number and none, come last.
+    """
+    touch, contacts, energies = result.touch, result.contacts, result.energies
+    head = _HEAD.pack(
+        result.n_tetrahedra,
+        result.n_nodes,
+        result.n_active,
+        result.active_point_tetrahedron,
+        result.n_substeps,
+        touch.n_contacts,
+        len(contacts.point),
+        energies is not None,
+        result.anchored_length,
+        result.cut_area,
+        result.work_of_blade,
+        result.work_of_cutting,
+        touch.penetration,
+        touch.force,
+        *result.profile,
+    )
+    # One call for all: each array by itself costs as much as the rest of the message.
+    arrays = np.concatenate(
+        (
+            *result.wrench,
+            *result.wrench_t1,
+            result.stiffness.ravel(),
+            result.force_on_tissue,
+            result.bounds.ravel(),
+            touch.force_of_floor,
+            contacts.point.ravel(),
+            contacts.normal.ravel(),
+            contacts.normal_force,
+            contacts.friction.ravel(),
+            contacts.cut_area,
+            energies or (),
+        ),
+        dtype="<f8",
+    )
+    return head + arrays.tobytes()
+
+
+def unpack_result(payload: bytes) -> StepResult:
+    """Return the result in a reply.
+
+    The numbers of the physics are passed on as they are, NaN too: what becomes of a tissue that
+    diverged is decided in one place for both links, the coupling.
+
+    Raises:
+        MessageError: the length is wrong, or a count is negative or too large.
+    """
+    if len(payload) < _HEAD.size:
+        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_HEAD.size} at least")
+    head = _HEAD.unpack_from(payload)
+    n_tetrahedra, n_nodes, n_active, tip_tetrahedron, n_substeps, n_touching, n, audited = head[:8]
+    check_counts(n_nodes, n_tetrahedra)
+    if not (0 <= n_active <= n_tetrahedra and -1 <= tip_tetrahedron < n_tetrahedra):
+        raise MessageError(
+            f"{n_active} active tetrahedra and tip in {tip_tetrahedron}, of {n_tetrahedra}"
+        )
+    if n_substeps < 0 or n_touching < 0:
+        raise MessageError(f"{n_substeps} substeps and {n_touching} contacts")
+    if not (0 <= n <= MOST_CONTACTS and audited in (0, 1)):
+        raise MessageError(f"{n} contacts of the blade, and {audited} audits")
+    wanted = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * n + _N_ENERGIES * audited)
+    if len(payload) != wanted:
+        raise MessageError(f"a step reply of {len(payload)} bytes; wanted {wanted}")
+    floats = np.frombuffer(payload, "<f8", offset=_HEAD.size).astype(np.float64)  # a copy
+    return StepResult(
+        wrench=Wrench(floats[0:3], floats[3:6], floats[6:9]),
+        wrench_t1=Wrench(floats[9:12], floats[12:15], floats[15:18]),
+        stiffness=floats[18:54].reshape(6, 6),
+        contacts=_contacts(floats[_N_ALWAYS : _N_ALWAYS + _N_EACH * n], n),
+        force_on_tissue=floats[54:57],
+        bounds=floats[57:63].reshape(2, 3),
+        n_tetrahedra=n_tetrahedra,
+        n_nodes=n_nodes,
+        n_active=n_active,
+        active_point_tetrahedron=tip_tetrahedron,
+        anchored_length=head[8],
+        cut_area=head[9],
+        work_of_blade=head[10],
+        work_of_cutting=head[11],
+        n_substeps=n_substeps,
+        touch=BodyContacts(n_touching, head[12], head[13], floats[63:66]),
+        profile=StageTimes(*head[14:]),
+        energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
+    )
+
+
+def _contacts(floats: FloatArray, n: int) -> BladeContacts:
+    """Return the contacts whose floats follow one another, quantity by quantity."""
+    return BladeContacts(
+        point=floats[: 3 * n].reshape(n, 3),
+        normal=floats[3 * n : 6 * n].reshape(n, 3),
+        normal_force=floats[6 * n : 7 * n],
+        friction=floats[7 * n : 10 * n].reshape(n, 3),
+        cut_area=floats[10 * n :],
+    )

@@ -1,0 +1,90 @@
+"""What has names and text: the description of the tissue (JSON) and an error (plain UTF-8)."""
+
+import math
+
+import msgspec
+import numpy as np
+
+from bridge.link import TissueDescription
+from bridge.tcp.messages.counts import check_counts
+from bridge.tcp.wire import MessageError
+from tissue import BladeShape, Material
+
+LARGEST_ERROR = 1 << 16
+"""[byte]. Text for a person to read."""
+LARGEST_DESCRIPTION = 1 << 16
+"""[byte]. A name and a dozen numbers."""
+
+
+class _Description(msgspec.Struct, forbid_unknown_fields=True):
+    scene: str
+    material: Material
+    bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    n_tetrahedra: int
+    n_nodes: int
+    blade: BladeShape | None
+    floor: float | None
+
+
+_description_decoder = msgspec.json.Decoder(_Description)
+
+
+def pack_description(description: TissueDescription) -> bytes:
+    """Return the reply to a HELLO."""
+    low, high = description.bounds.tolist()
+    return msgspec.json.encode(
+        _Description(
+            description.scene,
+            description.material,
+            (tuple(low), tuple(high)),
+            description.n_tetrahedra,
+            description.n_nodes,
+            description.blade,
+            description.floor,
+        )
+    )
+
+
+def unpack_description(payload: bytes) -> TissueDescription:
+    """Return the description in the reply to a HELLO.
+
+    Raises:
+        MessageError: a field is missing, of another type, or out of range.
+    """
+    try:
+        found = _description_decoder.decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise MessageError(f"the tissue's description cannot be read: {error}") from error
+    bounds = np.array(found.bounds)
+    if not (np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all()):
+        raise MessageError(f"the tissue's bounds are {bounds.tolist()} m")
+    check_counts(found.n_nodes, found.n_tetrahedra)
+    if found.floor is not None and not math.isfinite(found.floor):
+        raise MessageError(f"the floor is at {found.floor} m")
+    return TissueDescription(
+        found.scene,
+        found.material,
+        bounds,
+        found.n_tetrahedra,
+        found.n_nodes,
+        found.blade,
+        found.floor,
+    )
+
+
+def pack_error(message: str) -> bytes:
+    """Return the reply to what could not be done: one line for a person to read."""
+    return message[: LARGEST_ERROR // 4].encode("utf-8", "replace")  # a letter has 4 bytes at most
+
+
+def unpack_error(payload: bytes) -> str:
+    """Return the line in an ERROR, without what could steer a terminal.
+
+    Raises:
+        MessageError: it is no text.
+    """
+    try:
+        text = payload.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise MessageError(f"an error that cannot be read: {error}") from error
+    return "".join(letter if letter.isprintable() else "\ufffd" for letter in text)

@@ -1,0 +1,1 @@
+"""The robot arm, its scalpel, and the virtual hand that leads it."""

@@ -1,0 +1,141 @@
+"""A blade on any MuJoCo arm: two sites become a segment, a wrench pushes their body."""
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from bridge.coupling.coupling import ABSURD_FORCE, ABSURD_TORQUE
+from tissue import BladeSegment, FloatArray, Wrench
+
+SHORTEST_EDGE = 1e-4
+"""[m]. A shorter cutting edge is a mistake in the model: its direction would be noise."""
+
+
+class BladeError(ValueError):
+    """The model has no such blade, or the blade was handed a wrench that no tissue can exert."""
+
+
+class Blade:
+    """The cutting edge of a body of a MuJoCo model, which one reads, and pushes.
+
+    Works on any model: name the two sites at the ends of the edge. Call `segment` and `apply`
+    between `mj_step1` and `mj_step2`: there the sites are where `qpos` says (after a plain
+    `mj_step` they lag by a step), and the wrench is felt in the same step.
+
+    Args:
+        model: A compiled model.
+        data: Its data. Both are kept, and seen live.
+        heel: Site at the end of the edge that is nearest the handle.
+        tip: Site at the sharp end.
+        body: The body that carries both sites, and feels the wrench. None: the one they sit on.
+        forward: The direction in which the edge cuts, in the frame of the body; made orthogonal to
+            the edge.
+
+    Raises:
+        BladeError: a name that the model does not have; sites on different bodies; a body that
+            cannot move; an edge of no length; a `forward` along the edge.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        heel: str = "heel",
+        tip: str = "tip",
+        body: str | None = None,
+        forward: Sequence[float] = (0.0, 0.0, -1.0),
+    ) -> None:
+        heel_id = _identifier(model, mujoco.mjtObj.mjOBJ_SITE, "site", heel)
+        tip_id = _identifier(model, mujoco.mjtObj.mjOBJ_SITE, "site", tip)
+        body_id = int(model.site_bodyid[tip_id])
+        if body is not None:
+            body_id = _identifier(model, mujoco.mjtObj.mjOBJ_BODY, "body", body)
+        for site, site_id in ((heel, heel_id), (tip, tip_id)):
+            if model.site_bodyid[site_id] != body_id:
+                raise BladeError(
+                    f"site '{site}' sits on body '{model.body(model.site_bodyid[site_id]).name}', "
+                    f"not on '{model.body(body_id).name}'; both ends of the edge and the body that "
+                    "feels the wrench must be one"
+                )
+        if model.body_weldid[body_id] == 0 and model.body_mocapid[body_id] < 0:
+            raise BladeError(f"body '{model.body(body_id).name}' is welded to the world: no blade")
+        edge = np.array(model.site_pos[tip_id] - model.site_pos[heel_id])
+        self.length = float(np.linalg.norm(edge))
+        """From heel to tip [m]."""
+        if self.length < SHORTEST_EDGE:
+            raise BladeError(
+                f"sites '{heel}' and '{tip}' are {self.length:.1e} m apart; an edge needs at least "
+                f"{SHORTEST_EDGE} m"
+            )
+        self.body_id = body_id
+        """MuJoCo's number for the body that feels the wrench."""
+        self._forward = _across(edge / self.length, np.array(forward, np.float64))
+        # Views of MuJoCo's arrays: they stay valid for the life of `data`.
+        self._heel = data.site_xpos[heel_id]
+        self._tip = data.site_xpos[tip_id]
+        self._rotation = data.xmat[body_id].reshape(3, 3)
+        self._centre_of_mass = data.xipos[body_id]
+        self._applied = data.xfrc_applied[body_id]
+
+    def segment(self) -> BladeSegment:
+        """Return the edge as it is now, in the world frame. Copies."""
+        return BladeSegment(self._tip.copy(), self._heel.copy(), self._rotation @ self._forward)
+
+    def apply(self, wrench: Wrench) -> None:
+        """Push the blade until the next call.
+
+        MuJoCo's `xfrc_applied` acts at the body's centre of mass, the wrench at its own point: the
+        lever adds (point - centre of mass) x force to the torque.
+
+        Args:
+            wrench: World frame.
+
+        Raises:
+            BladeError: the wrench is not finite, or larger than `ABSURD_FORCE` or `ABSURD_TORQUE`.
+                What the blade felt before stays, and MuJoCo sees nothing of it.
+        """
+        # The last guard: MuJoCo takes 1e3 N without a word, and resets itself at 1e9 N or NaN.
+        # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
+        fx, fy, fz = wrench.force.tolist()
+        tx, ty, tz = wrench.torque.tolist()
+        px, py, pz = wrench.point.tolist()
+        cx, cy, cz = self._centre_of_mass.tolist()
+        rx, ry, rz = px - cx, py - cy, pz - cz
+        tx += ry * fz - rz * fy
+        ty += rz * fx - rx * fz
+        tz += rx * fy - ry * fx
+        force, torque = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
+        if not (force <= ABSURD_FORCE and torque <= ABSURD_TORQUE):  # catches NaN too
+            raise BladeError(
+                f"a wrench of {force:.3g} N and {torque:.3g} N m about its centre of mass was put "
+                f"on the blade; it must be finite and at most {ABSURD_FORCE:g} N and "
+                f"{ABSURD_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
+            )
+        self._applied[:] = (fx, fy, fz, tx, ty, tz)
+
+
+def _identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str) -> int:
+    """Return MuJoCo's number for a name."""
+    identifier = mujoco.mj_name2id(model, kind, name)
+    if identifier < 0:
+        count = model.nsite if kind == mujoco.mjtObj.mjOBJ_SITE else model.nbody
+        names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]
+        there = ", ".join(f"'{known}'" for known in names if known) or "none with a name"
+        raise BladeError(f"the model has no {word} '{name}'. It has: {there}")
+    return identifier
+
+
+def _across(edge: FloatArray, forward: FloatArray) -> FloatArray:
+    """Return the unit vector nearest to `forward` that is orthogonal to the unit vector `edge`."""
+    if forward.shape != (3,) or not np.isfinite(forward).all():
+        raise BladeError(f"forward is {forward.tolist()}; wanted three finite numbers")
+    across = forward - (forward @ edge) * edge
+    length = float(np.linalg.norm(across))
+    if length <= 1e-3 * float(np.linalg.norm(forward)):  # 0.06 degrees: the rest is rounding
+        raise BladeError(
+            f"forward {forward.tolist()} runs along the edge {edge.round(3).tolist()}; "
+            "a blade cuts across its edge"
+        )
+    return across / length

@@ -1,0 +1,118 @@
+"""The geoms of a MuJoCo arm as parts for the collision library, and what it stands on."""
+
+import mujoco
+import numpy as np
+
+from bridge import FixtureBox
+from bridge.collision.arm_geoms import N_SIZES, Kind, Part
+from tissue import FloatArray
+
+KINDS: dict[int, Kind] = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
+    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+}
+JOINTS_NEXT = 2
+"""Links this many joints from the instrument or fewer are next to it: those of a gimbal, whose axes
+meet in a point, so that their shapes overlap in any pose."""
+
+TABLE_THICKNESS = 0.02
+"""[m]. MuJoCo's table is a plane; what has gone 2 cm through it was seen on the way."""
+
+WORLD = 0
+"""MuJoCo's number for the body that everything stands in."""
+
+
+class ArmParts:
+    """The parts of an arm, and where they are.
+
+    Args:
+        model: A compiled model.
+        data: Its data, seen live.
+        blade: Number of the body that carries the blade.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, blade: int) -> None:
+        instrument = instrument_body(model, blade)
+        n_joints = _joints_up(model, instrument)
+        self._geoms = [
+            i
+            for i in range(model.ngeom)
+            if int(model.geom_type[i]) in KINDS
+            and int(model.geom_bodyid[i]) != WORLD
+            and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is not there to be met
+        ]
+        self.parts = []
+        for i in self._geoms:
+            body = int(model.geom_bodyid[i])
+            kind = KINDS[int(model.geom_type[i])]
+            self.parts.append(
+                Part(
+                    model.geom(i).name or f"{model.body(body).name} geom {i}",
+                    kind,
+                    tuple(model.geom_size[i][: N_SIZES[kind]].tolist()),
+                    is_instrument=_carries(model, instrument, body),
+                    may_meet_instrument=n_joints.get(body, JOINTS_NEXT + 1) > JOINTS_NEXT,
+                    may_meet_fixtures=int(model.body_weldid[body]) != WORLD,
+                )
+            )
+        self._positions = data.geom_xpos
+        self._axes = data.geom_xmat
+
+    def positions(self) -> FloatArray:
+        """Return where the parts are now [m], world frame, shape (n, 3). A copy."""
+        return self._positions[self._geoms]
+
+    def axes(self) -> FloatArray:
+        """Return their axes as columns, shape (n, 3, 3). A copy."""
+        return self._axes[self._geoms].reshape(-1, 3, 3)
+
+
+def instrument_body(model: mujoco.MjModel, blade: int) -> int:
+    """Return the body that the last joint before the blade moves: the handle, or the blade."""
+    body = blade
+    while model.body_jntnum[body] == 0 and int(model.body_parentid[body]) != WORLD:
+        body = int(model.body_parentid[body])
+    return body
+
+
+def tables(model: mujoco.MjModel) -> list[FixtureBox]:
+    """Return the planes that lie in the world, as boxes below them.
+
+    A plane without an end is left out: so is what it is for, a horizon to look at.
+    """
+    found = []
+    for i in range(model.ngeom):
+        x, y, _ = model.geom_size[i].tolist()
+        is_plane = int(model.geom_type[i]) == int(mujoco.mjtGeom.mjGEOM_PLANE)
+        if is_plane and int(model.geom_bodyid[i]) == WORLD and x > 0.0 and y > 0.0:
+            matrix = np.empty(9)
+            mujoco.mju_quat2Mat(matrix, model.geom_quat[i])
+            turned = matrix.reshape(3, 3)
+            found.append(
+                FixtureBox(
+                    model.geom(i).name or f"plane {i}",
+                    np.array([2.0 * x, 2.0 * y, TABLE_THICKNESS]),
+                    model.geom_pos[i] - 0.5 * TABLE_THICKNESS * turned[:, 2],
+                    turned,
+                )
+            )
+    return found
+
+
+def _carries(model: mujoco.MjModel, carrier: int, body: int) -> bool:
+    """Whether a body is `carrier`, or is fixed to it directly or by others."""
+    while body not in (carrier, WORLD):
+        body = int(model.body_parentid[body])
+    return body == carrier
+
+
+def _joints_up(model: mujoco.MjModel, body: int) -> dict[int, int]:
+    """Return how many joints are between a body and each of those that carry it."""
+    found, n = {body: 0}, 0
+    while body != WORLD:
+        n += int(model.body_jntnum[body])
+        body = int(model.body_parentid[body])
+        found[body] = n
+    return found

@@ -1,0 +1,77 @@
+"""What the arm and its instrument meet: looked for in each frame, counted, and said once."""
+
+import logging
+from collections import Counter
+from collections.abc import Iterable
+
+import numpy as np
+
+from bridge import Fixture, FixtureBox
+from bridge.collision.collisions import Collisions
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, tables
+from tissue import FloatArray
+
+FLOOR_MARGIN = 0.02
+"""[m], by which the floor reaches beyond the body. For the tissue it has no end; where the arm's
+base stands there is none."""
+
+log = logging.getLogger("scalpel_sim")
+
+
+class Touching:
+    """Looks at an arm after each frame.
+
+    Nothing pushes back where arm and fixtures meet, for neither MuJoCo nor the tissue knows of it:
+    a run in which they do is not what the device would do, and its user must hear of it.
+
+    Args:
+        arm: Its model's planes are fixtures too: the table.
+        fixtures: What else stands in the world.
+
+    Raises:
+        ValueError: two fixtures have one name.
+    """
+
+    def __init__(self, arm: Arm, fixtures: Iterable[Fixture] = ()) -> None:
+        self._arm = arm
+        self._parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
+        self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])
+        self._now: tuple[tuple[str, str], ...] = ()
+        self._frames: Counter[tuple[str, str]] = Counter()
+
+    @property
+    def now(self) -> tuple[tuple[str, str], ...]:
+        """Which part met what in the last frame."""
+        return self._now
+
+    @property
+    def frames(self) -> dict[str, int]:
+        """In how many frames a part met something, by "PART, FIXTURE"."""
+        return {", ".join(pair): n for pair, n in self._frames.items()}
+
+    def look(self) -> None:
+        """Look at where the arm is now. The first time that two things meet is logged."""
+        self._now = self._collisions.touching(self._parts.positions(), self._parts.axes())
+        for pair in self._now:
+            if pair not in self._frames:
+                log.warning(
+                    "at %.3f s the %s meets the %s, and nothing pushes back there: the device "
+                    "would stop. Move the stroke, or what is in its way",
+                    self._arm.time,
+                    *pair,
+                )
+            self._frames[pair] += 1
+
+
+def floor_below(bounds: FloatArray, height: float) -> FixtureBox:
+    """Return the floor that loose pieces land on, as far as it is below the body. Tissue frame.
+
+    Args:
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+        height: Of the upper side of the floor [m].
+    """
+    low, high = bounds[:, :2]
+    centre = np.array([*(0.5 * (low + high)), height - 0.5 * TABLE_THICKNESS])
+    size = np.array([*(high - low + 2.0 * FLOOR_MARGIN), TABLE_THICKNESS])
+    return FixtureBox("floor", size, centre)

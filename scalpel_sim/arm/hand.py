@@ -1,0 +1,193 @@
+"""A virtual hand: a six-dimensional spring and damper that leads a blade along a path."""
+
+import math
+from dataclasses import dataclass, fields
+
+import mujoco
+import numpy as np
+
+from tissue import BladeSegment, FloatArray
+
+HAND = "hand"
+"""Name of the body that shows where the hand wants the middle of the edge, and of its site."""
+EDGE = "edge"
+"""Name of the site in the middle of the edge, where the hand holds the blade."""
+ACTUATORS = ("hand_x", "hand_y", "hand_z", "hand_turn")
+
+
+@dataclass(frozen=True)
+class Impedance:
+    """How firmly the hand holds the blade.
+
+    The centre of the springs is the middle of the cutting edge, as in Cartesian impedance control
+    at the tool's centre point: a force F there moves the blade by F / stiffness and does not turn
+    it. The defaults are those of a firm robotic hand, not of a human one (which has some
+    0.3 to 1 kN/m): they hold an edge that is pushed with 8 N to 1.6 mm. They are integrated
+    implicitly, and stay stable against tissue of 10 kN/m whose force returns within the step.
+
+    Raises:
+        ValueError: a quantity is not finite, or not positive.
+    """
+
+    stiffness: float = 5e3
+    """[N/m]."""
+    damping: float = 40.0
+    """[N s/m]; about critical for the 70 g that one feels of the arm."""
+    turning_stiffness: float = 10.0
+    """[N m/rad]."""
+    turning_damping: float = 0.15
+    """[N m s/rad]; about critical for those 70 g, 8 cm from the middle of the edge."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"the hand's {field.name} is {value}; it must be positive")
+
+
+def add_hand(
+    spec: mujoco.MjSpec,
+    impedance: Impedance = Impedance(),
+    heel: str = "heel",
+    tip: str = "tip",
+) -> None:
+    """Add a hand that holds the blade between two sites of a model that is yet to be compiled.
+
+    The blade cuts towards -z of its body. Afterwards `Hand(model, data)` moves it.
+
+    Args:
+        spec: Has the two sites, on one body. It gains a mocap body, two sites and four actuators,
+            and MuJoCo's `discrete` integrator, which takes springs of actuators implicitly.
+        impedance: How firm the hand is.
+        heel: Site at the handle's end of the edge.
+        tip: Site at the sharp end.
+
+    Raises:
+        ValueError: the model has no such site.
+    """
+    for name in (heel, tip):
+        if spec.site(name) is None:
+            there = ", ".join(f"'{site.name}'" for site in spec.sites) or "none"
+            raise ValueError(f"the model has no site '{name}'. It has: {there}")
+    ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
+    edge = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+    spec.site(tip).parent.add_site(
+        name=EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=_orientation(edge, np.array([0.0, 0, -1.0]))
+    )
+    hand = spec.worldbody.add_body(name=HAND, mocap=True)
+    hand.add_site(name=HAND)
+    hand.add_geom(
+        name=HAND,
+        type=mujoco.mjtGeom.mjGEOM_SPHERE,
+        size=[0.003, 0.0, 0.0],
+        rgba=[1.0, 0.6, 0.2, 0.5],
+        contype=0,
+        conaffinity=0,
+        group=3,  # hidden unless asked for
+    )
+    for axis, name in enumerate(ACTUATORS[:3]):
+        spring = _actuator(spec, name)
+        spring.gear = np.eye(6)[axis]
+        spring.gainprm[0] = impedance.stiffness
+        spring.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        spring.biasprm[:3] = 0.0, -impedance.stiffness, -impedance.damping
+    _actuator(spec, ACTUATORS[3]).set_to_orientation(
+        impedance.turning_stiffness, impedance.turning_damping
+    )
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+
+
+class Hand:
+    """Moves a hand that `add_hand` put into the model.
+
+    Args:
+        model: A compiled model.
+        data: Its data.
+
+    Raises:
+        KeyError: the model has no hand.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        mocap = int(model.body(HAND).mocapid[0])
+        first = model.actuator(ACTUATORS[0]).id
+        controls = int(model.actuator_ctrladr[first])
+        outputs = int(model.actuator_outadr[first])
+        self._dt: float = model.opt.timestep
+        self._position = data.mocap_pos[mocap]
+        self._quaternion = data.mocap_quat[mocap]
+        self._control = data.ctrl[controls : controls + 6]
+        self._output = data.actuator_force[outputs : outputs + 6]
+        self._edge = data.site_xpos[model.site(EDGE).id]
+        self._lead = model.actuator_biasprm[first, 2] / model.actuator_biasprm[first, 1]
+        turn = model.actuator(ACTUATORS[3]).id
+        self._turning_lead = model.actuator_biasprm[turn, 2] / model.actuator_biasprm[turn, 1]
+        self._is_held = False
+
+    def hold(self, pose: BladeSegment) -> None:
+        """Want the blade at rest at `pose`, world frame. Also where a path jumps, or begins."""
+        self._is_held = False
+        self.follow(pose)
+
+    def follow(self, pose: BladeSegment) -> None:
+        """Want the blade at `pose` now, and moving as it has since the last call, a step ago.
+
+        The dampers resist motion relative to the path, not to the world: without that the blade
+        would lag by speed x damping / stiffness, 0.5 mm at 60 mm/s.
+
+        Args:
+            pose: World frame. Its length does not matter; its middle and its directions do.
+
+        Raises:
+            ValueError: the pose is not finite.
+        """
+        middle = (pose.tip + pose.heel) / 2.0
+        edge = pose.tip - pose.heel
+        length = math.sqrt(edge @ edge)
+        quaternion = _orientation(edge / length, pose.forward)
+        if not math.isfinite(middle.sum() + quaternion.sum()):
+            raise ValueError(f"the hand cannot follow a pose that is not finite: {pose}")
+        self._control[:] = 0.0
+        if self._is_held:
+            back = np.empty(4)
+            mujoco.mju_negQuat(back, quaternion)
+            mujoco.mju_rotVecQuat(
+                self._control[:3], (middle - self._position) * (self._lead / self._dt), back
+            )
+            mujoco.mju_subQuat(self._control[3:], quaternion, self._quaternion)
+            self._control[3:] *= self._turning_lead / self._dt
+        self._position[:] = middle
+        self._quaternion[:] = quaternion
+        self._is_held = True
+
+    @property
+    def deflection(self) -> FloatArray:
+        """How far the middle of the edge is from where the hand wants it [m], world frame, (3,)."""
+        return self._edge - self._position
+
+    @property
+    def force(self) -> FloatArray:
+        """What the hand did to the blade in the last step [N], world frame, shape (3,)."""
+        force = np.empty(3)
+        mujoco.mju_rotVecQuat(force, self._output[:3], self._quaternion)
+        return force
+
+
+def _actuator(spec: mujoco.MjSpec, name: str) -> "mujoco.MjsActuator":
+    """Add an actuator that acts on the middle of the edge as seen from the hand."""
+    return spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=EDGE, refsite=HAND)
+
+
+def _orientation(edge: FloatArray, forward: FloatArray) -> FloatArray:
+    """Return the quaternion (w, x, y, z) of axes whose +y is the edge and whose -z cuts."""
+    ex, ey, ez = edge.tolist()
+    along = float(forward @ edge)
+    zx, zy, zz = (along * edge - forward).tolist()
+    size = math.sqrt(zx * zx + zy * zy + zz * zz)
+    zx, zy, zz = zx / size, zy / size, zz / size
+    axes = np.array(
+        (ey * zz - ez * zy, ex, zx, ez * zx - ex * zz, ey, zy, ex * zy - ey * zx, ez, zz)
+    )
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, axes)
+    return quaternion

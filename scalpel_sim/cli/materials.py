@@ -1,0 +1,102 @@
+"""The materials that come with the project, as a table with the source of each figure."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from scalpel_sim.errors import unknown
+from tissue import DAMPING_BAND, MATERIALS, Figure, Preset
+
+KPA_PER_PA = 1e-3
+MM_PER_M = 1e3
+
+NOT_CONFIRMED = "*"
+"""Marks a figure that could not be traced to a measurement."""
+
+HEADINGS = ("name", "E, kPa", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
+
+SOURCED = (
+    "young_modulus",
+    "poisson_ratio",
+    "density",
+    "toughness",
+    "damping_ratio",
+    "blade_friction",
+)
+"""The figures of a preset."""
+
+
+def chosen_presets(name: str | None) -> list[Preset]:
+    """Return the preset of that name, or all.
+
+    Raises:
+        UsageError: there is none of that name; the message says which there are.
+    """
+    if name is None:
+        return list(MATERIALS.values())
+    if name not in MATERIALS:
+        raise unknown("material", name, MATERIALS)
+    return [MATERIALS[name]]
+
+
+def as_json(presets: Sequence[Preset]) -> str:
+    """Return the presets and their sources as JSON, SI units."""
+    return json.dumps([_as_numbers(preset) for preset in presets], indent=2, ensure_ascii=False)
+
+
+def print_presets(presets: Sequence[Preset]) -> None:
+    """Print what the presets are, and below where each figure comes from."""
+    console = Console()
+    table = Table(title="Materials", title_justify="left")
+    for heading in HEADINGS:
+        table.add_column(heading, justify="left" if heading == "name" else "right")
+    for preset in presets:
+        table.add_row(
+            preset.name,
+            _marked(preset.young_modulus, KPA_PER_PA),
+            _marked(preset.poisson_ratio),
+            _marked(preset.density),
+            _marked(preset.toughness),
+            _marked(preset.damping_ratio),
+            _marked(preset.blade_friction),
+            f"{preset.toughness.value / preset.young_modulus.value * MM_PER_M:.1f}",
+        )
+    console.print(table)
+    low, high = DAMPING_BAND
+    console.print(
+        f"{NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
+        "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
+        f"stretching at {low:g} and {high:g} Hz, less between. friction: on the faces of "
+        "a blade. J / E: how far a blade drags the tissue along before it parts.",
+        markup=False,
+        highlight=False,
+        soft_wrap=True,
+    )
+    for preset in presets:
+        console.print(
+            f"\n[bold]{preset.name}[/bold]: {preset.about}; law {preset.law}", highlight=False
+        )
+        for name in SOURCED:
+            line = _line(name, getattr(preset, name))
+            console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _marked(figure: Figure, scale: float = 1.0) -> str:
+    """Return the number, with a mark if nobody was found to have measured it."""
+    return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else NOT_CONFIRMED}"
+
+
+def _line(name: str, figure: Figure) -> str:
+    """Return what is known of a figure, in a line."""
+    mark = "" if figure.is_confirmed else NOT_CONFIRMED
+    source = f" [{figure.source}]" if figure.source else ""
+    return f"  {name}{mark}: {figure.measured}{source}"
+
+
+def _as_numbers(preset: Preset) -> dict[str, Any]:
+    """Return a preset as JSON has it."""
+    figures = {name: getattr(preset, name)._asdict() for name in SOURCED}
+    return {"name": preset.name, "about": preset.about, "law": preset.law} | figures

@@ -1,0 +1,78 @@
+"""Where the work of the blade went over time, as one picture."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from scalpel_sim.output.energy_terms import TERMS, Term
+from scalpel_sim.output.force_plot import DOTS_PER_INCH, MAGNITUDE, legend, plain
+from scalpel_sim.output.recording import Recording
+
+MJ_PER_J = 1e3
+PERCENT = 100.0
+
+SMALLEST_SHOWN = 0.003
+"""Share of the largest term below which another one is left out of the picture: no line as thin
+could be seen. The table has it."""
+
+OPACITY = 0.85
+"""So that the grid is seen through what is stacked."""
+
+MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
+"""Fixed: see `scalpel_sim.output.force_plot`."""
+
+
+def plot_energies(recording: Recording, title: str, path: Path) -> None:
+    """Write a PNG: the terms of the account on top of each other, and what is not accounted for."""
+    time = recording.column("time_s")
+    work = recording.column("work_of_blade_j")
+    figure = Figure(figsize=(8.0, 5.8))
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0), gridspec_kw=MARGINS)
+    figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
+    for sign in (1.0, -1.0):
+        _stack(above, time, recording, sign)
+    above.plot(time, MJ_PER_J * work, color=MAGNITUDE, lw=1.6, label="work of the blade")
+    above.axhline(0.0, color=MAGNITUDE, lw=0.6)
+    above.set_ylabel("energy [mJ]")
+    legend(above, 4)
+
+    most = float(np.abs(work).max(initial=0.0))
+    residual = recording.column("residual_j") / most if most > 0.0 else np.zeros_like(time)
+    below.plot(time, PERCENT * residual, color=MAGNITUDE, lw=1.2)
+    below.set_ylabel("residual\n[% of the work]")
+    below.set_xlabel("time [s]")
+    for axes in (above, below):
+        plain(axes)
+    figure.align_ylabels()
+    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
+
+
+def _stack(axes: Axes, time: np.ndarray, recording: Recording, sign: float) -> None:
+    """Draw what took energy upwards from zero, or with the other sign what gave it downwards."""
+    base = np.zeros_like(time)
+    for term in shown(recording):
+        height = np.clip(sign * _of(recording, term), 0.0, None)
+        if height.any():
+            is_first = sign > 0.0 or not (_of(recording, term) > 0.0).any()
+            label = term.label if is_first else None
+            low, high = sign * MJ_PER_J * base, sign * MJ_PER_J * (base + height)
+            axes.fill_between(
+                time, low, high, color=term.colour, lw=0.0, alpha=OPACITY, label=label
+            )
+            base = base + height
+
+
+def shown(recording: Recording) -> list[Term]:
+    """Return the terms that are large enough to be seen."""
+    sizes = [float(np.abs(_of(recording, term)).max(initial=0.0)) for term in TERMS]
+    return [
+        term for term, size in zip(TERMS, sizes, strict=True) if size > SMALLEST_SHOWN * max(sizes)
+    ]
+
+
+def _of(recording: Recording, term: Term) -> np.ndarray:
+    """Return a term over time [J]."""
+    return recording.column(f"{term.name}_j")

@@ -1,0 +1,107 @@
+"""Force and cut area over time, as one picture.
+
+Without pyplot: no display is looked for, and nothing is kept between two pictures.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from scalpel_sim.output.recording import Recording
+
+# Okabe and Ito's palette: told apart by those who see fewer colours too.
+COMPONENTS = (("x", "#d55e00"), ("y", "#009e73"), ("z", "#0072b2"))
+PARTS = (
+    ("edge_force", "edge", "#cc79a7"),
+    ("pressing_force", "faces, pressing", "#56b4e9"),
+    ("friction_force", "faces, friction", "#e69f00"),
+)
+MAGNITUDE = "#222222"
+AREA = "#aa3377"
+LIMITED = "#d55e00"
+DOTS_PER_INCH = 150
+MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.065, "top": 0.91, "hspace": 0.16}
+"""Fixed: to let matplotlib find them by itself would draw everything twice."""
+MM2_PER_M2 = 1e6
+
+SAME = 1e-9
+"""Relative difference between what the tissue did and what the arm felt that is only rounding."""
+
+
+def plot_forces(recording: Recording, title: str, path: Path) -> None:
+    """Write a PNG: the force that the arm feels, what it is made of, the area that was cut."""
+    time = recording.column("time_s")
+    figure = Figure(figsize=(8.0, 7.2))
+    above, middle, below = figure.subplots(
+        3, 1, sharex=True, height_ratios=(1.6, 1.2, 0.8), gridspec_kw=MARGINS
+    )
+    figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
+    _plot_felt(above, time, recording)
+    _plot_parts(middle, time, recording)
+    _plot_area(below, time, recording)
+    below.set_xlabel("time [s]")
+    for axes in (above, middle, below):
+        plain(axes)
+    figure.align_ylabels()
+    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
+
+
+def plain(axes: Axes) -> None:
+    """Leave away what frames a plot without telling anything."""
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(color="0.9", lw=0.6)
+    axes.set_axisbelow(True)
+    axes.margins(x=0.0)
+
+
+def legend(axes: Axes, n_columns: int) -> None:
+    """Put the legend over the plot, where it hides nothing."""
+    axes.legend(
+        ncols=n_columns,
+        frameon=False,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.98),
+        fontsize=8.5,
+        borderaxespad=0.0,
+        columnspacing=1.4,
+        handlelength=1.4,
+    )
+
+
+def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
+    """Draw what the arm feels; where the device is at its limit, what the tissue did instead."""
+    force, raw = recording.vector("force"), recording.vector("tissue_force")
+    size, wanted = (np.linalg.norm(vectors, axis=1) for vectors in (force, raw))
+    is_limited = np.abs(force - raw).max(axis=1, initial=0.0) > SAME * wanted
+    axes.plot(time, size, color=MAGNITUDE, lw=1.6, label="magnitude")
+    for i, (axis, colour) in enumerate(COMPONENTS):
+        axes.plot(time, force[:, i], color=colour, lw=1.0, label=f"${axis}$")
+    if is_limited.any():
+        axes.plot(time, wanted, color=LIMITED, lw=0.9, ls=":", label="of the tissue, unlimited")
+        axes.fill_between(
+            time, 0.0, 1.0, where=is_limited, transform=axes.get_xaxis_transform(),
+            color=LIMITED, alpha=0.12, lw=0.0, label="the device limits it",
+        )  # fmt: skip
+    axes.set_ylabel("force on the arm [N]")
+    legend(axes, 6)
+
+
+def _plot_parts(axes: Axes, time: np.ndarray, recording: Recording) -> None:
+    """Draw what the force on the blade is made of."""
+    for name, label, colour in PARTS:
+        size = np.linalg.norm(recording.vector(name), axis=1)
+        axes.plot(time, size, color=colour, lw=1.2, label=label)
+    axes.set_ylabel("of which [N]")
+    axes.set_ylim(bottom=0.0)
+    legend(axes, 3)
+
+
+def _plot_area(axes: Axes, time: np.ndarray, recording: Recording) -> None:
+    area = recording.column("cut_area_m2") * MM2_PER_M2
+    axes.fill_between(time, area, color=AREA, alpha=0.15, lw=0.0)
+    axes.plot(time, area, color=AREA, lw=1.6)
+    axes.set_ylabel("cut area [mm²]")
+    axes.set_ylim(bottom=0.0)

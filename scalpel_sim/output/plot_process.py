@@ -1,0 +1,83 @@
+"""Draws plots in a process of its own, which loads matplotlib while the run goes on."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import IO, cast
+
+from scalpel_sim.errors import RunError
+
+SLOWEST = 60.0
+"""How long a plot may take [s]: a second, or ten when matplotlib first looks for fonts."""
+
+
+class Plotter:
+    """A process that draws on request. It ends when it is closed, or when this process ends.
+
+    Loading matplotlib takes as long as a short run does; here it costs the run nothing.
+    """
+
+    def __init__(self) -> None:
+        # A session of its own: the Ctrl-C that ends a run must not end the drawing of it.
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", "from scalpel_sim.output.plot_process import main; main()"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+        )
+
+    def draw(self, recorded: Path, title: str, forces: Path, energies: Path) -> None:
+        """Draw what is in a `forces.csv`, and end the process.
+
+        Args:
+            recorded: The table.
+            title: Heading of the pictures.
+            forces: Where the picture of the forces goes.
+            energies: Where that of the energies goes, if they are in the table.
+
+        Raises:
+            RunError: a plot could not be drawn or written.
+        """
+        paths = {"recorded": recorded, "forces": forces, "energies": energies}
+        request = json.dumps({"title": title} | {key: str(path) for key, path in paths.items()})
+        try:
+            _, complaint = self._process.communicate(request, timeout=SLOWEST)
+        except subprocess.TimeoutExpired:
+            self.close()
+            raise RunError(f"{forces}: drawing it took more than {SLOWEST:g} s") from None
+        if self._process.returncode != 0:
+            reason = complaint.strip().rpartition("\n")[2] or f"exit {self._process.returncode}"
+            raise RunError(f"{forces}: could not be drawn ({reason})")
+
+    def __enter__(self) -> "Plotter":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End the process, if it still lives."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stderr):
+            cast(IO[str], pipe).close()
+
+
+def main() -> None:
+    """Load what is needed, and draw what the standard input then asks for."""
+    from scalpel_sim.output.energy_plot import plot_energies
+    from scalpel_sim.output.force_plot import plot_forces
+    from scalpel_sim.output.recording import read_forces
+
+    text = sys.stdin.read()
+    if text:
+        request = json.loads(text)
+        recording = read_forces(Path(request["recorded"]))
+        plot_forces(recording, request["title"], Path(request["forces"]))
+        if recording.is_audited:
+            plot_energies(recording, request["title"], Path(request["energies"]))

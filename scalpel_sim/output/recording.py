@@ -1,0 +1,108 @@
+"""What happened in each frame, as one table of numbers."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tissue import Energies, FloatArray
+
+ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
+"""Where the work of the blade went since the start, and what is not accounted for: see
+`tissue.Energies`. NaN without an audit."""
+N_OF_ACCOUNT = len(ACCOUNT)
+
+
+def _vector(name: str, unit: str) -> tuple[str, ...]:
+    return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
+
+
+COLUMNS = (
+    "time_s",
+    *_vector("tip", "m"),
+    *_vector("force", "n"),
+    *_vector("torque", "nm"),
+    *_vector("tissue_force", "n"),
+    *_vector("tissue_torque", "nm"),
+    *_vector("edge_force", "n"),
+    *_vector("pressing_force", "n"),
+    *_vector("friction_force", "n"),
+    *(f"stiffness_{axes}_n_m" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
+    "cut_area_m2",
+    "tetrahedra",
+    "anchored_length_m",
+    "work_of_blade_j",
+    *ACCOUNT,
+    "cd_s",
+    "gc_s",
+    "rx_s",
+    "rd_s",
+    "frame_s",
+)
+"""Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
+averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` the same
+before the limits of the device. `edge_force`, `pressing_force` and `friction_force` are what the
+tissue does to the blade's edge, to its faces, and along them, at the end of the frame; `stiffness`
+is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall times of the
+stages that the paper's Table 1 names; `frame_s` is the wall time of the whole frame without
+pictures (`rd_s`)."""
+
+FRAMES_AT_FIRST = 1024
+
+
+class Recording:
+    """Rows of `COLUMNS`, one a frame. Grows by doubling, so that a frame allocates nothing."""
+
+    def __init__(self, n_frames: int = FRAMES_AT_FIRST) -> None:
+        self._rows = np.zeros((max(n_frames, 1), len(COLUMNS)))
+        self._n = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def rows(self) -> FloatArray:
+        """All frames so far, shape (n_frames, n_columns). A view."""
+        return self._rows[: self._n]
+
+    def append(self, row: Sequence[float]) -> None:
+        """Add one frame: a number for each of `COLUMNS`."""
+        if self._n == len(self._rows):
+            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
+        self._rows[self._n] = row
+        self._n += 1
+
+    def column(self, name: str) -> FloatArray:
+        """Return one column, shape (n_frames,). A view."""
+        return self.rows[:, COLUMNS.index(name)]
+
+    def vector(self, name: str) -> FloatArray:
+        """Return the three columns of `tip`, `force` and the like, shape (n_frames, 3). A view."""
+        first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
+        return self.rows[:, first : first + 3]
+
+    @property
+    def is_audited(self) -> bool:
+        """Whether it is known where the work of the blade went."""
+        return len(self) > 0 and bool(np.isfinite(self.column("residual_j")[-1]))
+
+
+def read_forces(path: Path) -> Recording:
+    """Return the recording that a run wrote as `forces.csv`.
+
+    Raises:
+        ValueError: the file is no such table.
+        OSError: it cannot be read.
+    """
+    with path.open(encoding="ascii") as file:
+        header = file.readline().strip()
+        if header != ",".join(COLUMNS):
+            raise ValueError(
+                f"{path}: the first line is '{header[:200]}'; wanted the columns of a run"
+            )
+        lines = file.readlines()
+    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(COLUMNS)))
+    recording = Recording(len(rows))
+    for row in rows:
+        recording.append(row)
+    return recording

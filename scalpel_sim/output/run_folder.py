@@ -1,0 +1,157 @@
+"""The folder that a run fills, and that an end at any time leaves readable."""
+
+import json
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.recording import COLUMNS, Recording
+from scalpel_sim.output.summary import Summary
+from scalpel_sim.viewer.replay import ReplayWriter
+from tissue import Snapshot, write_vtu
+
+T = TypeVar("T")
+
+SUMMARY = "summary.json"
+FORCES = "forces.csv"
+PLOT = "force.png"
+ENERGY_PLOT = "energy.png"
+INITIAL = "initial.vtu"
+FINAL = "final.vtu"
+REPLAY = "replay.html"
+NAMES = (SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
+
+FRAMES_PER_FLUSH = 100
+"""So often are rows of `forces.csv` handed to the system: a kill loses a tenth of a second."""
+
+
+class Outputs:
+    """A folder with the files of one run. Those of an earlier run are removed, nothing else is.
+
+    Every `write_` raises RunError where the system refuses.
+
+    Args:
+        folder: Made where there is none.
+        plotter: Draws the plots. Whoever made it closes it.
+
+    Raises:
+        UsageError, RunError: as `check_folder`.
+    """
+
+    def __init__(self, folder: Path, plotter: Plotter) -> None:
+        self.folder = folder
+        self._plotter = plotter
+        check_folder(folder)
+        for name in NAMES:
+            _explained(folder / name, lambda path: path.unlink(missing_ok=True))
+        self._forces = _explained(folder / FORCES, lambda path: path.open("ab", buffering=0))
+        self._append(",".join(COLUMNS) + "\n")
+        self._n_written = 0
+
+    def path(self, name: str) -> Path:
+        """Return where a file of this run lies."""
+        return self.folder / name
+
+    def write_mesh(self, name: str, snapshot: Snapshot) -> None:
+        """Write the body as `initial.vtu` or `final.vtu`."""
+        _explained(self.path(name), lambda path: write_vtu(path, snapshot))
+
+    def write_forces(self, recording: Recording, *, all_rows: bool = False) -> None:
+        """Add the recording's new rows to `forces.csv`, once enough of them have come together.
+
+        Numbers are written so that reading them gives the same bits.
+        """
+        n_new = len(recording) - self._n_written
+        if n_new < (1 if all_rows else FRAMES_PER_FLUSH):
+            return
+        rows = recording.rows[self._n_written :].tolist()
+        text = "".join(",".join(map(repr, row)) + "\n" for row in rows)
+        self._append(text)
+        self._n_written = len(recording)
+
+    def write_plots(self, title: str) -> None:
+        """Draw `force.png`, and with an audit `energy.png`, from `forces.csv`."""
+        self._plotter.draw(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
+
+    def write_replay(self, replay: ReplayWriter) -> None:
+        """Write `replay.html`."""
+        _explained(self.path(REPLAY), replay.write)
+
+    def write_summary(self, summary: Summary) -> None:
+        """Write `summary.json`."""
+        text = summary_json(summary) + "\n"
+        _explained(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
+
+    def close(self) -> None:
+        """Close `forces.csv`. May be called twice."""
+        self._forces.close()
+
+    def _append(self, text: str) -> None:
+        _explained(self.path(FORCES), lambda _: self._forces.write(text.encode("ascii")))
+
+
+def check_folder(folder: Path) -> None:
+    """Make sure that a run can write there, making the folder where there is none.
+
+    Raises:
+        UsageError: the path is a file, or lies below one.
+        RunError: the folder cannot be made or written.
+    """
+    blocking = next((p for p in (folder, *folder.parents) if p.exists() and not p.is_dir()), None)
+    if blocking is not None:
+        raise UsageError(
+            f"{blocking}: is a file, and a folder is wanted there; choose another --out"
+        )
+
+    def try_to_write(path: Path) -> None:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path) as file:
+            file.write(b"can this folder be written?")
+
+    _explained(folder, try_to_write)
+
+
+def check_file(path: Path, suffix: str, option: str) -> None:
+    """Make sure that a file can be written, before the work that fills it.
+
+    Args:
+        path: The file; one that is there will be overwritten.
+        suffix: What its name must end in.
+        option: What chose it, for the message.
+
+    Raises:
+        UsageError: another suffix, a folder, or in a folder that is not there.
+        RunError: the system refuses.
+    """
+    if path.suffix.lower() != suffix:
+        raise UsageError(f"{option} is {path}; its name must end in {suffix}")
+    if path.is_dir() or not path.parent.is_dir():
+        reason = "it is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        raise UsageError(f"{option} is {path}, and {reason}; choose another file")
+    is_new = not path.exists()
+    try:
+        with path.open("ab"):
+            pass
+        if is_new:
+            path.unlink()
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another {option}"
+        ) from error
+
+
+def summary_json(summary: Summary) -> str:
+    """Return the summary as JSON text."""
+    return json.dumps(summary._asdict(), indent=2, allow_nan=False)
+
+
+def _explained(path: Path, action: Callable[[Path], T]) -> T:
+    """Do `action`, and turn the system's refusal into one line that names the path."""
+    try:
+        return action(path)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RunError(f"{path}: cannot be written ({reason}); choose another --out") from error

@@ -1,0 +1,1 @@
+"""Strokes: paths of a blade over time, given or planned through a body."""

@@ -1,0 +1,251 @@
+"""A stroke: the path of a blade over time, in the tissue frame."""
+
+import csv
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from scalpel_sim.errors import UsageError
+from tissue import BladeSegment, FloatArray
+
+SAME_LENGTH = 0.01
+"""By which fraction the blade's length may vary along a stroke: what rounding in a file leaves."""
+
+FASTEST = 2.0
+"""[m/s]. No hand cuts faster; times in milliseconds or positions in millimetres do."""
+
+COLUMNS = ("t", "tip_x", "tip_y", "tip_z", "heel_x", "heel_y", "heel_z")
+FORWARD_COLUMNS = ("forward_x", "forward_y", "forward_z")
+
+
+class StrokeError(UsageError):
+    """A path that no blade can follow, or that does not lead through the body."""
+
+
+class Stroke:
+    """The path of a blade over time, in the tissue frame.
+
+    Between two poses the middle of the edge moves on a straight line and the blade turns about one
+    axis, both evenly: the path is continuous, and as smooth as the poses are dense.
+
+    Args:
+        times: When the blade is where [s], shape (n,), increasing. Only differences matter: the
+            stroke starts at the first.
+        segments: The n poses, n >= 2. `forward` is made orthogonal to the edge.
+        name: For messages and reports.
+
+    Raises:
+        StrokeError: fewer than two poses; a number that is not finite; times that do not increase;
+            an edge of no length or of changing length; a `forward` along the edge; a blade faster
+            than `FASTEST`. The message counts poses from 0.
+    """
+
+    def __init__(
+        self, times: Sequence[float] | FloatArray, segments: Sequence[BladeSegment], name: str = ""
+    ) -> None:
+        self.name = name
+        given = np.array(times, np.float64)
+        if given.shape != (len(segments),) or len(given) < 2:
+            raise StrokeError(
+                f"a stroke has {len(given)} times and {len(segments)} poses; it needs as many of "
+                "one as of the other, and at least two"
+            )
+        tips, heels, forwards = (np.array(part, np.float64) for part in zip(*segments, strict=True))
+        if not tips.shape == heels.shape == forwards.shape == (len(segments), 3):
+            raise StrokeError("tip, heel and forward of every pose are three numbers each")
+        _check(given, tips, heels, forwards)
+        self.times = given - given[0]
+        """[s], from 0; shape (n,)."""
+        self._instants: list[float] = self.times.tolist()
+        edges = tips - heels
+        lengths = np.linalg.norm(edges, axis=1)
+        self.blade_length = float(lengths[0])
+        """From heel to tip [m]."""
+        self._middles = (tips + heels) / 2.0
+        self._rotations = _quaternions(edges / lengths[:, None], forwards)
+        self._spins = np.array(
+            [_turn(a, b) for a, b in zip(self._rotations, self._rotations[1:], strict=False)]
+        )
+
+    @property
+    def duration(self) -> float:
+        """[s]."""
+        return float(self.times[-1])
+
+    def pose(self, t: float) -> BladeSegment:
+        """Return the blade's pose at time `t` [s]. It rests before the start and after the end."""
+        t = min(max(t, 0.0), self._instants[-1])
+        i = min(bisect_right(self._instants, t) - 1, len(self._spins) - 1)
+        s = (t - self._instants[i]) / (self._instants[i + 1] - self._instants[i])
+        middle = self._middles[i] + s * (self._middles[i + 1] - self._middles[i])
+        quaternion, axes = self._rotations[i].copy(), np.empty(9)
+        mujoco.mju_quatIntegrate(quaternion, self._spins[i], s)
+        mujoco.mju_quat2Mat(axes, quaternion)
+        half_edge = 0.5 * self.blade_length * axes[1::3]
+        return BladeSegment(middle + half_edge, middle - half_edge, -axes[2::3])
+
+    def poses(self, count: int) -> list[BladeSegment]:
+        """Return `count` poses, evenly in time, the first and the last included."""
+        return [self.pose(t) for t in np.linspace(0.0, self.duration, count)]
+
+
+def from_csv(path: str | Path) -> Stroke:
+    """Read a stroke from a CSV file: one pose a line, in metres and seconds, tissue frame.
+
+    The first line names the columns: `t, tip_x, tip_y, tip_z, heel_x, heel_y, heel_z` and, if
+    wanted, `forward_x, forward_y, forward_z`, in any order. Without the latter the blade cuts
+    the way it moves. Empty lines, and lines that start with #, are skipped.
+
+    Raises:
+        StrokeError: no such file, or one that is no such table; the message names file and line.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise StrokeError(f"cannot read the stroke {path}: {reason}") from error
+    numbered = [
+        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise StrokeError(f"{path} is empty; its first line is {','.join(COLUMNS)}")
+    columns = _columns(path, *numbered[0])
+    table = np.array([_row(path, number, cells, columns) for number, cells in numbered[1:]])
+    if len(table) < 2:
+        raise StrokeError(f"{path} has {len(table)} poses; a stroke needs at least two")
+    times, tips, heels = table[:, 0], table[:, 1:4], table[:, 4:7]
+    if len(columns) > len(COLUMNS):
+        forwards = table[:, 7:10]
+    else:
+        forwards = _forwards_of_motion(path, tips, heels)
+    try:
+        segments = [BladeSegment(*pose) for pose in zip(tips, heels, forwards, strict=True)]
+        return Stroke(times, segments, path.stem)
+    except _PoseError as error:
+        raise StrokeError(f"{path}, line {numbered[1 + error.pose][0]}: {error.problem}") from error
+
+
+class _PoseError(StrokeError):
+    """What is wrong with one pose, so that a reader can name its line."""
+
+    def __init__(self, pose: int, problem: str) -> None:
+        super().__init__(f"pose {pose} of the stroke: {problem}")
+        self.pose = pose
+        self.problem = problem
+
+
+def _check(times: FloatArray, tips: FloatArray, heels: FloatArray, forwards: FloatArray) -> None:
+    """Refuse the first pose that a blade cannot take."""
+    finite = np.isfinite(np.column_stack([times, tips, heels, forwards])).all(axis=1)
+    if not finite.all():
+        raise _PoseError(int(np.argmin(finite)), "a number is not finite")
+    steps = np.diff(times)
+    if (steps <= 0.0).any():
+        i = int(np.argmax(steps <= 0.0)) + 1
+        raise _PoseError(i, f"time {times[i]:g} s follows {times[i - 1]:g} s; times must increase")
+    edges = tips - heels
+    lengths = np.linalg.norm(edges, axis=1)
+    if (lengths == 0.0).any():
+        raise _PoseError(int(np.argmin(lengths)), "tip and heel coincide: the blade has no length")
+    off = np.abs(lengths - lengths[0]) > SAME_LENGTH * lengths[0]
+    if off.any():
+        i = int(np.argmax(off))
+        raise _PoseError(
+            i,
+            f"the blade is {1e3 * lengths[i]:.2f} mm long, and was {1e3 * lengths[0]:.2f} mm at "
+            "the start; a blade does not stretch",
+        )
+    across = np.cross(edges, forwards)
+    along = np.linalg.norm(across, axis=1) <= 1e-3 * lengths * np.linalg.norm(forwards, axis=1)
+    if along.any():
+        raise _PoseError(
+            int(np.argmax(along)), "forward is zero or runs along the edge; a blade cuts across it"
+        )
+    speeds = np.maximum(*(np.linalg.norm(np.diff(end, axis=0), axis=1) for end in (tips, heels)))
+    speeds /= steps
+    if (speeds > FASTEST).any():
+        i = int(np.argmax(speeds > FASTEST)) + 1
+        raise _PoseError(
+            i,
+            f"the blade gets here at {speeds[i - 1]:.3g} m/s, and {FASTEST:g} m/s is the limit; "
+            "are the times in seconds and the positions in metres?",
+        )
+
+
+def _quaternions(edges: FloatArray, forwards: FloatArray) -> FloatArray:
+    """Return the rotations (w, x, y, z) of a blade body whose +y is the edge and -z is forward.
+
+    Args:
+        edges: Unit vectors from heel to tip, shape (n, 3).
+        forwards: Shape (n, 3); only the part across the edge counts.
+    """
+    across = forwards - (forwards * edges).sum(axis=1, keepdims=True) * edges
+    backs = -across / np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.stack([np.cross(edges, backs), edges, backs], axis=2)
+    quaternions = np.empty((len(edges), 4))
+    for quaternion, matrix in zip(quaternions, axes, strict=True):
+        mujoco.mju_mat2Quat(quaternion, matrix.ravel())
+    return quaternions
+
+
+def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
+    """Return the rotation vector, in the frame of `before`, that leads to `after`."""
+    turn = np.empty(3)
+    mujoco.mju_subQuat(turn, after, before)
+    return turn
+
+
+def _columns(path: Path, number: int, header: list[str]) -> list[int]:
+    """Return where each of the columns is, in the order in which they are used."""
+    names = [name.lower() for name in header]
+    wanted = COLUMNS + (FORWARD_COLUMNS if set(FORWARD_COLUMNS) & set(names) else ())
+    if sorted(names) != sorted(wanted):
+        raise StrokeError(
+            f"{path}, line {number}: the columns are '{','.join(header)[:200]}'; wanted "
+            f"{','.join(COLUMNS)} and, if the blade does not cut the way it moves, "
+            f"{','.join(FORWARD_COLUMNS)}"
+        )
+    return [names.index(name) for name in wanted]
+
+
+def _row(path: Path, number: int, cells: list[str], columns: list[int]) -> list[float]:
+    """Return the numbers of one line."""
+    if len(cells) != len(columns):
+        raise StrokeError(f"{path}, line {number}: {len(cells)} values, wanted {len(columns)}")
+    values = []
+    for column in columns:
+        try:
+            value = float(cells[column])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise StrokeError(f"{path}, line {number}: '{cells[column]}' is not a finite number")
+        values.append(value)
+    return values
+
+
+def _forwards_of_motion(path: Path, tips: FloatArray, heels: FloatArray) -> FloatArray:
+    """Return the direction in which the middle of the edge moves, across the edge, at each pose.
+
+    Where the blade rests, or only slides along itself, it faces the way it did before, or at the
+    start the way it will.
+    """
+    edges = (tips - heels) / np.maximum(np.linalg.norm(tips - heels, axis=1, keepdims=True), 1e-12)
+    moves = np.gradient((tips + heels) / 2.0, axis=0)
+    moves -= (moves * edges).sum(axis=1, keepdims=True) * edges
+    lengths = np.linalg.norm(moves, axis=1)
+    moving = lengths > 1e-3 * lengths.max(initial=0.0)
+    if not moving.any():
+        raise StrokeError(
+            f"{path}: the blade never moves across its edge, so the file must say which way it "
+            f"cuts, in columns {','.join(FORWARD_COLUMNS)}"
+        )
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(moves)), -1))
+    return moves[np.where(last < 0, int(np.argmax(moving)), last)]

@@ -1,0 +1,1 @@
+"""The live page, the replay, and the scene that both show."""

@@ -1,0 +1,64 @@
+"""What the 3D views are handed of a running simulation."""
+
+from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.simulation import Picture, Simulation
+from scalpel_sim.viewer.model_shapes import body_poses
+from scalpel_sim.viewer.replay import ReplayWriter
+from scalpel_sim.viewer.scene3d import Readings
+from scalpel_sim.viewer.viewer import Viewer
+
+
+def readings(simulation: Simulation) -> Readings | None:
+    """Return the numbers to show beside the picture of now; None before the first frame."""
+    wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
+    if result is None:
+        return None
+    contacts = result.contacts
+    on_tissue = contacts.normal_force[:, None] * contacts.normal + contacts.friction
+    forward = frame.vectors_to_tissue(simulation.arm.blade.segment().forward)
+    return Readings(
+        simulation.time,
+        wrench.force,
+        wrench.point,
+        result.cut_area,
+        result.n_tetrahedra,
+        contact_points=frame.points_to_world(contacts.point),
+        contact_forces=frame.vectors_to_world(-on_tissue),
+        parts=force_parts(contacts, forward),
+        energies=result.energies,
+    )
+
+
+def into_replay(replay: ReplayWriter) -> Picture:
+    """Return what keeps a replay up to date."""
+
+    def picture(simulation: Simulation) -> None:
+        if replay.is_due(simulation.time):
+            add_to(replay, simulation)
+
+    return picture
+
+
+def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
+    """Add a simulation as it is now; before its first frame too."""
+    replay.add(
+        simulation.time,
+        simulation.link.surface(),
+        body_poses(simulation.arm.data),
+        readings(simulation),
+    )
+
+
+def into_viewer(viewer: Viewer) -> Picture:
+    """Return what keeps a live viewer up to date."""
+
+    def picture(simulation: Simulation) -> None:
+        if viewer.is_due():
+            show(viewer, simulation)
+
+    return picture
+
+
+def show(viewer: Viewer, simulation: Simulation) -> None:
+    """Show a simulation as it is now; before its first frame too."""
+    viewer.show(simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation))

@@ -1,0 +1,43 @@
+import math
+
+import fcl
+import numpy as np
+import pytest
+
+from bridge.collision.arm_geoms import Part
+
+
+@pytest.mark.parametrize(
+    ("kind", "sizes", "why"),
+    [
+        ("cone", (1.0, 1.0), "is a 'cone'; wanted one of box, sphere"),
+        ("box", (1.0, 1.0), "a box has 3, all positive"),
+        ("sphere", (0.0,), "all positive"),
+        ("capsule", (1.0, math.nan), "all positive"),
+        ("cylinder", (1.0, math.inf), "all positive"),
+    ],
+)
+def test_a_part_of_no_shape_is_refused_by_name(kind, sizes, why):
+    with pytest.raises(ValueError, match=f"part 'wrist'.*{why}"):
+        Part("wrist", kind, sizes)
+
+
+@pytest.mark.parametrize(
+    ("kind", "sizes", "half_extents"),
+    [
+        ("box", (1.0, 2.0, 3.0), (1.0, 2.0, 3.0)),
+        ("sphere", (2.0,), (2.0, 2.0, 2.0)),
+        ("capsule", (1.0, 3.0), (1.0, 1.0, 4.0)),
+        ("cylinder", (1.0, 3.0), (1.0, 1.0, 3.0)),
+    ],
+)
+def test_the_box_around_a_part_is_that_of_the_collision_library(kind, sizes, half_extents):
+    part = Part("wrist", kind, sizes)
+    np.testing.assert_array_equal(part.half_extents, half_extents)
+    there = fcl.CollisionObject(part.geometry(), fcl.Transform())
+    for axis in range(3):
+        for gap, meets in ((-1e-3, True), (1e-3, False)):
+            at = np.zeros(3)
+            at[axis] = half_extents[axis] + 0.01 + gap
+            probe = fcl.CollisionObject(fcl.Sphere(0.01), fcl.Transform(at))
+            assert bool(fcl.collide(there, probe)) == meets

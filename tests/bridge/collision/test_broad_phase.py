@@ -1,0 +1,205 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge import FixtureBox, FixtureMesh
+from bridge.collision.broad_phase import BroadPhase
+from tissue import BladeSegment, BladeShape, BladeSweep, Chunks
+
+UNIT_BOX = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+SOUND_SPEED = 3.0
+DT = 1e-3
+FORWARD_LIKE = (0.3, 0.5, 0.7)
+
+coordinates = st.floats(-2.0, 2.0)
+vectors = st.tuples(coordinates, coordinates, coordinates).map(np.array)
+edges = vectors.filter(lambda v: np.linalg.norm(np.cross(v, FORWARD_LIKE)) > 1e-3)
+fractions = st.floats(0.0, 1.0)
+
+
+def segment(tip, edge):
+    tip, edge = np.array(tip, float), np.array(edge, float)
+    forward = np.cross(edge, FORWARD_LIKE)
+    return BladeSegment(tip, tip + edge, forward / np.linalg.norm(forward))
+
+
+def resting(tip, edge=(0.0, 0.0, 1.0)):
+    here = segment(tip, edge)
+    return BladeSweep(here, here)
+
+
+@given(edges, edges, vectors, fractions, fractions, st.tuples(fractions, fractions, fractions))
+def test_an_edge_that_passes_through_the_tissue_is_never_hidden(
+    edge_t0, edge_t1, motion, along, when, inside
+):
+    # Both ends move on straight lines; put the blade where the point at `along` the edge is at
+    # `inside` the unit box at the time `when`.
+    there = when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
+    tip_t0 = np.array(inside) - there
+    sweep = BladeSweep(segment(tip_t0, edge_t0), segment(tip_t0 + motion, edge_t1))
+    assert BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
+
+
+def test_a_blade_above_the_tissue_does_not_touch_it():
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(resting((0.5, 0.5, 1.01)), DT).tissue
+
+
+def test_a_blade_beside_a_slanted_tissue_box_is_told_apart_by_its_own_axes():
+    # The axis-aligned box of this diagonal edge would hold the corner (1, 1, 1); its own does not.
+    diagonal = resting((1.5, 0.9, 0.5), (-0.6, 0.6, 0.0))
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(diagonal, DT).tissue
+
+
+def test_a_fast_blade_does_not_tunnel_through_a_thin_sheet():
+    sheet = np.array([[-1.0, 0.0, -1.0], [1.0, 1e-4, 1.0]])
+    before, after = segment((0, -0.5, 0), (0, 0, 0.1)), segment((0, 0.5, 0), (0, 0, 0.1))
+    phase = BroadPhase(sheet, 0.0)
+    assert phase.contacts(BladeSweep(before, after), DT).tissue
+    assert not phase.contacts(BladeSweep(before, before), DT).tissue
+    assert not phase.contacts(BladeSweep(after, after), DT).tissue
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(2.9e-3, True), (3.1e-3, False)])
+def test_the_box_grows_by_what_sound_travels_in_a_step(gap, touches):
+    phase = BroadPhase(UNIT_BOX, SOUND_SPEED)
+    assert phase.contacts(resting((0.5, 0.5, 1.0 + gap)), DT).tissue == touches
+
+
+@pytest.mark.parametrize(("gap", "touches"), [(0.0499, True), (0.0501, False)])
+def test_the_box_of_a_falling_body_grows_by_what_it_fell_in_the_last_step(gap, touches):
+    phase = BroadPhase(UNIT_BOX + np.array([0.0, 0.0, 0.05]), 0.0)
+    phase.tissue_moved(UNIT_BOX, DT)
+    assert phase.contacts(resting((0.5, 0.5, -1.0 - gap)), DT).tissue == touches
+
+
+def test_the_box_follows_the_tissue():
+    phase = BroadPhase(UNIT_BOX, 0.0)
+    phase.tissue_moved(UNIT_BOX + 5.0, 1.0)
+    assert not phase.contacts(resting((0.5, 0.5, 0.5), (0, 0, 0.1)), DT).tissue
+    assert phase.contacts(resting((5.5, 5.5, 5.5), (0, 0, 0.1)), DT).tissue
+
+
+TABLE = FixtureBox("table", np.array([9.0, 9.0, 0.1]), np.array([0.0, 0.0, -0.5]))
+CLAMP = FixtureMesh(
+    "clamp",
+    np.array([[3.0, 0.0, 0.0], [3.0, 1.0, 0.0], [3.0, 0.0, 1.0]]),
+    np.array([[0, 1, 2]]),
+)
+
+
+@pytest.mark.parametrize(
+    ("tip", "named"),
+    [
+        ((0.5, 0.5, 3.0), ()),
+        ((0.5, 0.5, -0.5), ("table",)),
+        ((3.0, 0.2, 0.2), ("clamp",)),
+        ((3.0, 0.2, -0.5), ("table", "clamp")),
+    ],
+)
+def test_the_fixtures_that_the_blade_meets_are_named(tip, named):
+    phase = BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, CLAMP])
+    assert phase.contacts(resting(tip), DT).fixtures == named
+
+
+def test_a_fixture_of_many_triangles_does_not_hide_the_tissue():
+    grid = np.random.default_rng(0).random((3000, 3))
+    mesh = FixtureMesh("gauze", grid, np.arange(3000).reshape(1000, 3))
+    contacts = BroadPhase(UNIT_BOX, 0.0, [mesh]).contacts(resting((0.5, 0.5, 0.0)), DT)
+    assert contacts == (True, ("gauze",))
+
+
+def test_a_turned_box_is_met_where_it_is():
+    s = np.sqrt(0.5)
+    turn = np.array([[s, -s, 0.0], [s, s, 0.0], [0.0, 0.0, 1.0]])
+    bar = FixtureBox("bar", np.array([2.0, 0.02, 2.0]), np.array([5.0, 5.0, 0.0]), turn)
+    phase = BroadPhase(UNIT_BOX, 0.0, [bar])
+    assert phase.contacts(resting((5.5, 5.5, 0.0)), DT).fixtures == ("bar",)
+    assert phase.contacts(resting((5.5, 4.5, 0.0)), DT).fixtures == ()
+
+
+def test_two_fixtures_of_one_name_are_refused():
+    with pytest.raises(ValueError, match="two fixtures have the name 'table'"):
+        BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, TABLE])
+
+
+# ---- chunks --------------------------------------------------------------------------------------
+
+HORSESHOE = np.array(
+    [
+        [[0.0, 0.0, 0.0], [1.0, 0.2, 1.0]],
+        [[0.0, 0.2, 0.0], [0.2, 1.0, 1.0]],
+        [[0.8, 0.2, 0.0], [1.0, 1.0, 1.0]],
+    ]
+)
+"""Three boxes around a hollow, open at the back: the unit box is the box around all of them."""
+
+
+class Source:
+    """Chunks that can be moved, and how often they were asked for."""
+
+    def __init__(self, boxes, fastest=0.0):
+        self.boxes, self.fastest, self.n_asked = boxes, fastest, 0
+
+    def __call__(self):
+        self.n_asked += 1
+        return Chunks(self.boxes, self.fastest)
+
+
+def test_a_blade_in_the_hollow_of_a_body_touches_nothing():
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=Source(HORSESHOE))
+    assert not phase.contacts(resting((0.5, 0.6, 0.0)), DT).tissue
+    assert phase.contacts(resting((0.9, 0.6, 0.0)), DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0).contacts(resting((0.5, 0.6, 0.0)), DT).tissue
+
+
+def test_chunks_are_asked_for_only_in_the_box_around_all_and_before_the_blade_holds_tissue():
+    source = Source(HORSESHOE)
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
+    phase.contacts(resting((0.5, 0.6, 2.0)), DT)
+    assert phase.contacts(resting((0.5, 0.6, 0.0)), DT, engaged=True).tissue
+    assert source.n_asked == 0
+    phase.contacts(resting((0.5, 0.6, 0.0)), DT)
+    assert source.n_asked == 1
+
+
+@pytest.mark.parametrize(("fastest", "touches"), [(0.0, False), (99.9, False), (100.1, True)])
+def test_chunks_reach_as_far_as_sound_and_their_fastest_node_go_in_a_step(fastest, touches):
+    """The lips are 0.3 m from the middle of the hollow; sound goes 0.2 m."""
+    phase = BroadPhase(UNIT_BOX, 200.0, chunks=Source(HORSESHOE, fastest))
+    blade = BladeSegment(
+        np.array([0.5, 0.6, 0.0]), np.array([0.5, 0.6, 1.0]), np.array([0, 1.0, 0])
+    )
+    assert phase.contacts(BladeSweep(blade, blade), DT).tissue == touches
+
+
+def test_chunks_that_move_are_met_where_they_are():
+    source = Source(HORSESHOE)
+    phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
+    blade = resting((0.5, 0.6, 0.0))
+    assert not phase.contacts(blade, DT).tissue
+    source.boxes = HORSESHOE + np.array([0.35, 0.0, 0.0])
+    assert phase.contacts(blade, DT).tissue
+    source.boxes = HORSESHOE[:2]
+    assert not phase.contacts(blade, DT).tissue
+
+
+@given(st.lists(vectors, min_size=1, max_size=6), vectors, edges, vectors, fractions)
+def test_no_chunk_is_passed_through_unseen(corners, tip, edge, motion, when):
+    """A box of a millimetre around a point that the edge sweeps, among others."""
+    point = tip + when * motion + 0.3 * edge
+    low = np.array([point, *corners])
+    boxes = np.stack([low - 5e-4, low + 5e-4], axis=1)
+    bounds = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    phase = BroadPhase(bounds, 0.0, chunks=Source(boxes))
+    assert phase.contacts(BladeSweep(segment(tip, edge), segment(tip + motion, edge)), DT).tissue
+
+
+def test_the_body_of_a_blade_meets_what_its_edge_does_not():
+    shape = BladeShape(thickness=0.02, bevel_angle=0.5, height=0.3)
+    blade = BladeSegment(
+        np.array([0.5, 1.2, 0.0]), np.array([0.5, 1.2, 1.0]), np.array([0, 1.0, 0])
+    )
+    sweep = BladeSweep(blade, blade)
+    assert not BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0, blade=shape).contacts(sweep, DT).tissue

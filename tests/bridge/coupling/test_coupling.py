@@ -1,0 +1,195 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge import CouplingError
+from bridge.coupling.coupling import ABSURD_FORCE, ABSURD_FRAMES_IN_A_ROW, Coupling, DeviceLimits
+from bridge.coupling.passivity import Travel
+from tissue import Wrench
+
+TOUCH = DeviceLimits(force=3.3)
+PREMIUM = DeviceLimits(force=8.5, torque=0.188)
+
+components = st.floats(-900.0, 900.0)
+vectors = st.tuples(components, components, components).map(np.array)
+small_vectors = vectors.map(lambda v: v / 100.0)
+
+
+def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), point=(0.0, 0.0, 0.0)):
+    return Wrench(np.array(force), np.array(torque), np.array(point))
+
+
+def test_a_wrench_within_the_limits_is_felt_bit_for_bit():
+    tissue = wrench((1.0, 0.2, -0.3), (0.01, 0.0, 0.02), (0.1, 0.2, 0.3))
+    coupling = Coupling(PREMIUM)
+    felt = coupling.felt(tissue, 1e-3)
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(tissue, felt, strict=True))
+    assert coupling.n_force_limited == coupling.n_torque_limited == 0
+
+
+@given(vectors, small_vectors)
+def test_the_limits_hold_and_both_directions_are_kept(force, torque):
+    felt = Coupling(PREMIUM).felt(wrench(force, torque), 1e-3)
+    assert math.hypot(*felt.force) <= 8.5
+    assert math.hypot(*felt.torque) <= 0.188
+    np.testing.assert_allclose(np.cross(felt.force, force), 0.0, atol=1e-9)
+    np.testing.assert_allclose(np.cross(felt.torque, torque), 0.0, atol=1e-9)
+    assert felt.force @ force >= 0.0 and felt.torque @ torque >= 0.0
+
+
+def test_a_wrench_that_is_made_shorter_keeps_its_line_of_action():
+    felt = Coupling(TOUCH).felt(wrench((0.0, 0.0, 6.6), (0.2, 0.0, 0.0)), 1e-3)
+    np.testing.assert_allclose(felt.force, [0.0, 0.0, 3.3])
+    np.testing.assert_allclose(felt.torque, [0.1, 0.0, 0.0])
+
+
+def test_every_saturation_is_counted():
+    coupling = Coupling(PREMIUM)
+    coupling.felt(wrench((9.0, 0.0, 0.0)), 1e-3)
+    coupling.felt(wrench((9.0, 0.0, 0.0), (0.3, 0.0, 0.0)), 1e-3)
+    coupling.felt(wrench((8.0, 0.0, 0.0)), 1e-3)
+    assert (coupling.n_force_limited, coupling.n_torque_limited) == (2, 1)
+
+
+@given(st.lists(st.tuples(vectors, small_vectors), min_size=1, max_size=20))
+def test_no_profile_changes_the_force_faster_than_the_slew_limit(profile):
+    coupling = Coupling(DeviceLimits(force=8.5, torque=0.188, slew=1000.0))
+    before = np.zeros(3)
+    for force, torque in profile:
+        felt = coupling.felt(wrench(force, torque), 1e-3)
+        assert math.hypot(*(felt.force - before)) <= 1.0 + 1e-9
+        assert math.hypot(*felt.force) <= 8.5
+        assert math.hypot(*felt.torque) <= 0.188
+        before = felt.force
+
+
+def test_a_slewing_force_arrives():
+    coupling = Coupling(DeviceLimits(slew=1000.0))
+    felt = [coupling.felt(wrench((2.5, 0.0, 0.0)), 1e-3).force[0] for _ in range(4)]
+    np.testing.assert_allclose(felt, [1.0, 2.0, 2.5, 2.5])
+    assert coupling.n_slew_limited == 2
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["force", "torque", "point"])
+def test_what_is_not_finite_never_gets_out_and_is_counted(bad, where):
+    coupling = Coupling(TOUCH)
+    with pytest.raises(CouplingError, match="not finite"):
+        coupling.felt(wrench(**{where: (0.0, bad, 0.0)}), 1e-3)
+    assert coupling.n_not_finite == 1
+
+
+@pytest.mark.parametrize("force", [ABSURD_FORCE * 1.01, 1e9, 1e200])
+def test_an_absurd_wrench_is_felt_as_zero_and_counted(force):
+    coupling = Coupling(DeviceLimits())
+    felt = coupling.felt(wrench((force, 0.0, 0.0), (0.1, 0.0, 0.0)), 1e-3)
+    assert not felt.force.any() and not felt.torque.any()
+    assert coupling.n_absurd == 1
+
+
+def test_a_tissue_that_stays_absurd_ends_the_run_after_ten_frames():
+    coupling = Coupling(TOUCH)
+    for _ in range(ABSURD_FRAMES_IN_A_ROW - 1):
+        coupling.felt(wrench((1e6, 0.0, 0.0)), 1e-3)
+    with pytest.raises(CouplingError, match=r"10 frames in a row.*1e\+06 N"):
+        coupling.felt(wrench((1e6, 0.0, 0.0)), 1e-3)
+
+
+def test_a_tissue_that_comes_to_its_senses_starts_the_count_again():
+    coupling = Coupling(TOUCH)
+    for frame in range(5 * ABSURD_FRAMES_IN_A_ROW):
+        coupling.felt(wrench((1e6 if frame % 5 else 1.0, 0.0, 0.0)), 1e-3)
+    assert coupling.n_absurd == 4 * ABSURD_FRAMES_IN_A_ROW
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, np.nan])
+def test_a_limit_that_is_not_positive_is_refused(limit):
+    with pytest.raises(ValueError, match="the limit of force is"):
+        DeviceLimits(force=limit)
+
+
+def profiles(kind, n, n_frames, random):
+    """Forces and torques that a tissue might answer with, shapes (n, n_frames, 3)."""
+    sizes = random.uniform(0.1, 50.0, (n, 1, 1))
+    ways = random.normal(size=(2, n, 1, 3))
+    times = np.arange(n_frames)[None, :, None]
+    shapes = {
+        "step": times >= random.integers(0, n_frames, (n, 1, 1)),
+        "ramp": times / n_frames,
+        "alternating": (-1.0) ** (times // random.integers(1, 4, (n, 1, 1))),
+        "random": random.normal(size=(n, n_frames, 1)),
+    }
+    if kind == "random":
+        ways = random.normal(size=(2, n, n_frames, 3))
+    force, torque = sizes * shapes[kind] * ways
+    return force, torque * random.uniform(0.0, 0.1)
+
+
+def turned(felt, said):
+    """The largest sine of the angle between what is felt and what was said."""
+    sizes = np.linalg.norm(felt, axis=-1) * np.linalg.norm(said, axis=-1)
+    across = np.linalg.norm(np.cross(felt, said), axis=-1)
+    assert (np.sum(felt * said, axis=-1) >= 0.0).all()
+    return (across[sizes > 0.0] / sizes[sizes > 0.0]).max()
+
+
+def felt_of(limits, force, torque, travels=None, silences=None, **how):
+    """What an arm feels of each profile, with a coupling of its own; shapes as they are."""
+    felt = np.zeros((2, *force.shape))
+    for i in range(len(force)):
+        coupling = Coupling(limits, **how)
+        for k in range(force.shape[1]):
+            wrench_now = Wrench(force[i, k], torque[i, k], np.zeros(3))
+            more = {} if travels is None else {"travel": travels[i][k], "silence": silences[k]}
+            felt[:, i, k] = coupling.felt(wrench_now, 1e-3, **more)[:2]
+    return felt
+
+
+@pytest.mark.parametrize("limits", [TOUCH, PREMIUM], ids=["touch", "premium"])
+@pytest.mark.parametrize("kind", ["step", "ramp", "alternating", "random"])
+def test_625_profiles_of_a_kind_and_device_never_exceed_a_limit_and_keep_their_direction(
+    kind, limits
+):
+    force, torque = profiles(kind, 625, 20, np.random.default_rng(5))
+    felt_force, felt_torque = felt_of(limits, force, torque, passivity=False)
+    assert np.linalg.norm(felt_force, axis=-1).max() <= limits.force
+    assert np.linalg.norm(felt_torque, axis=-1).max() <= limits.torque
+    assert turned(felt_force, force) < 1e-6
+    assert turned(felt_torque, torque) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["step", "ramp", "alternating", "random"])
+def test_nor_do_they_with_controller_slew_limit_and_a_tissue_that_falls_silent(kind):
+    limits = DeviceLimits(force=8.5, torque=0.188, slew=2000.0)
+    random = np.random.default_rng(6)
+    force, torque = profiles(kind, 100, 40, random)
+    ways = random.normal(scale=[1e-4] * 3 + [1e-2] * 3, size=(100, 40, 6))
+    travels = [[Travel(way, 0.02, 0.0) for way in profile] for profile in ways]
+    silences = 1e-3 * np.concatenate([np.zeros(10), np.arange(40, 55), np.zeros(15)])
+    felt_force, felt_torque = felt_of(limits, force, torque, travels, silences)
+    assert np.linalg.norm(felt_force, axis=-1).max() <= limits.force
+    assert np.linalg.norm(felt_torque, axis=-1).max() <= limits.torque
+    changes = np.linalg.norm(np.diff(felt_force, axis=1), axis=-1)
+    assert changes.max() <= 2000.0 * 1e-3 * (1.0 + 1e-12)
+
+
+def test_what_the_arm_feels_of_a_silent_tissue_fades_and_comes_back_by_a_ramp():
+    coupling, dt = Coupling(TOUCH), 1e-3
+    for frame in range(600):
+        felt = coupling.felt(wrench((0.0, 2.0, 0.0)), dt, silence=frame * dt)
+        if frame in (0, 49, 275, 500):
+            allowed = {0: 2.0, 49: 2.0, 275: 1.0, 500: 0.0}[frame]
+            assert felt.force[1] == pytest.approx(allowed)
+    back = [coupling.felt(wrench((0.0, 2.0, 0.0)), dt).force[1] for _ in range(110)]
+    assert back[0] == pytest.approx(0.02) and back[-1] == 2.0
+    assert coupling.n_silent == 590
+
+
+def test_after_an_absurd_wrench_the_arm_feels_again_by_a_ramp():
+    coupling = Coupling(TOUCH)
+    coupling.felt(wrench((1e6, 0.0, 0.0)), 1e-3)
+    felt = [coupling.felt(wrench((1.0, 0.0, 0.0)), 1e-3).force[0] for _ in range(110)]
+    assert felt[0] == pytest.approx(0.02) and felt[49] == pytest.approx(0.51) and felt[-1] == 1.0

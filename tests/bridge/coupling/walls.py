@@ -1,0 +1,112 @@
+"""A wall that pushes back like a spring: a tissue without memory, whose every answer is known."""
+
+import numpy as np
+
+from bridge.link import TissueDescription
+from tissue import (
+    BladeContacts,
+    BladeSegment,
+    BladeSweep,
+    BodyContacts,
+    Chunks,
+    FloatArray,
+    Material,
+    StageTimes,
+    StepResult,
+    Wrench,
+)
+
+N_POINTS = 5
+"""Of the edge, equally spaced from tip to heel, each with its share of the stiffness."""
+
+
+class Wall:
+    """All space behind a plane. Points of the edge behind it are pushed out, without friction.
+
+    Args:
+        point: On the plane [m].
+        normal: Out of the wall, a unit vector.
+        stiffness: Of the whole edge [N/m].
+        told: The share of its stiffness that it tells of. 0 makes of it a tissue whose last wrench
+            can only be held.
+    """
+
+    def __init__(
+        self, point: FloatArray, normal: FloatArray, stiffness: float, told: float = 1.0
+    ) -> None:
+        self._point, self._normal = np.array(point, float), np.array(normal, float)
+        self._stiffness = stiffness
+        self._told = told
+        self._work = 0.0
+        self.impulse = np.zeros(3)
+        """That the blade felt if all went well: of the wall on the edge [N s]."""
+
+    def describe(self) -> TissueDescription:
+        everywhere = np.array([[-1.0] * 3, [1.0] * 3])
+        return TissueDescription("wall", Material(), everywhere, 1, 4)
+
+    def chunks(self) -> Chunks:
+        return Chunks(np.array([[[-1.0] * 3, [1.0] * 3]]), 0.0)
+
+    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        assert sweep is not None
+        start, end = _points(sweep.t0), _points(sweep.t1)
+        each = self._stiffness / N_POINTS
+        depth_t0, depth_t1 = (self._depth(points) for points in (start, end))
+        mean = each * _mean_of_positive(depth_t0, depth_t1)
+        now = each * np.maximum(depth_t1, 0.0)
+        pressed = np.maximum(depth_t1, 0.0) ** 2 - np.maximum(depth_t0, 0.0) ** 2
+        self._work += 0.5 * each * pressed.sum()
+        lever = end - sweep.t1.tip
+        turning = np.concatenate(
+            [np.tile(self._normal, (N_POINTS, 1)), np.cross(lever, self._normal)], axis=1
+        )
+        touching = turning[depth_t1 > 0.0]
+        wrench = self._wrench(mean, lever, sweep.t1.tip)
+        self.impulse += dt * wrench.force
+        n = len(touching)
+        return StepResult(
+            wrench=wrench,
+            wrench_t1=self._wrench(now, lever, sweep.t1.tip),
+            stiffness=self._told * each * touching.T @ touching,
+            contacts=BladeContacts(
+                point=end[depth_t1 > 0.0],
+                normal=np.tile(-self._normal, (n, 1)),
+                normal_force=now[depth_t1 > 0.0],
+                friction=np.zeros((n, 3)),
+                cut_area=np.zeros(n),
+            ),
+            force_on_tissue=-wrench.force,
+            bounds=self.describe().bounds,
+            n_tetrahedra=1,
+            n_nodes=4,
+            n_active=0,
+            active_point_tetrahedron=-1,
+            anchored_length=n / N_POINTS * float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip)),
+            cut_area=0.0,
+            work_of_blade=self._work,
+            work_of_cutting=0.0,
+            n_substeps=1,
+            touch=BodyContacts(0, 0.0, 0.0, np.zeros(3)),
+            profile=StageTimes(0.0, 0.0, 0.0),
+            energies=None,
+        )
+
+    def _depth(self, points: FloatArray) -> FloatArray:
+        return (self._point - points) @ self._normal
+
+    def _wrench(self, sizes: FloatArray, lever: FloatArray, tip: FloatArray) -> Wrench:
+        forces = sizes[:, None] * self._normal
+        return Wrench(forces.sum(axis=0), np.cross(lever, forces).sum(axis=0), tip.copy())
+
+
+def _points(segment: BladeSegment) -> FloatArray:
+    along = np.linspace(0.0, 1.0, N_POINTS)[:, None]
+    return segment.tip + along * (segment.heel - segment.tip)
+
+
+def _mean_of_positive(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the mean of max(0, x) where x goes evenly from a to b."""
+    inside = np.maximum(np.maximum(a, b), 0.0) ** 2 - np.maximum(np.minimum(a, b), 0.0) ** 2
+    span = np.abs(b - a)
+    return np.where(span > 1e-15, 0.5 * inside / np.maximum(span, 1e-15), np.maximum(a, 0.0))

@@ -1,0 +1,101 @@
+"""Bytes that were never a message, and messages with bytes changed, through every decoder."""
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from bridge.link import TissueDescription
+from bridge.tcp.messages.body import (
+    pack_pieces,
+    pack_snapshot,
+    pack_surface,
+    unpack_pieces,
+    unpack_snapshot,
+    unpack_surface,
+)
+from bridge.tcp.messages.chunks import pack_chunks, unpack_chunks
+from bridge.tcp.messages.quality import pack_quality, unpack_quality
+from bridge.tcp.messages.result import pack_result, unpack_result
+from bridge.tcp.messages.step import pack_step, unpack_step
+from bridge.tcp.messages.text import pack_description, pack_error, unpack_description, unpack_error
+from bridge.tcp.wire import MessageError
+from tests.bridge.tcp.serve_block import block_tissue
+from tissue import BladeSegment, BladeSweep
+
+N_MUTATIONS = 2000
+"""Of each message."""
+
+
+def real_messages():
+    """Return one of each, from a tissue that lives."""
+    tissue = block_tissue()
+    edge = BladeSegment(np.array([0.01, 0, 0]), np.array([0.01, 0, 0.03]), np.array([0.0, 1, 0]))
+    result = tissue.step(BladeSweep(edge, edge), 1e-3)
+    described = TissueDescription("block", tissue.material, tissue.bounds, 72, 36)
+    return {
+        "step": (pack_step(BladeSweep(edge, edge), 1e-3), unpack_step),
+        "result": (pack_result(result), unpack_result),
+        "snapshot": (pack_snapshot(tissue.snapshot()), unpack_snapshot),
+        "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
+        "surface": (pack_surface(tissue.surface()), unpack_surface),
+        "pieces": (pack_pieces(1), unpack_pieces),
+        "quality": (pack_quality(tissue.quality()), unpack_quality),
+        "description": (pack_description(described), unpack_description),
+        "error": (pack_error("no blade"), unpack_error),
+    }
+
+
+MESSAGES = real_messages()
+
+
+@given(st.sampled_from(sorted(MESSAGES)), st.binary(max_size=400))
+@example("error", b"\xa1\x80")  # a string that is no UTF-8
+def test_random_bytes_never_give_another_exception_than_ours(what, payload):
+    _, unpack = MESSAGES[what]
+    try:
+        value = unpack(payload)
+    except MessageError as error:
+        assert str(error)
+    else:
+        assert value is not None
+
+
+@pytest.mark.parametrize("what", sorted(MESSAGES))
+def test_a_changed_message_is_refused_or_still_means_something(what):
+    """Half of all changed numbers are still numbers: what passes must be fit for use."""
+    packed, unpack = MESSAGES[what]
+    random = np.random.default_rng(0)
+    n_refused = 0
+    for _ in range(N_MUTATIONS):
+        payload = bytearray(packed)
+        for at in random.integers(0, len(payload), random.integers(1, 5)):
+            payload[at] = random.integers(0, 256)
+        length = len(payload) if random.random() < 0.8 else random.integers(0, len(payload))
+        try:
+            value = unpack(bytes(payload[:length]))
+        except MessageError:
+            n_refused += 1
+        else:
+            assert is_fit(what, value)
+    assert n_refused > 0
+
+
+def is_fit(what, value):
+    """Whether nothing in a decoded message could harm who uses it."""
+    if what == "step":
+        sweep, dt = value
+        return 0.0 < dt <= 1.0 and (sweep is None or np.isfinite(np.array(sweep)).all())
+    if what == "snapshot":
+        return value.tetrahedra.min() >= 0 and value.tetrahedra.max() < len(value.positions)
+    if what == "surface":
+        return value.triangles.min() >= 0 and value.triangles.max() < len(value.positions)
+    if what == "result":
+        return -1 <= value.active_point_tetrahedron < value.n_tetrahedra
+    if what == "chunks":
+        return np.isfinite(value.boxes).all() and 0.0 <= value.fastest < np.inf
+    if what == "description":
+        return np.isfinite(value.bounds).all() and value.material.density > 0.0
+    if what == "error":
+        return value.isprintable()
+    return what == "quality" or value >= 0

@@ -1,0 +1,36 @@
+import numpy as np
+import pytest
+
+from bridge.tcp.messages.quality import pack_quality, unpack_quality
+from bridge.tcp.wire import MessageError
+from tests.bridge.bits import bits
+from tissue import CutReport, MeshMeasures
+
+QUALITY = CutReport(
+    7,
+    1e-5,
+    3e-5,
+    3e-3,
+    4e-4,
+    MeshMeasures(576, 3e-3, 900.0, 2e-3),
+    MeshMeasures(800, 5e-4, 3e3, np.inf),
+)
+
+
+def test_a_quality_report_arrives_bit_for_bit():
+    assert bits(unpack_quality(pack_quality(QUALITY))) == bits(QUALITY)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"n_cut_nodes": -1},
+        {"path_error_mean": np.nan},
+        {"guard": -1e-9},
+        {"now": QUALITY.now._replace(altitude=-np.inf)},
+        {"initial": QUALITY.initial._replace(n_tetrahedra=0)},
+    ],
+)
+def test_a_quality_report_of_no_body_is_refused(change):
+    with pytest.raises(MessageError):
+        unpack_quality(pack_quality(QUALITY._replace(**change)))

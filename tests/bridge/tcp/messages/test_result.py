@@ -1,0 +1,106 @@
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.tcp.messages.result import pack_result, unpack_result
+from bridge.tcp.wire import MessageError
+from tests.bridge.bits import bits
+from tests.bridge.tcp.serve_block import block_tissue
+from tissue import BladeContacts, BodyContacts, Energies, StageTimes, StepResult, Wrench
+
+any_float = st.floats(allow_nan=True, allow_infinity=True)
+
+
+counts = st.integers(0, 10**6)
+
+
+def rows(n, numbers):
+    return st.lists(numbers, min_size=3 * n, max_size=3 * n).map(
+        lambda values: np.array(values).reshape(n, 3)
+    )
+
+
+@st.composite
+def results(draw):
+    vectors = draw(rows(7, any_float))
+    n_tetrahedra = draw(counts)
+    n_contacts = draw(st.integers(0, 3))
+    return StepResult(
+        wrench=Wrench(*vectors[:3]),
+        wrench_t1=Wrench(*draw(rows(3, any_float))),
+        stiffness=draw(rows(12, any_float)).reshape(6, 6),
+        contacts=BladeContacts(
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float))[:, 0],
+            draw(rows(n_contacts, any_float)),
+            draw(rows(n_contacts, any_float))[:, 1],
+        ),
+        force_on_tissue=vectors[3],
+        bounds=vectors[4:6],
+        n_tetrahedra=n_tetrahedra,
+        n_nodes=draw(counts),
+        n_active=draw(st.integers(0, n_tetrahedra)),
+        active_point_tetrahedron=draw(st.integers(-1, n_tetrahedra - 1)),
+        anchored_length=draw(any_float),
+        cut_area=draw(any_float),
+        work_of_blade=draw(any_float),
+        work_of_cutting=draw(any_float),
+        n_substeps=draw(counts),
+        touch=BodyContacts(draw(counts), draw(any_float), draw(any_float), vectors[6]),
+        profile=StageTimes(*draw(st.tuples(any_float, any_float, any_float))),
+        energies=draw(st.none() | st.builds(Energies, *[any_float] * len(Energies._fields))),
+    )
+
+
+@given(results())
+def test_a_result_arrives_bit_for_bit_even_where_the_tissue_diverged(result):
+    assert bits(unpack_result(pack_result(result))) == bits(result)
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"n_active": 4}, "4 active tetrahedra"),
+        ({"active_point_tetrahedron": 3}, "tip in 3"),
+        ({"active_point_tetrahedron": -2}, "tip in -2"),
+        ({"n_tetrahedra": -1}, "-1 elements"),
+        ({"n_substeps": -1}, "-1 substeps"),
+        ({"touch": BodyContacts(-1, 0.0, 0.0, np.zeros(3))}, "-1 contacts"),
+    ],
+)
+def test_a_result_with_impossible_counts_is_refused(change, why):
+    zeros = np.zeros(3)
+    wrench, bounds, profile = (
+        Wrench(zeros, zeros, zeros),
+        np.zeros((2, 3)),
+        StageTimes(0.0, 0.0, 0.0),
+    )
+    touch = BodyContacts(0, 0.0, 0.0, zeros)
+    none = np.zeros((0, 3))
+    contacts = BladeContacts(none, none, np.zeros(0), none, np.zeros(0))
+    at_t1 = (wrench, np.zeros((6, 6)), contacts)
+    counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1)
+    good = StepResult(wrench, *at_t1, zeros, bounds, *counts_and_floats, touch, profile, None)
+    with pytest.raises(MessageError, match=why):
+        unpack_result(pack_result(good._replace(**change)))
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "why"),
+    [(6, -1, "-1 contacts of the blade"), (6, 2**16 + 1, "65537 contacts"), (7, 2, "2 audits")],
+)
+def test_a_result_with_an_impossible_number_of_blade_contacts_is_refused(place, value, why):
+    packed = bytearray(pack_result(block_tissue().step(None, 1e-3)))
+    struct.pack_into("<q", packed, 8 * place, value)
+    with pytest.raises(MessageError, match=why):
+        unpack_result(bytes(packed))
+
+
+def test_a_result_without_its_last_number_is_refused():
+    packed = pack_result(block_tissue().step(None, 1e-3))
+    with pytest.raises(MessageError, match=f"{len(packed) - 8} bytes; wanted {len(packed)}"):
+        unpack_result(packed[:-8])

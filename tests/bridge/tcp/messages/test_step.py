@@ -1,0 +1,59 @@
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.tcp.messages.step import pack_step, unpack_step
+from bridge.tcp.wire import MessageError
+from tests.bridge.bits import bits
+from tissue import BladeSegment, BladeSweep
+
+coordinates = st.floats(-1000.0, 1000.0)
+
+
+def rows(n, numbers):
+    return st.lists(numbers, min_size=3 * n, max_size=3 * n).map(
+        lambda values: np.array(values).reshape(n, 3)
+    )
+
+
+@st.composite
+def sweeps(draw):
+    tips = draw(rows(4, coordinates))
+    forward = np.array([0.6, 0.0, 0.8])
+    return BladeSweep(
+        BladeSegment(tips[0], tips[1], forward), BladeSegment(tips[2], tips[3], -forward)
+    )
+
+
+@given(sweeps(), st.floats(1e-6, 1.0))
+def test_a_sweep_arrives_bit_for_bit(sweep, dt):
+    assert bits(unpack_step(pack_step(sweep, dt))) == bits((sweep, dt))
+
+
+def test_no_blade_arrives_as_no_blade():
+    assert unpack_step(pack_step(None, 1e-3)) == (None, 1e-3)
+
+
+def step_numbers(**changes):
+    """Return a good step request as 19 numbers, with some places changed."""
+    numbers = [1e-3, *[0.1] * 6, 0.0, 1.0, 0.0, *[0.2] * 6, 0.0, 1.0, 0.0]
+    for place, value in changes.items():
+        numbers[int(place[1:])] = value
+    return struct.pack("<19d", *numbers)
+
+
+@pytest.mark.parametrize("place", range(19))
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9, -1e4])
+def test_a_step_with_one_impossible_number_is_refused(place, bad):
+    assert unpack_step(step_numbers())
+    with pytest.raises(MessageError):
+        unpack_step(step_numbers(**{f"_{place}": bad}))
+
+
+@pytest.mark.parametrize("dt", [0.0, -1e-3, 1.1, np.nan])
+def test_a_step_that_lasts_no_time_or_too_long_is_refused(dt):
+    with pytest.raises(MessageError, match="a step of"):
+        unpack_step(struct.pack("<d", dt))

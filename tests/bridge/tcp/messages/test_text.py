@@ -1,0 +1,63 @@
+import numpy as np
+import pytest
+
+from bridge.link import TissueDescription
+from bridge.tcp.messages.text import (
+    LARGEST_ERROR,
+    pack_description,
+    pack_error,
+    unpack_description,
+    unpack_error,
+)
+from bridge.tcp.wire import MessageError
+from tests.bridge.bits import bits
+from tissue import BladeShape, Material
+
+
+def test_a_description_arrives_with_every_property_of_material_and_blade():
+    material = Material(
+        young_modulus=12e3,
+        density=1050.0,
+        toughness=25.0,
+        skin_toughness=40.0,
+        toughness_exponent=0.5,
+        toughness_speed=0.2,
+        work_to_rupture=1e4,
+        blade_friction=0.1,
+        blade_viscosity=300.0,
+        viscous_damping=4.0,
+        retardation_time=1e-4,
+        friction=0.2,
+        law="neo_hookean",
+        poisson_ratio=0.45,
+    )
+    sent = TissueDescription(
+        "slab",
+        material,
+        np.array([[0.0, 0.1, 0.2], [1, 2, 3]]),
+        576,
+        175,
+        BladeShape(thickness=3e-4),
+        -0.01,
+    )
+    received = unpack_description(pack_description(sent))
+    assert bits(received.bounds) == bits(sent.bounds)
+    assert received._replace(bounds=None) == sent._replace(bounds=None)
+
+
+def test_the_longest_error_fits():
+    assert len(pack_error("\U0001f52a" * 10**6)) <= LARGEST_ERROR
+
+
+@pytest.mark.parametrize("density", [b"-1000.0", b"null", b"1e999", b'"heavy"'])
+def test_a_description_of_no_real_material_is_refused(density):
+    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    packed = pack_description(TissueDescription("", Material(density=1000.0), bounds, 1, 4))
+    assert unpack_description(packed)
+    with pytest.raises(MessageError, match=r"density|out of range"):
+        unpack_description(packed.replace(b'"density":1000.0', b'"density":' + density))
+
+
+def test_an_error_arrives_but_not_what_would_steer_a_terminal():
+    assert unpack_error(pack_error("no blade: 3 µm")) == "no blade: 3 µm"
+    assert unpack_error(b"gone\x1b[2J\n") == "gone\ufffd[2J\ufffd"

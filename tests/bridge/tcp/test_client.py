@@ -1,0 +1,378 @@
+"""The link between two processes. The server is a real one, in a process of its own."""
+
+import contextlib
+import signal
+import socket
+import struct
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from bridge import Bridge, InProcessLink, LinkError, TcpLink
+from bridge.tcp.address import parse_address
+from bridge.tcp.messages.step import pack_step
+from bridge.tcp.messages.text import pack_error, unpack_error
+from bridge.tcp.peer import HANDSHAKE_BYTES
+from bridge.tcp.server import MOST_CONNECTIONS, TissueServer
+from bridge.tcp.wire import VERSION, Kind, pack_frame
+from tests.bridge.bits import bits
+from tests.bridge.tcp.bare_sockets import (
+    DT,
+    HELLO,
+    assert_serves,
+    connected,
+    link_once_free,
+    read_all,
+    seated,
+)
+from tests.bridge.tcp.serve_block import block_tissue as make_block
+from tissue import BladeContacts, BladeSegment, BladeSweep
+
+
+@pytest.fixture
+def link(server):
+    with contextlib.closing(link_once_free(server.address)) as link:
+        yield link
+
+
+def cut(link, upright):
+    """Draw the blade half through the block; return every result without its wall times."""
+    bridge = Bridge(link)
+    results = []
+    for i in range(250):
+        bridge.step(upright(0.009, -0.002 + 0.05 * DT * i), DT)
+        result = bridge.result._replace(profile=None)
+        results.append(result._replace(contacts=BladeContacts(*map(np.copy, result.contacts))))
+    return results
+
+
+def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
+    here = InProcessLink(make_block())
+    felt_here, felt_there = cut(here, upright), cut(link, upright)
+    assert felt_here[-1].cut_area > 1e-5
+    assert max(len(result.contacts.point) for result in felt_here) > 3
+    assert max(np.linalg.norm(result.stiffness) for result in felt_here) > 1.0
+    assert felt_here[-1].energies.cutting > 0.0
+    assert felt_here[-1].n_tetrahedra > felt_here[0].n_tetrahedra
+    assert [bits(r) for r in felt_here] == [bits(r) for r in felt_there]
+    assert bits(here.snapshot()) == bits(link.snapshot())
+    assert bits(here.surface()) == bits(link.surface())
+    assert bits(here.chunks()) == bits(link.chunks())
+    assert here.n_pieces() == link.n_pieces()
+    assert bits(here.quality()) == bits(link.quality())
+    assert link.quality().n_cut_nodes > 0
+
+
+def test_every_client_finds_the_tissue_as_at_the_start(server, upright):
+    with contextlib.closing(link_once_free(server.address)) as first:
+        before = bits(first.snapshot())
+        results = [bits(r) for r in cut(first, upright)]
+    with contextlib.closing(link_once_free(server.address)) as second:
+        assert bits(second.snapshot()) == before
+        assert [bits(r) for r in cut(second, upright)] == results
+
+
+def test_the_description_is_that_of_the_tissue_that_is_served(link):
+    here = InProcessLink(make_block(), "block").describe()
+    there = link.describe()
+    assert bits(here.bounds) == bits(there.bounds)
+    assert here._replace(bounds=None) == there._replace(bounds=None)
+
+
+def test_a_second_client_is_refused_and_the_first_goes_on(server, link):
+    with pytest.raises(
+        LinkError, match=r"the client 127\.0\.0\.1:\d+ has the tissue, and only one"
+    ):
+        TcpLink(server.address)
+    assert link.step(None, DT).n_tetrahedra == 72
+
+
+def test_a_request_that_makes_no_sense_is_refused_and_the_tissue_does_not_hear_of_it(link, upright):
+    before = bits(link.snapshot())
+    segment = upright(0.009, 0.01)
+    lost = segment._replace(tip=np.array([0.0, np.nan, 0.0]))
+    with pytest.raises(LinkError, match="the blade is not within 1000 m"):
+        link.step(BladeSweep(segment, lost), DT)
+    with pytest.raises(LinkError, match=r"a step of -1\.0 s"):
+        link.step(None, -1.0)
+    assert bits(link.snapshot()) == before
+    assert link.step(None, DT).n_tetrahedra == 72
+
+
+def test_a_failure_of_the_tissue_is_reported_in_its_words(link, upright):
+    # The link lets a blade without length through; the tissue does not.
+    point = upright(0.009, 0.01)
+    point = BladeSegment(point.tip, point.tip, point.forward)
+    with pytest.raises(LinkError, match="refused: ValueError: "):
+        link.step(BladeSweep(point, point), DT)
+    assert link.step(None, DT).n_tetrahedra == 72
+
+
+# ---- hostile clients: each is followed by one that must be served --------------------------------
+
+
+@pytest.mark.parametrize(
+    ("garbage", "answer"),
+    [
+        (b"GET / HTTP/1.1\r\n\r\n", "this is not scalpel-sim"),
+        (bytes(100), "this is not scalpel-sim"),
+        (pack_frame(Kind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
+        (HELLO[:4] + b"\x63\x00" + HELLO[6:], "speaks version 99"),
+        (HELLO[:-1] + b"\x00", "its checksum is wrong"),
+        (pack_frame(Kind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
+    ],
+    ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
+)
+def test_garbage_is_answered_by_its_reason_and_costs_the_connection(server, garbage, answer):
+    with connected(server.address) as peer:
+        peer.sendall(garbage[:1000])
+        (frame,) = read_all(peer)
+    assert frame.kind == Kind.ERROR
+    assert answer in unpack_error(frame.payload)
+    assert_serves(server)
+
+
+@pytest.mark.parametrize("join", [connected, seated], ids=["before the hello", "as the client"])
+@pytest.mark.parametrize("part", [1, 10, 30])
+def test_half_a_message_costs_the_connection_after_a_while(server, join, part):
+    with join(server.address) as peer:
+        peer.sendall(pack_frame(Kind.STEP, 1, pack_step(None, DT))[:part])
+        last = read_all(peer)[-1]
+    assert "silent for too long" in unpack_error(last.payload)
+    assert_serves(server)
+
+
+def test_a_message_that_trickles_in_does_not_keep_its_place(server):
+    with connected(server.address) as peer, contextlib.suppress(OSError):
+        started = time.monotonic()
+        for byte in pack_frame(Kind.SNAPSHOT, 0, bytes(1000)):
+            peer.sendall(bytes([byte]))
+            time.sleep(0.02)
+    assert time.monotonic() - started < 5.0
+    assert_serves(server)
+
+
+@pytest.mark.parametrize("sent", [b"", HELLO, HELLO + HELLO[:7]], ids=["silent", "client", "half"])
+@pytest.mark.parametrize("how", ["closes", "resets"])
+def test_a_peer_that_vanishes_makes_room(server, sent, how):
+    peer = connected(server.address)
+    peer.sendall(sent)
+    if how == "resets":
+        peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    peer.close()
+    assert_serves(server)
+
+
+def test_connections_that_say_nothing_do_not_keep_a_client_out(server):
+    with contextlib.ExitStack() as stack:
+        for _ in range(MOST_CONNECTIONS - 1):
+            stack.enter_context(connected(server.address))
+        assert_serves(server)
+
+
+def test_too_many_connections_are_refused(server):
+    with contextlib.ExitStack() as stack:
+        for _ in range(MOST_CONNECTIONS):
+            stack.enter_context(connected(server.address))
+        with connected(server.address) as one_more:
+            (frame,) = read_all(one_more)
+    assert "8 connections are open" in unpack_error(frame.payload)
+    assert_serves(server)
+
+
+def test_a_client_that_never_reads_loses_its_place(server):
+    with seated(server.address) as peer:
+        peer.settimeout(5.0)
+        with pytest.raises((ConnectionError, TimeoutError)):
+            for sequence in range(1, 10**6):
+                peer.sendall(pack_frame(Kind.SNAPSHOT, sequence))
+    assert_serves(server)
+
+
+def test_a_flood_of_requests_is_answered_in_order(server):
+    n = 500
+    requests = [pack_frame(Kind.STEP, 1 + i, pack_step(None, DT)) for i in range(n)]
+    with seated(server.address) as peer:
+        peer.sendall(b"".join(requests))
+        peer.shutdown(socket.SHUT_WR)
+        assert [frame.sequence for frame in read_all(peer)] == list(range(1, n + 1))
+    assert_serves(server)
+
+
+def test_strangers_who_flood_the_server_do_not_change_a_cut(server, upright):
+    """They connect, say nothing, garbage, half a hello or a whole one, and leave or stay."""
+    with contextlib.closing(link_once_free(server.address)) as alone:
+        expected = [bits(result) for result in cut(alone, upright)]
+    done = threading.Event()
+
+    def bother():
+        talk = [b"", b"GET / HTTP/1.1\r\n\r\n", HELLO, HELLO[:9], bytes(1 << 20)]
+        with contextlib.ExitStack() as staying:
+            for i in range(10**6):
+                if done.is_set():
+                    return
+                with contextlib.suppress(OSError):
+                    stranger = connected(server.address)
+                    stranger.sendall(talk[i % len(talk)])
+                    if i % 7:
+                        stranger.close()
+                    else:
+                        staying.callback(stranger.close)
+
+    with contextlib.closing(link_once_free(server.address)) as link:
+        crowd = threading.Thread(target=bother)
+        crowd.start()
+        try:
+            found = [bits(result) for result in cut(link, upright)]
+        finally:
+            done.set()
+            crowd.join()
+    assert found == expected
+    assert_serves(server)
+
+
+def test_a_client_that_comes_back_in_the_middle_of_a_cut_finds_a_whole_body(start_server, upright):
+    server = start_server()
+    with contextlib.closing(TcpLink(server.address)) as link:
+        whole = bits(link.snapshot())
+        assert cut(link, upright)[-1].cut_area > 0.0
+    with contextlib.closing(link_once_free(server.address)) as link:
+        assert bits(link.snapshot()) == whole
+
+
+def test_an_old_request_is_not_done_twice(server):
+    with seated(server.address) as peer:
+        step = pack_frame(Kind.STEP, 1, pack_step(None, DT))
+        peer.sendall(step + step)
+        peer.shutdown(socket.SHUT_WR)
+        assert [frame.kind for frame in read_all(peer)] == [Kind.STEP, Kind.ERROR]
+    assert_serves(server)
+
+
+# ---- what a client is told -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def impostor():
+    """Return a function that starts a server which sends fixed bytes to whoever speaks first."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    done = threading.Event()
+
+    def start(answer):
+        def talk():
+            connection, _ = listener.accept()
+            with connection:
+                connection.recv(1 << 16)
+                connection.sendall(answer)
+                done.wait(5.0 if not answer else 0.0)
+
+        threading.Thread(target=talk, daemon=True).start()
+        return f"127.0.0.1:{listener.getsockname()[1]}"
+
+    yield start
+    done.set()
+    listener.close()
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "this is not scalpel-sim"),
+        (HELLO[:4] + b"\x63\x00" + HELLO[6:], f"speaks version 99 .* this one {VERSION}"),
+        (pack_frame(Kind.HELLO, 0, b"\x00"), "description cannot be read"),
+        (pack_frame(Kind.STEP, 0), "a reply of kind 2"),
+        (pack_frame(Kind.ERROR, 0, pack_error("go away")), "refused: go away"),
+        (HELLO[:10], "the other side has gone"),
+    ],
+    ids=["http", "other version", "no description", "wrong kind", "refusal", "half a frame"],
+)
+def test_a_server_that_is_no_tissue_gets_one_clear_error(impostor, answer, told):
+    with pytest.raises(LinkError, match=told):
+        TcpLink(impostor(answer))
+
+
+def test_a_server_that_does_not_answer_is_given_up(impostor):
+    with pytest.raises(LinkError, match=r"did not answer within 0\.2 s"):
+        TcpLink(impostor(b""), timeout=0.2)
+
+
+def test_a_server_that_is_not_there_gets_one_clear_error():
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+    with pytest.raises(LinkError, match=f"no tissue is served at 127.0.0.1:{port}; start one"):
+        TcpLink(f"127.0.0.1:{port}")
+
+
+def test_an_unknown_host_gets_one_clear_error():
+    with pytest.raises(LinkError, match=r"no-such-host\.invalid:8766 cannot be reached"):
+        TcpLink("no-such-host.invalid:8766")
+
+
+@pytest.mark.parametrize(
+    "address", ["", "localhost", ":80", "localhost:", "a:b", "a:65536", "a:-1"]
+)
+def test_what_is_no_address_is_refused(address):
+    with pytest.raises(ValueError, match="is no address; wanted HOST:PORT"):
+        TcpLink(address)
+
+
+def test_an_address_of_colons_is_written_in_brackets():
+    assert parse_address("[::1]:8766") == ("::1", 8766)
+
+
+def test_a_tissue_whose_process_dies_gets_one_clear_error_and_the_link_is_closed(start_server):
+    server = start_server()
+    link = TcpLink(server.address)
+    server.end(signal.SIGKILL)
+    with pytest.raises(LinkError, match="broke"):
+        link.step(None, DT)
+    with pytest.raises(LinkError, match="is closed"):
+        link.step(None, DT)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_the_server_ends_cleanly_on_a_signal_even_with_a_client(start_server, number):
+    server = start_server()
+    link = TcpLink(server.address)
+    link.step(None, DT)
+    assert server.end(number) == 0
+    link.close()
+
+
+def test_a_request_that_was_interrupted_does_not_put_the_link_out_of_step(link, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(link, "_answer_to", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            link.snapshot()
+    assert link.n_pieces() == 1
+    assert link.step(None, DT).n_tetrahedra == 72
+
+
+# ---- where a server listens ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "", "::", "192.0.2.1"])
+def test_a_host_that_others_can_reach_is_refused(host):
+    with pytest.raises(
+        ValueError, match=r"is open to other machines, and that takes a key: .*scalpel-sim key"
+    ):
+        TissueServer(make_block, host=host, port=0)
+
+
+@pytest.mark.parametrize("port", [-1, 65536])
+def test_a_port_that_is_none_is_refused(port):
+    with pytest.raises(ValueError, match=f"port {port} is none"):
+        TissueServer(make_block, port=port)
+
+
+def test_a_port_that_is_in_use_is_refused(server):
+    port = parse_address(server.address)[1]
+    with pytest.raises(
+        LinkError, match=f"cannot listen at 127.0.0.1:{port}: Address already in use"
+    ):
+        TissueServer(make_block, port=port)

@@ -1,0 +1,118 @@
+"""What docs/wire.md and docs/client.py say is so: the client runs against a real server."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridge.tcp.address import parse_address
+from bridge.tcp.messages.result import pack_result
+from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
+from bridge.tcp.seal import Sealer, direction_keys
+from bridge.tcp.server import MOST_CONNECTIONS
+from bridge.tcp.wire import LARGEST_FRAME, MORE, VERSION, Kind
+from tests.bridge.tcp.serve_block import block_tissue
+from tissue import BladeContacts, Energies
+
+DOCS = Path(__file__).parents[3] / "docs"
+WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
+CLIENT = DOCS / "client.py"
+
+
+def run_client(port):
+    return subprocess.run(
+        [sys.executable, "-I", str(CLIENT), str(port)], capture_output=True, text=True, timeout=60
+    )
+
+
+def test_a_client_of_thirty_lines_cuts_the_tissue_and_feels_it(server):
+    done = run_client(parse_address(server.address)[1])
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = re.findall(r"(\d+) ms: ([+-][\d.]+) N along y, (\d+) mm2 cut", done.stdout)
+    assert len(rows) == 10
+    assert min(float(force) for _, force, _ in rows) == pytest.approx(-5.0 * 0.02, rel=0.3)
+    assert float(rows[-1][2]) == pytest.approx(20 * 20, rel=0.05)
+
+
+def test_the_client_is_thirty_lines_and_imports_nothing_of_ours():
+    lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
+    assert len(lines) <= 30
+    imported = re.findall(r"^(?:import|from) (\w+)", CLIENT.read_text(), re.MULTILINE)
+    assert set(imported) <= set(sys.stdlib_module_names)
+
+
+def test_the_client_says_what_the_server_refuses(start_server):
+    server = start_server(key=bytes(32))
+    done = run_client(parse_address(server.address)[1])
+    assert done.returncode == 1 and "this server asks for a key" in done.stderr
+
+
+def test_every_kind_of_message_is_in_the_table():
+    table = dict(re.findall(r"^\| (\d+) \| ([A-Z]+) \|", WIRE, re.MULTILINE))
+    assert {int(kind): name for kind, name in table.items()} == {kind: kind.name for kind in Kind}
+
+
+def test_the_limits_are_those_of_the_server():
+    assert f"Version {VERSION}." in WIRE and f"0x{MORE:x}" in WIRE and f"{LARGEST_FRAME:,}" in WIRE
+    assert f"until HELLO is done, {HANDSHAKE_BYTES} bytes" in WIRE
+    assert f"complete after {FRAME_SECONDS:g} s, and a reply read after {SEND_SECONDS:g} s" in WIRE
+    assert f"HELLO must be done {HANDSHAKE_SECONDS:g} s" in WIRE
+    assert f"At most {MOST_CONNECTIONS} connections" in WIRE
+
+
+def test_the_numbers_of_a_result_are_where_the_table_says():
+    random, n = np.random.default_rng(0), 3
+    contacts = BladeContacts(*(random.random(shape) for shape in ((n, 3), (n, 3), n, (n, 3), n)))
+    result = (
+        block_tissue().step(None, 1e-3)._replace(contacts=contacts, energies=Energies(*range(12)))
+    )
+    payload = pack_result(result)
+
+    def at(offset, count):
+        return np.frombuffer(payload, "<f8", count, offset)
+
+    rows = re.findall(
+        r"^\| (\d+)(?: \+ (\d+)n)? \| f64 x (\d+)(n?) \| ([\w ]+)", WIRE, re.MULTILINE
+    )
+    found = {
+        name.strip(): at(int(offset) + int(each or 0) * n, int(count) * (n if per_contact else 1))
+        for offset, each, count, per_contact, name in rows
+    }
+    expected = {
+        "length of the edge in the tissue": (
+            result.anchored_length,
+            result.cut_area,
+            result.work_of_blade,
+            result.work_of_cutting,
+        ),
+        "where the body touches itself": (result.touch.penetration, result.touch.force),
+        "wall time of collision": result.profile,
+        "wrench on the blade": np.concatenate(result.wrench),
+        "the same at the end of the step": np.concatenate(result.wrench_t1),
+        "local stiffness": result.stiffness.ravel(),
+        "force on the tissue": result.force_on_tissue,
+        "lowest and highest corner of the body": result.bounds.ravel(),
+        "force of the floor on the body": result.touch.force_of_floor,
+        "contacts of the blade": np.concatenate([array.ravel() for array in contacts]),
+        "energies where the server audits them": np.arange(12.0),
+    }
+    assert set(found) == set(expected)
+    for name, numbers in expected.items():
+        np.testing.assert_array_equal(found[name], numbers, err_msg=name)
+
+
+def test_the_seals_of_the_documentation_are_those_of_the_link():
+    (code,) = re.findall(r"```python\n(.*?)```", WIRE, re.DOTALL)
+    told = {}
+    exec(compile(code, "wire.md", "exec"), told)
+    key, mine, theirs = bytes(range(32)), bytes(32), bytes([7] * 32)
+    to_server, to_client = told["direction_keys"](key, mine, theirs)
+    assert (to_server, to_client) == direction_keys(key, mine, theirs)
+    sealer = Sealer(to_server)
+    for n, payload in enumerate((b"", b"to cut")):
+        kind, sequence = Kind.STEP | MORE, 10 + n
+        seal = told["seal"](to_server, n, kind, sequence, payload)
+        assert sealer.sealed(kind, sequence, payload) == payload + seal

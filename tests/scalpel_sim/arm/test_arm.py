@@ -1,0 +1,163 @@
+import logging
+import os
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from scalpel_sim.arm.arm import ARMS, ASSETS, JOINTS, Arm, ArmError
+from tissue import Wrench
+
+BOTH = pytest.mark.parametrize("preset", ARMS)
+
+
+@BOTH
+def test_the_model_file_opens_by_itself(preset):
+    model = mujoco.MjModel.from_xml_path(str(ASSETS / f"{preset}.xml"))
+    assert [model.joint(i).name for i in range(model.njnt)] == list(JOINTS)
+    assert model.opt.timestep == 1e-3
+
+
+@BOTH
+def test_the_arm_is_balanced_and_stays_where_it_is_left(preset):
+    arm = Arm(preset)
+    before = arm.data.qpos.copy()
+    for _ in range(1000):
+        arm.step1()
+        arm.step2()
+        arm.check()
+    assert np.allclose(arm.data.qpos, before, atol=1e-9)
+
+
+@pytest.mark.parametrize(("preset", "published"), [("touch", 0.045), ("premium", 0.075)])
+def test_one_feels_the_published_mass_at_the_gimbal(preset, published):
+    """Vendor's figures; the eigenvalues differ by direction, as they do in the device."""
+    arm = Arm(preset)
+    inertia = np.zeros((6, 6))
+    mujoco.mj_fullM(arm.model, arm.data, inertia)
+    jacobian = np.zeros((3, 6))
+    gimbal = arm.model.body("gimbal").id
+    mujoco.mj_jac(arm.model, arm.data, jacobian, None, arm.data.xpos[gimbal], gimbal)
+    felt = np.linalg.eigvalsh(np.linalg.inv(jacobian @ np.linalg.solve(inertia, jacobian.T)))
+    assert 0.9 * published < felt[0] < felt[2] < 2.2 * published
+
+
+@BOTH
+def test_the_blade_is_as_long_as_was_asked_and_straight(preset):
+    arm = Arm(preset, blade_length=0.083, mount_angle=0.7)
+    segment = arm.blade.segment()
+    assert np.linalg.norm(segment.tip - segment.heel) == pytest.approx(0.083)
+    assert segment.forward @ (segment.tip - segment.heel) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_mount_angle_is_that_between_stylus_and_blade():
+    arm = Arm("touch", mount_angle=0.7)
+    stylus, blade = (arm.data.body(name).xmat.reshape(3, 3)[:, 1] for name in ("stylus", "blade"))
+    assert np.arccos(stylus @ blade) == pytest.approx(0.7)
+
+
+def test_the_base_stands_and_faces_as_was_asked():
+    here, there = (
+        Arm("touch", base_position=position, base_yaw=yaw).blade.segment()
+        for position, yaw in (((0, 0, 0), 0.0), ((0.1, 0.2, 0.3), np.pi / 2))
+    )
+    x, y, z = here.tip
+    assert np.allclose(there.tip, [0.1 - y, 0.2 + x, 0.3 + z])
+
+
+def test_an_unknown_arm_is_refused_with_the_known_ones():
+    with pytest.raises(ValueError, match="Did you mean 'touch'\\? Known: touch, premium"):
+        Arm("toch")
+
+
+@pytest.mark.parametrize(
+    ("qpos", "message"),
+    [
+        ([0, 0.5, 0, 0, 1.5], "wanted 6 finite angles"),
+        ([0, 0.5, 0, 0, 1.5, np.nan], "wanted 6 finite angles"),
+        (
+            [0, 2.0, 0, 0, 1.5, 0],
+            "joint 'shoulder' is put to 2.000 rad; its range is 0.000 to 1.75",
+        ),
+    ],
+)
+def test_angles_that_the_arm_cannot_take_are_refused(qpos, message):
+    with pytest.raises(ValueError, match=message):
+        Arm("touch").reset(qpos)
+
+
+def test_a_state_that_is_not_finite_stops_the_run_and_never_resets_silently():
+    arm = Arm("touch")
+    for _ in range(10):
+        arm.step1()
+        arm.step2()
+    arm.data.qvel[1] = np.nan
+    with pytest.raises(ArmError, match=r"t = 0.0100 s .*\(joints: shoulder\)"):
+        arm.check()
+
+
+@pytest.mark.parametrize("force", [np.nan, 1e12])
+def test_a_force_put_past_the_blade_is_noticed_within_the_tick(force, caplog):
+    arm = Arm("touch")
+    arm.step1()
+    arm.data.xfrc_applied[arm.blade.body_id, 0] = force
+    with caplog.at_level(logging.WARNING, "scalpel_sim"), pytest.raises(ArmError):
+        arm.step2()
+        arm.check()
+        arm.step1()  # MuJoCo looks at the state when a step begins
+        arm.check()
+    assert arm.time > 0.0
+
+
+def test_mujoco_leaves_no_log_file_behind(tmp_path):
+    script = (
+        "from scalpel_sim.arm.arm import Arm\n"
+        "arm = Arm('touch')\n"
+        "arm.data.qpos[0] = float('nan')\n"
+        "arm.step1()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert done.returncode == 0, done.stderr
+    assert "MuJoCo: " in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_same_wrenches_give_the_same_motion_bit_for_bit():
+    def run():
+        arm, random = Arm("premium"), np.random.default_rng(1)
+        start, path = arm.blade.segment(), []
+        for k in range(300):
+            shift = np.array([0.0, 1e-4 * k, 0.0])
+            arm.hand.follow(start._replace(tip=start.tip + shift, heel=start.heel + shift))
+            arm.step1()
+            force, torque = random.normal(size=3), 0.02 * random.normal(size=3)
+            arm.blade.apply(Wrench(force, torque, arm.blade.segment().tip))
+            arm.step2()
+            path.append((*arm.data.qpos, *arm.data.qvel))
+        return np.array(path)
+
+    assert run().tobytes() == run().tobytes()
+
+
+def test_a_reset_arm_forgets_what_it_did():
+    arm = Arm("touch")
+    fresh = Arm("touch")
+    arm.blade.apply(Wrench(np.array([3.0, 0, 0]), np.zeros(3), arm.blade.segment().tip))
+    for _ in range(50):
+        arm.step1()
+        arm.step2()
+    arm.reset(arm.model.key("home").qpos)
+    for _ in range(20):
+        for each in (arm, fresh):
+            each.step1()
+            each.step2()
+    assert np.array_equal(arm.data.qpos, fresh.data.qpos)
+    assert arm.time == fresh.time

@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+
+from bridge import FixtureBox
+from scalpel_sim import SCENES, prepare
+from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, Touching, floor_below
+from scalpel_sim.scenes import changed
+
+
+def lowered(arm, height):
+    """Let the hand lead the blade's tip down to a height, as a user would who aims too low."""
+    before = arm.blade.segment()
+    shift = np.array([0.0, 0.0, height - before.tip[2]])
+    for part in np.linspace(0.0, 1.0, 300):
+        way = part * shift
+        arm.hand.follow(before._replace(tip=before.tip + way, heel=before.heel + way))
+        arm.step1()
+        yield
+        arm.step2()
+
+
+@pytest.mark.parametrize("preset", ARMS)
+def test_an_arm_at_home_meets_nothing(preset, caplog):
+    touching = Touching(Arm(preset))
+    touching.look()
+    assert touching.now == () and touching.frames == {} and not caplog.records
+
+
+def test_a_blade_that_is_led_into_the_table_is_counted_and_said_once(caplog):
+    arm = Arm("touch")
+    touching = Touching(arm)
+    for _ in lowered(arm, -0.005):
+        touching.look()
+    assert ("blade", "table") in touching.now
+    assert touching.frames["blade, table"] > 5
+    said = [
+        record.message for record in caplog.records if "blade meets the table" in record.message
+    ]
+    assert len(said) == 1 and "nothing pushes back" in said[0]
+
+
+def test_a_handle_that_meets_a_clamp_is_named_with_it():
+    arm = Arm("touch")
+    arm.step1()
+    handle = arm.data.geom("stylus").xpos
+    clamp = FixtureBox("clamp", np.full(3, 0.01), handle + np.array([0.0, 0.0, 0.012]))
+    touching = Touching(arm, [clamp])
+    touching.look()
+    assert ("stylus", "clamp") in touching.now
+
+
+def test_an_instrument_that_is_folded_back_on_the_arm_is_seen():
+    arm = Arm("touch", blade_length=0.16)
+    touching = Touching(arm)
+    poses = np.random.default_rng(0).uniform(*arm.model.jnt_range.T, (300, 6))
+    met = set()
+    for qpos in poses:
+        arm.reset(qpos)
+        touching.look()
+        met |= set(touching.now)
+    assert {("blade", "upper_arm"), ("blade", "base")} <= met
+    assert not any(other in ("wrist", "gimbal", "stylus") for _, other in met)
+
+
+@pytest.mark.parametrize("scene", ["grid2", "slab"])
+def test_the_scenes_as_they_come_meet_nothing(scene):
+    simulation = prepare(SCENES[scene])
+    simulation.run(0.02)
+    assert simulation.touching.frames == {}
+
+
+def test_a_blade_that_passes_below_the_body_meets_the_floor_there():
+    simulation = prepare(changed(SCENES["grid2"], floor=-0.001))
+    simulation.run(0.02)
+    assert ("blade", "floor") in simulation.touching.now
+    assert simulation.touching.frames["blade, floor"] == 20
+
+
+def test_the_floor_lies_below_the_body_and_no_farther():
+    bounds = np.array([[0.0, 0.0, 0.0], [0.04, 0.02, 0.01]])
+    floor = floor_below(bounds, -0.005)
+    np.testing.assert_allclose(floor.centre[:2], [0.02, 0.01])
+    assert floor.centre[2] + 0.5 * floor.size[2] == pytest.approx(-0.005)
+    np.testing.assert_allclose(floor.size[:2], [0.04 + 2 * FLOOR_MARGIN, 0.02 + 2 * FLOOR_MARGIN])
+
+
+def test_what_stands_around_the_body_is_said_in_its_frame():
+    start = prepare(SCENES["grid2"]).stroke.pose(0.0)
+    clamp = FixtureBox("clamp", np.full(3, 5e-3), 0.5 * (start.tip + start.heel))
+    simulation = prepare(SCENES["grid2"], fixtures=[clamp])
+    simulation.run(0.003)
+    assert simulation.touching.now == (("blade", "clamp"),)

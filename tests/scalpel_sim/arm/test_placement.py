@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+
+from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
+from scalpel_sim.strokes.planning import STROKES, plan
+from tissue import block
+
+SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
+ON_EDGE = block((5, 1, 5), (0.12, 0.008, 0.12))
+
+
+def bounds(mesh):
+    return np.array([mesh.positions.min(axis=0), mesh.positions.max(axis=0)])
+
+
+def in_world(pose, placement):
+    return pose._replace(
+        tip=pose.tip + placement.tissue_origin, heel=pose.heel + placement.tissue_origin
+    )
+
+
+@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
+@pytest.mark.parametrize("name", STROKES)
+def test_both_arms_lead_the_blade_along_every_stroke(preset, mesh, name):
+    stroke = plan(name, mesh)
+    placement = place(stroke, bounds(mesh), preset)
+    assert placement.margin >= NEEDED_MARGIN
+    arm = placement.arm()
+    low, high = arm.model.jnt_range.T
+    worst = 0.0
+    for k in range(int(stroke.duration / 1e-3)):
+        wanted = in_world(stroke.pose(1e-3 * k), placement)
+        arm.hand.follow(wanted)
+        arm.step1()
+        there = arm.blade.segment()
+        arm.step2()
+        arm.check()
+        worst = max(
+            worst, np.abs(there.tip - wanted.tip).max(), np.abs(there.heel - wanted.heel).max()
+        )
+        assert (arm.data.qpos > low).all()
+        assert (arm.data.qpos < high).all()
+    assert worst < 1e-3
+
+
+@pytest.mark.parametrize("preset", ARMS)
+def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
+    stroke = plan("slanted", SLAB)
+    placement = place(stroke, bounds(SLAB), preset)
+    there, wanted = placement.arm().blade.segment(), in_world(stroke.pose(0.0), placement)
+    for part in range(3):
+        assert np.allclose(there[part], wanted[part], atol=1e-9)
+
+
+@pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
+@pytest.mark.parametrize("name", STROKES)
+def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(mesh, name):
+    stroke = plan(name, mesh)
+    placement = place(stroke, bounds(mesh))
+    assert placement.base_position[2] == 0.0
+    assert (bounds(mesh)[0] + placement.tissue_origin)[2] >= 0.01 - 1e-12
+    assert min(in_world(pose, placement).tip[2] for pose in stroke.poses(50)) >= 0.01 - 1e-12
+
+
+@pytest.mark.parametrize("preset", ARMS)
+@pytest.mark.parametrize("name", STROKES)
+def test_base_and_links_stay_out_of_the_body(preset, name):
+    stroke = plan(name, SLAB)
+    placement = place(stroke, bounds(SLAB), preset)
+    box = bounds(SLAB) + placement.tissue_origin
+    arm = placement.arm()
+    for k in range(int(stroke.duration / 1e-3)):
+        arm.hand.follow(in_world(stroke.pose(1e-3 * k), placement))
+        arm.step1()
+        if k % 50 == 0:
+            for body in ("base", "torso", "forearm", "wrist", "gimbal"):
+                position = arm.data.body(body).xpos
+                assert ((position < box[0]) | (position > box[1])).any()
+        arm.step2()
+
+
+def test_auto_takes_the_smallest_arm_that_reaches_and_renders_the_force():
+    stroke = plan("straight", SLAB)
+    assert place(stroke, bounds(SLAB)).preset == "touch"
+    assert place(stroke, bounds(SLAB), force=3.4).preset == "premium"
+    assert place(stroke, bounds(SLAB), force=100.0).preset == "premium"
+    large = block((4, 6, 4), (0.16, 0.24, 0.16))
+    assert place(plan("straight", large), bounds(large)).preset == "premium"
+
+
+@pytest.mark.parametrize(
+    ("preset", "remedy"),
+    [("touch", "smaller, or take --arm premium"), ("premium", "smaller"), ("auto", "smaller")],
+)
+def test_a_stroke_out_of_reach_is_refused_with_the_scale_that_would_do(preset, remedy):
+    mesh = block((4, 6, 4), (0.4, 0.6, 0.4))
+    with pytest.raises(PlacementError, match=rf"at 0\.\d+ times the size: .*{remedy}$") as error:
+        place(plan("straight", mesh), bounds(mesh), preset)
+    scale = float(str(error.value).split(" times the size")[0].split()[-1])
+    smaller = block((4, 6, 4), (0.4 * scale, 0.6 * scale, 0.4 * scale))
+    place(plan("straight", smaller), bounds(smaller), preset)
+
+
+def test_an_unknown_arm_is_refused_with_the_known_ones():
+    with pytest.raises(ValueError, match="Known: touch, premium, auto"):
+        place(plan("straight", SLAB), bounds(SLAB), "omni")

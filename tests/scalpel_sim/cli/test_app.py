@@ -1,0 +1,486 @@
+import json
+import os
+import pty
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.recording import read_forces
+from scalpel_sim.output.run_folder import ENERGY_PLOT, NAMES
+from tissue import MATERIALS
+
+HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
+FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
+
+UNAUDITED = set(NAMES) - {ENERGY_PLOT}
+"""The files of a run without an account of its energy."""
+
+WRONG_USE = {
+    "an unknown command": (["rnu"], "Did you mean .run."),
+    "an unknown option": (["run", "slab", "--tougness", "3"], "Did you mean --toughness"),
+    "a number that is none": (["run", "slab", "--young", "soft"], "soft"),
+    "too many words": (["run", "slab", "grid2"], "grid2"),
+    "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
+    "a scene and a mesh": (["run", "slab", "--mesh", "{mesh}"], "choose one"),
+    "a scale without a mesh": (["run", "slab", "--scale", "2"], "--mesh"),
+    "a mesh that is not there": (["run", "--mesh", "nothing.msh"], "nothing.msh"),
+    "a mesh that is a folder": (["run", "--mesh", "{folder}"], "{folder}"),
+    "a mesh of the wrong kind": (["run", "--mesh", "{text}"], "text.stl"),
+    "a broken mesh": (["run", "--mesh", "{broken}"], "broken.msh"),
+    "a mesh of no size": (["run", "--mesh", "{mesh}", "--scale", "0"], "--scale"),
+    "an unknown stroke": (["run", "slab", "--stroke", "strait"], "Did you mean 'straight'"),
+    "a stroke file that is not there": (["run", "slab", "--stroke", "no.csv"], "no.csv"),
+    "a stroke file with a broken line": (["run", "slab", "--stroke", "{bad_stroke}"], "line 3"),
+    "a stroke outside the body": (["run", "grid2", "--stroke", "{far}"], "mm away from the body"),
+    "an unknown side": (["run", "slab", "--fix", "lefft,right"], "left"),
+    "a box that holds no node": (["run", "slab", "--fix", "1,1,1:2,2,2"], "no node"),
+    "a stretch of sides that are free": (
+        ["run", "slab", "--fix", "bottom", "--stretch", "0.1"],
+        "--fix left,right",
+    ),
+    "an unknown arm": (["run", "slab", "--arm", "tuch"], "Did you mean 'touch'"),
+    "an unknown coupling": (["run", "slab", "--coupling", "virtal"], "Did you mean 'virtual'"),
+    "a stiffness of a coupling that has none": (
+        ["run", "slab", "--coupling-stiffness", "500"],
+        "--coupling-stiffness is for --coupling virtual",
+    ),
+    "a coupling that pulls the wrong way": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
+        "stiffness is -1.0; it must be positive",
+    ),
+    "a coupling without damping": (
+        ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
+        "damping is 0.0; it must be positive",
+    ),
+    "a tissue that is never asked": (["run", "slab", "--tissue-every", "0"], "it must be 1 to 100"),
+    "a tissue that is asked too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
+    "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
+    "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
+    "a list of an unknown material": (["materials", "lung"], "Known: liver"),
+    "springs of a law that has none": (
+        ["run", "slab", "--law", "neo_hookean", "--calibrate"],
+        "Add --law springs",
+    ),
+    "a calibration of a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--spring-error"],
+        "--spring-error belongs to the tissue",
+    ),
+    "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
+    "springs with the ratio of cork": (
+        ["run", "slab", "--poisson-ratio", "0"],
+        "Use law neo_hookean",
+    ),
+    "a ratio of what keeps its volume": (
+        ["run", "organ", "--law", "neo_hookean", "--poisson-ratio", "0.5"],
+        "below 0.5",
+    ),
+    "a toughness that is not a number": (["run", "slab", "--toughness", "nan"], "toughness"),
+    "a blade of negative thickness": (
+        ["run", "slab", "--blade-thickness", "-1"],
+        "thickness is -1",
+    ),
+    "a blade with the bevel of a hammer": (["run", "slab", "--blade-bevel", "80"], "80 degrees"),
+    "bevels that do not fit": (["run", "slab", "--blade-thickness", "0.01"], "only 0.006 m high"),
+    "an edge that is no number": (["run", "slab", "--blade-edge-radius", "nan"], "edge_radius"),
+    "a bevel of a line": (
+        ["run", "organ", "--blade-thickness", "0", "--blade-bevel", "10"],
+        "--blade-bevel is about a blade with faces",
+    ),
+    "friction on a line": (
+        ["run", "slab", "--blade-friction", "0.2"],
+        "add --blade-thickness 0.0004",
+    ),
+    "what blunts an edge that has no radius": (
+        ["run", "organ", "--work-to-rupture", "1e4", "--blade-edge-radius", "0"],
+        "add --blade-edge-radius",
+    ),
+    "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "blade_friction is -0.1"),
+    "a skin that costs less than nothing": (
+        ["run", "slab", "--skin-toughness", "-1"],
+        "skin_toughness is -1",
+    ),
+    "a toughness that is never twice itself": (
+        ["run", "slab", "--toughness-speed", "0"],
+        "toughness_speed is 0",
+    ),
+    "an account of nodes at different instants": (
+        ["run", "slab", "--audit", "--relaxation", "local"],
+        "--audit needs --relaxation global",
+    ),
+    "an account by two threads": (
+        ["run", "slab", "--audit", "--threads", "2"],
+        "--audit needs --relaxation global and --threads 1",
+    ),
+    "a blade for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],
+        "--blade-thickness belongs to the tissue",
+    ),
+    "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
+    "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
+    "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
+    "a figure by an unknown scheme": (
+        ["figure", "10", "--scheme", "mine"],
+        "Known: stellar, paper",
+    ),
+    "a snap beyond the node": (["run", "slab", "--snap", "2"], "snap is 2"),
+    "a guard that no split passes": (["run", "slab", "--guard", "nan"], "guard is nan"),
+    "a quality for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--snap", "0.1"],
+        "scalpel-sim serve",
+    ),
+    "no speed": (["run", "slab", "--speed", "0"], "speed"),
+    "an output folder that is a file": (["run", "slab", "--out", "{text}"], "is a file"),
+    "an address that is none": (["run", "--connect", "here"], "here"),
+    "a material for a tissue elsewhere": (
+        ["run", "--connect", "127.0.0.1:1", "--young", "1e4"],
+        "scalpel-sim serve",
+    ),
+    "a host that others can reach": (
+        ["serve", "grid2", "--host", "0.0.0.0"],
+        "'0.0.0.0' is open to other machines, and that takes a key",
+    ),
+    "another machine without a key": (
+        ["run", "--connect", "192.0.2.1:8766"],
+        "another machine, and that takes a key",
+    ),
+    "a key for no server": (["run", "grid2", "--key", "{text}"], "add --connect"),
+    "a key that is none": (["serve", "grid2", "--key", "{text}"], "key file text.stl"),
+    "a key written over a file": (["key", "{text}"], "exists already"),
+    "a port that does not exist": (["view", "grid2", "--port", "99999"], "99999"),
+}
+
+TETRAHEDRON = """$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$Nodes
+4
+1 0 0 0
+2 0.01 0 0
+3 0 0.01 0
+4 0 0 0.01
+$EndNodes
+$Elements
+1
+1 4 0 {nodes}
+$EndElements
+"""
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """Run in a folder of its own, with one file of each kind."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mesh.msh").write_text(TETRAHEDRON.format(nodes="1 2 3 4"))
+    (tmp_path / "broken.msh").write_text(TETRAHEDRON.format(nodes="1 2 3 9"))
+    (tmp_path / "text.stl").write_text("solid nothing")
+    (tmp_path / "far.csv").write_text(FAR_AWAY)
+    (tmp_path / "bad.csv").write_text(HEADER + "0,0,0,0,0,0,1\n1,0,0,x,0,0,1\n")
+    return {
+        "mesh": "mesh.msh",
+        "broken": "broken.msh",
+        "text": "text.stl",
+        "folder": str(tmp_path),
+        "far": "far.csv",
+        "bad_stroke": "bad.csv",
+    }
+
+
+def only_line(text: str) -> str:
+    (line,) = text.splitlines()
+    return line
+
+
+@pytest.mark.parametrize("case", WRONG_USE)
+def test_wrong_use_gets_one_line_and_exit_code_2(case, files, capsys):
+    words, expected = WRONG_USE[case]
+    code = command_line([word.format(**files) for word in words])
+    out, err = capsys.readouterr()
+    line = only_line("\n".join(x for x in err.splitlines() if not x.startswith("compiling")))
+    assert (code, out) == (2, "")
+    assert re.match(f"error: .*{expected.format(**files)}", line)
+    assert "Traceback" not in err
+
+
+def test_an_unreachable_server_is_a_failed_run(files, capsys):
+    with socket.socket() as nobody:
+        nobody.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{nobody.getsockname()[1]}"
+    assert command_line(["run", "--connect", address]) == 1
+    assert address in only_line(capsys.readouterr().err)
+
+
+@pytest.mark.parametrize("command", ["serve", "view"])
+def test_a_port_in_use_is_a_failed_run(command, files, capsys):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert command_line([command, "grid2", "--port", port]) == 1
+    line = capsys.readouterr().err.splitlines()[-1]
+    assert re.match(f"error: .*{port}.*in use", line)
+
+
+def test_a_folder_that_cannot_be_written_is_a_failed_run_before_it_begins(files, capsys):
+    assert command_line(["run", "slab", "--out", "/proc/nothing"]) == 1
+    assert "cannot be written" in only_line(capsys.readouterr().err)
+
+
+def test_verbose_shows_where_an_error_came_from(files, capsys):
+    assert command_line(["run", "slap", "-v"]) == 2
+    err = capsys.readouterr().err
+    assert "Traceback" in err and err.splitlines()[-1].startswith("error: no scene")
+
+
+def test_a_run_prints_the_table_of_the_paper_and_writes_every_file(files, capsys):
+    assert command_line(["run", "slab", "--seconds", "0.05"]) == 0
+    out, err = capsys.readouterr()
+    for words in (
+        "real-time factor",
+        "tetrahedra after",
+        "2,446",
+        "1.14",
+        "RX",
+        "92.2 %",
+        "path error",
+    ):
+        assert words in out
+    assert sorted(os.listdir("out/slab")) == sorted(NAMES)
+    assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
+
+
+def test_json_prints_the_summary_and_nothing_else(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.02", "--seed", "5", "--json", "--out", "here"]
+    assert command_line(words) == 0
+    printed = json.loads(capsys.readouterr().out)
+    with open("here/summary.json") as file:
+        assert json.load(file) == printed
+    assert (printed["scene"], printed["seed"], printed["frames"]) == ("grid2", 5, 20)
+    assert printed["settings"]["arm"] == "touch"  # what auto resolved to
+    assert printed["simulated_seconds"] == pytest.approx(0.02)
+
+
+def test_quiet_says_nothing(files, capsys):
+    assert command_line(["run", "grid2", "--seconds", "0.01", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--young", "2e4", "--toughness", "7"]
+    assert command_line(words) == 0
+    material = json.loads(capsys.readouterr().out)["settings"]["material"]
+    assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
+    how = [
+        "--tissue-every",
+        "10",
+        "--coupling",
+        "virtual",
+        "--coupling-stiffness",
+        "900",
+        "--no-passivity",
+    ]
+    line = ["run", "grid2", "--seconds", "0.5", "--json", "--out", "soft"]
+    assert command_line([*line, *how]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    settings, counters = summary["settings"], summary["counters"]
+    assert (settings["tissue_every"], settings["coupling"]) == (10, "virtual")
+    assert (settings["coupling_stiffness"], settings["passivity"]) == (900.0, False)
+    assert (counters["frames"], counters["answers"]) == (500, 50)
+    assert set(counters["passivity"]) == {"energy", "least_energy", "injected_away", "frames"}
+
+
+def test_a_named_material_reaches_the_tissue_with_what_is_changed_about_it(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--material", "gelatin"]
+    assert command_line([*words, "--toughness", "7"]) == 0
+    material = json.loads(capsys.readouterr().out)["settings"]["material"]
+    assert material["young_modulus"] == MATERIALS["gelatin"].young_modulus.value
+    assert (material["law"], material["toughness"]) == ("neo_hookean", 7.0)
+
+
+def test_a_blade_on_the_command_line_has_faces_that_the_tissue_presses_and_rubs(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.8", "--json", "--blade-thickness", "0.002"]
+    assert command_line([*words, "--blade-bevel", "20", "--blade-friction", "0.3"]) == 0
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["settings"]["blade"]["thickness"] == 0.002
+    assert summary["settings"]["blade"]["bevel_angle"] == pytest.approx(np.radians(20.0))
+    assert summary["energies_j"]["friction"] > 1e-5
+    assert abs(summary["residual_of_work"]) < 0.005
+    table = read_forces(Path("out/grid2/forces.csv"))
+    for name in ("pressing_force", "friction_force"):
+        assert np.linalg.norm(table.vector(name), axis=1).max() > 5e-3
+
+
+def test_a_tougher_skin_on_the_command_line_is_a_peak_of_force(files, capsys):
+    peaks = []
+    for skin in ("0", "40"):
+        words = ["run", "grid2", "--seconds", "0.6", "--json", "--no-audit", "--stretch", "0"]
+        assert command_line([*words, "--skin-toughness", skin]) == 0
+        summary = json.loads(capsys.readouterr().out)
+        assert summary["energies_j"] is None
+        peaks.append(summary["force_peak_n"])
+    assert peaks[1] > 1.2 * peaks[0]  # not all of the edge breaks in at once
+
+
+def test_materials_are_listed_with_their_sources(capsys):
+    assert command_line(["materials"]) == 0
+    told = capsys.readouterr().out
+    for preset in MATERIALS.values():
+        assert preset.name in told
+    assert "Gokgol et al. 2012" in told
+    assert command_line(["materials", "liver", "--json"]) == 0
+    (liver,) = json.loads(capsys.readouterr().out)
+    assert liver["toughness"]["value"] == MATERIALS["liver"].material.toughness
+
+
+def test_the_error_of_springs_is_stated_on_request_and_calibrated_away(files, capsys):
+    words = ["run", "slab", "--young", "2e4", "--seconds", "0.01"]
+    assert command_line([*words, "--spring-error", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["settings"]["springs"]["poisson_ratio"] < 0.05
+    assert command_line([*words, "--calibrate", "--json"]) == 0
+    springs = json.loads(capsys.readouterr().out)["settings"]["springs"]
+    assert springs["young_modulus_pa"] == pytest.approx(2e4, rel=1e-4)
+    assert springs["calibration"] == pytest.approx(29 / 30, rel=1e-3)
+
+
+def test_snap_and_guard_trade_the_path_of_the_cut_against_the_time_step(files, capsys):
+    def quality_with(*words):
+        cut = ["run", "grid2", "--stroke", "curved", "--seconds", "0.9", "--json", *words]
+        assert command_line(cut) == 0
+        return json.loads(capsys.readouterr().out)["quality"]
+
+    rough = quality_with("--snap", "0.6", "--guard", "0.3")
+    fine = quality_with("--snap", "0.02", "--guard", "0.01")
+    assert rough["guard_m"] <= rough["smallest_altitude_m"]
+    assert fine["path_error_mean_m"] < rough["path_error_mean_m"]
+    assert fine["substep_growth"] > rough["substep_growth"] >= 1.0
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_and_version_are_no_errors(words, capsys):
+    assert command_line(words) == 0
+    assert capsys.readouterr().err == ""
+
+
+def start(*words: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
+    """Start the program in a process of its own."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "scalpel_sim", *words],
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
+    )
+
+
+def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
+    """Wait until a run has written its first rows."""
+    while not (forces.exists() and forces.stat().st_size > 20_000):
+        assert program.poll() is None, program.communicate()
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
+    folder = tmp_path / "run"
+    program = start("run", "grid2", "--seconds", "1000", "--out", str(folder))
+    forces = folder / "forces.csv"
+    wait_for_rows(program, forces)
+    program.send_signal(number)
+    _, err = program.communicate(timeout=60)
+    assert program.returncode == 1
+    assert re.match(
+        f"error: interrupted by {number.name} after .* holds what", err.splitlines()[-1]
+    )
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == f"interrupted by {number.name}"
+    assert summary["frames"] == len(read_forces(forces)) >= 100
+    assert sorted(path.name for path in folder.iterdir()) == sorted(NAMES)
+
+
+def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
+    program = start("run", "grid2", "--seconds", "1000", "--out", str(tmp_path))
+    forces = tmp_path / "forces.csv"
+    wait_for_rows(program, forces)
+    program.kill()
+    program.communicate(timeout=60)
+    assert np.isfinite(read_forces(forces).rows).all()
+    assert (tmp_path / "initial.vtu").stat().st_size > 0
+
+
+def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    assert command_line(["run", "grid2", "--seconds", "0.9", "-q", "--out", str(here)]) == 0
+    key = str(tmp_path / "link.key")
+    assert command_line(["key", key]) == 0
+    server = start("serve", "grid2", "--audit", "--port", "0", "--key", key)
+    try:
+        address = re.search(r"127\.0\.0\.1:\d+", server.stdout.readline()).group()
+        words = ["run", "--connect", address, "--seconds", "0.9", "-q", "--out", str(there)]
+        assert command_line(words) == 1  # without the key
+        words += ["--key", key]
+        assert command_line(words) == 0
+    finally:
+        server.send_signal(signal.SIGINT)
+        server.communicate(timeout=60)
+    assert server.returncode == 0
+    ours, theirs = (read_forces(folder / "forces.csv") for folder in (here, there))
+    timed = 5  # columns of wall times at the end
+    assert ours.column("cut_area_m2").max() > 0.0
+    assert ours.is_audited  # so that no number is a NaN
+    assert np.array_equal(ours.rows[:, :-timed], theirs.rows[:, :-timed])
+    assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
+    assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
+
+
+@pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
+def test_the_arm_cuts_the_organ_in_two(tmp_path, stroke):
+    words = ["run", "organ", "--no-audit", "--stroke", stroke, "-q", "--out", str(tmp_path)]
+    assert command_line(words) == 0
+    assert json.loads((tmp_path / "summary.json").read_text())["pieces"] == 2
+
+
+def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
+    program = start("view", "grid2", "--seconds", "0.3", "--out", str(tmp_path))
+    said = ""
+    while "stays until Ctrl-C" not in said:
+        line = program.stderr.readline()
+        assert line, f"it ended: {said}"
+        said += line
+    url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", said).group(1)
+    with urllib.request.urlopen(url, timeout=10) as page:
+        assert "grid2: straight stroke" in page.read().decode()
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(UNAUDITED)
+    program.send_signal(signal.SIGINT)
+    out, _ = program.communicate(timeout=30)
+    assert program.returncode == 0
+    assert "tetrahedra after" in out
+
+
+def test_view_waits_for_enter_where_a_person_looks_on(tmp_path):
+    ours, theirs = pty.openpty()
+    program = start("view", "grid2", "--seconds", "0.1", "--out", str(tmp_path), stdin=theirs)
+    try:
+        while "press Enter" not in (line := program.stderr.readline()):
+            assert line, "it ended"
+        assert not (tmp_path / "forces.csv").exists()
+        os.write(ours, b"\n")
+        while "stays until Ctrl-C" not in (line := program.stderr.readline()):
+            assert line, "it ended"
+        assert len(read_forces(tmp_path / "forces.csv")) == 100
+    finally:
+        program.terminate()
+        program.communicate(timeout=30)
+        os.close(ours)
+        os.close(theirs)

@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
+from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.scenes import changed
+from tissue import BladeContacts
+
+FORWARD = np.array([0.0, 1.0, 0.0])
+
+
+def test_the_parts_are_the_edge_the_press_on_the_faces_and_what_rubs_along_them():
+    """A sample of the edge holds 2 N back; each face is pressed by 3 N, one is rubbed by 1 N."""
+    contacts = BladeContacts(
+        point=np.zeros((3, 3)),
+        normal=np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
+        normal_force=np.array([2.0, 3.0, 3.0]),
+        friction=np.array([[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]),
+        cut_area=np.zeros(3),
+    )
+    parts = force_parts(contacts, FORWARD)
+    assert parts.edge == pytest.approx([-0.5, -2.0, 0.0])
+    assert parts.pressing == pytest.approx([0.0, 0.0, 0.0])
+    assert parts.friction == pytest.approx([0.0, -1.0, 0.0])
+
+
+def test_the_face_of_the_steepest_bevel_is_none_of_the_edge():
+    steep = np.array([[0.5, np.sin(np.radians(60.0)), 0.0]])
+    contacts = BladeContacts(np.zeros((1, 3)), steep, np.ones(1), np.zeros((1, 3)), np.zeros(1))
+    assert not force_parts(contacts, FORWARD).edge.any()
+
+
+@pytest.fixture(scope="module")
+def cut() -> tuple[Simulation, list[np.ndarray]]:
+    """A cut with a scalpel that rubs, and the force at the end of each of its frames."""
+    scene = changed(SCENES["grid2"], blade=SCALPEL, blade_friction=0.3, audit=True)
+    simulation = prepare(scene)
+    forces: list[np.ndarray] = []
+    simulation.run(1.0, lambda now: forces.append(now.result.wrench_t1.force.copy()))
+    return simulation, forces
+
+
+def test_the_parts_of_each_frame_add_up_to_the_force_at_its_end(cut):
+    simulation, forces = cut
+    parts = ("edge_force", "pressing_force", "friction_force")
+    recorded = [simulation.recording.vector(name) for name in parts]
+    assert all(np.abs(part).max() > 1e-3 for part in recorded)
+    there = simulation.frame.vectors_to_world(np.array(forces))
+    assert sum(recorded) == pytest.approx(there, abs=1e-9)
+
+
+def test_the_stiffness_of_each_frame_is_that_of_the_tissue_in_the_world(cut):
+    simulation, _ = cut
+    last = simulation.recording.rows[-1]
+    assert simulation.recording.column("stiffness_yy_n_m").max() > 100.0
+    there = simulation.result.stiffness[:3, :3]  # the frames are parallel
+    first = COLUMNS.index("stiffness_xx_n_m")
+    assert last[first : first + 3] == pytest.approx(np.diag(there), rel=1e-12)
+
+
+def test_the_account_of_each_frame_is_in_the_table_and_closes(cut):
+    recording = cut[0].recording
+    assert recording.is_audited
+    work = recording.column("work_of_blade_j")[-1]
+    assert recording.column("friction_j")[-1] > 0.0
+    assert abs(recording.column("residual_j")[-1]) < 0.005 * work

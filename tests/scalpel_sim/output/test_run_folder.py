@@ -1,0 +1,352 @@
+import csv
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.energy_plot import OPACITY, plot_energies
+from scalpel_sim.output.energy_terms import TERMS
+from scalpel_sim.output.force_plot import LIMITED, PARTS, plot_forces
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.recording import COLUMNS, Recording
+from scalpel_sim.output.report import print_table
+from scalpel_sim.output.run_folder import (
+    ENERGY_PLOT,
+    FORCES,
+    FRAMES_PER_FLUSH,
+    INITIAL,
+    PLOT,
+    SUMMARY,
+    Outputs,
+    summary_json,
+)
+from scalpel_sim.output.summary import Summary, summarise
+from tissue import CutReport, Energies, MeshMeasures, Snapshot, block
+from tissue.mesh.pieces import pieces_of
+
+DT = 1e-3
+QUALITY = CutReport(
+    n_cut_nodes=9,
+    path_error_mean=1e-4,
+    path_error_largest=6e-4,
+    node_size=2e-3,
+    guard=3e-4,
+    initial=MeshMeasures(6, 2e-3, 1000.0, 2e-3),
+    now=MeshMeasures(9, 4e-4, 3000.0, 5e-4),
+)
+
+PIECES = pieces_of(
+    Snapshot(
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.vstack([np.eye(3), np.zeros(3), np.eye(3) + 2.0, np.full(3, 2.0)]),
+        np.zeros((8, 3)),
+        np.ones(8),
+        np.array([[3, 0, 1, 2], [7, 4, 5, 6]]),
+        np.arange(8) == 4,
+    )
+)
+"""Two tetrahedra, the second of which is held."""
+
+
+@pytest.fixture(scope="module")
+def plotter():
+    with Plotter() as plotter:
+        yield plotter
+
+
+def recorded(n_frames: int) -> Recording:
+    """A recording in which everything is random, but for times that sum to less than the wall's."""
+    untimed = COLUMNS.index("cd_s") - 1
+    rng = np.random.default_rng(0)
+    recording = Recording(1)
+    for i in range(n_frames):
+        recording.append((i * DT, *rng.normal(size=untimed), *rng.uniform(0.0, 1e-5, 5)))
+    return recording
+
+
+def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any) -> Summary:
+    return summarise(
+        recording,
+        scene="block",
+        status="complete",
+        seed=7,
+        dt=DT,
+        wall_seconds=wall_seconds,
+        tetrahedra_initial=6,
+        tetrahedra_final=8,
+        pieces=PIECES,
+        quality=QUALITY,
+        counters=counters,
+        touched={},
+        settings={"stroke": "straight"},
+    )
+
+
+def test_a_recording_keeps_every_frame_when_it_grows():
+    rows = np.arange(3000.0 * len(COLUMNS)).reshape(3000, -1)
+    recording = Recording(1)
+    for row in rows:
+        recording.append(row)
+    assert np.array_equal(recording.rows, rows)
+
+
+def test_a_vector_is_its_three_columns():
+    recording = recorded(5)
+    columns = [recording.column(f"torque_{axis}_nm") for axis in "xyz"]
+    assert np.array_equal(recording.vector("torque"), np.transpose(columns))
+
+
+def test_forces_csv_reads_back_to_the_same_bits(tmp_path, plotter):
+    recording = recorded(250)
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_forces(recording, all_rows=True)
+    with (tmp_path / FORCES).open(newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header == list(COLUMNS)
+    assert np.array_equal(np.array(rows, float), recording.rows)
+
+
+def test_forces_csv_is_on_disk_while_the_run_goes_on(tmp_path, plotter):
+    outputs, recording = Outputs(tmp_path, plotter), Recording()
+    for i in range(FRAMES_PER_FLUSH + 5):
+        recording.append([float(i)] * len(COLUMNS))
+        outputs.write_forces(recording)
+    assert len((tmp_path / FORCES).read_text().splitlines()) == 1 + FRAMES_PER_FLUSH
+
+
+def test_a_new_run_removes_the_files_of_the_last_one_and_no_others(tmp_path, plotter):
+    for name in (SUMMARY, PLOT, "notes.txt"):
+        (tmp_path / name).write_text("old")
+    Outputs(tmp_path, plotter)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [FORCES, "notes.txt"]
+
+
+def test_a_path_that_is_a_file_is_wrong_use(tmp_path, plotter):
+    file = tmp_path / "file"
+    file.write_text("mine")
+    for path in (file, file / "below"):
+        with pytest.raises(UsageError, match="is a file"):
+            Outputs(path, plotter)
+    assert file.read_text() == "mine"
+
+
+def test_a_folder_that_cannot_be_made_is_a_failed_run(plotter):
+    with pytest.raises(RunError, match=r"^/proc/nothing: cannot be written \("):
+        Outputs(Path("/proc/nothing"), plotter)
+
+
+def test_the_mesh_of_an_output_folder_reads_back(tmp_path, plotter):
+    meshio = pytest.importorskip("meshio")
+    mesh = block((1, 1, 1), (0.01, 0.01, 0.01))
+    n = len(mesh.positions)
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_mesh(
+        INITIAL,
+        Snapshot(
+            mesh.positions + 0.001,
+            mesh.positions,
+            np.zeros((n, 3)),
+            np.ones(n),
+            mesh.tetrahedra,
+            np.zeros(n, bool),
+        ),
+    )
+    found = meshio.read(tmp_path / INITIAL)
+    assert np.array_equal(found.points, mesh.positions + 0.001)
+    assert np.array_equal(found.point_data["rest_position"], mesh.positions)
+    assert found.point_data["mass"].dtype == np.float64
+
+
+def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):
+    image = pytest.importorskip("PIL.Image")
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_forces(recorded(50), all_rows=True)
+    outputs.write_plots("block: straight stroke")
+    with image.open(tmp_path / PLOT) as picture:
+        pixels = np.asarray(picture.convert("RGB"))
+    assert pixels.shape[0] > 500 and pixels.shape[1] > 800
+    assert (pixels == (0x22, 0x22, 0x22)).all(axis=2).sum() > 500  # the magnitude's line
+
+
+def test_the_plot_shows_what_the_force_is_made_of_and_where_the_device_limits_it(tmp_path):
+    plain, limited = still(), still()
+    for name in ("force_z_n", "tissue_force_z_n"):
+        plain.column(name)[:] = limited.column(name)[:] = 2.0
+    limited.column("tissue_force_z_n")[50:] = 4.0
+    edge = still()
+    edge.column("edge_force_x_n")[:] = 1.0
+    plot_forces(plain, "plain", tmp_path / "plain.png")
+    plot_forces(limited, "limited", tmp_path / "limited.png")
+    plot_forces(edge, "edge", tmp_path / "edge.png")
+    assert n_of_colour(tmp_path / "plain.png", LIMITED) < n_of_colour(
+        tmp_path / "limited.png", LIMITED
+    )
+    (_, _, edge_colour), *_ = PARTS
+    assert n_of_colour(tmp_path / "edge.png", edge_colour) > 500
+
+
+def test_an_account_gets_a_picture_in_which_heights_are_energies(tmp_path):
+    recording = still()
+    recording.column("work_of_blade_j")[:] = 3e-3
+    recording.column("cutting_j")[:] = 2e-3
+    recording.column("damping_j")[:] = 1e-3
+    plot_energies(recording, "block", tmp_path / ENERGY_PLOT)
+    cutting, damping = (
+        n_of_colour(tmp_path / ENERGY_PLOT, seen_through(colour_of(name)))
+        for name in ("cutting", "damping")
+    )
+    assert cutting > 10_000
+    assert cutting == pytest.approx(2 * damping, rel=0.1)
+
+
+def test_without_an_account_there_is_no_picture_of_it(tmp_path):
+    recording = still()
+    recording.column("residual_j")[:] = np.nan
+    with Plotter() as plotter:
+        outputs = Outputs(tmp_path, plotter)
+        outputs.write_forces(recording, all_rows=True)
+        outputs.write_plots("block: straight stroke")
+    assert (tmp_path / PLOT).exists() and not (tmp_path / ENERGY_PLOT).exists()
+
+
+def still(n_frames: int = 100) -> Recording:
+    """A recording of nothing, to put something in."""
+    recording = Recording()
+    for i in range(n_frames):
+        recording.append([i * DT] + [0.0] * (len(COLUMNS) - 2) + [1e-4])
+    return recording
+
+
+def n_of_colour(path: Path, colour: str) -> int:
+    """How many pixels of a picture are nearly of a colour."""
+    image = pytest.importorskip("PIL.Image")
+    with image.open(path) as picture:
+        pixels = np.asarray(picture.convert("RGB"), int)
+    wanted = [int(colour[i : i + 2], 16) for i in (1, 3, 5)]
+    return int((np.abs(pixels - wanted).max(axis=2) <= 3).sum())
+
+
+def colour_of(name: str) -> str:
+    return next(term.colour for term in TERMS if term.name == name)
+
+
+def seen_through(colour: str) -> str:
+    """What a colour of the stack looks like on white."""
+    channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    seen = (round(OPACITY * channel + (1.0 - OPACITY) * 255) for channel in channels)
+    return "#" + "".join(f"{channel:02x}" for channel in seen)
+
+
+def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
+    outputs = Outputs(tmp_path, plotter)
+    outputs.write_summary(summary_of(recorded(10)))
+    found = json.loads((tmp_path / SUMMARY).read_text())
+    promised = (
+        "scene seed simulated_seconds wall_seconds real_time_factor frame_rate_median "
+        "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
+        "force_peak_n "
+        "force_mean_n work_of_blade_j share versions"
+    )
+    assert set(promised.split()) <= set(found)
+    assert {"RX", "RD", "GC", "CD"} <= set(found["share"])
+    assert {"scalpel_sim", "python", "numpy", "numba", "mujoco", "platform"} <= set(
+        found["versions"]
+    )
+
+
+def test_the_summary_tells_of_each_piece():
+    summary = json.loads(summary_json(summary_of(recorded(10))))
+    assert summary["pieces"] == len(summary["each_piece"]) == 2
+    assert [piece["held"] for piece in summary["each_piece"]] == [False, True]
+    first = summary["each_piece"][0]
+    assert first["volume_m3"] == pytest.approx(1 / 6) and first["mass_kg"] == 4.0
+    assert first["centre_m"] == [0.25] * 3 and np.shape(first["inertia_kg_m2"]) == (3, 3)
+
+
+def test_the_table_has_a_row_for_each_piece():
+    console = Console(record=True, width=100)
+    print_table(summary_of(recorded(10)), console)
+    text = console.export_text()
+    assert "piece 1, loose" in text and "piece 2, held" in text
+
+
+def test_the_table_tells_what_came_between_the_tissue_and_the_arm():
+    console = Console(record=True, width=100)
+    passivity = {"energy": 0.0, "least_energy": -5e-7, "injected_away": 2e-3, "frames": 12}
+    print_table(
+        summary_of(recorded(10), force_limited=1234, silent=0, passivity=passivity), console
+    )
+    text = console.export_text()
+    assert re.search("force above the device's limit.*1,234 frames", text)
+    assert re.search("damped for passivity.*12 frames, 2 mJ", text)
+    assert "silent" not in text
+
+
+def test_the_summary_has_the_trade_between_path_error_and_time_step():
+    found = summary_of(recorded(10)).quality
+    assert found["path_error_mean_node_sizes"] == pytest.approx(0.05)
+    assert found["path_error_largest_node_sizes"] == pytest.approx(0.3)
+    assert found["tetrahedra_growth"] == pytest.approx(1.5)
+    assert found["frequency_growth"] == pytest.approx(3.0)
+    assert found["substep_growth"] == pytest.approx(4.0)
+
+
+def test_the_summary_tells_where_the_work_went_and_what_is_missing():
+    recording = still()
+    for name, energy in (("work_of_blade_j", 4e-3), ("cutting_j", 3e-3), ("residual_j", 1e-5)):
+        recording.column(name)[-1] = energy
+    summary = summary_of(recording)
+    assert summary.energies_j["work_of_blade"] == 4e-3
+    assert summary.energies_j["cutting"] == 3e-3
+    assert set(Energies._fields) | {"residual"} == set(summary.energies_j)
+    assert summary.residual_of_work == pytest.approx(0.0025)
+
+
+def test_without_an_audit_the_summary_does_not_pretend_to_know():
+    recording = still()
+    recording.column("residual_j")[:] = np.nan
+    summary = summary_of(recording)
+    assert summary.energies_j is None and summary.residual_of_work is None
+    json.loads(summary_json(summary))
+
+
+def test_the_table_has_a_row_for_each_term_of_the_account():
+    console = Console(record=True, width=100)
+    recording = still()
+    recording.column("work_of_blade_j")[-1] = 4e-3
+    recording.column("friction_j")[-1] = 1e-3
+    print_table(summary_of(recording), console)
+    (row,) = [line for line in console.export_text().splitlines() if "friction on" in line]
+    assert "1.0000 mJ" in row and "25.00%" in row
+
+
+def test_the_shares_sum_to_one():
+    assert sum(summary_of(recorded(100)).share.values()) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_figures_follow_from_the_frames():
+    recording = Recording()
+    for i in range(100):
+        row = dict.fromkeys(COLUMNS, 0.0)
+        row |= {"force_z_n": -2.0 if i < 50 else 0.0, "frame_s": 1e-2 if i == 99 else 1e-4}
+        recording.append([row[name] for name in COLUMNS])
+    summary = summary_of(recording, wall_seconds=0.05)
+    assert summary.simulated_seconds == pytest.approx(0.1)
+    assert summary.real_time_factor == pytest.approx(2.0)
+    assert summary.force_peak_n == 2.0
+    assert summary.force_mean_n == 2.0  # over the frames in which there was a force
+    assert summary.frame_rate_median == pytest.approx(1e4)
+    assert summary.frame_rate_p99 == pytest.approx(
+        1.0 / np.percentile(recording.column("frame_s"), 99)
+    )
+
+
+def test_a_run_that_ended_before_its_first_frame_has_a_summary_too():
+    summary = summary_of(Recording(), wall_seconds=0.0)
+    assert summary.simulated_seconds == summary.force_peak_n == summary.frame_rate_median == 0.0
+    assert json.loads(json.dumps(summary._asdict(), allow_nan=False))["frames"] == 0

@@ -1,0 +1,160 @@
+import re
+
+import numpy as np
+import pytest
+
+from scalpel_sim.output.force_parts import ForceParts
+from scalpel_sim.viewer import replay as replay_module
+from scalpel_sim.viewer.model_shapes import body_poses
+from scalpel_sim.viewer.replay import BYTES_PER_TRIANGLE, ReplayWriter
+from tests.browser import WINDOW, local_file, new_tab, pixels, pixels_of
+from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+from tests.scalpel_sim.real_cut import cut_tissue
+from tissue import Energies
+
+N_PIXELS = WINDOW["width"] * WINDOW["height"]
+
+
+def times_in(path) -> list[float]:
+    return [float(time) for time in re.findall(r'data-time="([^"]+)"', path.read_text())][1:]
+
+
+def write_cut(path, *, n_frames=3, wireframe=False, title="a block"):
+    model, data = little_arm()
+    replay = ReplayWriter(model, title=title, frame=FRAME, wireframe=wireframe)
+    for i in range(n_frames):
+        surface = cut_tissue()[min(i, 2)]
+        replay.add(0.1 * i, surface, body_poses(data), readings(0.1 * i))
+    replay.write(path)
+
+
+def test_a_run_of_a_second_is_kept_as_twenty_five_frames_and_its_last(tmp_path):
+    model, data = little_arm()
+    replay = ReplayWriter(model)
+    whole, poses = cut_tissue()[0], body_poses(data)
+    for frame in range(1000):
+        replay.add(frame / 1000, whole, poses)
+    replay.write(tmp_path / "replay.html")
+    times = times_in(tmp_path / "replay.html")
+    assert len(times) == 26
+    assert np.allclose(np.diff(times[:-1]), 0.04)
+    assert times[-1] == 0.999
+
+
+def test_a_heavy_body_gets_fewer_frames_evenly_spread(tmp_path, monkeypatch):
+    model, data = little_arm()
+    whole, poses = cut_tissue()[0], body_poses(data)
+    limit = 10 * len(whole.triangles) * BYTES_PER_TRIANGLE
+    monkeypatch.setattr(replay_module, "FILE_LIMIT", limit)
+    replay = ReplayWriter(model)
+    for frame in range(100):
+        if replay.is_due(frame * 0.04):
+            replay.add(frame * 0.04, whole, poses)
+    replay.write(tmp_path / "replay.html")
+    times = times_in(tmp_path / "replay.html")
+    assert 5 <= len(times) <= 10
+    assert np.ptp(np.diff(times)) < 1e-9
+
+
+def test_a_file_is_no_larger_than_was_reckoned(tmp_path):
+    write_cut(tmp_path / "few.html", n_frames=2)
+    write_cut(tmp_path / "more.html", n_frames=12)
+    added = (tmp_path / "more.html").stat().st_size - (tmp_path / "few.html").stat().st_size
+    assert added / 10 < len(cut_tissue()[2].triangles) * BYTES_PER_TRIANGLE
+
+
+def test_a_replay_without_frames_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="no frames"):
+        ReplayWriter(little_arm()[0]).write(tmp_path / "replay.html")
+
+
+def test_a_title_is_text_and_not_markup(tmp_path):
+    write_cut(tmp_path / "replay.html", title="<b>$bold</b>")
+    assert "<h1>&lt;b&gt;$bold&lt;/b&gt;</h1>" in (tmp_path / "replay.html").read_text()
+
+
+@pytest.mark.browser
+def test_the_page_plays_the_cut_by_itself_and_asks_nobody_for_anything(tab, tmp_path):
+    asked = []
+    tab.on("request", lambda request: asked.append(request.url.split(":")[0]))
+    write_cut(tmp_path / "replay.html")
+    tab.goto(local_file(tmp_path / "replay.html"))
+    tab.wait_for_function("window.viewer && typeof player !== 'undefined' && player.shown === 2")
+    assert set(asked) <= {"file", "data", "blob"}
+    assert tab.title() == "a block"
+    assert tab.text_content("#force") == "1.00 N"
+    tab.click("#play")
+    assert not tab.evaluate("player.isPlaying")
+
+
+@pytest.mark.browser
+def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp_path):
+    model, data = little_arm()
+    felt = readings(0.0)._replace(
+        contact_points=np.array([[0.0, 0.0, 0.08], [0.01, 0.0, 0.08]]),
+        contact_forces=np.array([[0.0, -0.5, 0.0], [0.0, -0.5, 0.1]]),
+        parts=ForceParts(np.array([0.0, -0.6, 0.8]), np.zeros(3), np.array([0.2, 0.0, 0.0])),
+        energies=Energies(*np.zeros(12))._replace(cutting=3e-3, friction=1e-3, elastic=-2e-3),
+    )
+    replay = ReplayWriter(model, frame=FRAME)
+    replay.add(0.0, cut_tissue()[0], body_poses(data), felt)
+    replay.write(tmp_path / "replay.html")
+    tab.goto(local_file(tmp_path / "replay.html"))
+    tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
+    ends = tab.evaluate("[...picture.contacts.geometry.attributes.position.array]")
+    start, end, _, other = np.reshape(ends, (4, 3))
+    assert start == pytest.approx([0.0, 0.0, 0.08])
+    assert (end - start)[1] < 0.0 and (other[2] - 0.08) / (end - start)[1] == pytest.approx(-0.2)
+    assert tab.text_content("#parts") == "1.00 · 0.00 · 0.20 N"
+    right = "(s) => document.querySelector(s).getBoundingClientRect().right"
+    assert tab.evaluate(right, "#parts") < tab.evaluate(right, "#readings")
+    bars = tab.evaluate("[...document.querySelectorAll('#account span')].map((s) => s.title)")
+    assert bars == ["cutting: toughness x area: 3.00 mJ", "friction on the blade: 1.00 mJ"]
+    tab.uncheck("#contacts")
+    assert not tab.evaluate("picture.contacts.visible")
+
+
+@pytest.fixture(scope="module")
+def replay_tab(browser, tmp_path_factory):
+    """A tab that shows the last frame of a cut, and nothing beside the picture."""
+    path = tmp_path_factory.mktemp("replay") / "replay.html"
+    write_cut(path, wireframe=True)
+    tab = new_tab(browser)
+    tab.goto(local_file(path))
+    tab.wait_for_function("typeof player !== 'undefined' && player.shown >= 0")
+    tab.evaluate("player.pause(), player.seek(player.length)")
+    tab.evaluate("document.querySelectorAll('header, dl').forEach((e) => e.hidden = true)")
+    tab.wait_for_function(
+        "picture.looks.get('skin').map.image && picture.looks.get('cut').map.image"
+    )
+    yield tab
+    tab.close()
+
+
+@pytest.mark.browser
+def test_the_wireframe_is_drawn_on_request(replay_tab):
+    assert replay_tab.is_checked("#wireframe")
+    wired = pixels(replay_tab)
+    replay_tab.uncheck("#wireframe")
+    assert (np.abs(wired - pixels(replay_tab)).max(axis=2) > 12).sum() > 1000
+
+
+@pytest.mark.browser
+def test_skin_and_cut_faces_are_seen_and_differ_in_colour(replay_tab):
+    replay_tab.uncheck("#wireframe")
+    skin, cut = pixels_of(replay_tab, "tissue/skin"), pixels_of(replay_tab, "tissue/cut")
+    assert len(skin) > N_PIXELS / 30
+    assert len(cut) > N_PIXELS / 300
+    red, green, _ = np.median(skin, axis=0)
+    cut_red, cut_green, _ = np.median(cut, axis=0)
+    assert red > 1.2 * green
+    assert cut_red / cut_green > 1.25 * red / green
+    assert skin.std(axis=0).min() > 5.0, "the skin has no texture"
+
+
+@pytest.mark.browser
+def test_before_the_cut_there_is_skin_only_and_the_blade_is_seen(replay_tab):
+    replay_tab.evaluate("player.seek(0)")
+    assert len(pixels_of(replay_tab, "tissue/skin")) > N_PIXELS / 30
+    assert len(pixels_of(replay_tab, "tissue/cut")) == 0
+    assert len(pixels_of(replay_tab, "bodies/3/blade")) > 15

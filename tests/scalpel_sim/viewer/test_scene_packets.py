@@ -1,0 +1,75 @@
+import msgspec
+import mujoco
+import numpy as np
+import pytest
+
+from bridge import TissueFrame
+from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
+from scalpel_sim.viewer.scene_packets import Stage
+from tests.scalpel_sim.cut_block import cut_block
+from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+
+
+def commands(packet: bytes) -> dict[str, dict]:
+    """Return the commands of a packet by their kind and path, or name."""
+    decoded = msgspec.msgpack.decode(packet, ext_hook=lambda code, body: bytes(body))
+    return {
+        " ".join(filter(None, (each["type"], each.get("path") or each.get("name")))): each
+        for each in decoded["commands"]
+    }
+
+
+def opening(surface, frame=FRAME):
+    model, data = little_arm()
+    return commands(Stage(shapes_of(model), frame).opening(surface, body_poses(data)))
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0, 30.0])
+def test_the_camera_frames_bodies_of_any_size(size):
+    block = cut_block(0.0)
+    camera = opening(block._replace(positions=block.positions * size))["set_camera"]
+    centre = np.array([0.02, 0.03, 0.02]) * size + FRAME.origin
+    diagonal = np.linalg.norm([0.04, 0.06, 0.04]) * size
+    assert camera["target"] == pytest.approx(centre)
+    distance = np.linalg.norm(np.subtract(camera["eye"], centre))
+    assert 1.5 * diagonal < distance < 4.0 * diagonal
+    assert camera["eye"][2] > centre[2] + 0.3 * distance, "one looks down on it"
+
+
+def test_the_camera_turns_with_the_tissue():
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = opening(cut_block(0.0), TissueFrame(rotation=quarter))["set_camera"]
+    view = np.subtract(turned["eye"], turned["target"]) @ quarter
+    assert abs(view[1]) > abs(view[0]), "along the cut rather than across it"
+
+
+def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
+    model, data = little_arm()
+    stage = Stage(shapes_of(model), FRAME)
+    first = commands(stage.opening(cut_block(0.0), body_poses(data)))
+    data.qpos[0] = 0.01
+    mujoco.mj_kinematics(model, data)
+    later = commands(stage.frame(cut_block(0.01), body_poses(data), readings(0.1)))
+    assert first["set_transform /tissue"]["matrix"][12:15] == pytest.approx(FRAME.origin)
+    assert "set_transform /tissue" not in later
+    handle = model.body("handle").id
+    assert later[f"set_transform /bodies/{handle}"]["matrix"][12:15] == pytest.approx(
+        [0.0, 0.01, 0.12]
+    )
+
+
+def test_pictures_travel_once_and_geometry_with_every_frame():
+    model, data = little_arm()
+    stage = Stage(shapes_of(model), FRAME)
+    first = commands(stage.opening(cut_block(0.0), body_poses(data)))
+    later = commands(stage.frame(cut_block(0.01), body_poses(data)))
+    assert {"set_look skin", "set_look cut"} <= first.keys()
+    assert {"set_object /tissue/skin", "set_object /tissue/cut"} <= later.keys()
+    assert not any(key.startswith("set_look") for key in later)
+    assert not any(key.startswith("set_object /bodies") for key in later)
+
+
+def test_a_model_without_shapes_is_no_obstacle():
+    stage = Stage([])
+    camera = commands(stage.opening(cut_block(0.0), np.zeros((1, 7))))["set_camera"]
+    assert np.isfinite(camera["eye"]).all()

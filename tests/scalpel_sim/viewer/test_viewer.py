@@ -1,0 +1,201 @@
+import asyncio
+import os
+import signal
+import socket
+import threading
+import time
+import urllib.error
+import urllib.request
+
+import pytest
+from tornado.websocket import websocket_connect
+
+from scalpel_sim import Viewer
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.viewer.model_shapes import body_poses
+from tests.browser import WINDOW, new_tab, pixels_of
+from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+from tests.scalpel_sim.real_cut import cut_tissue
+
+NO_WAIT = 0.25
+"""What `show` may take on a busy machine [s]. Usually 20 microseconds; if it waited for
+a viewer that does not read, it would wait for ever."""
+
+PATIENCE = 20.0
+"""How long anything may take on a busy machine [s]."""
+
+
+@pytest.fixture
+def viewer():
+    with Viewer(little_arm()[0], frame=FRAME) as viewer:
+        yield viewer
+
+
+class Run:
+    """A run that shows a block being parted, as fast as it can, until it is told to stop."""
+
+    def __init__(self, viewer: Viewer) -> None:
+        self.surfaces = cut_tissue()
+        self.poses = body_poses(little_arm()[1])
+        self.viewer = viewer
+        self.longest = 0.0
+        self.n_shown = 0
+
+    def go_on(self, n: int = 200) -> None:
+        """Show the next `n` pictures, and remember the longest wait."""
+        for _ in range(n):
+            surface = self.surfaces[self.n_shown % len(self.surfaces)]
+            start = time.perf_counter()
+            self.viewer.show(surface, self.poses, readings(self.n_shown / 1000))
+            self.longest = max(self.longest, time.perf_counter() - start)
+            self.n_shown += 1
+
+
+def until(condition, what: str) -> None:
+    """Wait for a condition."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, f"waited {PATIENCE} s for {what}"
+        time.sleep(0.02)
+
+
+def port_of(viewer: Viewer) -> int:
+    return int(viewer.url.rstrip("/").rsplit(":", 1)[1])
+
+
+def status(url: str, **headers: str) -> int:
+    try:
+        with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def test_the_page_is_served_on_loopback_only(viewer):
+    assert viewer.url.startswith("http://127.0.0.1:")
+    assert status(viewer.url) == 200
+    with pytest.raises(ConnectionRefusedError):  # another address of this machine
+        socket.create_connection(("127.0.0.2", port_of(viewer)), timeout=PATIENCE)
+
+
+def test_a_foreign_name_that_points_here_is_not_served(viewer):
+    assert status(viewer.url, Host="evil.example") == 404
+
+
+def test_a_port_that_was_asked_for_and_is_in_use_is_an_error_that_names_it(viewer):
+    with pytest.raises(RunError, match=f"port {port_of(viewer)} is in use"):
+        Viewer(little_arm()[0], port=port_of(viewer))
+
+
+def test_without_a_wish_the_next_free_port_is_taken(viewer):
+    with Viewer(little_arm()[0]) as second:
+        assert port_of(second) != port_of(viewer)
+        assert status(second.url) == 200
+
+
+def test_a_port_that_does_not_exist_is_wrong_use():
+    with pytest.raises(UsageError, match="ports go from 1 to 65535"):
+        Viewer(little_arm()[0], port=70000)
+
+
+def test_a_killed_viewer_does_not_disturb_the_run(viewer):
+    run = Run(viewer)
+    run.go_on()
+    os.kill(viewer._process.pid, signal.SIGKILL)
+    until(lambda: not viewer.is_running, "the process to be gone")
+    run.go_on()
+    assert not viewer.is_due()
+    assert run.longest < NO_WAIT
+
+
+def test_a_viewer_that_has_stopped_reading_does_not_disturb_the_run(viewer):
+    run = Run(viewer)
+    os.kill(viewer._process.pid, signal.SIGSTOP)
+    run.go_on(2000)
+    assert run.longest < NO_WAIT
+    start = time.monotonic()
+    viewer.close()
+    assert time.monotonic() - start < 10.0
+    assert not viewer.is_running
+
+
+def test_closing_ends_the_process_and_frees_the_port(viewer):
+    viewer.close()
+    assert not viewer.is_running
+    with Viewer(little_arm()[0], port=port_of(viewer)) as again:
+        assert again.url == viewer.url
+
+
+def test_the_process_ends_with_the_run_however_that_ended(viewer):
+    viewer._pipe.close()  # as when the run was killed
+    until(lambda: not viewer.is_running, "the process to end")
+    assert not viewer.is_running
+
+
+def test_pictures_are_due_at_most_thirty_times_a_second(viewer):
+    run = Run(viewer)
+    assert viewer.is_due()
+    run.go_on(1)
+    assert not viewer.is_due()
+    time.sleep(1 / 20)
+    assert viewer.is_due()
+
+
+def test_a_page_that_does_not_draw_gets_no_more_pictures(viewer):
+    run = Run(viewer)
+    run.go_on(1)
+    received = []
+
+    async def sleepy_page():
+        socket_url = viewer.url.replace("http", "ws") + "frames"
+        page = await websocket_connect(socket_url, on_message_callback=received.append)
+        deadline = time.monotonic() + 1.0
+        while time.monotonic() < deadline:
+            run.go_on(1)
+            await asyncio.sleep(0.02)
+        page.close()
+
+    in_a_thread(sleepy_page)
+    packets = [message for message in received if message is not None]
+    assert 1 <= len(packets) <= 2, "the opening and at most one picture"
+
+
+def in_a_thread(coroutine) -> None:
+    """Run a coroutine where no other event loop is running."""
+    failures = []
+
+    def run() -> None:
+        try:
+            asyncio.run(coroutine())
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    assert failures == []
+
+
+@pytest.mark.browser
+def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
+    run = Run(viewer)
+    run.go_on(21)  # ends with the block cut in two
+    tab, other = new_tab(browser), new_tab(browser)
+    for page in (tab, other):
+        page.goto(viewer.url)
+        page.wait_for_function("document.getElementById('time').textContent === '0.02 s'")
+    tab.wait_for_function(
+        "picture.looks.get('skin').map.image && picture.looks.get('cut').map.image"
+    )
+    n_pixels = WINDOW["width"] * WINDOW["height"]
+    assert len(pixels_of(tab, "tissue/skin")) > n_pixels / 30
+    assert len(pixels_of(tab, "tissue/cut")) > n_pixels / 300
+
+    other.close()
+    run.go_on(1000)
+    tab.wait_for_function("document.getElementById('time').textContent === '1.02 s'")
+    tab.close()
+    run.go_on(1000)
+    assert viewer.is_running
+    assert run.longest < NO_WAIT
+    assert tab.failures == other.failures == []

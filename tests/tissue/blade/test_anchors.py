@@ -1,0 +1,347 @@
+"""The edge anchors: what holds, what slips, and that action is reaction."""
+
+import numpy as np
+import pytest
+
+from tests.tissue.kernels_of import springs_of, tool_with
+from tissue import Material, block
+from tissue.blade.anchors import (
+    ANCHORED,
+    FREE,
+    LEFT,
+    RETRACTED,
+    Edge,
+    anchor_position,
+    anchored_length,
+    clear_forces,
+    edge_frame,
+    is_engaged,
+    measure_speeds,
+    new_anchors,
+    pull,
+)
+from tissue.blade.engagement import any_free_in_box, let_go, meet, seize
+from tissue.blade.forces import frequency_with_tool
+from tissue.blade.impulse_totals import (
+    IMPULSE,
+    IMPULSE_TORQUE,
+    RELEASED,
+    TISSUE_IMPULSE,
+    WORK_OF_BLADE,
+    WORK_OF_BREAKING,
+    WORK_OF_CUTTING,
+)
+from tissue.blade.material_frame import rotation_of, to_material
+from tissue.blade.return_mapping import find, put, slip
+from tissue.blade.toughness import resistance_of
+from tissue.core.vec3 import Vec3, vec3
+from tissue.cutting.blade_path import new_path
+from tissue.geometry.tetrahedron import Matrix3
+from tissue.mesh.body import CUT, OUTER, build_body, walk
+from tissue.mesh.point_location import build_grid
+from tissue.mesh.star import LARGEST_STAR, no_visits
+
+pytestmark = pytest.mark.kernel
+
+BLOCK = block((2, 4, 2), (0.02, 0.04, 0.02))
+STIFF, TOUGH = 10e3, 20.0
+BOX = (Vec3(0.0, 0.0, 0.0), Vec3(0.02, 0.04, 0.02))
+"""Lowest and highest corner of it [m]."""
+
+N = 5
+
+
+def edge_at(y, x=0.011, z=0.001, length=0.016):
+    """An upright edge inside the block, that stays where it is and faces along y."""
+    tip, heel, forward = Vec3(x, y, z), Vec3(x, y, z + length), Vec3(0.0, 1.0, 0.0)
+    return Edge(tip, heel, forward, tip, heel, forward)
+
+
+class Held:
+    """A block that five samples of the edge are anchored in, at y = 9 mm."""
+
+    def __init__(self):
+        self.body = build_body(BLOCK, None, None)
+        self.springs = springs_of(self.body)
+        self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
+        self.queue = np.zeros(LARGEST_STAR, dtype=np.int64)
+        self.anchors = new_anchors(N, 0.016, STIFF)
+        self.tough = resistance_of(Material(toughness=TOUGH), None)
+        self.forces = np.zeros_like(self.body.rest)
+        grid = build_grid(self.body, self.body.positions, 0.0)
+        meet(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3, *BOX)
+
+    def pull(self, edge, toughness=TOUGH):
+        x = self.body.positions
+        clear_forces(self.anchors, self.body, self.forces)
+        tough = resistance_of(Material(toughness=toughness), None)
+        pull(self.anchors, self.body, edge, x, 1.0, 1.0, 1.0, tough, self.forces)
+        return self.anchors.totals
+
+    def slip(self, edge, reach=0.005):
+        slip(self.anchors, self.body, self.visits, edge, 1.0, self.tough, reach, self.queue)
+
+
+@pytest.fixture
+def held():
+    return Held()
+
+
+THRESHOLD = TOUGH / (4.0 * STIFF)
+"""How far the edge is ahead of its anchors when they begin to slip [m]: J l / (4 E l)."""
+
+
+def test_a_sample_in_the_tissue_is_anchored_where_it_is(held):
+    assert (held.anchors.state == ANCHORED).all()
+    np.testing.assert_allclose(held.anchors.rest[:, :2], [[0.011, 0.009]] * N, atol=1e-15)
+
+
+def test_the_samples_stand_for_the_whole_edge():
+    anchors = new_anchors(7, 0.03, STIFF)
+    assert anchors.length.sum() == pytest.approx(0.03)
+    assert anchors.length[0] == anchors.length[-1] == pytest.approx(anchors.length[1] / 2)
+
+
+def test_a_sample_outside_stays_free_and_pulls_nothing(held):
+    anchors = new_anchors(N, 0.016, STIFF)
+    grid = build_grid(held.body, held.body.positions, 0.0)
+    assert not any_free_in_box(anchors, edge_at(-0.001), 1.0, *BOX)
+    assert any_free_in_box(anchors, edge_at(0.001), 1.0, *BOX)
+    meet(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3, *BOX)
+    assert not is_engaged(anchors)
+    x = held.body.positions
+    pull(anchors, held.body, edge_at(-0.001), x, 1.0, 1.0, 1.0, held.tough, held.forces)
+    assert not anchors.totals.any()
+    assert not held.forces.any()
+
+
+def test_a_pull_below_toughness_times_length_does_not_slip(held):
+    before = held.anchors.rest.copy()
+    held.slip(edge_at(0.009 + 0.99 * THRESHOLD))
+    np.testing.assert_array_equal(held.anchors.rest, before)
+    assert held.anchors.totals[WORK_OF_CUTTING] == 0.0
+
+
+def test_a_stronger_pull_slips_until_toughness_times_length_is_left(held):
+    edge = edge_at(0.009 + 3.0 * THRESHOLD)
+    held.slip(edge)
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.0 * THRESHOLD, rtol=1e-12)
+    totals = held.pull(edge)
+    assert totals[TISSUE_IMPULSE + 1] == pytest.approx(TOUGH * 0.016, rel=1e-12)
+
+
+def test_skin_holds_more_until_it_breaks_and_then_as_much_as_the_rest(held):
+    held.tough = resistance_of(Material(toughness=TOUGH, skin_toughness=3.0 * TOUGH), None)
+    before = held.anchors.rest.copy()
+    held.slip(edge_at(0.009 + 2.9 * THRESHOLD))
+    np.testing.assert_array_equal(held.anchors.rest, before)
+    held.slip(edge_at(0.009 + 3.1 * THRESHOLD))
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.1 * THRESHOLD, rtol=1e-12)
+    assert not held.anchors.at_skin.any()
+    # The spring gives (9 - 1) / 2 and 3 x 0.1 of surplus, the area takes 2.1; the rest is breaking.
+    unit = TOUGH * 0.016 * THRESHOLD
+    assert held.anchors.totals[WORK_OF_BREAKING] == pytest.approx(2.2 * unit, rel=1e-6)
+
+
+def test_an_edge_that_goes_faster_is_held_harder(held):
+    held.tough = resistance_of(
+        Material(toughness=TOUGH, toughness_exponent=1.0, toughness_speed=0.1), None
+    )
+    fast = edge_at(0.009 + 5.0 * THRESHOLD)
+    slow = edge_at(0.009 + 5.0 * THRESHOLD - 1e-4)
+    edge = Edge(
+        slow.tip_t0, slow.heel_t0, slow.forward_t0, fast.tip_t1, fast.heel_t1, fast.forward_t1
+    )
+    measure_speeds(held.anchors, edge, 1e-3)  # 0.1 mm in 1 ms
+    np.testing.assert_allclose(held.anchors.speed, 0.1, rtol=1e-9)
+    held.slip(edge)
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 3.0 * THRESHOLD, rtol=1e-9)
+
+
+def test_slipping_further_costs_toughness_times_area(held):
+    """Past the threshold, an advance of 1 um over the whole edge dissipates J l 1 um."""
+    for i in range(4000):
+        held.slip(edge_at(0.009 + i * 1e-6))
+    way = 4000e-6 - 1e-6 - THRESHOLD
+    work = held.anchors.totals[WORK_OF_CUTTING]
+    assert work == pytest.approx(TOUGH * 0.016 * way, rel=2e-3)
+
+
+def test_a_pull_across_the_flat_never_slips(held):
+    before = held.anchors.rest.copy()
+    held.slip(edge_at(0.009, x=0.011 + 10.0 * THRESHOLD))
+    np.testing.assert_allclose(held.anchors.rest, before, atol=1e-12)
+    assert held.anchors.totals[WORK_OF_CUTTING] == 0.0
+
+
+def test_a_blade_that_backs_off_feels_nothing_and_bites_again_where_it_was(held):
+    before = held.anchors.rest.copy()
+    held.slip(edge_at(0.009 - 0.001))
+    assert (held.anchors.state == RETRACTED).all()
+    assert not held.pull(edge_at(0.008))[:WORK_OF_BLADE].any()
+    held.slip(edge_at(0.009 + 0.5 * THRESHOLD))
+    assert (held.anchors.state == ANCHORED).all()
+    np.testing.assert_array_equal(held.anchors.rest, before)
+
+
+def test_a_blade_that_backs_off_and_goes_aside_beyond_reach_is_free(held):
+    held.slip(edge_at(0.003, x=0.019))
+    assert (held.anchors.state == FREE).all()
+
+
+@pytest.mark.parametrize(("first", "goes_on"), [(N - 1, True), (0, False)])
+def test_the_path_of_a_sample_let_go_goes_on_beside_one_that_holds_and_else_begins_anew(
+    held, first, goes_on
+):
+    path = new_path(N)
+    path.known[:] = True
+    held.anchors.state[first:] = RETRACTED
+    let_go(held.anchors, held.body, held.visits, path, edge_at(0.012), 1.0, held.queue)
+    assert (held.anchors.state[first:] == FREE).all()
+    assert path.known[N - 1] == goes_on
+
+
+def test_letting_go_is_counted_as_released_energy(held):
+    held.slip(edge_at(0.009 - 0.001))
+    stiffness = 4.0 * STIFF * 0.016
+    assert held.anchors.totals[RELEASED] == pytest.approx(0.5 * stiffness * 0.001**2, rel=1e-9)
+
+
+def test_a_sample_that_slips_out_through_the_skin_has_left(held):
+    for i in range(40):
+        held.slip(edge_at(0.009 + i * 0.001))
+    assert (held.anchors.state == LEFT).all()
+
+
+def pushed(held):
+    """The block squeezed and shifted at random, the edge ahead of it and turned."""
+    random = np.random.default_rng(0)
+    held.body.positions[:] += random.normal(size=held.body.rest.shape) * 5e-4
+    tip, heel = Vec3(0.0115, 0.0096, 0.0012), Vec3(0.0107, 0.0102, 0.0171)
+    return Edge(tip, heel, Vec3(0.0, 1.0, 0.0), tip, heel, Vec3(0.0, 1.0, 0.0))
+
+
+def test_force_on_the_nodes_plus_force_on_the_blade_is_zero(held):
+    totals = held.pull(pushed(held))
+    on_blade = totals[IMPULSE : IMPULSE + 3]
+    assert np.linalg.norm(on_blade) > 0.1
+    np.testing.assert_allclose(held.forces.sum(axis=0) + on_blade, 0.0, atol=1e-14)
+    np.testing.assert_allclose(totals[TISSUE_IMPULSE : TISSUE_IMPULSE + 3], -on_blade, atol=1e-14)
+
+
+@pytest.mark.parametrize("about", [(0.0, 0.0, 0.0), (0.3, -1.0, 2.0)])
+def test_torques_about_any_point_cancel(held, about):
+    totals = held.pull(pushed(held))
+    force, torque = totals[IMPULSE : IMPULSE + 3], totals[IMPULSE_TORQUE : IMPULSE_TORQUE + 3]
+    on_blade = torque - np.cross(about, force)
+    on_nodes = np.cross(held.body.positions - about, held.forces).sum(axis=0)
+    np.testing.assert_allclose(on_blade + on_nodes, 0.0, atol=1e-12)
+
+
+def test_forces_are_cleared_where_anchors_were(held):
+    held.pull(pushed(held))
+    clear_forces(held.anchors, held.body, held.forces)
+    assert not held.forces.any()
+
+
+def test_the_blade_works_force_times_way(held):
+    tip, heel, forward = Vec3(0.011, 0.009, 0.001), Vec3(0.011, 0.009, 0.017), Vec3(0.0, 1.0, 0.0)
+    to = Edge(
+        tip,
+        heel,
+        forward,
+        tip._replace(y=0.0091),
+        heel._replace(y=0.0091),
+        forward,
+    )
+    held.pull(to)
+    stiffness = 4.0 * STIFF * 0.016
+    assert held.anchors.totals[WORK_OF_BLADE] == pytest.approx(stiffness * 1e-4 * 1e-4, rel=1e-9)
+
+
+def test_the_neighbours_of_an_anchored_sample_that_are_inside_are_anchored_too(held):
+    held.anchors.state[:] = FREE
+    held.anchors.state[2] = ANCHORED
+    seize(held.anchors, held.body, held.visits, edge_at(0.0095), 1.0, 1e-2, held.tough, held.queue)
+    assert (held.anchors.state == ANCHORED).all()
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009, atol=1e-12)
+
+
+def test_anchors_raise_the_bound_on_frequency_by_their_stiffness(held):
+    scratch = np.zeros_like(held.body.rest)
+    none = np.zeros(len(held.body.rest))
+    bound = frequency_with_tool(tool_with(held.anchors), held.body, none, scratch)
+    assert not scratch.any()
+    assert bound > 4.0 * STIFF * held.anchors.length[0] / held.body.masses.sum()
+    held.anchors.state[:] = FREE
+    assert frequency_with_tool(tool_with(held.anchors), held.body, none, scratch) == 0.0
+
+
+def test_anchored_length_is_that_of_the_samples_that_pull(held):
+    assert anchored_length(held.anchors) == pytest.approx(0.016)
+    held.anchors.state[0] = RETRACTED
+    assert anchored_length(held.anchors) == pytest.approx(0.014)
+
+
+def test_an_anchor_moves_with_its_material_point(held):
+    held.body.positions[:] = held.body.rest * [1.0, 2.0, 1.0] + [0.0, 0.0, 0.5]
+    at = anchor_position(held.anchors, held.body, held.body.positions, 0)
+    assert at == pytest.approx((0.011, 0.018, 0.501))
+
+
+def test_a_stretched_body_maps_a_step_back_to_rest(held):
+    held.body.positions[:] = held.body.rest * [1.0, 1.5, 1.0]
+    assert to_material(held.body, 0, Vec3(0.0, 0.003, 0.0)) == pytest.approx((0.0, 0.002, 0.0))
+
+
+def test_a_step_in_a_squashed_tetrahedron_stays_as_it_is(held):
+    held.body.positions[:] = held.body.rest * [1.0, 1e-3, 1.0]
+    assert to_material(held.body, 0, Vec3(0.0, 0.003, 0.0)) == (0.0, 0.003, 0.0)
+
+
+def test_the_rotation_in_a_stretch_and_turn_is_the_turn():
+    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
+    turn *= np.linalg.det(turn)
+    stretched = turn @ np.diag([1.3, 0.8, 1.1])
+    found = rotation_of(Matrix3(*(Vec3(*column) for column in stretched.T.tolist())))
+    np.testing.assert_allclose(np.transpose(found), turn, atol=1e-9)
+
+
+def test_the_frame_of_the_edge_is_square():
+    forward = Vec3(0.0, 1.0, 0.4)
+    tip, heel = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.02)
+    frame = np.array(edge_frame(Edge(tip, heel, forward, tip, heel, forward), 0.5))
+    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(frame[1], [0.0, 1.0, 0.0])
+
+
+def test_a_search_goes_around_the_rim_of_a_cut(held):
+    """The block is cut at y = 20 mm but for its right half; the way leads around."""
+    body = held.body
+    rest = body.rest[body.tetrahedra]
+    for t, f in np.argwhere(body.links >= 0):
+        face = np.delete(rest[t], f, axis=0)
+        if np.allclose(face[:, 1], 0.02) and (face[:, 0] < 0.0101).all():
+            body.links[t, f] = CUT
+    beyond = Vec3(0.003, 0.023, 0.004)
+    start = walk(body, Vec3(0.003, 0.017, 0.004), 0).tetrahedron
+    assert walk(body, beyond, start).link == CUT
+    place = find(body, held.visits, beyond, start, held.queue)
+    assert place.inside
+    assert body.rest[body.tetrahedra[place.tetrahedron], 1].mean() > 0.02
+
+
+def test_a_search_that_ends_at_the_skin_says_so(held):
+    place = find(held.body, held.visits, Vec3(0.01, 0.5, 0.01), 0, held.queue)
+    assert not place.inside
+    assert place.beyond_skin
+    assert OUTER in held.body.links[place.tetrahedron]
+
+
+def test_an_anchor_beyond_the_tissue_is_put_at_a_point_of_it(held):
+    put(held.anchors, held.body, 0, 0, Vec3(0.011, 0.0, -0.5))
+    assert (held.anchors.weights[0] >= 0.0).all()
+    assert held.anchors.weights[0].sum() == pytest.approx(1.0)
+    low, high = BLOCK.positions.min(axis=0), BLOCK.positions.max(axis=0)
+    assert (low <= vec3(held.anchors.rest, 0)).all()
+    assert (vec3(held.anchors.rest, 0) <= high).all()

@@ -1,0 +1,88 @@
+"""The path of an edge whose way is given: samples advance or wait, and find where they are."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.kernels_of import cut_of
+from tissue import block
+from tissue.blade.prescribed_path import begin_path, prescribe_path
+from tissue.core.vec3 import Vec3
+from tissue.cutting.blade_path import resampled
+from tissue.mesh.point_location import build_grid
+
+pytestmark = pytest.mark.kernel
+
+AHEAD = Vec3(0.0, 1.0, 0.0)
+
+
+def at(y: float) -> np.ndarray:
+    """Return an upright edge with its tip and middle in the unit cube, and its heel above."""
+    return np.array([[0.5, y, 0.2], [0.5, y, 0.5], [0.5, y, 1.5]])
+
+
+@pytest.fixture
+def begun():
+    """A unit cube, its grid, and an edge that has not moved yet."""
+    cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)), n_samples=3)
+    begin_path(cut.path, at(0.2))
+    return cut, build_grid(cut.body, cut.body.rest, 0.0)
+
+
+def test_samples_go_where_they_are_told(begun):
+    cut, cells = begun
+    there = at(0.3)
+    prescribe_path(cut.path, cut.body, cells, there, AHEAD)
+    np.testing.assert_array_equal(cut.path.t0, at(0.2))
+    np.testing.assert_array_equal(cut.path.t1, there)
+    np.testing.assert_array_equal(cut.path.linked, [True, True, False])
+
+
+def test_a_sample_that_goes_back_waits_until_it_is_ahead_of_where_it_has_been(begun):
+    cut, cells = begun
+    for y in (0.3, 0.1, 0.25, 0.4):
+        prescribe_path(cut.path, cut.body, cells, at(y), AHEAD)
+        assert cut.path.t1[0, 1] == pytest.approx(max(y, 0.3))
+
+
+def test_samples_inside_know_a_tetrahedron_that_holds_them(begun):
+    cut, cells = begun
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
+    for k in range(2):
+        corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
+        assert (corners.min(axis=0) <= cut.path.t1[k]).all()
+        assert (cut.path.t1[k] <= corners.max(axis=0)).all()
+    assert cut.path.seed[2] == -1  # far above, and so is the way of its segment
+
+
+def test_the_side_of_the_blade_is_across_its_edge_and_its_way(begun):
+    cut, cells = begun
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
+    np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)
+
+
+def test_an_edge_is_divided_into_pieces_no_longer_than_the_spacing():
+    rows = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0], [1.0, 0.0, 2.0]]])
+    finer = resampled(rows, 0.25, 100)
+    assert finer.shape == (2, 9, 3)
+    np.testing.assert_allclose(finer[1, :, 2], np.linspace(0.0, 2.0, 9))
+
+
+def test_an_edge_is_divided_into_no_more_samples_than_there_may_be():
+    rows = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]] * 2)
+    assert resampled(rows, 1e-6, 50).shape[1] == 50
+
+
+def test_the_corners_of_a_bent_edge_stay_where_they_are():
+    rows = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.5, 1.0]]])
+    finer = resampled(rows, 0.5, 100)[0]
+    assert finer.tolist() == [[0, 0, 0], [0, 0, 0.5], [0, 0, 1], [0, 0.5, 1]]
+
+
+def test_a_jittered_body_gives_every_sample_inside_a_seed():
+    mesh = bodies.jittered(3, 0, size=1.0)
+    cut = cut_of(mesh, n_samples=20)
+    points = np.random.default_rng(0).uniform(0.01, 0.99, (20, 3))
+    begin_path(cut.path, points - [0.0, 1e-3, 0.0])
+    prescribe_path(cut.path, cut.body, build_grid(cut.body, cut.body.rest, 0.0), points, AHEAD)
+    assert (cut.path.seed >= 0).all()

@@ -1,0 +1,276 @@
+"""The faces of the blade: what they part, what they hold, and that action is reaction."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from tissue import BladeShape, Material, block
+from tissue.blade.anchors import Edge
+from tissue.blade.impulse_totals import (
+    IMPULSE,
+    IMPULSE_TORQUE,
+    N_TOTALS,
+    RELEASED,
+    TISSUE_IMPULSE,
+    WORK_OF_BLADE,
+    WORK_OF_FRICTION,
+)
+from tissue.blade.side_contact import (
+    POINTS,
+    add_flank_stiffness,
+    blade_frame,
+    depth,
+    face_point,
+    in_blade,
+    new_flanks,
+    press_flanks,
+    profile,
+    slide_flanks,
+    with_more_rows,
+)
+from tissue.blade.side_search import find_faces, forget_cells, forget_faces
+from tissue.core.vec3 import Vec3, cross, vec3
+from tissue.mesh.body import build_body
+from tissue.mesh.point_location import build_grid
+from tissue.mesh.star import no_visits
+
+pytestmark = pytest.mark.kernel
+
+SHAPE = BladeShape(thickness=2e-3, bevel_angle=math.atan(0.25), height=20e-3)
+MATERIAL = Material(blade_friction=0.5)
+BLOCK = block((2, 2, 2), (0.01, 0.01, 0.01))
+LENGTH = 0.03
+
+
+def edge_at(x, y=0.015, z=-0.01, forward=Vec3(0.0, 1.0, 0.0)):
+    """An upright blade across x, whose edge is behind the block and whose side is at the block."""
+    tip, heel = Vec3(x, y, z), Vec3(x, y, z + LENGTH)
+    return Edge(tip, heel, forward, tip, heel, forward)
+
+
+class Pressed:
+    """The block, which ends at x = 0.01, and a blade beside it, whose side is at x - 1 mm."""
+
+    def __init__(self, x=0.0115, material=MATERIAL):
+        self.body = build_body(BLOCK, None, None)
+        self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
+        self.flanks = new_flanks(SHAPE, material, 0.005, len(BLOCK.tetrahedra))
+        self.totals = np.zeros(N_TOTALS)
+        self.forces = np.zeros_like(self.body.rest)
+        self.find(edge_at(x))
+
+    def find(self, edge, margin=2e-3):
+        tetrahedra = build_grid(self.body, self.body.positions, 0.0)
+        forget_cells(self.flanks)
+        self.look(tetrahedra, edge, margin)
+
+    def look(self, tetrahedra, edge, margin=2e-3):
+        where = (self.body, self.visits, tetrahedra, edge, 1.0, margin, self.totals)
+        while not find_faces(self.flanks, *where):
+            self.flanks = with_more_rows(self.flanks)
+
+    def press(self, edge):
+        self.forces[:] = 0.0
+        x = self.body.positions
+        press_flanks(self.flanks, edge, x, 1.0, 1.0, 1.0, self.forces, self.totals)
+        return self.forces.sum(axis=0)
+
+    def slide(self, edge):
+        slide_flanks(self.flanks, edge, self.body.positions, 1.0, 1e-3, self.totals)
+
+
+@pytest.fixture
+def pressed():
+    return Pressed()
+
+
+def test_the_profile_is_a_wedge_with_a_back_and_two_ends():
+    flanks = new_flanks(SHAPE, MATERIAL, 0.005, 1)
+    reach = [
+        profile(flanks, LENGTH, 0.0, Vec3(a, s, 0.0)).z
+        for a, s in [(0.015, 0.0), (0.015, 2e-3), (0.015, 9e-3), (0.015, 0.02), (0.0, 9e-3)]
+    ]
+    np.testing.assert_allclose(reach, [0.0, 0.5e-3, 1e-3, 0.0, 0.0], atol=1e-15)
+
+
+def test_the_faces_beside_the_blade_are_found_once_each(pressed):
+    rows = pressed.flanks.face[: pressed.flanks.count[0]]
+    beside = [row for row in rows if (pressed.body.rest[pressed.body.tetrahedra[row // 4]][
+        [k for k in range(4) if k != row % 4], 0] > 0.0099).all()]  # fmt: skip
+    assert len(beside) == 8  # four squares of two triangles
+    assert len(set(rows.tolist())) == len(rows)
+
+
+def test_a_blade_that_does_not_reach_the_tissue_does_not_press_it(pressed):
+    assert not pressed.press(edge_at(0.0115)).any()
+
+
+def test_pressure_is_stiffness_times_depth_times_area(pressed):
+    force = pressed.press(edge_at(0.0108))  # its side is 0.2 mm inside
+    expected = pressed.flanks.stiffness * 0.2e-3 * 0.01**2
+    np.testing.assert_allclose(force, [-expected, 0.0, 0.0], rtol=1e-9, atol=1e-12)
+
+
+def test_what_the_blade_does_to_the_tissue_is_done_to_it(pressed):
+    pressed.press(edge_at(0.0108))
+    tissue, blade = pressed.totals[TISSUE_IMPULSE:][:3], pressed.totals[IMPULSE:][:3]
+    np.testing.assert_allclose(tissue, -blade, rtol=1e-12)
+    torque = sum(
+        np.array(cross(vec3(pressed.body.positions, i), vec3(pressed.forces, i)))
+        for i in range(len(pressed.forces))
+    )
+    np.testing.assert_allclose(pressed.totals[IMPULSE_TORQUE:][:3], -torque, atol=1e-15)
+
+
+def test_a_point_that_is_first_seen_within_the_blade_is_not_thrown_out():
+    pressed = Pressed(x=0.0106)
+    assert not pressed.press(edge_at(0.0106)).any()
+
+
+def test_the_bevel_reaches_such_a_point_as_the_blade_goes_on():
+    """2 mm further the bevel, of slope 1/4, is 0.5 mm thicker; the side of the blade is 0.4 in."""
+    pressed = Pressed(x=0.0106)
+    force = pressed.press(edge_at(0.0106, y=0.017))
+    expected = pressed.flanks.stiffness * 0.4e-3 * 0.01**2
+    assert -force[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_rising_bevel_pushes_the_tissue_forward():
+    """The wedge pays for what it parts: forward force is outward force times the slope."""
+    pressed = Pressed(x=0.0106, material=Material())
+    force = pressed.press(edge_at(0.0106, y=0.0158))
+    assert force[0] < 0.0
+    assert force[1] == pytest.approx(-0.25 * force[0], rel=1e-9)
+
+
+def test_friction_holds_below_its_limit_and_slides_above(pressed):
+    edge = edge_at(0.0108)
+    pressed.press(edge)
+    pressed.slide(edge)
+    normal = -pressed.press(edge)[0]
+    little, far = edge_at(0.0108, y=0.0150499), edge_at(0.0108, y=0.016)
+    stuck = pressed.press(little)[1]
+    assert stuck == pytest.approx(pressed.flanks.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
+    assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
+
+
+def test_sliding_takes_friction_times_way(pressed):
+    pressed.slide(edge_at(0.0108))
+    normal = -pressed.press(edge_at(0.0108))[0]
+    for y in (0.0155, 0.0165):
+        before = pressed.totals[WORK_OF_FRICTION]
+        pressed.press(edge_at(0.0108, y=y))
+        pressed.slide(edge_at(0.0108, y=y))
+    taken = pressed.totals[WORK_OF_FRICTION] - before
+    assert taken == pytest.approx(0.5 * normal * 1e-3, rel=1e-6)
+
+
+def test_viscosity_adds_stress_times_speed():
+    """The point slid 0.5 mm in 1 ms, but for the few percent by which its spring still grew."""
+    dry, wet = Pressed(), Pressed(material=Material(blade_friction=0.5, blade_viscosity=1e3))
+    forces = []
+    for one in (dry, wet):
+        for y in (0.015, 0.0155, 0.016):
+            one.press(edge_at(0.0108, y=y))
+            one.slide(edge_at(0.0108, y=y))
+        forces.append(one.press(edge_at(0.0108, y=0.016))[1])
+    assert forces[1] - forces[0] == pytest.approx(1e3 * 0.5 * 0.01**2, rel=0.1)
+
+
+def test_the_force_is_the_slope_of_the_energy(pressed):
+    """Work of the blade from outside to 0.2 mm inside, in 200 parts, is what is stored."""
+    xs = np.linspace(0.0112, 0.0108, 201)
+    for a, b in itertools.pairwise(xs):
+        end, start = edge_at(b), edge_at(a)
+        after = (end.tip_t1, end.heel_t1, end.forward_t1)
+        moving = Edge(start.tip_t0, start.heel_t0, start.forward_t0, *after)
+        at_half = pressed.totals
+        press_flanks(
+            pressed.flanks, moving, pressed.body.positions, 0.5, 1.0, 1.0, pressed.forces, at_half
+        )
+    pressed.slide(edge_at(0.0108))
+    stored = pressed.flanks.energy[: pressed.flanks.count[0]].sum()
+    assert pressed.totals[WORK_OF_BLADE] == pytest.approx(stored, rel=1e-4)
+    forget_faces(pressed.flanks, pressed.totals)
+    assert pressed.totals[RELEASED] == pytest.approx(stored, rel=1e-12)
+
+
+def test_a_known_face_keeps_what_it_holds(pressed):
+    edge = edge_at(0.0108)
+    pressed.slide(edge)
+    dragged = edge_at(0.0108, y=0.01503)
+    before = pressed.press(dragged)
+    pressed.find(dragged)
+    np.testing.assert_allclose(pressed.press(dragged), before, rtol=1e-9)
+
+
+def test_to_look_again_at_what_trembles_under_the_blade_gives_it_no_energy(pressed):
+    edge = edge_at(0.0108)
+    pressed.slide(edge)
+    pressed.body.positions[:, 1] *= 1.1  # its faces are larger now
+    pressed.slide(edge)
+    before = pressed.totals[RELEASED]
+    areas = pressed.flanks.area[: pressed.flanks.count[0]].copy()
+    held = pressed.flanks.energy[: pressed.flanks.count[0]] > 0.0
+    assert held.any()
+    pressed.find(edge)
+    assert pressed.totals[RELEASED] == pytest.approx(before, abs=1e-18)
+    np.testing.assert_array_equal(pressed.flanks.area[: len(areas)][held], areas[held])
+
+
+def test_nodes_beside_the_blade_count_as_stiffer(pressed):
+    rows = np.zeros_like(pressed.body.rest)
+    add_flank_stiffness(pressed.flanks, rows)
+    area = POINTS * pressed.flanks.area[: pressed.flanks.count[0]].sum()
+    assert rows[:, 0].sum() >= pressed.flanks.stiffness * area
+
+
+def test_coordinates_on_the_blade_are_those_of_its_frame(pressed):
+    at = in_blade(blade_frame(edge_at(0.0), 1.0), Vec3(0.002, 0.005, 0.004))
+    np.testing.assert_allclose(at, [0.014, 0.01, abs(at.z) * np.sign(at.z)], atol=1e-15)
+    assert abs(at.z) == pytest.approx(0.002)
+
+
+def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
+    frame = blade_frame(edge_at(0.0108), 1.0)
+    rows = range(int(pressed.flanks.count[0]))
+    depths = [
+        depth(pressed.flanks, LENGTH, i, 0,
+              in_blade(frame, face_point(pressed.flanks, pressed.body.positions, i, 0))).z
+        for i in rows
+    ]  # fmt: skip
+    assert max(depths) == pytest.approx(0.2e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ({"thickness": -1e-3}, "thickness"),
+        ({"height": math.nan}, "height"),
+        ({"bevel_angle": 1.5}, "degrees"),
+        ({"height": 1e-4}, "bevels"),
+        ({"edge_radius": -1.0}, "edge_radius"),
+    ],
+)
+def test_a_blade_that_cannot_be_is_refused_by_name(wrong, why):
+    with pytest.raises(ValueError, match=why):
+        BladeShape(**wrong)
+
+
+def test_a_blade_that_stays_in_its_cells_finds_what_a_search_anew_would():
+    """To and fro by less than a cell, into another one, and away."""
+    pressed = Pressed()
+    kept = build_grid(pressed.body, pressed.body.positions, 0.5e-3)
+    numbers = []
+    for x in (0.0115, 0.0113, 0.0109, 0.0131, 0.0045, 0.0115):
+        faces = []
+        for anew in (False, True):
+            if anew:
+                forget_cells(pressed.flanks)
+            pressed.look(kept, edge_at(x))
+            faces.append(pressed.flanks.face[: pressed.flanks.count[0]].tolist())
+        assert faces[0] == faces[1]
+        numbers.append(len(faces[0]))
+    assert 0 < numbers.count(0) < len(numbers)

@@ -1,0 +1,79 @@
+"""Beside a cut face a blade is in its slit; before the rim, below the bottom, across it: not."""
+
+import numpy as np
+import pytest
+
+from tissue import Tissue, block
+from tissue.blade.slit import behind_edge, in_slit
+from tissue.core.vec3 import Vec3
+from tissue.cutting.blade_path import new_path
+from tissue.mesh.body import TETRAHEDRA
+from tissue.mesh.point_location import build_grid, tetrahedron_at
+
+EDGE = 0.04
+REACH = 1e-3
+UP, AHEAD, ACROSS = Vec3(0.0, 0.0, 1.0), Vec3(0.0, 1.0, 0.0), Vec3(1.0, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def slit_body():
+    """A cube with a slit at x = 20 mm, from y = 0 to 20 mm, from its top down to z = 20 mm."""
+    tissue = Tissue(block((4, 4, 4), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))
+    y = np.linspace(-0.01, 0.02, 31)
+    edges = [[[0.02, at, 0.02], [0.02, at, 0.05]] for at in y]
+    area = tissue.incise(edges, (0.0, 1.0, 0.0))
+    assert area == pytest.approx(4e-4)
+    return tissue._body
+
+
+def is_in_slit(body, x, y, z, along=UP, forward=AHEAD) -> bool:
+    p = Vec3(x, y, z)
+    t = tetrahedron_at(body, build_grid(body, body.rest, 0.0), body.rest, p)
+    assert 0 <= t < body.counts[TETRAHEDRA]
+    return in_slit(body, t, p, along, forward, REACH)
+
+
+@pytest.mark.parametrize("x", [0.0195, 0.0205])
+def test_a_blade_along_a_cut_face_on_either_side_is_in_the_slit(slit_body, x):
+    assert is_in_slit(slit_body, x, 0.011, 0.033)
+
+
+def test_a_blade_a_few_reaches_beside_the_cut_is_in_whole_tissue(slit_body):
+    assert not is_in_slit(slit_body, 0.025, 0.011, 0.033)
+
+
+def test_a_blade_ahead_of_the_rim_is_in_whole_tissue(slit_body):
+    assert not is_in_slit(slit_body, 0.0201, 0.0207, 0.033)
+
+
+def test_a_blade_below_the_bottom_is_in_whole_tissue(slit_body):
+    assert not is_in_slit(slit_body, 0.0201, 0.011, 0.0193)
+
+
+def test_a_blade_that_crosses_the_slit_is_in_whole_tissue(slit_body):
+    assert not is_in_slit(slit_body, 0.0195, 0.011, 0.033, forward=ACROSS)
+
+
+def test_a_body_without_a_cut_has_no_slit():
+    body = Tissue(block((2, 2, 2), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))._body
+    assert not is_in_slit(body, 0.019, 0.011, 0.033)
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize(
+    ("place", "expected"),
+    [
+        ((0.0, -0.5, 0.5), True),
+        ((0.0, 0.5, 0.5), False),
+        ((0.0, -0.5, -0.5), False),
+        ((0.0, -0.5, 1.5), False),
+        ((0.3, -0.5, 0.5), True),
+    ],
+    ids=["behind", "ahead", "below the tip", "above the heel", "behind, aside"],
+)
+def test_a_point_is_behind_the_edge_between_tip_and_heel_only(place, expected):
+    path = new_path(3)
+    path.t1[:] = [[0.0, 0.0, z] for z in (0.0, 0.5, 1.0)]
+    path.forward[:] = [0.0, 1.0, 0.0]
+    path.linked[:2] = True
+    assert behind_edge(path, Vec3(*place)) == expected

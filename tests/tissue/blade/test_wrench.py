@@ -1,0 +1,109 @@
+"""Wrench, stiffness and contacts at an instant: three views of the same forces."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tests.bodies import sides
+from tissue import BladeSegment, BladeShape, BladeSweep, Material, Tissue, block
+
+MESH = block((6, 6, 3), (0.04, 0.04, 0.02))
+TOUGH = Material(toughness=20.0, blade_friction=0.3)
+DT = 1e-3
+NO_GRAVITY = (0.0, 0.0, 0.0)
+
+
+def edge_at(y, x=0.0201, turned=0.0):
+    tip = np.array([x, y, -0.005])
+    return BladeSegment(
+        tip, tip + np.array([0.0, 0.0, 0.03]), np.array([np.sin(turned), np.cos(turned), 0.0])
+    )
+
+
+def cut_to(y, material=TOUGH, blade=BladeShape()):
+    """Return a tissue that was cut from y = 0 to there, the last result, and where the edge is."""
+    tissue = Tissue(MESH, material, fixed=sides(MESH), gravity=NO_GRAVITY, blade=blade)
+    poses = [edge_at(at) for at in np.arange(-0.002, y, 1e-4)]
+    for a, b in itertools.pairwise(poses):
+        result = tissue.step(BladeSweep(a, b), DT)
+    return tissue, result, poses[-1]
+
+
+@pytest.fixture(scope="module")
+def cut():
+    return cut_to(0.02)
+
+
+def test_the_contacts_add_up_to_the_wrench(cut):
+    _, result, _ = cut
+    contacts, wrench = result.contacts, result.wrench_t1
+    forces = contacts.normal * contacts.normal_force[:, None] + contacts.friction
+    np.testing.assert_allclose(forces.sum(axis=0), -wrench.force, atol=1e-12)
+    assert (contacts.normal_force >= 0.0).all()
+    np.testing.assert_allclose(np.linalg.norm(contacts.normal, axis=1), 1.0, rtol=1e-12)
+
+
+def test_the_area_of_the_contacts_is_what_the_step_cut():
+    tissue, result, pose = cut_to(0.015)
+    poses = [edge_at(pose.tip[1] + i * 1e-4) for i in range(21)]
+    areas, works = [], [result.work_of_cutting]
+    for a, b in itertools.pairwise(poses):
+        result = tissue.step(BladeSweep(a, b), DT)
+        areas.append(result.contacts.cut_area.sum())
+        works.append(result.work_of_cutting)
+    np.testing.assert_allclose(np.array(areas) * TOUGH.toughness, np.diff(works), rtol=1e-9)
+    assert sum(areas) == pytest.approx(2e-3 * 0.02, rel=0.3)  # the lips spring forward
+
+
+def test_friction_is_within_its_cone(cut):
+    _, result, _ = cut
+    faces = result.contacts.cut_area == 0.0
+    faces &= np.abs(result.contacts.normal[:, 0]) > 0.5
+    assert faces.any()
+    friction = np.linalg.norm(result.contacts.friction[faces], axis=1)
+    along_normal = result.contacts.normal_force[faces]
+    # The normal leans forward on the bevels, where the pressure is the x of it.
+    assert (friction <= 0.3 * along_normal * (1.0 + 1e-9)).all()
+
+
+def test_views_cost_no_copy(cut):
+    _, result, _ = cut
+    assert all(view.base is not None for view in result.contacts)
+
+
+def test_the_mean_wrench_is_that_at_the_end_where_nothing_changes():
+    tissue, _, pose = cut_to(0.02, Material(viscous_damping=100.0))
+    for _ in range(300):
+        result = tissue.step(BladeSweep(pose, pose), DT)
+    np.testing.assert_allclose(result.wrench.force, result.wrench_t1.force, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(result.wrench.torque, result.wrench_t1.torque, rtol=1e-3, atol=1e-6)
+
+
+def test_stiffness_is_symmetric_and_positive(cut):
+    _, result, _ = cut
+    np.testing.assert_array_equal(result.stiffness, result.stiffness.T)
+    assert np.linalg.eigvalsh(result.stiffness).min() > -1e-9 * np.trace(result.stiffness)
+    assert np.linalg.eigvalsh(result.stiffness).max() > 100.0  # a scalpel in tissue: N/m
+
+
+@pytest.mark.parametrize("blade", [None, BladeShape()])
+@pytest.mark.parametrize("axis", [0, 2])
+def test_stiffness_is_how_the_force_changes_before_the_tissue_moves(blade, axis):
+    """A shift of a micrometre sideways or along the edge, in 0.1 us: the tissue stays."""
+    forces = []
+    for way in (0.0, 1e-6):
+        tissue, result, pose = cut_to(0.01, Material(toughness=2000.0), blade)
+        shift = way * np.eye(3)[axis]
+        moved = pose._replace(tip=pose.tip + shift, heel=pose.heel + shift)
+        forces.append(tissue.step(BladeSweep(pose, moved), 1e-7).wrench_t1.force)
+    change = (forces[1] - forces[0]) / 1e-6
+    np.testing.assert_allclose(change, -result.stiffness[:3, axis], rtol=0.02, atol=5.0)
+
+
+def test_without_a_blade_nothing_acts(cut):
+    tissue, _, _ = cut_to(0.01)
+    result = tissue.step(None, DT)
+    assert not result.wrench_t1.force.any()
+    assert not result.stiffness.any()
+    assert len(result.contacts.point) == 0

@@ -1,0 +1,72 @@
+"""Edges of blocks that one can draw: those of a box are ridges, those in its faces are flat."""
+
+import numpy as np
+import pytest
+
+from tissue import TetrahedralMesh, block
+from tissue.contact.feature_edges import across, is_ridge
+from tissue.mesh.body import OUTER, build_body
+from tissue.mesh.surface import OUTWARD
+
+pytestmark = pytest.mark.kernel
+
+
+def boundary_edges(body):
+    """Return every edge of every boundary face: tetrahedron, face, edge, and its two ends."""
+    return [
+        (t, f, k, *(int(body.tetrahedra[t, OUTWARD[f, (k + q) % 3]]) for q in (0, 1)))
+        for t, f in zip(*np.nonzero(body.links == OUTER), strict=True)
+        for k in range(3)
+    ]
+
+
+def without(mesh, low):
+    """Return a mesh without the tetrahedra whose middle is beyond `low` [m] in every direction."""
+    middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
+    kept = mesh.tetrahedra[~(middles > low).all(axis=1)]
+    nodes, renamed = np.unique(kept, return_inverse=True)
+    return TetrahedralMesh(mesh.positions[nodes], renamed.reshape(-1, 4))
+
+
+def test_beyond_an_edge_is_the_other_face_that_has_it():
+    body = build_body(block((2, 2, 1), (0.02, 0.02, 0.01)), None, None)
+    edges = boundary_edges(body)
+    for t, f, k, a, b in edges:
+        (beyond,) = ((u, g, m) for u, g, m, c, d in edges if (c, d) == (b, a))
+        face, tip = across(body, t, f, k, OUTWARD)
+        assert face == 4 * beyond[0] + beyond[1]
+        assert tip == body.tetrahedra[beyond[0], OUTWARD[beyond[1], (beyond[2] + 2) % 3]]
+
+
+def test_of_a_block_only_the_edges_of_the_box_are_ridges():
+    size = np.array([0.02, 0.02, 0.01])
+    body = build_body(block((2, 2, 1), size), None, None)
+    for t, f, k, a, b in boundary_edges(body):
+        ends = body.rest[[a, b]]
+        n_sides = sum((ends[:, x] == side).all() for x in range(3) for side in (0.0, size[x]))
+        assert is_ridge(body, t, f, k, OUTWARD) == (n_sides == 2)
+
+
+def test_the_inner_edge_of_an_l_is_a_valley_and_no_ridge():
+    mesh = without(block((2, 1, 2), (0.02, 0.01, 0.02)), [0.01, 0.0, 0.01])
+    body = build_body(mesh, None, None)
+    inner = outer = 0
+    for t, f, k, a, b in boundary_edges(body):
+        ends = body.rest[[a, b]]
+        if (ends[:, [0, 2]] == 0.01).all():
+            assert not is_ridge(body, t, f, k, OUTWARD)
+            inner += 1
+        elif (ends[:, [0, 2]] == 0.0).all():
+            assert is_ridge(body, t, f, k, OUTWARD)
+            outer += 1
+    assert inner == 2 and outer == 2
+
+
+def test_the_edge_of_a_blade_like_wedge_is_a_ridge():
+    """Its two faces are folded onto each other, two degrees apart."""
+    thin = 0.0175
+    wedge = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, thin], [1.0, 0.5, -thin]])
+    body = build_body(TetrahedralMesh(0.01 * wedge, np.array([[0, 1, 2, 3]])), None, None)
+    edges = [row for row in boundary_edges(body) if {row[3], row[4]} == {0, 1}]
+    assert len(edges) == 2
+    assert all(is_ridge(body, t, f, k, OUTWARD) for t, f, k, _, _ in edges)

@@ -1,0 +1,93 @@
+"""`Arrays`: what goes into a struct is what a kernel reads and writes."""
+
+import numpy as np
+import pytest
+
+from tissue import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+
+pytestmark = pytest.mark.kernel
+
+
+class Inner(Arrays):
+    values: FloatArray
+    weight: float
+
+
+class Outer(Arrays):
+    numbers: IntArray
+    inner: Inner
+    table: FloatArray
+    flags: np.ndarray
+
+
+def example(n=3):
+    return Outer(
+        numbers=np.arange(n),
+        inner=Inner(values=np.linspace(0.0, 1.0, n), weight=2.5),
+        table=np.arange(2.0 * n).reshape(n, 2),
+        flags=np.array([True, False, True]),
+    )
+
+
+@kernel
+def summed(outer):
+    """Reads every field, through a struct in the struct."""
+    total = 0.0
+    for i in range(len(outer.numbers)):
+        total += outer.numbers[i] + outer.inner.weight * outer.inner.values[i]
+    for i in range(outer.table.shape[0]):
+        for j in range(outer.table.shape[1]):
+            total += outer.table[i, j]
+    if outer.flags[0] and not outer.flags[1]:
+        total += 100.0
+    return total
+
+
+@kernel
+def write(outer):
+    outer.table[1, 1] = -1.0
+    outer.inner.values[0] = 7.0
+
+
+def test_a_kernel_reads_every_kind_of_field():
+    assert summed(example()) == pytest.approx(3 + 2.5 * 1.5 + 15 + 100)
+
+
+def test_a_kernel_writes_into_the_arrays_themselves():
+    outer = example()
+    write(outer)
+    assert outer.table[1, 1] == -1.0
+    assert outer.inner.values[0] == 7.0
+
+
+def test_one_kernel_serves_arrays_of_any_size():
+    assert summed(example(3)) != summed(example(3).replaced(numbers=np.arange(2)))
+
+
+def test_replaced_keeps_the_other_fields_and_leaves_the_first_alone():
+    first = example()
+    second = first.replaced(numbers=np.array([10, 20]))
+    assert second.inner is first.inner
+    assert second.table is first.table
+    assert len(first.numbers) == 3
+
+
+@pytest.mark.parametrize(
+    "fields", [{}, {"values": np.zeros(2)}, {"values": 0, "weight": 1, "x": 2}]
+)
+def test_missing_and_unknown_fields_are_refused(fields):
+    with pytest.raises(TypeError, match="Inner takes"):
+        Inner(**fields)
+
+
+def test_an_array_with_gaps_is_refused():
+    with pytest.raises(TypeError, match="contiguous"):
+        Inner(values=np.zeros(10)[::2], weight=1.0)
+
+
+def test_a_field_of_another_type_than_before_is_refused():
+    example()
+    with pytest.raises(TypeError, match="other types"):
+        Inner(values=np.zeros(3, dtype=np.int64), weight=1.0)

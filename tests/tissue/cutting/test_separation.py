@@ -1,0 +1,163 @@
+"""Opening the sheet: two tetrahedra, a fan, a crumb; which faces are cut, which nodes doubled."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, naive, soundness
+from tests.tissue.kernels_of import cut_of
+from tissue import block
+from tissue.cutting.blade_path import put_on_lattice
+from tissue.cutting.cut_surface import decide_side, see_side
+from tissue.cutting.separation import open_sheet, tetrahedron_side
+from tissue.cutting.workspace import flag
+from tissue.mesh.body import CUT, NODES, TETRAHEDRA
+from tissue.mesh.changes import N_FACES, clear_changes
+
+pytestmark = pytest.mark.kernel
+
+
+def blade_in_plane(cut, x: float, sideways: float = 1.0) -> None:
+    """Let an upright edge at `x` lie beside the whole body, facing along y."""
+    path = cut.path
+    path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
+    path.t0[:] = path.t1 - [0.0, 0.1, 0.0]
+    path.forward[:] = [0.0, 1.0, 0.0]
+    path.sideways[:] = [sideways, 0.0, 0.0]
+    path.member[:] = True
+    path.linked[0] = True
+    put_on_lattice(path, cut.body.lattice)
+
+
+def two_halves():
+    """Return a unit cube of 2 x 1 x 1 cells, the nodes of its middle plane on the sheet."""
+    cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
+    blade_in_plane(cut, 0.5)
+    x = cut.body.rest[: cut.body.counts[NODES], 0]
+    for node in np.flatnonzero(x == 0.5):
+        flag(cut, node)
+    return cut
+
+
+def mesh_of(cut):
+    return cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]]
+
+
+def test_faces_between_the_two_sides_of_the_sheet_are_cut_and_their_nodes_doubled():
+    cut = two_halves()
+    open_sheet(cut)
+    assert cut.change.counts[N_FACES] == 2  # the square in the middle
+    assert cut.body.counts[NODES] == 12 + 4
+    assert soundness.n_pieces(mesh_of(cut)) == 2
+    assert soundness.link_faults(cut.body) == []
+    assert cut.change.area[0] == pytest.approx(1.0)
+
+
+def test_copies_lie_where_the_node_was_and_know_each_other():
+    cut = two_halves()
+    open_sheet(cut)
+    for copy in range(12, 16):
+        node = cut.body.twin[copy]
+        assert cut.body.twin[node] == copy
+        np.testing.assert_array_equal(cut.body.rest[copy], cut.body.rest[node])
+
+
+def test_a_second_look_at_an_open_sheet_changes_nothing():
+    cut = two_halves()
+    open_sheet(cut)
+    tetrahedra = mesh_of(cut).copy()
+    clear_changes(cut.change)
+    open_sheet(cut)
+    np.testing.assert_array_equal(mesh_of(cut), tetrahedra)
+    assert cut.change.counts[N_FACES] == 0
+
+
+def test_a_face_with_a_node_off_the_sheet_stays_whole():
+    cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
+    blade_in_plane(cut, 0.5)
+    on = np.flatnonzero(cut.body.rest[:12, 0] == 0.5)
+    for node in on[:2]:
+        flag(cut, node)
+    open_sheet(cut)
+    assert soundness.n_pieces(mesh_of(cut)) == 1
+    assert cut.body.counts[NODES] == 12
+
+
+def test_a_single_cut_face_inside_opens_no_node():
+    """Around its rim the tetrahedra still hang together."""
+    cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
+    blade_in_plane(cut, 0.5)
+    tetrahedra = mesh_of(cut)
+    rest = cut.body.rest
+    faces = soundness.faces_of(tetrahedra)
+    middle = [f for f in faces.nodes if (rest[f, 0] == 0.5).all() and 13 in f]
+    for node in middle[0]:
+        flag(cut, node)
+    open_sheet(cut)
+    assert cut.change.counts[N_FACES] == 1
+    assert cut.body.counts[NODES] == 27
+    assert (cut.body.links[: len(tetrahedra)] == CUT).sum() == 2
+
+
+def test_the_last_face_of_a_tetrahedron_holds():
+    cut = cut_of(bodies.two_tetrahedra())
+    blade_in_plane(cut, 0.4)
+    for node in (1, 2, 3):
+        flag(cut, node)
+    open_sheet(cut)
+    assert cut.change.counts[N_FACES] == 0
+    assert cut.body.counts[NODES] == 5
+
+
+def test_a_piece_smaller_than_a_crumb_stays_with_the_body():
+    cut = two_halves()
+    cut = cut.replaced(quality=cut.quality.replaced(crumb=0.51))
+    open_sheet(cut)
+    assert soundness.n_pieces(mesh_of(cut)) == 1
+    assert cut.body.counts[NODES] == 12
+
+
+def test_links_after_a_cut_are_those_of_the_new_tetrahedra_built_from_scratch():
+    cut = two_halves()
+    open_sheet(cut)
+    links = cut.body.links[: len(mesh_of(cut))]
+    np.testing.assert_array_equal(np.maximum(links, -1), naive.links(mesh_of(cut)))
+
+
+# which side a tetrahedron is on
+
+
+def one_tetrahedron(*on_sheet: int):
+    """Return the corner of a cube, its nodes of those numbers on the sheet at x = 0.3."""
+    cut = cut_of(bodies.unit_tetrahedron())
+    blade_in_plane(cut, 0.3)
+    for node in on_sheet:
+        flag(cut, node)
+    return cut
+
+
+def test_a_side_that_was_decided_stays():
+    cut = one_tetrahedron(0, 2, 3)
+    decide_side(cut.sheet, 0, -1)
+    assert tetrahedron_side(cut, 0) == -1
+
+
+def test_a_side_that_a_node_was_seen_on_outweighs_where_it_lies():
+    cut = one_tetrahedron(0, 2, 3)
+    assert tetrahedron_side(cut, 0) == 1  # node 1 is at x = 1
+    see_side(cut.sheet, 1, -1, True)
+    assert tetrahedron_side(cut, 0) == -1
+
+
+def test_a_tetrahedron_seen_on_both_sides_is_on_neither_yet():
+    cut = one_tetrahedron(2, 3)
+    see_side(cut.sheet, 0, -1, True)
+    see_side(cut.sheet, 1, 1, True)
+    assert tetrahedron_side(cut, 0) == 0
+
+
+def test_a_tetrahedron_that_lies_on_both_sides_is_on_neither_yet():
+    assert tetrahedron_side(one_tetrahedron(2, 3), 0) == 0
+
+
+def test_a_tetrahedron_with_all_nodes_on_the_sheet_is_where_its_middle_is():
+    assert tetrahedron_side(one_tetrahedron(0, 1, 2, 3), 0) == -1  # x = 0.25

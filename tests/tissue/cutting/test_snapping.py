@@ -1,0 +1,128 @@
+"""One crossing of one edge: when it splits the edge, when it uses an end, when it does nothing."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.kernels_of import cut_of
+from tissue.core.vec3 import Vec3
+from tissue.cutting.blade_path import put_on_lattice
+from tissue.cutting.cut_surface import begin_sheet, on_sheet, side_of
+from tissue.cutting.snapping import insert_crossing, insert_in_face, snap_distance, sort_crossings
+from tissue.cutting.workspace import flag
+from tissue.mesh.body import NODES
+from tissue.mesh.changes import N_FLAGGED
+
+pytestmark = pytest.mark.kernel
+
+SIZE = 1.0 / np.sqrt(3.0)
+"""Size of the node at the origin of the corner of a cube: its altitude; that of the others is 1."""
+
+
+def corner(x: float, **quality):
+    """Return the corner of a unit cube, a blade across it at `x`, its side +1 towards +x."""
+    cut = cut_of(bodies.unit_tetrahedron())
+    path = cut.path
+    path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
+    path.t0[:] = path.t1 - [0.0, 1.0, 0.0]
+    path.forward[:] = [0.0, 1.0, 0.0]
+    path.sideways[:] = [1.0, 0.0, 0.0]
+    path.member[:] = True
+    path.linked[0] = True
+    put_on_lattice(path, cut.body.lattice)
+    return cut.replaced(quality=cut.quality.replaced(**quality))
+
+
+def test_an_edge_crossed_in_its_middle_gets_a_node_there():
+    cut = corner(0.5)
+    insert_crossing(cut, 0, 1, 0, 0.5)
+    assert cut.body.counts[NODES] == 5
+    np.testing.assert_allclose(cut.body.rest[4], [0.5, 0.0, 0.0])
+    assert on_sheet(cut.sheet, 4)
+
+
+def test_the_ends_of_a_crossed_edge_are_seen_on_their_sides():
+    cut = corner(0.5)
+    insert_crossing(cut, 0, 1, 0, 0.5)
+    assert (side_of(cut.sheet, 0), side_of(cut.sheet, 1)) == (-1, 1)
+
+
+@pytest.mark.parametrize(("share", "splits"), [(0.29, False), (0.31, True)])
+def test_a_crossing_nearer_than_a_share_of_the_node_s_size_uses_the_node(share, splits):
+    x = share * SIZE
+    cut = corner(x, snap=0.3)
+    insert_crossing(cut, 0, 1, 0, x)
+    assert (cut.body.counts[NODES] == 5) == splits
+    assert on_sheet(cut.sheet, 0) != splits
+
+
+def test_a_crossing_nearer_than_the_floor_uses_the_node():
+    cut = corner(0.25, snap=0.0, floor=0.3)
+    insert_crossing(cut, 0, 1, 0, 0.25)
+    assert cut.body.counts[NODES] == 4
+    assert on_sheet(cut.sheet, 0)
+
+
+def test_a_split_that_would_break_the_guard_uses_the_nearest_node():
+    cut = corner(0.3, snap=0.01, guard=0.5)
+    insert_crossing(cut, 0, 1, 0, 0.3)
+    assert cut.body.counts[NODES] == 4
+    assert on_sheet(cut.sheet, 0)
+
+
+def test_the_offset_of_a_node_is_how_far_it_lies_from_the_sheet():
+    cut = corner(0.1)
+    insert_crossing(cut, 0, 1, 0, 0.1)
+    assert cut.sheet.offset[0] == pytest.approx(0.1)
+
+
+def test_a_crossing_beside_a_node_on_the_sheet_is_explained_by_it():
+    cut = corner(0.1)
+    insert_crossing(cut, 0, 1, 0, 0.1)
+    insert_crossing(cut, 0, 2, 0, 0.1)
+    assert cut.body.counts[NODES] == 4
+    assert cut.change.counts[N_FLAGGED] == 1
+
+
+def test_an_edge_with_both_ends_on_the_sheet_is_left_alone():
+    cut = corner(0.5)
+    flag(cut, 0)
+    flag(cut, 1)
+    insert_crossing(cut, 0, 1, 0, 0.5)
+    assert cut.body.counts[NODES] == 4
+
+
+def test_a_node_of_an_earlier_sheet_draws_the_same_cut_again_from_as_far():
+    cut = corner(0.4)
+    flag(cut, 0)  # 0.4 from the sheet, further than a new node may be
+    assert snap_distance(cut, 0) == pytest.approx(0.3 * SIZE)
+    begin_sheet(cut.sheet)
+    assert snap_distance(cut, 0) == pytest.approx(1.5 * 0.4)
+
+
+@pytest.mark.parametrize(
+    ("weights", "place"),
+    [
+        (Vec3(0.9, 0.05, 0.05), 1),
+        (Vec3(0.05, 0.9, 0.05), 2),
+        (Vec3(1 / 3, 1 / 3, 1 / 3), 4),
+        (Vec3(0.5, 0.48, 0.02), 4),
+    ],
+    ids=["at a corner", "at another", "in the middle", "at a side"],
+)
+def test_a_point_in_a_face_uses_its_corner_splits_its_side_or_itself(weights, place):
+    cut = corner(0.5, snap=0.2)
+    assert insert_in_face(cut, 1, 2, 3, weights) == place
+    assert on_sheet(cut.sheet, place)
+    if weights.z == 0.02:  # on the side of 1 and 2
+        assert cut.body.rest[4, 2] == 0.0
+
+
+def test_crossings_are_handled_from_the_middle_of_their_edges_outwards():
+    cut = corner(0.5)
+    work = cut.work
+    work.n_crossings[0] = 4
+    work.crossing[:4, :2] = [[5, 6], [1, 9], [1, 3], [0, 1]]
+    work.crossing_at[:4, 0] = [0.9, 0.4, 0.6, 0.5]
+    sort_crossings(cut)
+    assert work.order[:4].tolist() == [3, 2, 1, 0]

@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+
+from tests import bodies
+from tissue import Material
+from tissue.core.vec3 import Vec3
+from tissue.elasticity.elasticity import Elasticity
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
+from tissue.integrators.stability import SAFETY, stable_step
+from tissue.mesh.body import build_body
+from tissue.mesh.star import no_visits
+
+MESH = bodies.jittered(2, seed=5)
+
+
+@pytest.mark.parametrize("retardation_time", [0.0, 1e-4, 1e-3, 1e-2, 1.0])
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.45, 0.49])
+def test_no_motion_grows_in_a_step_however_much_dampers_brake(retardation_time, poisson_ratio):
+    """The Runge-Kutta step of M x'' + C x' + K x = 0 as a matrix: K of tetrahedra, C of springs."""
+    material = Material(law="neo_hookean", poisson_ratio=poisson_ratio)
+    springs = Material(material.spring_modulus)
+    root = 1.0 / np.sqrt(np.repeat(masses(MESH, material.density), 3))
+    k, c = (root[:, None] * stiffness_matrix(MESH, m).toarray() * root for m in (material, springs))
+    c *= retardation_time
+    body = build_body(MESH, None, None)
+    elasticity = Elasticity(material, body, no_visits(len(body.rest), len(body.tetrahedra)))
+    around = Surroundings(Vec3(0.0, 0.0, 0.0), 0.0, retardation_time)
+    h = stable_step(elasticity, elasticity.frequency_squared, around) / SAFETY
+    one, zero = np.eye(len(k)), np.zeros_like(k)
+    x, v = np.hstack([one, zero]), np.hstack([zero, one])  # of the state (x, v)
+    a1 = -k @ x - c @ v
+    middle = x + h / 2.0 * v + h * h / 8.0 * a1
+    a2 = -k @ middle - c @ (v + h / 2.0 * a1)
+    a3 = -k @ middle - c @ (v + h / 2.0 * a2)
+    a4 = -k @ (x + h * v + h * h / 2.0 * a3) - c @ (v + h * a3)
+    step = np.vstack(
+        [x + h * v + h * h / 6.0 * (a1 + a2 + a3), v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)]
+    )
+    # Six motions as a whole have a double 1, which rounding splits.
+    assert np.abs(np.linalg.eigvals(step)).max() < 1.0 + 1e-4

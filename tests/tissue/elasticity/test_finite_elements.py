@@ -1,0 +1,134 @@
+"""Rest shapes and rows of a solid, and how they follow splits and cuts."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, naive, naive_solid
+from tests.tissue.cutting.test_stellar_subdivision import split_all
+from tests.tissue.kernels_of import cut_of, springs_of
+from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
+from tissue import block
+from tissue.core.simd import WIDTH
+from tissue.elasticity.finite_elements import (
+    POOL_MARGIN,
+    VOLUME,
+    build_stars,
+    build_tetrahedra,
+    corner_at,
+    grown_solid,
+    neo_hookean,
+    no_solid,
+    room_for_stars,
+    shape_place,
+    tetrahedron_at,
+    volume_term,
+)
+from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.mesh.body import NODES, TETRAHEDRA
+from tissue.mesh.changes import N_DIRTY, clear_changes, touched_nodes
+from tissue.mesh.star import LARGEST_STAR, no_visits
+
+pytestmark = pytest.mark.kernel
+
+MESHES = {"grid": block((2, 1, 1), (0.2, 0.1, 0.1)), "jittered": bodies.jittered(2, 3)}
+
+
+@pytest.fixture(params=MESHES)
+def mesh(request):
+    return MESHES[request.param]
+
+
+def corners(solid, node):
+    """Return the corners that the node is, as (tetrahedron, which of its four), in order."""
+    first = int(solid.first[node])
+    slots = range(first, first + int(solid.count[node]))
+    return [(tetrahedron_at(solid, slot), corner_at(solid, slot)) for slot in slots]
+
+
+def test_a_row_names_each_tetrahedron_around_the_node_in_order(mesh):
+    solid = solid_of(mesh, law_of(0.45)).solid
+    for node in range(len(mesh.positions)):
+        around = corners(solid, node)
+        assert [t for t, _ in around] == sorted(naive.star(mesh.tetrahedra, node))
+        assert all(mesh.tetrahedra[t, k] == node for t, k in around)
+
+
+def test_a_row_is_filled_up_with_places_that_are_always_zero(mesh):
+    body = solid_of(mesh, law_of(0.45))
+    body.energy(moved(mesh))
+    assert np.abs(body.forces(moved(mesh))).max() > 0.0
+    solid = body.solid
+    for node in range(len(mesh.positions)):
+        end = int(solid.first[node] + solid.count[node])
+        beyond = slice(end, end + -int(solid.count[node]) % WIDTH)
+        assert (solid.volume[solid.around[beyond]] == 0.0).all()
+        for c in range(3):
+            assert (solid.forces[solid.corner[beyond] + c * WIDTH] == 0.0).all()
+
+
+def test_volumes_at_rest_are_those_of_tetrahedra_and_a_quarter_of_those_around_a_node(mesh):
+    solid = solid_of(mesh, law_of(0.45)).solid
+    volumes = naive_solid.volumes(mesh)
+    for t, volume in enumerate(volumes):
+        assert solid.shape[shape_place(t, VOLUME)] == pytest.approx(volume, rel=1e-12)
+    expected = naive_solid.around_nodes(mesh, volumes)
+    np.testing.assert_allclose(solid.node_volume, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_rows_renewed_where_a_cut_touched_are_those_built_from_scratch(law):
+    """The forces have the same bits, and the bound still holds the place of that from scratch."""
+    cut = cut_of(bodies.jittered(3, 1, size=1.0))
+    springs_of(cut.body)
+    renewed = built(cut.body, law)
+    visits, around = cut.visits, np.zeros(LARGEST_STAR, dtype=np.int64)
+    nodes = np.zeros(len(cut.body.rest), dtype=np.int64)
+    random = np.random.default_rng(5)
+    for _ in range(20):
+        clear_changes(cut.change)
+        split_all(cut, [(int(random.integers(1000)), bool(random.integers(2)), 0.4, 0.5)])
+        springs_of(cut.body)
+        n = touched_nodes(cut.body, cut.change, visits, nodes)
+        build_tetrahedra(renewed.solid, cut.body, cut.change.dirty, cut.change.counts[N_DIRTY])
+        assert build_stars(renewed.solid, cut.body, visits, nodes, n, around) == n
+        assert bound_solid_frequencies(renewed.solid, cut.body, visits, nodes, n) > n
+    afresh = built(cut.body, law)
+    for node in range(int(cut.body.counts[NODES])):
+        assert corners(renewed.solid, node) == corners(afresh.solid, node)
+    x = cut.body.rest[: cut.body.counts[NODES]]
+    x = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
+    np.testing.assert_array_equal(renewed.forces(x), afresh.forces(x))
+    assert renewed.energy(x) == afresh.energy(x)
+    assert renewed.frequency() == pytest.approx(afresh.frequency(), rel=0.2)
+
+
+def test_no_room_for_a_row_is_said_and_nothing_is_lost():
+    whole = solid_of(MESHES["grid"], law_of(0.45))
+    body, n = whole.body, int(whole.body.counts[NODES])
+    room = (n, int(body.counts[TETRAHEDRA]))
+    visits, around = no_visits(*room), np.zeros(LARGEST_STAR, dtype=np.int64)
+    tight = no_solid(law_of(0.45), *room, POOL_MARGIN + 40)
+    build_tetrahedra(tight, body, tight.every, room[1])
+    done = build_stars(tight, body, visits, tight.every, n, around)
+    assert 0 < done < n
+    larger = grown_solid(tight, *room, room_for_stars(*room))
+    assert build_stars(larger, body, visits, larger.every[done:], n - done, around) == n - done
+    for node in range(n):
+        assert corners(larger, node) == corners(whole.solid, node)
+
+
+def test_forces_are_the_same_after_the_arrays_have_grown(mesh):
+    body = solid_of(mesh, law_of(0.45))
+    x = moved(mesh)
+    before = body.forces(x)
+    room = (3 * len(mesh.positions), 5 * len(mesh.tetrahedra))
+    larger = grown_solid(body.solid, *room, room_for_stars(*room))
+    np.testing.assert_array_equal(body._replace(solid=larger).forces(x), before)
+
+
+def test_the_law_at_small_strain_has_the_moduli_it_was_made_of():
+    law = neo_hookean(3e3, 20e3)
+    assert 0.75 * law.mu == pytest.approx(3e3)
+    assert law.lam_of_nodes - 5.0 / 6.0 * 3e3 == pytest.approx(20e3)
+    assert law.a == pytest.approx(1.0 + 0.75 * law.mu / law.lam_of_nodes)
+    assert (volume_term(5e3).mu, volume_term(5e3).a) == (0.0, 1.0)

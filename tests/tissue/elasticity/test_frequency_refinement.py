@@ -1,0 +1,76 @@
+"""Weights that bring the bound on frequencies near the truth, against eigenvalues."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.solids import LAWS, fastest, law_of, solid_of
+from tissue import block
+from tissue.elasticity.frequency_refinement import tighten
+from tissue.mesh.body import NODES
+from tissue.mesh.star import no_visits
+
+pytestmark = pytest.mark.kernel
+
+SMALL_NODE = 31
+"""A node inside `bodies.jittered(3, ...)`, which the tests draw close to a neighbour."""
+
+
+def with_a_sliver():
+    """Return a mesh in which a node lies near a face opposite to it: one mode is fast."""
+    mesh = bodies.jittered(3, 1)
+    around = mesh.tetrahedra[(mesh.tetrahedra == SMALL_NODE).any(axis=1)][0]
+    others = mesh.positions[around[around != SMALL_NODE]].mean(axis=0)
+    x = mesh.positions.copy()
+    x[SMALL_NODE] += 0.6 * (others - x[SMALL_NODE])
+    return mesh._replace(positions=x)
+
+
+def tightened(solid, allowed=0.0):
+    """Weigh the nodes anew; return those whose bound may have changed."""
+    n = int(solid.body.counts[NODES])
+    solid.solid.listed[:n] = np.arange(n)
+    visits = no_visits(len(solid.body.rest), len(solid.body.tetrahedra))
+    n = tighten(solid.solid, solid.body, visits, n, allowed)
+    return solid.solid.listed[:n]
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_8_what_the_bound_is_above_the_fastest_mode_by_becomes_half_of_it_at_most(law):
+    solid = solid_of(with_a_sliver(), law)
+    before, truth = solid.frequency(), fastest(solid)
+    tightened(solid)
+    assert 0.0 <= solid.frequency() - truth <= 0.5 * (before - truth)
+
+
+def test_in_a_regular_mesh_there_is_little_to_gain_and_the_bound_never_rises():
+    solid = solid_of(block((3, 3, 3), (0.03, 0.03, 0.03)), law_of(0.45))
+    before = solid.frequency()
+    tightened(solid)
+    assert fastest(solid) <= solid.frequency() <= before
+
+
+def test_what_is_allowed_elsewhere_is_left_as_it_is():
+    solid = solid_of(with_a_sliver(), law_of(0.45))
+    weights, bounds = solid.solid.weight.copy(), solid.solid.frequency_squared.copy()
+    tightened(solid, allowed=bounds.max())
+    np.testing.assert_array_equal(solid.solid.weight, weights)
+    np.testing.assert_array_equal(solid.solid.frequency_squared, bounds)
+
+
+def test_only_the_nodes_that_it_lists_have_another_bound():
+    solid = solid_of(with_a_sliver(), law_of(0.45))
+    before = solid.solid.frequency_squared.copy()
+    listed = tightened(solid, allowed=0.8 * before.max())
+    changed = np.flatnonzero(solid.solid.frequency_squared != before)
+    assert 0 < len(changed) <= len(listed) == len(np.unique(listed))
+    assert np.isin(changed, listed).all()
+
+
+def test_nodes_that_are_fixed_keep_no_weight():
+    mesh = with_a_sliver()
+    solid = solid_of(mesh, law_of(0.45), bodies.sides(mesh))
+    tightened(solid)
+    held = np.flatnonzero(bodies.sides(mesh))
+    assert (solid.solid.weight[held] == 0.0).all()
+    assert fastest(solid) <= solid.frequency()

@@ -1,0 +1,224 @@
+"""Forces of tetrahedra against their slow twin, against the energy, and against theory."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, naive_solid
+from tests.tissue.cutting.test_stellar_subdivision import split_all
+from tests.tissue.kernels_of import cut_of, springs_of
+from tests.tissue.solids import (
+    LAWS,
+    YOUNG_MODULUS,
+    SolidBody,
+    built,
+    j_of,
+    lame,
+    law_of,
+    moved,
+    solid_of,
+)
+from tissue import TetrahedralMesh, block
+from tissue.core.jit import is_compiling
+from tissue.mesh.body import NODES, TETRAHEDRA
+
+pytestmark = pytest.mark.kernel
+
+MESHES = {
+    "one tetrahedron": bodies.unit_tetrahedron(),
+    "two": bodies.two_tetrahedra(),
+    "grid": block((2, 1, 1), (0.2, 0.1, 0.1)),
+    "jittered": bodies.jittered(2, 3),
+}
+
+needs_speed = pytest.mark.skipif(not is_compiling(), reason="thousands of steps: compiled only")
+
+
+@pytest.fixture(params=MESHES)
+def mesh(request):
+    return MESHES[request.param]
+
+
+@pytest.fixture(params=LAWS)
+def law(request):
+    return LAWS[request.param]
+
+
+def size(mesh):
+    return float(np.ptp(mesh.positions))
+
+
+def test_forces_and_energy_are_those_of_deformation_gradients_and_stresses(mesh, law):
+    solid, x = solid_of(mesh, law), moved(mesh)
+    expected = naive_solid.forces(mesh, x, law)
+    np.testing.assert_allclose(solid.forces(x), expected, atol=1e-13 * np.abs(expected).max())
+    assert solid.energy(x) == pytest.approx(naive_solid.energy(mesh, x, law), rel=1e-12)
+
+
+def test_at_rest_there_is_no_force_and_no_energy(mesh, law):
+    solid = solid_of(mesh, law)
+    assert np.abs(solid.forces(mesh.positions)).max() < 1e-13 * YOUNG_MODULUS * size(mesh) ** 2
+    assert abs(solid.energy(mesh.positions)) < 1e-13 * YOUNG_MODULUS * size(mesh) ** 3
+
+
+def test_force_is_the_downhill_gradient_of_energy(mesh, law):
+    solid, x = solid_of(mesh, law), moved(mesh)
+    forces = solid.forces(x)
+    step = 1e-6 * size(mesh)
+    for node, axis in [(0, 0), (1, 1), (3, 2)]:
+        here = np.zeros_like(x)
+        here[node, axis] = step
+        slope = (solid.energy(x + here) - solid.energy(x - here)) / (2.0 * step)
+        assert forces[node, axis] == pytest.approx(-slope, rel=1e-6, abs=1e-6 * np.ptp(forces))
+
+
+def test_forces_within_a_body_add_up_to_no_force_and_no_torque(mesh, law):
+    x = moved(mesh)
+    forces = solid_of(mesh, law).forces(x)
+    total = np.abs(forces).sum()
+    assert np.abs(forces.sum(axis=0)).max() < 1e-14 * total
+    assert np.abs(np.cross(x, forces).sum(axis=0)).max() < 1e-14 * total * size(mesh)
+
+
+def test_25_a_body_turned_by_a_quarter_feels_no_force(mesh, law):
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = mesh.positions @ quarter.T + [1.0, -2.0, 0.5]
+    assert np.abs(solid_of(mesh, law).forces(turned)).max() < 1e-9 * YOUNG_MODULUS * size(mesh) ** 2
+
+
+def test_forces_turn_with_the_body(mesh, law):
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    turn *= np.linalg.det(turn)
+    solid, x = solid_of(mesh, law), moved(mesh)
+    forces = solid.forces(x)
+    np.testing.assert_allclose(
+        solid.forces(x @ turn.T), forces @ turn.T, atol=1e-12 * np.ptp(forces)
+    )
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+def test_22_affine_stretch_leaves_inner_nodes_in_balance(averaged):
+    """Patch test: where the boundary moves as an affine map says, so do the inner nodes."""
+    mesh = bodies.jittered_grid(3, 1, size=1.0)
+    inner = ((mesh.positions > 1e-9) & (mesh.positions < 1.0 - 1e-9)).all(axis=1)
+    map_ = np.eye(3) + 0.1 * np.random.default_rng(2).normal(size=(3, 3))
+    affine = mesh.positions @ map_.T
+    shifted = affine + np.where(inner[:, None], moved(mesh, 0.01) - mesh.positions, 0.0)
+    solid = solid_of(mesh, law_of(0.3, averaged), ~inner)
+    balanced = _balanced(solid, shifted, inner)
+    np.testing.assert_allclose(balanced, affine, atol=1e-10)
+
+
+def _balanced(solid: SolidBody, x, inner):
+    """Newton's method on the forces of the inner nodes, with a stiffness by differences."""
+    x, places = x.copy(), np.argwhere(np.repeat(inner[:, None], 3, axis=1))
+    for _ in range(8):
+        stiffness = np.empty((len(places), len(places)))
+        for column, (node, axis) in enumerate(places):
+            step = np.zeros_like(x)
+            step[node, axis] = 1e-6
+            pull = (solid.forces(x + step) - solid.forces(x - step)) / 2e-6
+            stiffness[:, column] = pull[tuple(places.T)]
+        x[tuple(places.T)] -= np.linalg.solve(stiffness, solid.forces(x)[tuple(places.T)])
+    return x
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.25, 0.45])
+def test_22_a_rod_pulled_a_little_bears_young_s_modulus_times_strain(poisson_ratio, averaged):
+    mesh = bodies.jittered_grid(3, 1, size=1.0)
+    strain = 1e-7
+    narrowing = -poisson_ratio * strain
+    x = mesh.positions * (1.0 + np.array([strain, narrowing, narrowing]))
+    forces = solid_of(mesh, law_of(poisson_ratio, averaged)).forces(x)
+    pulled = mesh.positions[:, 0] > 1.0 - 1e-9
+    assert -forces[pulled, 0].sum() == pytest.approx(YOUNG_MODULUS * strain, rel=1e-6)
+    on_flanks = ~pulled & (mesh.positions[:, 0] > 1e-9)
+    assert np.abs(forces[on_flanks]).max() < 1e-6 * YOUNG_MODULUS * strain
+
+
+def test_moduli_of_the_law_are_those_at_small_strain():
+    """Pure shear and pure dilatation: stresses 2 mu eps and (3 lam + 2 mu) eps."""
+    mesh, eps = MESHES["one tetrahedron"], 1e-7
+    mu, lam = lame(0.45)
+    for law in (law_of(0.45), law_of(0.45, averaged=False)):
+        shear = naive_solid.stresses(mesh, mesh.positions @ np.diag([1 + eps, 1 - eps, 1.0]), law)
+        np.testing.assert_allclose(np.diag(shear[0]), [2 * mu * eps, -2 * mu * eps, 0.0], atol=1e-8)
+        swollen = naive_solid.stresses(mesh, (1.0 + eps) * mesh.positions, law)
+        expected = np.eye(3) * (3.0 * lam + 2.0 * mu) * eps
+        np.testing.assert_allclose(swollen[0], expected, rtol=1e-5, atol=1e-8)
+
+
+@needs_speed
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_25_nodes_thrown_at_random_return_to_rest_inside_out_or_not(averaged, seed):
+    """A unit block between two plates; a free one can knot itself."""
+    mesh = block((3, 3, 3), (1.0, 1.0, 1.0))
+    held = bodies.sides(mesh)
+    thrown = np.random.default_rng(seed).uniform(size=mesh.positions.shape)
+    thrown[held] = mesh.positions[held]
+    assert (j_of(mesh, thrown) < 0.0).sum() > 50
+    law = law_of(0.45, averaged)
+    stiffer = law.replaced(
+        mu=10 * law.mu,
+        lam_of_tetrahedra=10 * law.lam_of_tetrahedra,
+        lam_of_nodes=10 * law.lam_of_nodes,
+    )
+    at_rest = solid_of(mesh, stiffer, held).relaxed(thrown, seconds=2.0, drag=20.0)
+    assert j_of(mesh, at_rest).min() > 0.999
+    np.testing.assert_allclose(at_rest, mesh.positions, atol=1e-4)
+
+
+SPLITS = [(int(1e6 * a), bool(b > 0.5), 0.2 + 0.6 * c, 0.2 + 0.6 * d)
+          for a, b, c, d in np.random.default_rng(7).random((100, 4))]  # fmt: skip
+"""A hundred stellar splits without a cut: which tetrahedron, its face or an edge, and where."""
+
+
+def subdivided(mesh: TetrahedralMesh, x):
+    """Return the mesh and its positions after `SPLITS`."""
+    cut = cut_of(mesh)
+    cut.body.positions[: len(x)] = x
+    split_all(cut, SPLITS)
+    n = int(cut.body.counts[NODES])
+    tetrahedra = cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]]
+    return TetrahedralMesh(cut.body.rest[:n], tetrahedra), cut.body.positions[:n].copy()
+
+
+def test_26_splitting_tetrahedra_leaves_the_energy_as_it_was():
+    mesh = block((3, 3, 3), (1.0, 1.0, 1.0))
+    x, law = moved(mesh, 0.03), law_of(0.45, averaged=False)
+    finer, there = subdivided(mesh, x)
+    assert len(finer.tetrahedra) > len(mesh.tetrahedra) + 200
+    before = solid_of(mesh, law).energy(x)
+    assert solid_of(finer, law).energy(there) == pytest.approx(before, rel=1e-12)
+
+
+@needs_speed
+@pytest.mark.parametrize("averaged", [False, True])
+def test_26_a_slab_hangs_as_deep_after_tetrahedra_were_split(averaged):
+    """The paper's block between two plates, under its weight; splits only make it softer."""
+    mesh = block((4, 6, 4), (1.0, 1.5, 1.0))
+    finer, _ = subdivided(mesh, mesh.positions)
+    before, after = (_depth(which, law_of(0.45, averaged)) for which in (mesh, finer))
+    assert before < after < 1.02 * before
+
+
+def _depth(mesh, law):
+    """How far the middle of mass of a slab comes down [m]."""
+    solid = solid_of(mesh, law, bodies.sides(mesh))
+    masses = solid.body.masses
+    weight = np.outer(masses, [0.0, 0.0, -1.0])
+    x = solid.relaxed(mesh.positions, seconds=2.0, drag=12.0, pull=weight)
+    return float(masses @ (mesh.positions - x)[:, 2] / masses.sum())
+
+
+def test_20_forces_after_splits_are_those_of_the_mesh_built_from_scratch():
+    cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
+    split_all(cut, SPLITS[:20])
+    springs_of(cut.body)
+    n = int(cut.body.counts[NODES])
+    mesh = TetrahedralMesh(cut.body.rest[:n], cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]])
+    x = moved(mesh, 0.02)
+    for law in LAWS.values():
+        expected = solid_of(mesh, law).forces(x)
+        np.testing.assert_array_equal(built(cut.body, law).forces(x), expected)

@@ -1,0 +1,169 @@
+"""Sides of planes and pierced triangles: exact, and nothing slips through where triangles meet."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tests import naive
+from tissue.core.vec3 import Vec3
+from tissue.geometry.exact_predicates import (
+    LATTICE_LIMIT,
+    LATTICE_POINTS,
+    Point,
+    lattice_around,
+    nearest,
+    orient3d,
+    pierces,
+)
+
+pytestmark = pytest.mark.kernel
+
+A, B = Point(1, 1, -5), Point(1, 1, 5)
+P, Q, R = Point(0, 0, 0), Point(4, 0, 0), Point(0, 4, 0)
+
+
+def points(random, n, reach=LATTICE_POINTS // 2):
+    """Return `n` lattice points of a body."""
+    return [Point(*row) for row in random.integers(-reach, reach, (n, 3)).tolist()]
+
+
+def test_a_point_above_a_left_turn_is_positive():
+    assert orient3d(P, Q, R, Point(0, 0, 1)) == 16
+    assert orient3d(P, Q, R, Point(0, 0, -1)) == -16
+    assert orient3d(P, Q, R, Point(7, -3, 0)) == 0
+
+
+def test_sides_are_exact_for_points_next_to_the_plane():
+    random = np.random.default_rng(1)
+    for _ in range(2000):
+        a, b, c = points(random, 3, LATTICE_POINTS // 8)
+        i, j = random.integers(-2, 3, 2).tolist()
+        on_plane = [p + i * (q - p) + j * (r - p) for p, q, r in zip(a, b, c, strict=True)]
+        d = Point(*(x + int(e) for x, e in zip(on_plane, random.integers(-1, 2, 3), strict=True)))
+        assert orient3d(a, b, c, d) == naive.determinant(a, b, c, d)
+
+
+def adversarial(random: np.random.Generator) -> list[Point]:
+    """Return four points that nearly, or just, lie in one plane, on one line or in one point."""
+    reach = LATTICE_LIMIT // 8
+    a, u, v = random.integers(-reach, reach + 1, (3, 3))
+    if random.random() < 0.5:  # a thin or short triangle
+        u, v = u // 10 ** int(random.integers(0, 5)), u // int(random.integers(1, 9)) + v % 3
+    i, j = random.integers(-3, 4, 2)
+    off = random.integers(-1, 2, 3) * (random.random() < 0.7)
+    four = [a, a + u, a + v, a + i * u + j * v + off]
+    return [Point(*p.clip(-LATTICE_LIMIT, LATTICE_LIMIT).tolist()) for p in four]
+
+
+def test_sides_are_exact_in_10000_cases_made_to_fail():
+    random = np.random.default_rng(7)
+    zero = 0
+    for _ in range(10_000):
+        four = adversarial(random)
+        expected = naive.determinant(*four)
+        zero += expected == 0
+        assert orient3d(*four) == expected
+    assert 1_000 < zero < 9_000
+
+
+def test_no_points_of_the_lattice_overflow():
+    ends = (-LATTICE_LIMIT, LATTICE_LIMIT)
+    corners = [Point(*corner) for corner in itertools.product(ends, repeat=3)]
+    for four in itertools.permutations(corners, 4):
+        assert orient3d(*four) == naive.determinant(*four)
+
+
+def test_a_segment_through_a_triangle_pierces_it():
+    assert pierces(A, B, P, Q, R)
+    assert not pierces(A, Point(1, 1, -1), P, Q, R)
+    assert not pierces(Point(3, 3, -5), Point(3, 3, 5), P, Q, R)
+
+
+def test_piercing_agrees_with_exact_fractions():
+    random = np.random.default_rng(2)
+    n_pierced = 0
+    for _ in range(1000):
+        a, b, p, q, r = points(random, 5)
+        ends = naive.determinant(p, q, r, a), naive.determinant(p, q, r, b)
+        weights = naive.pierced_at(a, b, p, q, r)
+        expected = ends[0] * ends[1] < 0 and weights is not None and min(weights) > 0
+        assert pierces(a, b, p, q, r) == expected
+        n_pierced += expected
+    assert n_pierced > 20
+
+
+def test_the_order_of_nodes_and_ends_does_not_matter():
+    random = np.random.default_rng(3)
+    for _ in range(200):
+        a, b, *triangle = points(random, 5)
+        expected = pierces(a, b, *triangle)
+        for nodes in itertools.permutations(triangle):
+            assert pierces(a, b, *nodes) == expected
+            assert pierces(b, a, *nodes) == expected
+
+
+def test_turning_a_triangle_round_its_nodes_does_not_matter_even_for_ties():
+    small = [Point(*p) for p in itertools.product(range(2), repeat=3)]
+    for a, b, p, q, r in itertools.permutations(small, 5):
+        assert pierces(a, b, p, q, r) == pierces(a, b, q, r, p) == pierces(a, b, r, p, q)
+
+
+def test_of_two_triangles_exactly_one_is_pierced_through_their_common_edge():
+    random = np.random.default_rng(4)
+    n = 0
+    while n < 10_000:
+        p, step, way, r, s = random.integers(-1000, 1001, (5, 3))
+        q, middle = p + 7 * step, p + random.integers(1, 7) * step
+        a, b = middle - 2 * way, middle + 3 * way
+        if naive.determinant(a, b, p, r) * naive.determinant(a, b, p, s) >= 0:
+            continue  # a fold: the segment touches it, or passes it by
+        a, b, p, q, r, s = (Point(*x.tolist()) for x in (a, b, p, q, r, s))
+        assert naive.determinant(a, b, p, q) == 0
+        assert pierces(a, b, p, q, r) != pierces(a, b, q, p, s)
+        n += 1
+
+
+def test_of_two_segments_exactly_one_pierces_the_triangle_they_meet_on():
+    random = np.random.default_rng(5)
+    for _ in range(2000):
+        p, u, v, a, c = random.integers(-1000, 1001, (5, 3))
+        triangle = [Point(*x.tolist()) for x in (p, p + 5 * u, p + 5 * v)]
+        a, b, c = (Point(*x.tolist()) for x in (a, p + u + 2 * v, c))
+        if naive.determinant(*triangle, a) * naive.determinant(*triangle, c) < 0:
+            assert pierces(a, b, *triangle) != pierces(b, c, *triangle)
+
+
+def test_a_flat_triangle_is_never_pierced():
+    random = np.random.default_rng(6)
+    for _ in range(500):
+        a, b, p, step = random.integers(-1000, 1001, (4, 3))
+        i, j = random.integers(-3, 4, 2)
+        flat = (Point(*x.tolist()) for x in (p, p + i * step, p + j * step))
+        assert not pierces(Point(*a.tolist()), Point(*b.tolist()), *flat)
+
+
+def test_nothing_slips_between_the_triangles_of_an_edge_that_advances():
+    """Wherever a line meets what an edge sweeps, exactly one triangle of its quads is pierced."""
+    tips = [Point(0, 0, 0), Point(4, 1, 0), Point(6, 0, 0), Point(12, 0, 0)]
+    heels = [Point(0, 8, 0), Point(2, 8, 0), Point(8, 8, 0), Point(12, 8, 0)]
+    triangles = []
+    for t0, t1, h0, h1 in zip(tips, tips[1:], heels, heels[1:], strict=False):
+        triangles += [(t0, t1, h1), (t0, h1, h0)]
+    for x, y in itertools.product(range(1, 12), range(2, 8)):
+        for lean in itertools.product((-3, 0, 1), repeat=2):
+            below = Point(x - lean[0], y - lean[1], -1)
+            above = Point(x + lean[0], y + lean[1], 1)
+            assert sum(pierces(below, above, *triangle) for triangle in triangles) == 1
+
+
+def test_the_lattice_covers_the_body_from_its_centre():
+    lattice = lattice_around(np.array([[0.0, 0.0, 0.0], [0.1, 0.02, 0.04]]))
+    assert nearest(lattice, Vec3(0.05, 0.01, 0.02)) == Point(0, 0, 0)
+    assert nearest(lattice, Vec3(0.1, 0.01, 0.02)) == Point(LATTICE_POINTS // 2, 0, 0)
+
+
+def test_a_blade_far_from_the_body_is_pulled_in_to_the_lattice():
+    lattice = lattice_around(np.array([[0.0, 0.0, 0.0], [0.1, 0.02, 0.04]]))
+    far = nearest(lattice, Vec3(1e9, -1e9, 0.02))
+    assert (far.x, far.y, far.z) == (LATTICE_LIMIT, -LATTICE_LIMIT, 0)

@@ -1,0 +1,156 @@
+"""Networks of springs that are advanced by the kernels of the relaxations, without `Tissue`."""
+
+import numpy as np
+
+from tests import bodies
+from tests.tissue.kernels_of import Network, elastic_of, network_of
+from tissue import BoolArray, FloatArray, Hierarchical
+from tissue.core.vec3 import Vec3
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.integrators.hierarchical.kernels import Trails, hierarchical_frame, new_trails
+from tissue.integrators.hierarchical.stepper import ring_steps
+from tissue.integrators.local.chebyshev import STABILISATION, chebyshev
+from tissue.integrators.local.element_subsets import find_patch, new_patch, reach_of
+from tissue.integrators.local.kernels import macro_step, new_zone
+from tissue.integrators.local.sleeping import all_asleep, wake_all
+from tissue.integrators.local.step_selection import find_listed_patch
+from tissue.integrators.node_rings import (
+    N_FOUND,
+    Rings,
+    add_focus,
+    begin_search,
+    new_rings,
+    search,
+)
+from tissue.tissue import NOWHERE
+
+FREE_FALL = Vec3(0.0, 0.0, -9.81)
+
+
+def block(
+    n: int,
+    *,
+    held: bool = True,
+    gravity: Vec3 = Vec3(0.0, 0.0, 0.0),
+    drag: float = 0.0,
+    retardation_time: float = 0.0,
+) -> Network:
+    """Return a box of n x n x n jittered cells, held at two sides or free."""
+    mesh = bodies.jittered_grid(n, 0)
+    network = network_of(mesh, bodies.sides(mesh) if held else None)
+    return network._replace(surroundings=Surroundings(gravity, drag, retardation_time))
+
+
+def nearest(network: Network, point: FloatArray) -> int:
+    """Return the node that is nearest to a point at rest [m]."""
+    return int(np.argmin(np.linalg.norm(network.body.rest - point, axis=1)))
+
+
+def rings_around(network: Network, node: int, last_ring: int) -> Rings:
+    """Return the rings around one node."""
+    rings = new_rings(len(network.body.rest))
+    begin_search(rings)
+    add_focus(rings, node)
+    search(rings, network.springs, last_ring)
+    return rings
+
+
+def found(rings: Rings) -> list[int]:
+    """Return the nodes that were found, in order."""
+    return rings.order[: rings.state[N_FOUND]].tolist()
+
+
+def frames(
+    network: Network,
+    focus: int,
+    span: float,
+    n: int,
+    updates: int,
+    last_ring: int,
+    frozen: bool,
+    trails: Trails | None = None,
+) -> None:
+    """Advance by `n` frames of `span` [s] of the hierarchical relaxation."""
+    n_nodes = len(network.body.rest)
+    rings = rings_around(network, focus, last_ring + 1)
+    trails = trails or new_trails(n_nodes)
+    external = np.zeros((n_nodes, 3))
+    n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
+    settings = (span, 0.0, 1.0, n_micro, every, last_ring, frozen)
+    for _ in range(n):
+        hierarchical_frame(
+            network.body,
+            network.springs,
+            network.tool,
+            NOWHERE,
+            rings,
+            trails,
+            external,
+            network.surroundings,
+            *settings,
+        )
+
+
+def leaps(
+    network: Network,
+    fine: list[int],
+    span: float,
+    n: int,
+    n_substeps: int,
+    stabilisation: float = STABILISATION,
+) -> None:
+    """Advance by `n` macro steps of `span` [s], all nodes awake, velocities of this instant."""
+    body, elastic = network.body, elastic_of(network.springs)
+    n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+    zone, activity = new_zone(n_nodes, n_tetrahedra), all_asleep(n_nodes)
+    listed = new_patch(n_nodes, n_tetrahedra)
+    wake_all(activity, body, network.springs)
+    begin_search(zone.rings)
+    for node in fine:
+        if not body.fixed[node]:
+            add_focus(zone.rings, node)
+    search(zone.rings, network.springs, reach_of(elastic))
+    find_patch(zone.patch, elastic, zone.rings, 0, reach_of(elastic) - 1)
+    find_listed_patch(listed, elastic, activity, new_rings(n_nodes))
+    for i in range(n):
+        macro_step(
+            body,
+            elastic,
+            network.tool,
+            NOWHERE,
+            activity,
+            listed,
+            zone,
+            chebyshev(n_substeps, stabilisation),
+            np.zeros((n_nodes, 3)),
+            network.surroundings,
+            span,
+            0.0,
+            1.0,
+            0.5 if i == 0 else 1.0,
+        )
+
+
+def highest_frequency(network: Network) -> float:
+    """Return the bound on the angular frequency [1/s] of the nodes that can move."""
+    free = ~network.body.fixed
+    return float(np.sqrt(network.springs.frequency_squared[free].max()))
+
+
+def stiffen(network: Network, nodes: list[int], factor: float) -> None:
+    """Make the springs between these nodes that many times as stiff."""
+    springs, among = network.springs, set(nodes)
+    for node in nodes:
+        first = springs.first[node]
+        for slot in range(first, first + springs.count[node]):
+            if int(springs.neighbour[slot]) in among:
+                springs.stiffness[slot] *= factor
+                springs.rest_pull[slot] *= factor
+
+
+def shake(network: Network, size: float) -> None:
+    """Bend the body by waves of that size [m], at rest where it is fixed."""
+    body = network.body
+    free: BoolArray = ~body.fixed
+    body.positions[:] = body.rest + size * np.sin(200.0 * body.rest)[:, [1, 2, 0]] * free[:, None]
+    body.velocities[:] = 0.0

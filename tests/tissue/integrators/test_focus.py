@@ -1,0 +1,80 @@
+"""The rings grow around the tip of the blade, and all that it holds is in ring 0."""
+
+import numpy as np
+import pytest
+
+from tests.tissue.integrators.networks import block, found
+from tests.tissue.kernels_of import tool_with
+from tissue.blade.anchors import ANCHORED, new_anchors
+from tissue.integrators.focus import find_held, find_rings
+from tissue.integrators.node_rings import (
+    UNREACHED,
+    add_focus,
+    begin_search,
+    new_rings,
+    ring_of,
+    search,
+)
+
+pytestmark = pytest.mark.kernel
+
+NETWORK = block(5)
+BODY, SPRINGS = NETWORK.body, NETWORK.springs
+N_NODES = len(BODY.rest)
+TIP, HEEL = 0, len(BODY.tetrahedra) - 1
+"""Tetrahedra in opposite corners of the body."""
+
+
+def held_by(*tetrahedra):
+    anchors = new_anchors(len(tetrahedra) + 1, 0.01, 10e3)
+    anchors.state[1:] = ANCHORED  # the very tip is out of the tissue
+    anchors.tetrahedron[1:] = tetrahedra
+    held = new_rings(N_NODES)
+    assert find_held(held, BODY, tool_with(anchors))
+    return held
+
+
+def around(held, last_ring):
+    rings = new_rings(N_NODES)
+    find_rings(rings, held, SPRINGS, last_ring, np.zeros(N_NODES, np.int64))
+    return rings
+
+
+def test_the_first_anchor_from_the_tip_is_the_focus():
+    corners = [BODY.tetrahedra[t].tolist() for t in (TIP, HEEL)]
+    assert found(held_by(TIP, HEEL)) == [*corners[0], *corners[1]]
+
+
+def test_rings_are_counted_from_the_tip_and_what_is_held_is_in_ring_0():
+    rings = around(held_by(TIP, HEEL), 2)
+    expected = new_rings(N_NODES)
+    begin_search(expected)
+    for node in BODY.tetrahedra[TIP]:
+        add_focus(expected, node)
+    search(expected, SPRINGS, 2)
+    for node in found(expected):
+        assert ring_of(rings, node) == ring_of(expected, node)
+    assert {ring_of(rings, node) for node in BODY.tetrahedra[HEEL]} == {0}
+
+
+def test_neighbours_of_what_is_held_far_away_are_seen_in_the_last_ring():
+    rings = around(held_by(TIP, HEEL), 2)
+    far = int(BODY.tetrahedra[HEEL, 0])
+    first = SPRINGS.first[far]
+    beside = SPRINGS.neighbour[first : first + SPRINGS.count[far]].tolist()
+    assert {ring_of(rings, node) for node in beside} == {0, 2}
+
+
+def test_the_order_is_ring_by_ring_and_each_node_once():
+    rings = around(held_by(TIP, 30, HEEL), 3)
+    order = found(rings)
+    assert len(set(order)) == len(order)
+    assert (np.diff(rings.ring[order]) >= 0).all()
+
+
+def test_when_the_blade_has_let_go_the_focus_stays():
+    held = held_by(TIP)
+    before = found(held)
+    assert not find_held(held, BODY, tool_with(new_anchors(2, 0.01, 10e3)))
+    assert found(held) == before
+    assert ring_of(held, int(BODY.tetrahedra[HEEL, 0])) == UNREACHED

@@ -1,0 +1,64 @@
+"""What a user may choose, and what is said of a choice that cannot be."""
+
+import pytest
+
+from tissue import Hierarchical, LocalTimeStepping, Material
+from tissue.integrators.options import Global, checked_relaxation
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [("global", Global()), ("local", LocalTimeStepping()), ("hierarchical", Hierarchical())],
+)
+def test_a_name_stands_for_the_default_settings(name, settings):
+    assert checked_relaxation(name, Material()) == settings
+
+
+def test_settings_are_taken_as_they_are():
+    chosen = Hierarchical(updates=16, rings=2, far="frozen")
+    assert checked_relaxation(chosen, Material()) is chosen
+
+
+@pytest.mark.parametrize(
+    ("choice", "message"),
+    [("fast", "no relaxation is called 'fast'. Known: global"), (3, "relaxation is 3")],
+)
+def test_an_unknown_choice_is_refused(choice, message):
+    with pytest.raises(ValueError, match=message):
+        checked_relaxation(choice, Material())
+
+
+@pytest.mark.parametrize(
+    "material", [Material(law="neo_hookean", poisson_ratio=0.4), Material(poisson_ratio=0.4)]
+)
+def test_the_hierarchy_is_for_springs_alone(material):
+    with pytest.raises(ValueError, match="on its springs alone"):
+        checked_relaxation("hierarchical", material)
+    assert checked_relaxation("local", material) == LocalTimeStepping()
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"updates": 16, "rings": 6}, "must be a multiple of 64"),
+        ({"updates": 0}, "updates is 0"),
+        ({"rings": -1}, "rings is -1"),
+        ({"far": "away"}, "far is 'away'; it must be one of moved, frozen"),
+    ],
+)
+def test_a_hierarchy_that_cannot_be_is_refused(settings, message):
+    with pytest.raises(ValueError, match=message):
+        Hierarchical(**settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"rings": -1}, "rings is -1"),
+        ({"stabilisation": 0.0}, "stabilisation is 0.0"),
+        ({"stabilisation": float("nan")}, "stabilisation is nan"),
+    ],
+)
+def test_local_time_stepping_that_cannot_be_is_refused(settings, message):
+    with pytest.raises(ValueError, match=message):
+        LocalTimeStepping(**settings)

@@ -1,0 +1,178 @@
+"""Order and stability of the time integration, measured on the engine's own steps."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from tests import bodies, strokes
+from tests.tissue.kernels_of import dense_modes, network_of, oscillator
+from tissue import Tissue, block
+from tissue.integrators.stability import STABILITY_LIMIT, largest_stable_step
+
+FREQUENCY = 2.0 * np.pi
+"""Of the oscillator [1/s]: one swing a second."""
+
+DAMPINGS = {
+    "undamped": {},
+    "drag": {"viscous_damping": 0.4 * FREQUENCY},
+    "retardation": {"retardation_time": 0.4 / FREQUENCY},
+    "both": {"viscous_damping": 0.2 * FREQUENCY, "retardation_time": 0.3 / FREQUENCY},
+}
+
+
+ROUNDED_TABLE = 0.01
+"""Growth a step that the three decimals of the table, and what lies between its entries, may add.
+`SAFETY` takes a fifth off the step; a step 2 % beyond the limit already grows by more."""
+
+
+def exact_swing(t, damping):
+    """Return x and x' of the oscillator released at rest 0.3 m from where it hangs."""
+    rate = damping.get("viscous_damping", 0.0)
+    rate += damping.get("retardation_time", 0.0) * FREQUENCY**2
+    decay = 0.5 * rate
+    w = np.sqrt(FREQUENCY**2 - decay**2)
+    fall = np.exp(-decay * t)
+    x = 0.3 * fall * (np.cos(w * t) + decay / w * np.sin(w * t))
+    v = -0.3 * fall * FREQUENCY**2 / w * np.sin(w * t)
+    return np.array([x, v])
+
+
+def swing_error(n, damping):
+    """Return the error in x and x' after one second in `n` steps."""
+    network = oscillator(FREQUENCY, **damping)
+    network.body.positions[1, 0] = 1.3
+    network.advance(1.0 / n, n)
+    state = np.array([network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]])
+    return np.abs(state - exact_swing(1.0, damping)).max()
+
+
+def order(steps, errors):
+    """Return the slope of the error over the step, both logarithmic."""
+    return -np.polyfit(np.log(steps), np.log(errors), 1)[0]
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("damping", DAMPINGS)
+def test_the_order_is_four_on_an_oscillator(damping):
+    steps = [40, 80, 160, 320]
+    errors = [swing_error(n, DAMPINGS[damping]) for n in steps]
+    assert order(steps, errors) >= 3.9
+    assert errors[-1] < 1e-6
+
+
+@pytest.mark.parametrize("damping", DAMPINGS)
+def test_the_order_is_four_on_a_network_of_springs(damping):
+    """A block of 190 springs, bent far beyond small strains, against 16 times as many steps."""
+    per_second = {"viscous_damping": 20.0, "retardation_time": 1e-3}
+    network = network_of(
+        MESH, bodies.sides(MESH), **{name: per_second[name] for name in DAMPINGS[damping]}
+    )
+    free = ~bodies.sides(MESH)
+    x = MESH.positions / np.ptp(MESH.positions, axis=0)
+    bent = 0.01 * np.sin(np.pi * x[:, [0]]) * np.array([0.5, 1.0, 0.7]) * free[:, None]
+
+    def after(n, seconds=0.04):
+        network.body.positions[:] = MESH.positions + bent
+        network.body.velocities[:] = 0.0
+        network.advance(seconds / n, n)
+        return network.body.positions.copy()
+
+    steps = [40, 57, 80, 113]
+    fine = after(16 * steps[-1])
+    errors = [np.abs(after(n) - fine).max() for n in steps]
+    assert order(steps, errors) >= 3.9
+
+
+MESH = block((3, 2, 2), (0.06, 0.04, 0.04))
+
+
+def growth(step, ratio, by_drag):
+    """Return by how much a step of `step` / w makes the oscillator grow, at most.
+
+    The oscillator is linear, so a step is a matrix; its columns are the steps from unit states.
+    """
+    damping = {"viscous_damping": 2.0 * ratio} if by_drag else {"retardation_time": 2.0 * ratio}
+    network = oscillator(1.0, **damping)
+    columns = []
+    for x, v in ((1.0, 0.0), (0.0, 1.0)):
+        # Small, for a node that passes through its neighbour is no linear spring any more.
+        network.body.positions[1, 0], network.body.velocities[1, 0] = 1.0 + 1e-3 * x, 1e-3 * v
+        network.advance(step)
+        state = network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]
+        columns.append(np.array(state) / 1e-3)
+    return np.abs(np.linalg.eigvals(np.transpose(columns))).max()
+
+
+def measured_limit(ratio, by_drag=True):
+    """Return the first step, in units of 1 / w, beyond which the oscillator grows."""
+    scan = np.linspace(0.05, 4.0, 400)
+    first = next(i for i, step in enumerate(scan) if growth(step, ratio, by_drag) > 1.0 + 1e-6)
+    low, high = scan[first - 1], scan[first]
+    for _ in range(20):
+        middle = 0.5 * (low + high)
+        if growth(middle, ratio, by_drag) > 1.0 + 1e-6:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize(("ratio", "limit"), [(0.0, 2.587), (0.5, 2.785), (1.0, 1.331)])
+@pytest.mark.parametrize("by_drag", [True, False], ids=["drag", "retardation"])
+def test_the_limit_of_stability_is_that_of_the_method(ratio, limit, by_drag):
+    assert measured_limit(ratio, by_drag) == pytest.approx(limit, abs=0.005)
+
+
+@pytest.mark.parametrize(("ratio", "limit"), STABILITY_LIMIT.tolist())
+def test_no_entry_of_the_table_is_above_the_measured_limit(ratio, limit):
+    assert limit <= measured_limit(ratio) + 0.001
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.3, 0.55, 0.6, 0.65, 0.8, 1.2, 1.7, 2.5, 3.0, 4.0, 10.0])
+def test_the_largest_stable_step_is_stable_between_the_entries_too(ratio):
+    for drag, retardation in ((2.0 * ratio, 0.0), (0.0, 2.0 * ratio), (ratio, ratio)):
+        step = largest_stable_step(1.0, retardation, drag)
+        assert growth(step, ratio, drag > 0.0) <= 1.0 + ROUNDED_TABLE
+
+
+def test_a_body_without_springs_may_take_any_step():
+    assert largest_stable_step(0.0, 1e-4, 5.0) == np.inf
+
+
+def cut_body(mesh, stroke):
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
+    strokes.make(tissue, stroke)
+    return tissue
+
+
+LOOSEST_BOUND = 1.6
+"""Bound on the frequency over the highest true one, at most. 1.04 to 1.35 were measured."""
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_bound_on_frequency_of_a_cut_body_holds_and_is_not_far_off(seed):
+    mesh = bodies.jittered(3, seed)
+    tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.02 * seed))
+    assert tissue.n_tetrahedra > len(mesh.tetrahedra)
+    body, springs = tissue._body, tissue._elasticity.arrays.springs
+    true = np.linalg.eigvalsh(dense_modes(body, springs))[-1]
+    n = tissue.n_nodes
+    bound = springs.frequency_squared[:n][~body.fixed[:n]].max()
+    assert true <= bound <= LOOSEST_BOUND**2 * true
+    assert bound <= tissue._elasticity.frequency_squared
+
+
+def test_every_mode_of_every_body_is_stable_at_the_step_that_is_taken():
+    """For each mode w of the body, a step of the bound's length must not make it grow."""
+    dampings = [(0.0, 0.0), (2e-4, 5.0), (5e-3, 0.0)]
+    for seed, (retardation, drag) in itertools.product(range(2), dampings):
+        network = network_of(bodies.jittered(2, seed))
+        n = len(network.body.rest)
+        bound = np.sqrt(network.springs.frequency_squared[:n].max())
+        step = largest_stable_step(bound, retardation, drag)
+        modes = np.linalg.eigvalsh(dense_modes(network.body, network.springs))
+        for w in np.sqrt(modes[modes > 1e-6 * modes.max()][::5]):
+            ratio = 0.5 * (w * retardation + drag / w)
+            assert growth(step * w, ratio, by_drag=True) <= 1.0 + 1e-6

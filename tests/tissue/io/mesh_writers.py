@@ -1,0 +1,200 @@
+"""Small writers of the formats that `read_mesh` reads, straight from their specifications.
+
+Each file also holds a point, a line and a triangle, as meshers write them.
+"""
+
+import base64
+import struct
+import zlib
+
+import numpy as np
+
+from tissue import TetrahedralMesh
+
+FIRST_TAG = 7
+"""Gmsh's nodes are counted from here, for tags need not begin at 1."""
+
+
+def gmsh_1(mesh: TetrahedralMesh) -> bytes:
+    """Gmsh 1.0."""
+    nodes = [
+        f"{i + FIRST_TAG} {x!r} {y!r} {z!r}" for i, (x, y, z) in enumerate(mesh.positions.tolist())
+    ]
+    cells = _cells(mesh)
+    elements = [
+        f"{k} {kind} 1 2 {len(c)} {_spaced(c)}" for k, (kind, c) in enumerate(cells, start=1)
+    ]
+    lines = ["$NOD", str(len(nodes)), *nodes, "$ENDNOD", "$ELM", str(len(cells)), *elements]
+    return "\n".join([*lines, "$ENDELM", ""]).encode()
+
+
+def gmsh_2(mesh: TetrahedralMesh, order: str = "") -> bytes:
+    """Gmsh 2.2: as text, or binary in byte order "<" or ">"."""
+    cells = _cells(mesh)
+    if not order:
+        nodes = "".join(
+            f"{i + FIRST_TAG} {x!r} {y!r} {z!r}\n"
+            for i, (x, y, z) in enumerate(mesh.positions.tolist())
+        ).encode()
+        elements = "".join(
+            f"{k} {kind} 2 1 1 {_spaced(c)}\n" for k, (kind, c) in enumerate(cells, start=1)
+        ).encode()
+    else:
+        nodes = b"".join(
+            struct.pack(order + "i3d", i + FIRST_TAG, *p) for i, p in enumerate(mesh.positions)
+        )
+        elements = b"".join(
+            struct.pack(f"{order}3i{3 + len(c)}i", kind, 1, 2, k, 1, 1, *c)
+            for k, (kind, c) in enumerate(cells, start=1)
+        )
+        nodes, elements = nodes + b"\n", elements + b"\n"
+    return (
+        _gmsh_header("2.2", order)
+        + b"$Nodes\n%d\n%b$EndNodes\n" % (len(mesh.positions), nodes)
+        + b"$Elements\n%d\n%b$EndElements\n" % (len(cells), elements)
+    )
+
+
+def gmsh_4(mesh: TetrahedralMesh, order: str = "") -> bytes:
+    """Gmsh 4.1: as text, or binary in byte order "<" or ">". Nodes in two blocks."""
+    n, cells = len(mesh.positions), _cells(mesh)
+    nodes = [("Q", [2, n, FIRST_TAG, n + FIRST_TAG - 1])]
+    for dimension, block in ((2, range(3)), (3, range(3, n))):
+        is_parametric = int(dimension == 2)
+        nodes += [("i", [dimension, 1, is_parametric]), ("Q", [len(block)])]
+        nodes += [("Q", [i + FIRST_TAG]) for i in block]
+        nodes += [("d", [*mesh.positions[i], *([0.5, 0.25] * is_parametric)]) for i in block]
+    elements = [("Q", [4, len(cells), 1, len(cells)])]
+    tag = 1
+    for dimension, kind in ((0, 15), (1, 1), (2, 2), (3, 4)):
+        block = [c for k, c in cells if k == kind]
+        elements += [("i", [dimension, 1, kind]), ("Q", [len(block)])]
+        for c in block:
+            elements.append(("Q", [tag, *c]))
+            tag += 1
+    return (
+        _gmsh_header("4.1", order)
+        + b"$Entities\n0 0 0 0\n$EndEntities\n"
+        + b"$Nodes\n%b\n$EndNodes\n" % _numbers(nodes, order)
+        + b"$Elements\n%b\n$EndElements\n" % _numbers(elements, order)
+    )
+
+
+def vtk_legacy(
+    mesh: TetrahedralMesh, version: str, is_binary: bool, dtype: str = "double"
+) -> bytes:
+    """VTK legacy with cells as size and nodes (2.0), or as offsets and connectivity (5.1)."""
+    cells = [(_VTK_KINDS[kind], [i - FIRST_TAG for i in c]) for kind, c in _cells(mesh)]
+
+    def array(values: object, code: str) -> bytes:
+        values = np.ravel(values)
+        text = " ".join(repr(v) for v in values.tolist()).encode()
+        return (values.astype(">" + code).tobytes() if is_binary else text) + b"\n"
+
+    kind = b"BINARY" if is_binary else b"ASCII"
+    head = b"# vtk DataFile Version %b\na title\n%b\nDATASET UNSTRUCTURED_GRID\n"
+    parts = [head % (version.encode(), kind)]
+    parts.append(b"FIELD FieldData 1\nTIME 1 1 double\n" + array([0.5], "f8"))
+    parts.append(b"POINTS %d %b\n" % (len(mesh.positions), dtype.encode()))
+    parts.append(array(mesh.positions, "f8" if dtype == "double" else "f4"))
+    parts.append(b"METADATA\nINFORMATION 0\n\n")
+    flat = np.concatenate([c for _, c in cells])
+    if version == "5.1":
+        offsets = np.cumsum([0, *(len(c) for _, c in cells)])
+        parts.append(b"CELLS %d %d\n" % (len(offsets), len(flat)))
+        parts.append(b"OFFSETS vtktypeint64\n" + array(offsets, "i8"))
+        parts.append(b"CONNECTIVITY vtktypeint64\n" + array(flat, "i8"))
+    else:
+        sized = np.concatenate([[len(c), *c] for _, c in cells])
+        parts.append(b"CELLS %d %d\n" % (len(cells), len(sized)) + array(sized, "i4"))
+    parts.append(b"CELL_TYPES %d\n" % len(cells) + array([k for k, _ in cells], "i4"))
+    parts.append(b"POINT_DATA %d\n" % len(mesh.positions))
+    return b"".join(parts)
+
+
+def vtu(
+    mesh: TetrahedralMesh,
+    form: str = "binary",
+    order: str = "<",
+    header: str = "UInt64",
+    is_compressed: bool = False,
+    appended_is_raw: bool = True,
+) -> bytes:
+    """VTK XML in all its ways to write numbers; `form` is ascii, binary or appended."""
+    cells = [(_VTK_KINDS[kind], [i - FIRST_TAG for i in c]) for kind, c in _cells(mesh)]
+    appended = b""
+
+    def array(name: str, dtype: str, values: object) -> bytes:
+        nonlocal appended
+        code = {"Float64": "f8", "Int64": "i8", "UInt8": "u1"}[dtype]
+        offset = b' offset="%d"' % len(appended) if form == "appended" else b""
+        data = np.ravel(values).astype(order + code).tobytes()
+        if form == "ascii":
+            text = " ".join(repr(v) for v in np.ravel(values).tolist()).encode()
+        elif form == "appended":
+            appended += _vtu_data(data, order, header, is_compressed, appended_is_raw)
+            text = b""
+        else:
+            text = _vtu_data(data, order, header, is_compressed, is_raw=False)
+        components = b' NumberOfComponents="3"' if name == "Points" else b""
+        return b'<DataArray type="%b" Name="%b"%b format="%b"%b>%b</DataArray>\n' % (
+            *(dtype.encode(), name.encode(), components, form.encode(), offset),
+            text,
+        )
+
+    body = b'<Piece NumberOfPoints="%d" NumberOfCells="%d">\n' % (len(mesh.positions), len(cells))
+    body += b"<Points>" + array("Points", "Float64", mesh.positions) + b"</Points>\n<Cells>"
+    body += array("connectivity", "Int64", np.concatenate([c for _, c in cells]))
+    body += array("offsets", "Int64", np.cumsum([len(c) for _, c in cells]))
+    body += array("types", "UInt8", [k for k, _ in cells]) + b"</Cells>\n</Piece>\n"
+    endian = b"LittleEndian" if order == "<" else b"BigEndian"
+    compressor = b' compressor="vtkZLibDataCompressor"' if is_compressed else b""
+    if form == "appended":
+        encoding = b"raw" if appended_is_raw else b"base64"
+        appended = b'<AppendedData encoding="%b">_%b</AppendedData>\n' % (encoding, appended)
+    return (
+        b'<?xml version="1.0"?>\n'
+        b'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="%b" header_type="%b"%b>\n'
+        b"<UnstructuredGrid>\n%b</UnstructuredGrid>\n%b</VTKFile>\n"
+        % (endian, header.encode(), compressor, body, appended)
+    )
+
+
+_VTK_KINDS = {15: 1, 1: 3, 2: 5, 4: 10}
+"""Gmsh's number of a kind of cell to VTK's."""
+
+
+def _cells(mesh: TetrahedralMesh) -> list[tuple[int, list[int]]]:
+    """List kind and node tags of all cells, in Gmsh's numbers."""
+    tetrahedra = (mesh.tetrahedra + FIRST_TAG).tolist()
+    first = tetrahedra[0]
+    return [(15, first[:1]), (1, first[:2]), (2, first[:3]), *((4, c) for c in tetrahedra)]
+
+
+def _gmsh_header(version: str, order: str) -> bytes:
+    one = struct.pack(order + "i", 1) + b"\n" if order else b""
+    return b"$MeshFormat\n%b %d 8\n%b$EndMeshFormat\n" % (version.encode(), bool(order), one)
+
+
+def _numbers(lines: list[tuple[str, list[float]]], order: str) -> bytes:
+    if order:
+        return b"".join(struct.pack(f"{order}{len(v)}{code}", *v) for code, v in lines)
+    return "\n".join(
+        _spaced([float(x) if code == "d" else x for x in v]) for code, v in lines
+    ).encode()
+
+
+def _spaced(values: list[float]) -> str:
+    return " ".join(repr(v) for v in values)
+
+
+def _vtu_data(data: bytes, order: str, header: str, is_compressed: bool, is_raw: bool) -> bytes:
+    code = "I" if header == "UInt32" else "Q"
+    if not is_compressed:
+        whole = struct.pack(order + code, len(data)) + data
+        return whole if is_raw else base64.b64encode(whole)
+    size = 100  # small, for there to be many blocks
+    blocks = [zlib.compress(data[i : i + size]) for i in range(0, len(data), size)]
+    numbers = [len(blocks), size, len(data) % size, *(len(b) for b in blocks)]
+    parts = [struct.pack(f"{order}{len(numbers)}{code}", *numbers), b"".join(blocks)]
+    return b"".join(parts if is_raw else [base64.b64encode(part) for part in parts])

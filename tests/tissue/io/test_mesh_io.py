@@ -1,0 +1,405 @@
+import os
+import socket
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.tissue.io import mesh_writers as write
+from tissue import Snapshot, TetrahedralMesh, block, read_mesh, write_vtu
+from tissue.boundary_conditions import side_nodes
+from tissue.io.mesh_io import MeshError
+from tissue.mesh.validation import checked
+
+BLOCK = block((2, 1, 2), (0.03, 0.02, 0.01))
+
+FILES = {
+    "gmsh 1.0.msh": write.gmsh_1(BLOCK),
+    **{f"gmsh 2.2 {o}.msh": write.gmsh_2(BLOCK, o) for o in ("", "<", ">")},
+    **{f"gmsh 4.1 {o}.msh": write.gmsh_4(BLOCK, o) for o in ("", "<", ">")},
+    **{
+        f"vtk {version} {'binary' if b else 'text'}.vtk": write.vtk_legacy(BLOCK, version, b)
+        for version in ("2.0", "5.1")
+        for b in (False, True)
+    },
+    "text.vtu": write.vtu(BLOCK, "ascii"),
+    **{
+        f"{form} {order} {header} {'zlib' if z else 'plain'}.vtu": write.vtu(
+            BLOCK, form, order, header, z
+        )
+        for form in ("binary", "appended")
+        for order in "<>"
+        for header in ("UInt32", "UInt64")
+        for z in (False, True)
+    },
+    "appended base64.vtu": write.vtu(BLOCK, "appended", appended_is_raw=False),
+    "appended base64 zlib.vtu": write.vtu(
+        BLOCK, "appended", is_compressed=True, appended_is_raw=False
+    ),
+}
+
+
+def refusal(path):
+    """Return the message with which `path` is refused."""
+    with pytest.raises(MeshError) as caught:
+        read_mesh(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    return message
+
+
+def refusal_of(folder, name, data):
+    path = folder / name
+    path.write_bytes(data)
+    return refusal(path)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_format_gives_back_the_mesh_to_the_last_bit(name, tmp_path):
+    (tmp_path / name).write_bytes(FILES[name])
+    mesh = read_mesh(tmp_path / name)
+    assert np.array_equal(mesh.positions, BLOCK.positions)
+    assert np.array_equal(mesh.tetrahedra, BLOCK.tetrahedra)
+
+
+def test_single_precision_and_windows_lines_are_read_too(tmp_path):
+    (tmp_path / "f.vtk").write_bytes(write.vtk_legacy(BLOCK, "2.0", True, "float"))
+    assert np.array_equal(read_mesh(tmp_path / "f.vtk").positions, BLOCK.positions.astype("f4"))
+    for name in ("gmsh 1.0.msh", "gmsh 2.2 .msh", "gmsh 4.1 .msh", "vtk 2.0 text.vtk"):
+        (tmp_path / name).write_bytes(FILES[name].replace(b"\n", b"\r\n"))
+        assert np.array_equal(read_mesh(tmp_path / name).tetrahedra, BLOCK.tetrahedra)
+
+
+@pytest.mark.parametrize("file_format", ["gmsh22", "gmsh", "vtk42", "vtk51", "vtu"])
+@pytest.mark.parametrize("binary", [False, True])
+def test_what_meshio_writes_is_read(file_format, binary, tmp_path):
+    path = tmp_path / f"mesh.{'msh' if 'gmsh' in file_format else file_format[:3]}"
+    mesh = meshio.Mesh(BLOCK.positions, [("tetra", BLOCK.tetrahedra)])
+    meshio.write(path, mesh, file_format=file_format, binary=binary)
+    assert np.array_equal(read_mesh(path).tetrahedra, BLOCK.tetrahedra)
+    assert np.allclose(read_mesh(path).positions, BLOCK.positions, rtol=0.0, atol=1e-12)
+
+
+def test_the_scale_brings_millimetres_to_metres(tmp_path):
+    in_millimetres = BLOCK._replace(positions=1000.0 * BLOCK.positions)
+    (tmp_path / "mm.msh").write_bytes(write.gmsh_2(in_millimetres))
+    assert read_mesh(tmp_path / "mm.msh", 0.001).positions == pytest.approx(BLOCK.positions)
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_scale_that_is_not_positive_is_refused(scale, tmp_path):
+    with pytest.raises(ValueError, match="scale is"):
+        read_mesh(tmp_path / "any.msh", scale)
+
+
+# ------------------------------------------------------------------ what is not a mesh at all
+
+
+def test_a_missing_file_a_directory_and_an_empty_file_are_refused(tmp_path):
+    assert "no such file" in refusal(tmp_path / "missing.msh")
+    (tmp_path / "folder.msh").mkdir()
+    assert "directory" in refusal(tmp_path / "folder.msh")
+    assert "empty" in refusal_of(tmp_path, "empty.vtk", b"")
+    assert "empty" in refusal_of(tmp_path, "blank.vtk", b" \n \n")
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.msh")
+    assert "pipe" in refusal(tmp_path / "pipe.msh")
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(tmp_path / "s.msh"))
+        assert "pipe" in refusal(tmp_path / "s.msh")
+
+
+def test_a_file_too_large_is_refused_before_it_is_read(tmp_path):
+    with (tmp_path / "large.vtu").open("wb") as file:
+        file.truncate(2**31 + 1)  # sparse: takes no room on the disk
+    assert "expected at most 2147483648 bytes, found 2147483649" in refusal(tmp_path / "large.vtu")
+
+
+@pytest.mark.parametrize("suffix", ["", ".txt", ".mesh", ".inp"])
+def test_another_suffix_is_refused_with_those_that_are_read(suffix, tmp_path):
+    message = refusal_of(tmp_path, "mesh" + suffix, FILES["gmsh 1.0.msh"])
+    assert ".msh, .vtk, .vtu" in message
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".OBJ", ".ply"])
+def test_a_file_of_a_surface_is_refused_with_what_to_do(suffix, tmp_path):
+    assert "only a surface" in refusal_of(tmp_path, "organ" + suffix, b"solid organ")
+
+
+@pytest.mark.parametrize("suffix", [".msh", ".vtk", ".vtu"])
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"<!DOCTYPE html><html><body>404</body></html>", "a web page"),
+        (b"\n<html>\n<body>Sign in</body></html>", "a web page"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "Git LFS"),
+        (b"\x1f\x8b\x08\x00\x00\x00\x00\x00", "compressed"),
+        (b"hello", "expected"),
+        (bytes(range(256)) * 4, "expected"),
+        (b"\x00" * 1000, "expected"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_with_what_was_found(suffix, data, message, tmp_path):
+    assert message in refusal_of(tmp_path, "file" + suffix, data)
+
+
+def test_a_file_of_another_format_is_refused_with_what_was_expected_and_found(tmp_path):
+    message = refusal_of(tmp_path, "a.msh", FILES["vtk 2.0 text.vtk"])
+    assert "line 1: expected $MeshFormat or $NOD, found '# vtk DataFile" in message
+    message = refusal_of(tmp_path, "a.vtk", FILES["gmsh 1.0.msh"])
+    assert "line 1: expected '# vtk DataFile Version', found '$NOD'" in message
+
+
+# ------------------------------------------------------------------ what is broken
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("part", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_a_truncated_file_is_refused(name, part, tmp_path):
+    data = FILES[name]
+    assert "expected" in refusal_of(tmp_path, name, data[: int(part * len(data))])
+
+
+@pytest.mark.parametrize(
+    "lie", [b"10", b"-5", b"4000000000", b"99999999999999999999", b"x", b"1.5"]
+)
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [
+        ("gmsh 1.0.msh", b"$NOD\n%b"),
+        ("gmsh 1.0.msh", b"$ELM\n%b"),
+        ("gmsh 2.2 .msh", b"$Nodes\n%b"),
+        ("gmsh 2.2 .msh", b"$Elements\n%b"),
+        ("gmsh 2.2 <.msh", b"$Nodes\n%b"),
+        ("gmsh 2.2 <.msh", b"$Elements\n%b"),
+        ("gmsh 4.1 .msh", b"$Nodes\n2 %b"),
+        ("gmsh 4.1 .msh", b"$Elements\n4 %b"),
+        ("vtk 2.0 text.vtk", b"POINTS %b"),
+        ("vtk 2.0 text.vtk", b"CELLS %b"),
+        ("vtk 2.0 text.vtk", b"CELL_TYPES %b"),
+        ("vtk 2.0 binary.vtk", b"POINTS %b"),
+        ("vtk 2.0 binary.vtk", b"CELLS %b"),
+        ("vtk 2.0 binary.vtk", b"CELL_TYPES %b"),
+        ("vtk 5.1 text.vtk", b"CELLS %b"),
+        ("vtk 5.1 binary.vtk", b"CELLS %b"),
+        ("text.vtu", b'NumberOfPoints="%b'),
+        ("text.vtu", b'NumberOfCells="%b'),
+        ("binary < UInt64 plain.vtu", b'NumberOfPoints="%b'),
+        ("appended < UInt64 zlib.vtu", b'NumberOfCells="%b'),
+    ],
+)
+def test_a_count_that_lies_is_refused_with_what_was_expected_and_found(name, count, lie, tmp_path):
+    n_nodes, n_cells = len(BLOCK.positions), len(BLOCK.tetrahedra) + 3
+    truths = [count % b"%d" % n for n in (n_nodes, n_cells, n_cells + 1)]
+    (truth,) = (t for t in truths if t in FILES[name])
+    message = refusal_of(tmp_path, name, FILES[name].replace(truth, count % lie))
+    assert "expected" in message
+    assert "found" in message
+
+
+def test_a_word_among_the_numbers_is_refused_by_its_line(tmp_path):
+    lines = FILES["gmsh 1.0.msh"].split(b"\n")
+    lines[4] = lines[4].replace(b"0.01", b"O.01")
+    message = refusal_of(tmp_path, "typo.msh", b"\n".join(lines))
+    assert "line 5: expected numbers" in message
+    assert "'O.01'" in message
+
+
+def test_an_index_out_of_range_is_refused_by_its_tetrahedron(tmp_path):
+    mesh = BLOCK._replace(tetrahedra=BLOCK.tetrahedra.copy())
+    mesh.tetrahedra[3, 1] = 500
+    for name, data in (
+        ("1.msh", write.gmsh_1(mesh)),
+        ("2.msh", write.gmsh_2(mesh, "<")),
+        ("4.msh", write.gmsh_4(mesh)),
+        ("a.vtk", write.vtk_legacy(mesh, "5.1", True)),
+        ("a.vtu", write.vtu(mesh)),
+    ):
+        message = refusal_of(tmp_path, name, data)
+        assert "tetrahedron 3" in message
+        assert "index out of range" in message
+
+
+def test_a_node_that_is_there_twice_is_refused_by_its_tag(tmp_path):
+    data = FILES["gmsh 1.0.msh"].replace(b"\n8 ", b"\n7 ", 1)
+    assert "node 7 is there twice" in refusal_of(tmp_path, "twice.msh", data)
+
+
+def test_a_broken_mesh_is_refused_under_the_name_of_its_file(tmp_path):
+    mesh = BLOCK._replace(positions=BLOCK.positions.copy())
+    mesh.positions[3, 1] = np.nan
+    for name, data in (("a.msh", write.gmsh_2(mesh)), ("a.vtu", write.vtu(mesh))):
+        assert "node 3 has a coordinate that is NaN" in refusal_of(tmp_path, name, data)
+
+
+@pytest.mark.parametrize(
+    ("cells", "message"),
+    [
+        ([("triangle", [[0, 1, 2]])], "only a surface, no tetrahedra: found 1 triangles"),
+        ([("line", [[0, 1]])], "no tetrahedra; found 1 lines"),
+        ([("tetra10", [range(10)])], "1 tetrahedra with 10 nodes: mesh the body with"),
+        ([("tetra", [[0, 1, 2, 3]]), ("hexahedron", [range(8)])], "1 tetrahedra, 1 hexahedra"),
+    ],
+)
+@pytest.mark.parametrize("name", ["a.msh", "a.vtk", "a.vtu"])
+def test_cells_that_are_not_tetrahedra_with_four_nodes_are_refused(name, cells, message, tmp_path):
+    path = tmp_path / name
+    mesh = meshio.Mesh(BLOCK.positions, [(k, np.array([list(c) for c in cs])) for k, cs in cells])
+    meshio.write(path, mesh, file_format="gmsh22" if name == "a.msh" else None)
+    assert message in refusal(path)
+
+
+def test_xml_that_defines_entities_is_refused(tmp_path):
+    bomb = b'<!DOCTYPE a [<!ENTITY b "bb">]>' + FILES["text.vtu"]
+    assert "document type" in refusal_of(tmp_path, "bomb.vtu", bomb)
+
+
+def test_a_block_that_unpacks_to_more_than_it_says_is_refused(tmp_path):
+    honest = write.vtu(BLOCK, "appended", is_compressed=True)
+    data = honest.replace(b'NumberOfPoints="18"', b'NumberOfPoints="17"')
+    assert "expected 408 bytes of numbers, found 432" in refusal_of(tmp_path, "z.vtu", data)
+
+
+NUMBERS = [
+    b"-1",
+    b"0",
+    b"3",
+    b"1e9",
+    b"4294967295",
+    b"9223372036854775807",
+    b"nan",
+    b"inf",
+    b"",
+    b"$",
+]
+
+
+@st.composite
+def mutated(draw, data):
+    """Some bytes, words or stretches of `data` changed, doubled or taken away."""
+    for _ in range(draw(st.integers(1, 4))):
+        if not data:
+            return data
+        at = draw(st.integers(0, len(data) - 1))
+        length = draw(st.integers(1, 40))
+        change = draw(st.sampled_from(["byte", "word", "delete", "double", "truncate"]))
+        if change == "byte":
+            data = data[:at] + bytes([draw(st.integers(0, 255))]) + data[at + 1 :]
+        elif change == "word":
+            start = max(data.rfind(b" ", 0, at), data.rfind(b"\n", 0, at), data.rfind(b'"', 0, at))
+            rest = data[start + 1 :]
+            word = rest.split()[0] if rest.split() else b""
+            data = data[: start + 1] + draw(st.sampled_from(NUMBERS)) + rest[len(word) :]
+        elif change == "delete":
+            data = data[:at] + data[at + length :]
+        elif change == "double":
+            data = data[: at + length] + data[at:]
+        else:
+            data = data[:at]
+    return data
+
+
+@pytest.mark.parametrize("name", FILES)
+@settings(
+    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(choice=st.data())
+def test_a_damaged_file_is_refused_or_gives_a_sound_mesh(name, tmp_path, choice):
+    path = tmp_path / name
+    path.write_bytes(choice.draw(mutated(FILES[name])))
+    try:
+        mesh = read_mesh(path)
+    except MeshError:
+        return
+    assert checked(mesh).mesh.tetrahedra.shape == mesh.tetrahedra.shape
+
+
+# ------------------------------------------------------------------ what we write
+
+
+def snapshot():
+    rng = np.random.default_rng(0)
+    n = len(BLOCK.positions)
+    moved = BLOCK.positions + rng.uniform(-1e-4, 1e-4, (n, 3))
+    velocities, masses = rng.normal(size=(n, 3)), rng.uniform(1e-6, 1e-3, n)
+    fixed = side_nodes(BLOCK, ["left"])
+    return Snapshot(moved, BLOCK.positions, velocities, masses, BLOCK.tetrahedra, fixed)
+
+
+def test_a_snapshot_is_read_by_meshio_to_the_last_bit(tmp_path):
+    write_vtu(tmp_path / "body.vtu", snapshot())
+    mesh = meshio.read(tmp_path / "body.vtu")
+    assert mesh.points.dtype == np.float64
+    assert np.array_equal(mesh.points, snapshot().positions)
+    assert np.array_equal(mesh.cells_dict["tetra"], BLOCK.tetrahedra)
+    assert np.array_equal(mesh.point_data["rest_position"], BLOCK.positions)
+    assert np.array_equal(mesh.point_data["velocity"], snapshot().velocities)
+    assert np.array_equal(mesh.point_data["mass"], snapshot().masses)
+    assert np.array_equal(mesh.point_data["fixed"].astype(bool), snapshot().fixed)
+
+
+def test_the_piece_of_each_tetrahedron_is_among_the_cell_data(tmp_path):
+    alone = TetrahedralMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
+    n = len(BLOCK.positions)
+    body = Snapshot(
+        np.vstack([alone.positions - 5.0, BLOCK.positions]),
+        np.vstack([alone.positions * 0.001, BLOCK.positions]),
+        np.zeros((n + 4, 3)),
+        np.ones(n + 4),
+        np.vstack([alone.tetrahedra, BLOCK.tetrahedra + 4]),
+        np.zeros(n + 4, dtype=bool),
+    )
+    write_vtu(tmp_path / "body.vtu", body)
+    (piece,) = meshio.read(tmp_path / "body.vtu").cell_data["piece"]
+    assert piece.tolist() == [1] + [0] * len(BLOCK.tetrahedra)  # the largest at rest is 0
+
+
+def test_a_snapshot_is_a_mesh_that_we_read(tmp_path):
+    write_vtu(tmp_path / "body.vtu", snapshot())
+    mesh = read_mesh(tmp_path / "body.vtu")
+    assert np.array_equal(mesh.positions, snapshot().positions)
+    assert np.array_equal(mesh.tetrahedra, BLOCK.tetrahedra)
+
+
+class Interrupts:
+    """The user presses Ctrl-C while this is written."""
+
+    def __array__(self, *_, **__):
+        raise KeyboardInterrupt
+
+
+def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path):
+    path = tmp_path / "body.vtu"
+    write_vtu(path, snapshot())
+    before = path.read_bytes()
+    with pytest.raises(KeyboardInterrupt):
+        write_vtu(path, snapshot()._replace(fixed=Interrupts()))
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["body.vtu"]
+
+
+# ------------------------------------------------------------------ meshes of others
+
+
+@pytest.mark.skipif("SCALPEL_SIM_TEST_MESHES" not in os.environ, reason="no folder of meshes given")
+@pytest.mark.parametrize(
+    ("name", "n_nodes", "n_tetrahedra"),
+    [
+        ("sofa_liver.msh", 181, 596),
+        ("sofa_truthcylinder1.msh", 642, 2524),
+        ("bullet_banana.vtk", 725, 2395),
+        ("sofaenv_tissue_volume.msh", 493, 1432),
+    ],
+)
+def test_public_meshes_are_read_and_can_be_held_by_their_sides(name, n_nodes, n_tetrahedra):
+    mesh = read_mesh(Path(os.environ["SCALPEL_SIM_TEST_MESHES"]) / name, 0.01)
+    assert mesh.positions.shape == (n_nodes, 3)
+    assert mesh.tetrahedra.shape == (n_tetrahedra, 4)
+    for side in ("left", "right"):
+        assert 3 <= side_nodes(mesh, [side]).sum() < n_nodes / 4

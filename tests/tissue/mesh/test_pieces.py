@@ -1,0 +1,95 @@
+"""Each connected piece is known: its number, mass, motion, and whether it is held."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, soundness, strokes
+from tissue import Material, Tissue, block
+from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
+
+BLOCK = block((4, 2, 2), (0.04, 0.02, 0.02))
+
+
+def cut_block(weight=0.0):
+    """Return a block of 16 g, held at its left half, and cut clean across at 3/4 of its length."""
+    tissue = Tissue(
+        BLOCK,
+        # So sharp that the blade does not push the block aside; and slippery, for with friction the
+        # soft piece, turned by the blade, catches on the corners of the other and hangs there.
+        Material(toughness=0.5, friction=0.0),
+        fixed=BLOCK.positions[:, 0] <= 0.02,
+        gravity=(0.0, 0.0, -weight),
+    )
+    strokes.make(tissue, strokes.straight(BLOCK, 0.75))
+    return tissue
+
+
+@pytest.fixture(scope="module")
+def cut():
+    return cut_block()
+
+
+def test_a_whole_body_is_one_piece():
+    tissue = Tissue(BLOCK)
+    (piece,) = tissue.pieces()
+    assert piece.n_tetrahedra == tissue.n_tetrahedra and piece.n_nodes == tissue.n_nodes
+    assert piece.mass == pytest.approx(0.016) and piece.volume == pytest.approx(16e-6)
+    assert not piece.is_held
+    np.testing.assert_allclose(piece.centre, [0.02, 0.01, 0.01], atol=1e-4)
+
+
+def test_the_pieces_of_a_cut_come_with_the_larger_first_and_know_who_holds_them(cut):
+    large, small = cut.pieces()
+    assert large.is_held and not small.is_held
+    assert large.rest_volume == pytest.approx(0.75 * 16e-6)
+    assert small.rest_volume == pytest.approx(0.25 * 16e-6)
+    assert large.mass + small.mass == pytest.approx(0.016, rel=1e-12)
+    assert large.n_tetrahedra + small.n_tetrahedra == cut.n_tetrahedra
+    assert large.centre[0] < 0.03 < small.centre[0]
+
+
+def test_every_way_of_counting_pieces_agrees(cut):
+    piece = cut.piece_of_tetrahedra()
+    assert np.bincount(piece).tolist() == [p.n_tetrahedra for p in cut.pieces()]
+    assert cut.n_pieces() == len(cut.pieces()) == soundness.n_pieces(cut.snapshot().tetrahedra) == 2
+
+
+def test_a_spinning_piece_has_the_velocities_that_it_was_given(cut):
+    body = cut.snapshot()
+    nodes = np.unique(body.tetrahedra[piece_of_tetrahedra(body) == 1])
+    v, w = np.array([0.1, -0.2, 0.3]), np.array([3.0, -1.0, 2.0])
+    body.velocities[nodes] = v + np.cross(w, body.positions[nodes] - pieces_of(body)[1].centre)
+    small = pieces_of(body)[1]
+    np.testing.assert_allclose(small.velocity, v, atol=1e-12)
+    np.testing.assert_allclose(small.angular_velocity, w, atol=1e-9)
+    np.testing.assert_allclose(small.angular_momentum, small.inertia @ w, atol=1e-15)
+    np.testing.assert_allclose(small.inertia, small.inertia.T)
+
+
+def test_the_inertia_of_a_piece_is_that_of_its_nodes(cut):
+    body, piece = cut.snapshot(), cut.pieces()[0]
+    nodes = np.unique(body.tetrahedra[cut.piece_of_tetrahedra() == 0])
+    expected = np.zeros((3, 3))
+    for node in nodes:
+        r = body.positions[node] - piece.centre
+        expected += body.masses[node] * (r @ r * np.eye(3) - np.outer(r, r))
+    np.testing.assert_allclose(piece.inertia, expected, rtol=1e-9)
+
+
+def test_equal_pieces_come_in_the_order_of_their_tetrahedra():
+    two = bodies.unit_tetrahedron()
+    mesh = two._replace(
+        positions=np.vstack([two.positions, two.positions + 3.0]) * 0.01,
+        tetrahedra=np.array([[4, 5, 6, 7], [0, 1, 2, 3]]),
+    )
+    assert Tissue(mesh).piece_of_tetrahedra().tolist() == [0, 1]
+
+
+def test_a_loose_piece_falls_and_a_held_one_does_not():
+    tissue = cut_block(weight=9.81)
+    before = tissue.pieces()
+    for _ in range(100):
+        tissue.step(None, strokes.DT)
+    large, small = tissue.pieces()
+    assert small.velocity[2] < before[1].velocity[2] - 0.3
+    assert large.centre[2] == pytest.approx(before[0].centre[2], abs=1e-3)

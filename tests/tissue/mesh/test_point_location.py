@@ -1,0 +1,109 @@
+"""Where a point is, by cells, against a look at every tetrahedron; and how far the body reaches."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.kernels_of import cut_of
+from tissue.core.vec3 import Vec3
+from tissue.cutting.stellar_subdivision import split_edge
+from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
+from tissue.mesh.body import NODES, TETRAHEDRA
+from tissue.mesh.bounding_boxes import survey
+from tissue.mesh.point_location import (
+    build_grid,
+    list_appended,
+    list_moved,
+    no_grid,
+    tetrahedron_at,
+    tetrahedron_in_box,
+)
+
+pytestmark = pytest.mark.kernel
+
+MARGIN = 0.05
+
+
+@pytest.fixture
+def cut():
+    """A unit cube of some 150 tetrahedra."""
+    return cut_of(bodies.jittered(3, 0, size=1.0))
+
+
+def first_that_holds(body, p: Vec3) -> int:
+    """Ask every tetrahedron."""
+    for t in range(int(body.counts[TETRAHEDRA])):
+        if smallest_weight(barycentric_in(p, body.positions, body.tetrahedra, t)) >= 0.0:
+            return t
+    return -1
+
+
+def holds(body, t: int, p: Vec3) -> bool:
+    return smallest_weight(barycentric_in(p, body.positions, body.tetrahedra, t)) >= 0.0
+
+
+def expect_found(body, cells, seed: int) -> None:
+    """Fail unless a point is found if any tetrahedron holds it, and in one that does."""
+    for row in np.random.default_rng(seed).uniform(-0.2, 1.2, (60, 3)).tolist():
+        p = Vec3(*row)
+        t = tetrahedron_at(body, cells, body.positions, p)
+        assert (t >= 0) == (first_that_holds(body, p) >= 0)
+        assert t < 0 or holds(body, t, p)
+
+
+def test_a_point_is_found_where_a_look_at_all_tetrahedra_finds_it(cut):
+    expect_found(cut.body, build_grid(cut.body, cut.body.positions, MARGIN), seed=0)
+
+
+def test_a_grid_that_lists_nothing_finds_nothing(cut):
+    assert tetrahedron_at(cut.body, no_grid(), cut.body.positions, Vec3(0.5, 0.5, 0.5)) == -1
+
+
+def test_points_are_found_while_nodes_go_less_far_than_the_margin(cut):
+    cells = build_grid(cut.body, cut.body.positions, MARGIN)
+    n = int(cut.body.counts[NODES])
+    cut.body.positions[:n] += np.random.default_rng(1).uniform(-0.02, 0.02, (n, 3))
+    expect_found(cut.body, cells, seed=1)
+
+
+def test_points_are_found_when_nodes_that_went_far_are_listed_again(cut):
+    cells = build_grid(cut.body, cut.body.positions, MARGIN)
+    n = int(cut.body.counts[NODES])
+    cut.body.positions[:n] += [0.3, -0.2, 0.1]
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.work.around)
+    expect_found(cut.body, cells, seed=2)
+
+
+def test_points_are_found_in_tetrahedra_that_were_appended(cut):
+    cells = build_grid(cut.body, cut.body.positions, MARGIN)
+    for t in range(0, 60, 5):
+        split_edge(cut, cut.body.tetrahedra[t, 0], cut.body.tetrahedra[t, 1], 0.4)
+    assert list_appended(cut.body, cut.body.positions, cells)
+    expect_found(cut.body, cells, seed=3)
+
+
+def test_a_box_beside_the_body_meets_no_tetrahedron_and_one_across_it_does(cut):
+    x = cut.body.positions
+    cells = build_grid(cut.body, x, MARGIN)
+    beside = Vec3(1.1, 0.0, 0.0), Vec3(1.2, 1.0, 1.0)
+    across = Vec3(0.9, 0.4, 0.4), Vec3(1.2, 0.5, 0.5)
+    assert tetrahedron_in_box(cut.body, cells, x, *beside) == -1
+    found = tetrahedron_in_box(cut.body, cells, x, *across)
+    corners = x[cut.body.tetrahedra[found]]
+    assert corners.max(axis=0)[0] >= 0.9
+    assert (corners.max(axis=0)[1:] >= 0.4).all()
+    assert (corners.min(axis=0)[1:] <= 0.5).all()
+
+
+def test_the_body_reaches_from_its_lowest_to_its_highest_node(cut):
+    cut.body.positions[7] = [-3.0, 0.5, 4.0]
+    seen = survey(cut.body)
+    assert seen.is_finite
+    assert seen.low == (-3.0, 0.0, 0.0)
+    assert seen.high == (1.0, 1.0, 4.0)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_node_that_is_nowhere_is_seen(cut, value):
+    cut.body.positions[7, 1] = value
+    assert not survey(cut.body).is_finite

@@ -1,0 +1,55 @@
+"""The tetrahedra around a node and an edge, against a look at all of them."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, naive
+from tissue import block
+from tissue.mesh.body import build_body
+from tissue.mesh.star import LARGEST_STAR, edge_star, mean_node_size, no_visits, node_size, star
+
+pytestmark = pytest.mark.kernel
+
+MESHES = {"grid": block((2, 2, 2), (1.0, 1.0, 1.0)), "jittered": bodies.jittered(3, 4, size=1.0)}
+
+
+@pytest.fixture(params=MESHES)
+def mesh(request):
+    return MESHES[request.param]
+
+
+@pytest.fixture
+def around(mesh):
+    """The body, marks and scratch of a search in it."""
+    visits = no_visits(len(mesh.positions), len(mesh.tetrahedra))
+    return build_body(mesh, None, None), visits, np.zeros(LARGEST_STAR, dtype=np.int64)
+
+
+def test_a_star_is_every_tetrahedron_that_names_the_node(mesh, around):
+    body, visits, out = around
+    for node in range(len(mesh.positions)):
+        n = star(body, visits, node, body.node_tetrahedron[node], out)
+        assert len(set(out[:n])) == n
+        assert set(out[:n].tolist()) == naive.star(mesh.tetrahedra, node)
+
+
+def test_the_star_of_an_edge_is_every_tetrahedron_that_names_both_ends(mesh, around):
+    body, visits, out = around
+    for a, b in mesh.tetrahedra[:, :2]:
+        n = edge_star(body, visits, a, b, out)
+        both = naive.star(mesh.tetrahedra, a) & naive.star(mesh.tetrahedra, b)
+        assert set(out[:n].tolist()) == both
+
+
+def test_node_size_is_the_smallest_altitude_around(mesh, around):
+    body, visits, out = around
+    n_nodes = len(mesh.positions)
+    sizes = [naive.node_size(mesh.positions, mesh.tetrahedra, node) for node in range(n_nodes)]
+    assert [node_size(body, visits, k, out) for k in range(n_nodes)] == pytest.approx(sizes)
+    assert mean_node_size(body, visits, out) == pytest.approx(np.mean(sizes))
+
+
+def test_a_new_search_forgets_the_last(mesh, around):
+    body, visits, out = around
+    first = star(body, visits, 0, body.node_tetrahedron[0], out)
+    assert star(body, visits, 0, body.node_tetrahedron[0], out) == first

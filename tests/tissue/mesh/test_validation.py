@@ -1,0 +1,208 @@
+import logging
+
+import numpy as np
+import pytest
+
+from tissue import MeshError, TetrahedralMesh, block
+from tissue.geometry.connected_components import components
+from tissue.mesh.validation import checked, expect_sound, quality, signed_volumes
+
+CORNERS = 0.01 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+
+
+def sound_block():
+    positions, tetrahedra = block((2, 2, 2), (0.02, 0.02, 0.02))
+    return positions.copy(), tetrahedra.copy()
+
+
+def expect_refusal(positions, tetrahedra, message):
+    with pytest.raises(MeshError, match=message):
+        checked(TetrahedralMesh(positions, tetrahedra))
+
+
+def test_a_sound_mesh_passes_unchanged():
+    mesh = block()
+    result = checked(mesh)
+    assert result.warnings == ()
+    assert np.array_equal(result.mesh.positions, mesh.positions)
+    assert np.array_equal(result.mesh.tetrahedra, mesh.tetrahedra)
+    assert np.array_equal(result.origin, np.arange(len(mesh.positions)))
+
+
+def test_other_types_of_numbers_are_converted():
+    positions, tetrahedra = sound_block()
+    mesh = checked(TetrahedralMesh(positions.astype("f4"), tetrahedra.astype("u4"))).mesh
+    assert mesh.positions.dtype == np.float64
+    assert mesh.tetrahedra.dtype == np.int64
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_coordinate_that_is_not_finite_is_refused_by_its_node(value):
+    positions, tetrahedra = sound_block()
+    positions[3, 1] = value
+    expect_refusal(positions, tetrahedra, "node 3 has a coordinate that is NaN or infinite")
+
+
+@pytest.mark.parametrize("index", [27, -1, 2**62])
+def test_an_index_out_of_range_is_refused_by_its_tetrahedron(index):
+    positions, tetrahedra = sound_block()
+    tetrahedra[5, 2] = index
+    expect_refusal(
+        positions, tetrahedra, f"tetrahedron 5 has an index out of range, such as {index}"
+    )
+
+
+def test_a_repeated_node_is_refused_by_its_tetrahedron():
+    positions, tetrahedra = sound_block()
+    tetrahedra[5, 2] = tetrahedra[5, 1]
+    expect_refusal(positions, tetrahedra, "tetrahedron 5 has a repeated node")
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2, 3], [1, 0, 2, 3], [3, 1, 0, 2]])
+def test_a_duplicate_tetrahedron_is_refused_in_whatever_order_its_nodes_are(order):
+    positions, tetrahedra = sound_block()
+    tetrahedra = np.concatenate([tetrahedra, tetrahedra[3:4, order]])
+    expect_refusal(positions, tetrahedra, "duplicate tetrahedra: 3 and 48")
+
+
+def test_flat_tetrahedra_are_refused_the_worst_first():
+    positions, tetrahedra = sound_block()
+    positions = np.concatenate(
+        [positions, [[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0.01, 0.01, 0]]]
+    )
+    tetrahedra = np.concatenate([tetrahedra, [[27, 28, 29, 30]]])
+    expect_refusal(positions, tetrahedra, "1 flat tetrahedra, the worst: 48 ")
+
+
+def test_tetrahedra_with_two_nodes_in_one_place_are_refused():
+    positions, tetrahedra = sound_block()
+    positions[tetrahedra[0, 1]] = positions[tetrahedra[0, 0]]
+    expect_refusal(positions, tetrahedra, "flat tetrahedra, the worst: 0 ")
+
+
+def test_an_inverted_tetrahedron_among_others_is_refused_by_name():
+    positions, tetrahedra = sound_block()
+    tetrahedra[4] = tetrahedra[4, [1, 0, 2, 3]]
+    expect_refusal(positions, tetrahedra, r"inverted tetrahedra: 4 \(1 of 48\)")
+
+
+def test_the_odd_one_is_named_where_all_others_are_inverted():
+    positions, tetrahedra = sound_block()
+    tetrahedra[:4] = tetrahedra[:4, [1, 0, 2, 3]]
+    tetrahedra[5:] = tetrahedra[5:, [1, 0, 2, 3]]
+    expect_refusal(positions, tetrahedra, "not inverted while the others are tetrahedra: 4 ")
+
+
+def test_a_mesh_whose_tetrahedra_all_turn_right_is_turned_with_a_warning():
+    positions, tetrahedra = sound_block()
+    result = checked(TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]))
+    assert (signed_volumes(*result.mesh) > 0.0).all()
+    assert "all 48 tetrahedra turn right" in result.warnings[0]
+
+
+def test_a_face_shared_by_three_tetrahedra_is_refused_by_its_nodes():
+    positions = np.concatenate([CORNERS, [[0.002, 0.002, 0.02], [0.002, 0.002, -0.02]]])
+    tetrahedra = np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 2, 1, 5]])
+    expect_refusal(positions, tetrahedra, r"face \[0, 1, 2\] is shared by 3 tetrahedra, 0, 1, 2")
+
+
+def test_two_tetrahedra_on_the_same_side_of_their_face_are_refused():
+    positions = np.concatenate([CORNERS, [[0.002, 0.002, 0.02]]])
+    expect_refusal(positions, np.array([[0, 1, 2, 3], [0, 1, 2, 4]]), "tetrahedra 0 and 1 overlap")
+
+
+def test_no_tetrahedra_are_refused():
+    expect_refusal(CORNERS, np.zeros((0, 4), dtype=int), "no tetrahedra")
+
+
+def test_arrays_of_the_wrong_shape_or_type_are_refused():
+    expect_refusal(CORNERS[:, :2], np.array([[0, 1, 2, 3]]), "positions are float64 of shape")
+    expect_refusal(CORNERS, np.array([[0, 1, 2]]), "tetrahedra are int64 of shape")
+    expect_refusal(CORNERS, np.array([[0.0, 1, 2, 3]]), "whole numbers")
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"),
+    [(1e6, "over 1000 m: millimetres"), (1e-4, "under 1e-05 m")],
+)
+def test_an_extent_that_makes_no_sense_in_metres_is_refused(scale, message):
+    positions, tetrahedra = sound_block()
+    expect_refusal(scale * positions, tetrahedra, message)
+
+
+def test_a_body_of_twenty_metres_gets_a_hint_at_the_scale():
+    positions, tetrahedra = sound_block()
+    result = checked(TetrahedralMesh(1000.0 * positions, tetrahedra))
+    assert result.warnings == ("extent 20 m: millimetres? use --scale 0.001",)
+
+
+def test_unused_nodes_are_dropped_with_a_warning_and_the_rest_keep_their_origin():
+    positions, tetrahedra = sound_block()
+    result = checked(TetrahedralMesh(np.concatenate([CORNERS[:2], positions]), tetrahedra + 2))
+    assert np.array_equal(result.mesh.positions, positions)
+    assert np.array_equal(result.mesh.tetrahedra, tetrahedra)
+    assert np.array_equal(result.origin, np.arange(2, 29))
+    assert "dropped 2 nodes that no tetrahedron uses, the first 0, 1" in result.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("other", "n_split"),
+    [
+        ([[0.0, 0, -1], [-1, 0, 0], [0, -1, 0]], 1),  # shares node 0
+        ([[1.0, 0, 0], [0.5, -1, 0], [0.5, 0, -1]], 2),  # shares edge 01
+    ],
+)
+def test_tetrahedra_that_hang_together_by_a_node_or_an_edge_are_parted(other, n_split):
+    other = 0.01 * np.array(other)
+    is_edge = n_split == 2
+    positions = np.concatenate([CORNERS, other[1:] if is_edge else other])
+    second = [0, 1, 4, 5] if is_edge else [0, 4, 5, 6]
+    tetrahedra = np.array([[0, 1, 2, 3], second])
+    if signed_volumes(positions, tetrahedra)[1] < 0.0:
+        tetrahedra[1] = tetrahedra[1, [0, 1, 3, 2]]
+    result = checked(TetrahedralMesh(positions, tetrahedra))
+    assert len(result.mesh.positions) == 8
+    assert not set(result.mesh.tetrahedra[0]) & set(result.mesh.tetrahedra[1])
+    assert np.array_equal(result.mesh.positions, positions[result.origin])
+    assert f"split {n_split} node" in result.warnings[0]
+    assert "in 2 pieces" in result.warnings[1]
+
+
+def test_slivers_are_allowed_with_a_warning():
+    positions, tetrahedra = sound_block()
+    (warning,) = checked(TetrahedralMesh(positions * [1, 1, 1e-3], tetrahedra)).warnings
+    assert warning.startswith("48 slivers")
+
+
+def test_warnings_and_errors_carry_the_name_of_the_mesh(caplog):
+    positions, tetrahedra = sound_block()
+    with caplog.at_level(logging.WARNING, logger="tissue"):
+        checked(TetrahedralMesh(1000.0 * positions, tetrahedra), "liver.msh")
+    assert caplog.messages == ["liver.msh: extent 20 m: millimetres? use --scale 0.001"]
+    with pytest.raises(MeshError, match=r"^liver\.msh: there are no tetrahedra"):
+        checked(TetrahedralMesh(positions, tetrahedra[:0]), "liver.msh")
+
+
+def test_quality_is_one_for_a_regular_tetrahedron_whatever_its_size():
+    regular = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    for size in (1e-4, 1.0, 100.0):
+        assert abs(quality(size * regular, np.array([[0, 1, 2, 3]]))) == pytest.approx(1.0)
+
+
+def test_components_are_numbered_by_their_lowest_vertices():
+    n, labels = components(6, np.array([[5, 1], [0, 2], [2, 4]]))
+    assert n == 3
+    assert labels.tolist() == [0, 1, 0, 2, 0, 1]
+
+
+def test_a_mesh_that_would_have_to_be_repaired_is_refused_where_it_must_not_change():
+    positions, tetrahedra = sound_block()
+    expect_sound(TetrahedralMesh(positions, tetrahedra))
+    expect_sound(TetrahedralMesh(1000.0 * positions, tetrahedra))  # doubtful, but not wrong
+    for broken in (
+        TetrahedralMesh(np.concatenate([positions, CORNERS]), tetrahedra),
+        TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]),
+        TetrahedralMesh(positions, tetrahedra[[0, 0]]),
+    ):
+        with pytest.raises(MeshError):
+            expect_sound(broken)

@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+
+from tests.tissue.geometry_of_meshes import dihedral_angles
+from tissue import block, liver_lobe
+from tissue.mesh.faces import boundary_faces, sorted_faces
+from tissue.mesh.validation import checked, signed_volumes
+from tissue.shapes.liver_lobe import make_mesh
+
+
+def test_the_default_grid_is_the_block_of_figure_10():
+    mesh = block()
+    assert mesh.positions.shape == (5 * 7 * 5, 3)
+    assert mesh.tetrahedra.shape == (576, 4)
+    assert np.array_equal(mesh.positions.min(axis=0), [0.0, 0.0, 0.0])
+    assert np.array_equal(mesh.positions.max(axis=0), [0.04, 0.06, 0.04])
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (1, 2, 5), (4, 6, 4)])
+def test_the_six_tetrahedra_of_a_cell_are_equal_in_volume_and_turn_left(cells):
+    volumes = signed_volumes(*block(cells, (0.1, 0.2, 0.3)))
+    assert volumes == pytest.approx(0.1 * 0.2 * 0.3 / (6 * np.prod(cells)), rel=1e-12)
+
+
+def test_the_six_tetrahedra_of_a_cell_share_its_main_diagonal():
+    mesh = block((1, 1, 1), (1.0, 1.0, 1.0))
+    for corner in ([0, 0, 0], [1, 1, 1]):
+        node = np.flatnonzero((mesh.positions == corner).all(axis=1))
+        assert (mesh.tetrahedra == node).any(axis=1).all()
+
+
+@pytest.mark.parametrize("cells", [(1, 1, 1), (3, 1, 2), (2, 3, 4)])
+def test_neighbouring_cells_agree_on_the_diagonal_of_their_face(cells):
+    n_x, n_y, n_z = cells
+    tetrahedra = block(cells).tetrahedra
+    assert sorted_faces(tetrahedra).counts.max() <= 2
+    assert len(boundary_faces(tetrahedra)) == 4 * (n_x * n_y + n_y * n_z + n_z * n_x)
+
+
+def test_the_boundary_faces_of_a_grid_turn_left_seen_from_outside():
+    mesh = block((2, 3, 1))
+    a, b, c = (mesh.positions[boundary_faces(mesh.tetrahedra)[:, k]] for k in range(3))
+    enclosed = np.einsum("ij,ij->i", np.cross(a, b), c).sum() / 6.0
+    assert enclosed == pytest.approx(signed_volumes(*mesh).sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (dict(cells=(0, 1, 1)), "at least 1"),
+        (dict(cells=(1, 1)), "three whole numbers"),
+        (dict(cells=(1.5, 1, 1)), "three whole numbers"),
+        (dict(cells=(10**6, 10**6, 1)), "at most"),
+        (dict(size=(0.1, 0.0, 0.1)), "finite and positive"),
+        (dict(size=(0.1, float("nan"), 0.1)), "finite and positive"),
+        (dict(size=0.1), "three lengths"),
+    ],
+)
+def test_a_grid_that_cannot_be_is_refused_by_name(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        block(**arguments)
+
+
+def test_the_organ_that_is_shipped_is_the_one_that_the_code_makes():
+    shipped, made = liver_lobe(), make_mesh()
+    assert np.array_equal(shipped.tetrahedra, made.tetrahedra)
+    assert np.allclose(shipped.positions, made.positions, rtol=0.0, atol=1e-12)
+
+
+def test_the_organ_is_of_the_size_of_a_liver_lobe_and_stands_at_the_origin():
+    mesh = liver_lobe()
+    assert 4500 <= len(mesh.tetrahedra) <= 5500
+    assert mesh.positions.min(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    assert mesh.positions.max(axis=0) == pytest.approx([0.090, 0.060, 0.033], abs=1.5e-3)
+
+
+def test_the_organ_is_one_sound_piece_with_good_angles():
+    mesh = liver_lobe()
+    assert checked(mesh).warnings == ()
+    angles = dihedral_angles(mesh)
+    assert angles.min() >= 10.0
+    assert angles.max() <= 165.0
+
+
+def test_the_surface_of_the_organ_is_a_closed_sphere():
+    triangles = boundary_faces(liver_lobe().tetrahedra)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    distinct, counts = np.unique(edges, axis=0, return_counts=True)
+    assert (counts == 2).all()
+    assert len(np.unique(triangles)) - len(distinct) + len(triangles) == 2

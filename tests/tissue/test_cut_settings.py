@@ -1,0 +1,103 @@
+"""Path against time step: what may be asked for, and what the report says of a cut."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests import soundness
+from tests.strokes import curved, make, upright
+from tissue import CutReport, CutSettings, Material, Tissue, block, fixed_nodes
+
+SIZE = 0.04
+CELLS = 4
+MESH = block((CELLS, CELLS, CELLS), (SIZE, SIZE, SIZE))
+SOFT_TO_CUT = Material(toughness=0.1)
+"""The blade drags it along by 10 µm: where the blade passes, it cuts."""
+HELD = fixed_nodes(MESH, "left,right")
+NO_GRAVITY = (0.0, 0.0, 0.0)
+DRAG = 0.02
+"""How far the blade may push the tissue aside all the same, in node sizes."""
+
+
+def cut_at(x: float, quality: CutSettings | None = None) -> Tissue:
+    """Return a block that an upright blade has cut in two at `x` [m]."""
+    tissue = Tissue(MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, quality=quality)
+    make(tissue, upright(x, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
+    return tissue
+
+
+def curved_with(snap: float, guard: float) -> CutReport:
+    quality = CutSettings(snap=snap, floor=snap, guard=guard)
+    tissue = Tissue(MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, quality=quality)
+    make(tissue, curved(MESH))
+    return tissue.quality()
+
+
+def test_the_path_error_is_how_far_the_cut_faces_are_from_where_the_blade_passed():
+    x = 0.0185
+    tissue = cut_at(x)
+    surface, found = tissue.surface(), tissue.quality()
+    nodes = np.unique(surface.triangles[surface.is_cut])
+    off = np.abs(surface.rest_positions[nodes, 0] - x)
+    assert found.n_cut_nodes == len(nodes)
+    assert off.mean() > 0.1 * found.node_size  # most crossings moved to nodes
+    assert found.path_error_largest == pytest.approx(off.max(), abs=DRAG * found.node_size)
+    assert found.path_error_mean == pytest.approx(off.mean(), abs=DRAG * found.node_size)
+
+
+def test_a_cut_along_the_faces_of_the_mesh_has_no_path_error_and_no_price():
+    found = cut_at(SIZE / 2).quality()
+    assert found.n_cut_nodes == 2 * (CELLS + 1) ** 2
+    assert found.path_error_largest < DRAG * found.node_size
+    assert (found.growth, found.frequency_growth) == (1.0, pytest.approx(1.0, rel=0.5))
+
+
+def test_a_later_cut_does_not_forget_the_path_error_of_the_first():
+    tissue = cut_at(0.0185)
+    first = tissue.quality()
+    make(tissue, upright(0.0324, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
+    both = tissue.quality()
+    assert both.n_cut_nodes > first.n_cut_nodes
+    assert both.path_error_largest >= first.path_error_largest
+
+
+def test_less_snapping_follows_the_blade_more_closely_and_costs_time_step():
+    rough, fine = curved_with(0.5, 0.25), curved_with(0.05, 0.05)
+    assert fine.path_error_mean < 0.5 * rough.path_error_mean
+    assert fine.growth > rough.growth
+    assert fine.substep_growth > rough.substep_growth > 1.0
+
+
+def test_the_smallest_altitude_is_that_of_the_thinnest_tetrahedron_and_not_below_the_guard():
+    tissue = cut_at(0.0176)
+    body, found = tissue.snapshot(), tissue.quality()
+    lowest = soundness.smallest_altitude(body.rest_positions, body.tetrahedra)
+    assert found.now.altitude == pytest.approx(lowest, rel=1e-9)
+    assert found.guard <= found.now.altitude < found.initial.altitude
+
+
+def test_a_body_without_a_cut_has_no_path_error_and_has_not_grown():
+    found = Tissue(MESH).quality()
+    assert (found.n_cut_nodes, found.path_error_mean, found.path_error_largest) == (0, 0.0, 0.0)
+    assert found.initial == found.now
+    assert (found.growth, found.frequency_growth, found.substep_growth) == (1.0, 1.0, 1.0)
+
+
+def test_a_body_that_cannot_move_has_a_report():
+    found = Tissue(MESH, fixed=np.ones(len(MESH.positions), bool)).quality()
+    assert found.now.frequency == 0.0 and math.isinf(found.now.time_step)
+    assert (found.frequency_growth, found.substep_growth) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("name", ["snap", "floor", "guard", "crumb"])
+@pytest.mark.parametrize("value", [-0.1, math.nan, math.inf])
+def test_a_quality_that_is_no_share_is_refused_by_name(name, value):
+    with pytest.raises(ValueError, match=f"{name} is {value}"):
+        CutSettings(**{name: value})
+
+
+@pytest.mark.parametrize(("name", "value"), [("snap", 1.1), ("guard", 0.6)])
+def test_a_quality_that_no_mesh_could_have_is_refused(name, value):
+    with pytest.raises(ValueError, match=f"{name} is {value}.* at most"):
+        CutSettings(**{name: value})

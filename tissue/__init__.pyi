@@ -1,0 +1,77 @@
+from .blade_shape import BladeShape as BladeShape
+from .boundary_conditions import fixed_nodes as fixed_nodes
+from .core.array_types import BoolArray as BoolArray
+from .core.array_types import FloatArray as FloatArray
+from .core.array_types import IntArray as IntArray
+from .cut_settings import CutReport as CutReport
+from .cut_settings import CutSettings as CutSettings
+from .cut_settings import MeshMeasures as MeshMeasures
+from .integrators.options import Hierarchical as Hierarchical
+from .integrators.options import LocalTimeStepping as LocalTimeStepping
+from .io.mesh_io import read_mesh as read_mesh
+from .io.mesh_io import write_vtu as write_vtu
+from .material import Law as Law
+from .material import Material as Material
+from .material_presets import DAMPING_BAND as DAMPING_BAND
+from .material_presets import MATERIALS as MATERIALS
+from .material_presets import Figure as Figure
+from .material_presets import Preset as Preset
+from .mesh.validation import MeshError as MeshError
+from .shapes.block import block as block
+from .shapes.liver_lobe import liver_lobe as liver_lobe
+from .tissue import Tissue as Tissue
+from .tissue import TissueError as TissueError
+from .types import BladeContacts as BladeContacts
+from .types import BladeSegment as BladeSegment
+from .types import BladeSweep as BladeSweep
+from .types import BodyContacts as BodyContacts
+from .types import Chunks as Chunks
+from .types import Energies as Energies
+from .types import Piece as Piece
+from .types import SchemeStatistics as SchemeStatistics
+from .types import Snapshot as Snapshot
+from .types import StageTimes as StageTimes
+from .types import StepResult as StepResult
+from .types import Surface as Surface
+from .types import TetrahedralMesh as TetrahedralMesh
+from .types import Wrench as Wrench
+
+__all__ = [
+    "BladeContacts",
+    "BladeSegment",
+    "BladeShape",
+    "BladeSweep",
+    "BodyContacts",
+    "BoolArray",
+    "Chunks",
+    "CutReport",
+    "CutSettings",
+    "DAMPING_BAND",
+    "Energies",
+    "Figure",
+    "FloatArray",
+    "Hierarchical",
+    "IntArray",
+    "Law",
+    "LocalTimeStepping",
+    "MATERIALS",
+    "Material",
+    "MeshError",
+    "MeshMeasures",
+    "Piece",
+    "Preset",
+    "SchemeStatistics",
+    "Snapshot",
+    "StageTimes",
+    "StepResult",
+    "Surface",
+    "TetrahedralMesh",
+    "Tissue",
+    "TissueError",
+    "Wrench",
+    "block",
+    "fixed_nodes",
+    "liver_lobe",
+    "read_mesh",
+    "write_vtu",
+]

@@ -1,0 +1,77 @@
+"""The path of an edge whose way through the body at rest is given, not traced by anchors."""
+
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
+from tissue.cutting.blade_path import Path
+from tissue.mesh.body import Body, walk
+from tissue.mesh.point_location import (
+    TetrahedronGrid,
+    list_appended,
+    tetrahedron_at,
+    tetrahedron_in_box,
+)
+
+
+@kernel
+def begin_path(path: Path, points: FloatArray) -> None:
+    """Let the edge be at `points` [m], shape (n, 3), at rest; it has not moved yet."""
+    n = len(path.member)
+    for k in range(n):
+        store(path.t1, k, vec3(points, k))
+        path.seed[k] = -1
+        path.member[k] = True
+        path.known[k] = True
+        path.linked[k] = k + 1 < n
+
+
+@kernel
+def prescribe_path(
+    path: Path, body: Body, grid: TetrahedronGrid, points: FloatArray, forward: Vec3
+) -> None:
+    """Let the edge go on to `points` [m], shape (n, 3), at rest, cutting `forward`.
+
+    A sample that is not ahead of where it has been is held there: only the edge cuts, not the back.
+    """
+    list_appended(body, body.rest, grid)
+    n = len(path.member)
+    along = sub(vec3(points, n - 1), vec3(points, 0))
+    flat = cross(forward, along)
+    store(path.sideways, 0, scale(1.0 / norm(flat), flat))
+    for k in range(n):
+        start = vec3(path.t1, k)
+        p = vec3(points, k)
+        store(path.t0, k, start)
+        store(path.forward, k, forward)
+        if dot(sub(p, start), forward) > 0.0:
+            store(path.t1, k, p)
+    for k in range(n):
+        path.seed[k] = _find_seed(path, body, grid, k)
+
+
+@kernel
+def _find_seed(path: Path, body: Body, grid: TetrahedronGrid, k: int) -> int:
+    """A tetrahedron that holds sample `k`, or else one that the way of its segment may meet."""
+    p = vec3(path.t1, k)
+    if path.seed[k] >= 0:
+        at = walk(body, p, path.seed[k])
+        if at.inside:
+            return at.tetrahedron
+    t = tetrahedron_at(body, grid, body.rest, p)
+    if t >= 0:
+        return t
+    other = min(k + 1, len(path.member) - 1)
+    a = vec3(path.t0, k)
+    b = vec3(path.t0, other)
+    c = vec3(path.t1, other)
+    low = Vec3(
+        min(min(a.x, b.x), min(c.x, p.x)),
+        min(min(a.y, b.y), min(c.y, p.y)),
+        min(min(a.z, b.z), min(c.z, p.z)),
+    )
+    high = Vec3(
+        max(max(a.x, b.x), max(c.x, p.x)),
+        max(max(a.y, b.y), max(c.y, p.y)),
+        max(max(a.z, b.z), max(c.z, p.z)),
+    )
+    return tetrahedron_in_box(body, grid, body.rest, low, high)

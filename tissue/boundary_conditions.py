@@ -1,0 +1,232 @@
+"""Which nodes to hold: sides of the body, boxes, half-spaces, lists.
+
+Masks of shape (n_nodes,), for the paper's displacement boundary conditions.
+"""
+
+import difflib
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.core.array_types import BoolArray, FloatArray
+from tissue.mesh.faces import boundary_faces
+from tissue.types import TetrahedralMesh
+
+SIDES = {
+    "left": (0, False),
+    "right": (0, True),
+    "front": (1, False),
+    "back": (1, True),
+    "bottom": (2, False),
+    "top": (2, True),
+}
+"""The body's sides: the axis, and whether the side is at its high end."""
+
+FLATNESS = 1e-5
+"""How far a flat side may depart from a plane, as a fraction of the body's extent along the axis.
+
+Files in single precision depart by 1e-6. Larger than 1 / cells, and a grid loses its second layer.
+"""
+
+MIN_FLAT_COVER = 0.05
+"""A side is flat where its plane holds triangles over this fraction of the bounding box's side.
+
+Less is a chance facet of a round body, too small to hold it by.
+"""
+
+DEPTH = 0.05
+"""A round side reaches this deep, as a fraction of the body's extent along the axis.
+
+On an ellipsoid that is a cap of 44 % of its width.
+"""
+
+DEPTH_GROWTH = 1.25
+"""A coarse round side that holds no three nodes off a line is deepened by this factor at a time."""
+
+MIN_SPREAD = 1e-3
+"""Three nodes are off a line if they spread across it by this fraction of how they spread along."""
+
+ROUNDING = 1e-9
+"""Nodes this close to a box or a plane, in units of the body's extent, are on it."""
+
+
+def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
+    """Return the nodes that the text `specification` names.
+
+    Args:
+        mesh: The body.
+        specification: Sides joined by commas ("left,right"), or the corners of a box in m
+            ("0,0,0:0.01,0.06,0.04"), or "none".
+
+    Raises:
+        ValueError: The text is none of these, or the box holds no node.
+    """
+    text = specification.strip()
+    if text.lower() == "none":
+        return np.zeros(len(mesh.positions), dtype=bool)
+    if ":" in text:
+        return box_nodes(mesh, *_box_corners(text))
+    return side_nodes(mesh, text.split(","))
+
+
+def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
+    """Return the boundary nodes of the sides in `names`, together.
+
+    left and right are the low and the high end of x, front and back of y, bottom and top of z.
+    Of a flat side these are the nodes in its plane, exactly; of a round one those less than `DEPTH`
+    of the body's extent deep, and deeper where those would not hold the body: three nodes that are
+    not on a line.
+
+    Raises:
+        ValueError: A name is not a side.
+    """
+    axes = [_side(name) for name in ([names] if isinstance(names, str) else names)]
+    triangles = boundary_faces(mesh.tetrahedra)
+    mask = np.zeros(len(mesh.positions), dtype=bool)
+    for axis, is_high in axes:
+        mask |= _one_side(mesh.positions, triangles, axis, is_high)
+    return mask
+
+
+def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) -> BoolArray:
+    """Return the nodes between the corners `low` and `high` [m], faces of the box included.
+
+    Raises:
+        ValueError: The corners are not finite or not in order, or no node is between them.
+    """
+    low, high = _point(low, "the low corner"), _point(high, "the high corner")
+    if not np.all(low <= high):
+        raise ValueError(
+            f"the box goes from {_text(low)} to {_text(high)} m; "
+            "each coordinate of the first corner must be the smaller"
+        )
+    slack = ROUNDING * np.ptp(mesh.positions, axis=0).max()
+    mask = np.all((mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1)
+    if not mask.any():
+        raise ValueError(
+            f"no node is in the box from {_text(low)} to {_text(high)} m; {_where(mesh.positions)}"
+        )
+    return mask
+
+
+def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLike) -> BoolArray:
+    """Return the nodes on the plane through `point` [m], and those that `normal` points to.
+
+    With a plane that touches the body and an outward normal these are the nodes on the plane.
+
+    Raises:
+        ValueError: A value is not finite, the normal is zero, or no node is there.
+    """
+    point, normal = _point(point, "the point"), _point(normal, "the normal")
+    length = np.linalg.norm(normal)
+    if length == 0.0:
+        raise ValueError("the normal of the plane is zero; it must point to the nodes to hold")
+    slack = ROUNDING * np.ptp(mesh.positions, axis=0).max()
+    mask = (mesh.positions - point) @ (normal / length) >= -slack
+    if not mask.any():
+        raise ValueError(
+            f"no node is beyond the plane through {_text(point)} m with normal {_text(normal)}; "
+            f"{_where(mesh.positions)}"
+        )
+    return mask
+
+
+def listed_nodes(mesh: TetrahedralMesh, nodes: npt.ArrayLike) -> BoolArray:
+    """Return a mask of the nodes in the list `nodes`, counted from 0.
+
+    Raises:
+        ValueError: An entry is not a whole number, or not a node.
+    """
+    listed = np.asarray(nodes)
+    if listed.size and listed.dtype.kind not in "iu":
+        raise ValueError(f"the list of nodes holds {listed.dtype} values; give whole numbers")
+    listed = listed.astype(np.int64).ravel()
+    wrong = listed[(listed < 0) | (listed >= len(mesh.positions))]
+    if wrong.size:
+        raise ValueError(
+            f"there is no node {wrong[0]}; the body has the nodes 0 to {len(mesh.positions) - 1}"
+        )
+    mask = np.zeros(len(mesh.positions), dtype=bool)
+    mask[listed] = True
+    return mask
+
+
+def _side(name: str) -> tuple[int, bool]:
+    """Return the axis of a side, and whether it is the high end."""
+    key = name.strip().lower()
+    if key not in SIDES:
+        close = difflib.get_close_matches(key, [*SIDES, "none"], n=1)
+        hint = f" Did you mean '{close[0]}'?" if close else ""
+        raise ValueError(
+            f"'{name.strip()}' is not a side of the body.{hint} Sides: {', '.join(SIDES)}; "
+            "or a box x0,y0,z0:x1,y1,z1 in m; or none"
+        )
+    return SIDES[key]
+
+
+def _one_side(
+    positions: FloatArray, triangles: npt.NDArray[np.int64], axis: int, is_high: bool
+) -> BoolArray:
+    """Return the boundary nodes of one side."""
+    on_boundary = np.zeros(len(positions), dtype=bool)
+    on_boundary[triangles] = True
+    low, high = positions[on_boundary].min(axis=0), positions[on_boundary].max(axis=0)
+    extent = high - low
+    below = (high - positions)[:, axis] if is_high else (positions - low)[:, axis]
+
+    in_plane = on_boundary & (below <= FLATNESS * extent[axis])
+    if _covered(positions, triangles[in_plane[triangles].all(axis=1)], axis) >= (
+        MIN_FLAT_COVER * np.prod(np.delete(extent, axis))
+    ):
+        return in_plane
+    depth = DEPTH
+    while True:  # ends: at depth 1 a body holds three nodes off a line, else it has no volume
+        side = on_boundary & (below <= depth * extent[axis])
+        if _holds(positions[side]) or depth >= 1.0:
+            return side
+        depth *= DEPTH_GROWTH
+
+
+def _covered(positions: FloatArray, triangles: npt.NDArray[np.int64], axis: int) -> float:
+    """Return the area of `triangles` seen along `axis` [m2]."""
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    return float(np.abs(0.5 * np.cross(b - a, c - a)[:, axis]).sum())
+
+
+def _holds(points: FloatArray) -> bool:
+    """Whether three of the points are off a line, so that holding them stops every rotation."""
+    if len(points) < 3:
+        return False
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[1] > MIN_SPREAD * spread[0])
+
+
+def _box_corners(text: str) -> tuple[FloatArray, FloatArray]:
+    """Parse "x0,y0,z0:x1,y1,z1"."""
+    try:
+        low, high = (np.array([float(n) for n in c.split(",")]) for c in text.split(":"))
+    except ValueError:
+        low = high = np.empty(0)
+    if low.shape != (3,) or high.shape != (3,):
+        raise ValueError(f"'{text}' is not a box; write its corners in m as x0,y0,z0:x1,y1,z1")
+    return low, high
+
+
+def _point(values: npt.ArrayLike, name: str) -> FloatArray:
+    """Return three finite numbers, or say what is wrong with them."""
+    point = np.asarray(values, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise ValueError(f"{name} is {values!r}; it must be three finite numbers")
+    return point
+
+
+def _where(positions: FloatArray) -> str:
+    """Say where the body is."""
+    low, high = positions.min(axis=0), positions.max(axis=0)
+    return f"the body goes from {_text(low)} to {_text(high)} m"
+
+
+def _text(point: FloatArray) -> str:
+    """Write a point for people."""
+    return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"

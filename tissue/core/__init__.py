@@ -1,0 +1,1 @@
+"""Ground of the engine: the compiler, structs of arrays, points and vectors of eight doubles."""

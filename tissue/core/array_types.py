@@ -1,0 +1,10 @@
+"""Types of arrays, by what they hold."""
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+SlotArray = npt.NDArray[np.int32]
+"""Indices that the loops of the 1 kHz read: half the bytes."""
+BoolArray = npt.NDArray[np.bool_]

@@ -1,0 +1,314 @@
+"""Vectors of eight doubles (`Lanes`) inside kernels, for the loops that the 1 kHz rests on.
+
+LLVM does not vectorise a gather over the neighbours of a node by itself. Here the kernel says so:
+it reads as for one neighbour, but each value is a vector of eight. On a machine with narrower
+registers LLVM splits each operation in two or four. A `Point` is x, y, z of one node in a vector
+of four.
+
+Each function is also a plain Python function on NumPy arrays, which runs when the JIT is off: the
+tests compare the two. `+ - * /` work on both.
+"""
+
+import operator
+from collections.abc import Callable
+from inspect import Parameter, Signature
+from typing import Any, cast
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import lower_builtin, models, register_model, type_callable
+
+from tissue.core.array_types import FloatArray, SlotArray
+from tissue.core.jit import kernel
+
+WIDTH = 8
+"""Doubles in a vector: one cache line, and one AVX-512 register."""
+
+Lanes = Any
+"""In Python an array of eight doubles; in a kernel one vector. It stands in for a float, so that a
+`Vec3` of them is eight points, and the functions of `tissue.core.vec3` work on eight at a time."""
+Point = np.ndarray
+"""In Python x, y, z and a 0; in a kernel one vector of four."""
+
+
+@kernel
+def filled(n: int) -> int:
+    """Return the slots that a row of `n` entries takes: a multiple of `WIDTH`."""
+    return (n + WIDTH - 1) // WIDTH * WIDTH
+
+
+def aligned(n: int, dtype: type = np.float64) -> np.ndarray:
+    """Return zeros that begin with a cache line: a vector across two lines loads at half speed."""
+    line = 64 // np.dtype(dtype).itemsize
+    memory: np.ndarray = np.zeros(n + line, dtype)
+    skip = -memory.ctypes.data % 64 // memory.itemsize
+    return memory[skip : skip + n]
+
+
+def room_for_points(n: int) -> FloatArray:
+    """Return zeros of shape (n, 3) with one more double behind them: see `eight_points`."""
+    return np.zeros(3 * n + 1)[:-1].reshape(n, 3)
+
+
+class LanesType(types.Type):
+    """Numba's type of a vector of doubles."""
+
+    def __init__(self, width: int) -> None:
+        self.width = width
+        super().__init__(name=f"Lanes({width})")
+
+
+LANES = LanesType(WIDTH)
+POINT = LanesType(4)
+_THREE = types.UniTuple(LANES, 3)
+_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
+_POINT = ir.VectorType(ir.DoubleType(), 4)
+_XYZ = ir.Constant(ir.VectorType(ir.IntType(1), 4), [1, 1, 1, 0])
+_I32 = ir.IntType(32)
+_EVEN, _ODD = [0, 8, 2, 10, 4, 12, 6, 14], [1, 9, 3, 11, 5, 13, 7, 15]
+_FIRST, _SECOND = [0, 1, 8, 9, 4, 5, 12, 13], [2, 3, 10, 11, 6, 7, 14, 15]
+_I64 = ir.IntType(64)
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, fe_type: LanesType) -> None:
+        super().__init__(manager, fe_type, ir.VectorType(ir.DoubleType(), fe_type.width))
+
+
+def _compiled(
+    function: Callable, *kinds: Any, result: types.Type = LANES
+) -> Callable[[Callable], Callable]:
+    """Give `function`, on arguments of these kinds, the code that the decorated one builds.
+
+    It is called with the builder, the numba types of the arguments, and their values.
+    """
+
+    def fits(kind: Any, argument: types.Type) -> bool:
+        return isinstance(argument, kind) if isinstance(kind, type) else argument == kind
+
+    @type_callable(function)
+    def _types(_: Any) -> Callable:
+        def typer(*arguments: types.Type) -> types.Type | None:
+            if len(arguments) == len(kinds) and all(map(fits, kinds, arguments)):
+                return result
+            return None
+
+        names = [f"argument_{i}" for i in range(len(kinds))]
+        parameters = [Parameter(name, Parameter.POSITIONAL_OR_KEYWORD) for name in names]
+        cast(Any, typer).__signature__ = Signature(parameters)  # Numba folds arguments by it
+        return typer
+
+    def register(build: Callable) -> Callable:
+        @lower_builtin(function, *kinds)
+        def _lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            arguments = [
+                _Array(context, builder, kind, value) if isinstance(kind, types.Array) else value
+                for kind, value in zip(signature.args, values, strict=True)
+            ]
+            made = build(builder, *arguments)
+            return context.get_dummy_value() if made is None else made
+
+        return build
+
+    return register
+
+
+class _Array:
+    """An array argument: where its elements are."""
+
+    def __init__(self, context: Any, builder: Any, kind: types.Array, value: Any) -> None:
+        self._data = context.make_array(kind)(context, builder, value).data
+        self._builder = builder
+
+    def at(self, i: Any, n_columns: int = 1) -> Any:
+        """Return a pointer to element `i`, or to the first of row `i`."""
+        builder = self._builder
+        if i.type.width < 64:
+            i = builder.sext(i, _I64)
+        if n_columns > 1:
+            i = builder.mul(i, ir.Constant(_I64, n_columns))
+        return builder.gep(self._data, [i])
+
+
+def _shuffled(builder: Any, a: Any, b: Any, order: Any) -> Any:
+    lanes = list(order)
+    return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_I32, len(lanes)), lanes))
+
+
+def _operator(function: Callable, instruction: str, kind: LanesType) -> None:
+    @_compiled(function, kind, kind, result=kind)
+    def _build(builder: Any, a: Any, b: Any) -> Any:
+        # A product and a sum may become one instruction that rounds once: faster, and no less
+        # exact. Nothing is reordered.
+        return getattr(builder, instruction)(a, b, flags=("contract",))
+
+
+for _kind in (LANES, POINT):
+    _operator(operator.add, "fadd", _kind)
+    _operator(operator.sub, "fsub", _kind)
+    _operator(operator.mul, "fmul", _kind)
+    _operator(operator.truediv, "fdiv", _kind)
+
+
+def lanes(value: float) -> Lanes:
+    """Return eight times the same number."""
+    return np.full(WIDTH, value)
+
+
+@_compiled(lanes, types.Float)
+def _lanes(builder: Any, value: Any) -> Any:
+    return _everywhere(builder, value, _VECTOR)
+
+
+def _everywhere(builder: Any, value: Any, kind: Any) -> Any:
+    one = builder.insert_element(ir.Constant(kind, ir.Undefined), value, ir.Constant(_I32, 0))
+    return _shuffled(builder, one, one, [0] * kind.count)
+
+
+def load(array: FloatArray, i: int) -> Lanes:
+    """Return the eight elements of a vector from `i` on."""
+    return array[i : i + WIDTH].copy()
+
+
+@_compiled(load, types.Array, types.Integer)
+def _load(builder: Any, array: _Array, i: Any) -> Any:
+    return builder.load(builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
+
+
+def store(array: FloatArray, i: int, values: Lanes) -> None:
+    """Write eight elements of a vector from `i` on."""
+    array[i : i + WIDTH] = values
+
+
+@_compiled(store, types.Array, types.Integer, LANES, result=types.void)
+def _store(builder: Any, array: _Array, i: Any, values: Any) -> None:
+    builder.store(values, builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
+
+
+def square_root(a: Lanes) -> Lanes:
+    """Return the square root of each."""
+    return np.sqrt(a)
+
+
+@_compiled(square_root, LANES)
+def _square_root(builder: Any, a: Any) -> Any:
+    function = _declared(builder.module, "llvm.sqrt.v8f64", ir.FunctionType(_VECTOR, [_VECTOR]))
+    return builder.call(function, [a])
+
+
+def times(value: float, a: Point) -> Point:
+    """Return a point times a number."""
+    return value * a
+
+
+@_compiled(times, types.Float, POINT, result=POINT)
+def _times(builder: Any, value: Any, a: Any) -> Any:
+    return builder.fmul(_everywhere(builder, value, _POINT), a, flags=("contract",))
+
+
+def point(points: FloatArray, i: int) -> Point:
+    """Return row `i` of an array of shape (n, 3) with a 0 behind it."""
+    return np.array([*points[i], 0.0])
+
+
+@_compiled(point, types.Array, types.Integer, result=POINT)
+def _load_point(builder: Any, points: _Array, i: Any) -> Any:
+    pointer = builder.bitcast(points.at(i, 3), _POINT.as_pointer())
+    kind = ir.FunctionType(_POINT, [_POINT.as_pointer(), _I32, _XYZ.type, _POINT])
+    function = _declared(builder.module, "llvm.masked.load.v4f64.p0v4f64", kind)
+    zero = ir.Constant(_POINT, [0.0] * 4)
+    return builder.call(function, [pointer, ir.Constant(_I32, 8), _XYZ, zero])
+
+
+def store_point(points: FloatArray, i: int, a: Point) -> None:
+    """Write x, y, z into row `i` of an array of shape (n, 3)."""
+    points[i] = a[:3]
+
+
+@_compiled(store_point, types.Array, types.Integer, POINT, result=types.void)
+def _store_point(builder: Any, points: _Array, i: Any, a: Any) -> None:
+    pointer = builder.bitcast(points.at(i, 3), _POINT.as_pointer())
+    arguments = [_POINT, _POINT.as_pointer(), _I32, _XYZ.type]
+    kind = ir.FunctionType(ir.VoidType(), arguments)
+    function = _declared(builder.module, "llvm.masked.store.v4f64.p0v4f64", kind)
+    builder.call(function, [a, pointer, ir.Constant(_I32, 8), _XYZ])
+
+
+def point_of(x: float, y: float, z: float) -> Point:
+    """Return a point of these coordinates."""
+    return np.array([x, y, z, 0.0])
+
+
+@_compiled(point_of, types.Float, types.Float, types.Float, result=POINT)
+def _point_of(builder: Any, *coordinates: Any) -> Any:
+    made = ir.Constant(_POINT, [0.0] * 4)
+    for c, value in enumerate(coordinates):
+        made = builder.insert_element(made, value, ir.Constant(_I32, c))
+    return made
+
+
+def spread(a: Point) -> tuple[Lanes, Lanes, Lanes]:
+    """Return x, y and z of a point, each in all lanes."""
+    return lanes(a[0]), lanes(a[1]), lanes(a[2])
+
+
+@_compiled(spread, POINT, result=_THREE)
+def _spread(builder: Any, a: Any) -> Any:
+    return _tuple_of(builder, [_shuffled(builder, a, a, [c] * WIDTH) for c in range(3)])
+
+
+def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
+    """Return x, y and z of rows `of[i]` to `of[i + 7]` of an array of shape (n, 3).
+
+    Of each four doubles are read, which the array must have room for: see `room_for_points`. To
+    read three takes a tenth longer for a force.
+    """
+    rows = points[of[i : i + WIDTH]]
+    return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy()
+
+
+@_compiled(eight_points, types.Array, types.Array, types.Integer, result=_THREE)
+def _eight_points(builder: Any, points: _Array, of: _Array, i: Any) -> Any:
+    rows = []
+    for k in range(WIDTH):
+        row = points.at(builder.load(of.at(builder.add(i, i.type(k)))), 3)
+        rows.append(builder.load(builder.bitcast(row, _POINT.as_pointer()), align=8))
+    a, b, c, d = (_shuffled(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4))
+    ab, cd = (_shuffled(builder, *pair, _EVEN) for pair in ((a, b), (c, d)))
+    x = _shuffled(builder, ab, cd, _FIRST)
+    z = _shuffled(builder, ab, cd, _SECOND)
+    ab, cd = (_shuffled(builder, *pair, _ODD) for pair in ((a, b), (c, d)))
+    return _tuple_of(builder, [x, _shuffled(builder, ab, cd, _FIRST), z])
+
+
+def _tuple_of(builder: Any, values: list[Any]) -> Any:
+    made = ir.Constant(ir.ArrayType(values[0].type, len(values)), ir.Undefined)
+    for i, value in enumerate(values):
+        made = builder.insert_value(made, value, i)
+    return made
+
+
+def _declared(module: Any, name: str, kind: Any) -> Any:
+    known = module.globals.get(name)
+    return known if known is not None else ir.Function(module, kind, name)
+
+
+def summed(x: Lanes, y: Lanes, z: Lanes) -> Point:
+    """Return the point whose coordinates are the sums of eight: neighbours first, as in a tree."""
+    pairs = np.stack([x, y, z]).reshape(3, 4, 2).sum(axis=2)
+    halves = pairs[:, :2] + pairs[:, 2:]
+    return np.array([*(halves[:, 0] + halves[:, 1]), 0.0])
+
+
+@_compiled(summed, LANES, LANES, LANES, result=POINT)
+def _summed(builder: Any, x: Any, y: Any, z: Any) -> Any:
+    def halves(a: Any, b: Any) -> Any:
+        pairs = builder.fadd(_shuffled(builder, a, b, _EVEN), _shuffled(builder, a, b, _ODD))
+        low = _shuffled(builder, pairs, pairs, range(4))
+        return builder.fadd(low, _shuffled(builder, pairs, pairs, range(4, WIDTH)))
+
+    xy, z0 = halves(x, y), halves(z, ir.Constant(_VECTOR, [0.0] * WIDTH))
+    low = _shuffled(builder, xy, z0, [0, 1, 4, 5])
+    return builder.fadd(low, _shuffled(builder, xy, z0, [2, 3, 6, 7]))

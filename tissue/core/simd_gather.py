@@ -1,0 +1,96 @@
+"""Gathers between nodes and blocks of eight tetrahedra, and the largest of what is gathered.
+
+As in `tissue.core.simd` each is also a plain Python function, which runs when the JIT is off.
+"""
+
+import operator
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+
+from tissue.core.array_types import FloatArray, SlotArray
+from tissue.core.simd import (
+    _I32,
+    _POINT,
+    _VECTOR,
+    LANES,
+    POINT,
+    WIDTH,
+    Lanes,
+    Point,
+    _Array,
+    _compiled,
+)
+
+
+def gathered(values: FloatArray, of: SlotArray, i: int) -> Lanes:
+    """Return `values` at `of[i]` to `of[i + 7]`."""
+    return values[of[i : i + WIDTH]]
+
+
+@_compiled(gathered, types.Array, types.Array, types.Integer)
+def _gathered(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
+    made = ir.Constant(_VECTOR, ir.Undefined)
+    for lane in range(WIDTH):
+        place = builder.load(of.at(builder.add(i, i.type(lane))))
+        made = builder.insert_element(made, builder.load(values.at(place)), _I32(lane))
+    return made
+
+
+def sum_of_eight(values: FloatArray, of: SlotArray, i: int) -> float:
+    """Return the sum of `values` at `of[i]` to `of[i + 7]`."""
+    return float(_tree(list(values[of[i : i + WIDTH]])))
+
+
+@_compiled(sum_of_eight, types.Array, types.Array, types.Integer, result=types.float64)
+def _sum_of_eight(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
+    places = (builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH))
+    return _tree([builder.load(values.at(place)) for place in places], builder.fadd)
+
+
+def sum_of_eight_points(values: FloatArray, of: SlotArray, i: int) -> Point:
+    """Return the sum of eight points, x at `of[i]` to `of[i + 7]`, y and z 8 and 16 behind it."""
+    x, y, z = (_tree(list(values[of[i : i + WIDTH] + c * WIDTH])) for c in range(3))
+    return np.array([x, y, z, 0.0])
+
+
+@_compiled(sum_of_eight_points, types.Array, types.Array, types.Integer, result=POINT)
+def _sum_of_eight_points(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
+    places = [builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH)]
+    made = ir.Constant(_POINT, [0.0] * 4)
+    for c in range(3):
+        terms = [
+            builder.load(values.at(builder.add(place, place.type(c * WIDTH)))) for place in places
+        ]
+        made = builder.insert_element(made, _tree(terms, builder.fadd), _I32(c))
+    return made
+
+
+def larger(a: Lanes, b: Lanes) -> Lanes:
+    """Return the larger of each two; `b` where there is none."""
+    return np.where(a > b, a, b)
+
+
+@_compiled(larger, LANES, LANES)
+def _larger(builder: Any, a: Any, b: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(">", a, b), a, b)
+
+
+def largest(a: Lanes) -> float:
+    """Return the largest of eight."""
+    return float(a.max())
+
+
+@_compiled(largest, LANES, result=types.float64)
+def _largest(builder: Any, a: Any) -> Any:
+    values = [builder.extract_element(a, _I32(k)) for k in range(WIDTH)]
+    return _tree(values, lambda b, c: builder.select(builder.fcmp_ordered(">", b, c), b, c))
+
+
+def _tree(terms: list[Any], add: Any = operator.add) -> Any:
+    """Sum of eight, or another fold, neighbours first: operations need not wait for each other."""
+    while len(terms) > 1:
+        terms = [add(a, b) for a, b in zip(terms[::2], terms[1::2], strict=True)]
+    return terms[0]

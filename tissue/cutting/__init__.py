@@ -1,0 +1,1 @@
+"""The topology modifier: it brings the path of the blade into the mesh."""

@@ -1,0 +1,61 @@
+"""The cut-edge code: which edges of a tetrahedron the blade has crossed (paper, section 3).
+
+The corners A, B, C, D are the local nodes 0 to 3. The six bits stand in the printed order,
+AB BC BD AC CD AD, with AB the most significant: Figure 7's 48 = 110000 is AB and BC.
+"""
+
+from tissue.core.jit import kernel
+
+CORNERS = "ABCD"
+
+EDGES = ((0, 1), (1, 2), (1, 3), (0, 2), (2, 3), (0, 3))
+"""Corners of each edge, in the order of the bits."""
+
+FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
+"""Corners of each face. Face k lies opposite corner k, as everywhere in `tissue`."""
+
+N_CODES = 64
+
+WHOLE, TIP, FULL = 0, 1, 2
+"""State of a face: not cut; cut up to a point inside it, where the tip passed; cut across. The
+state with the tip through it and no edge cut (3, pierced) has no edge code of its own."""
+
+
+def code_of(*edges: str) -> int:
+    """Return the code of the edges with these names, such as "AB" and "BC"."""
+    code = 0
+    for name in edges:
+        code |= 1 << bit_of(edge_named(name))
+    return code
+
+
+def edge_named(name: str) -> int:
+    """Return the number of the edge with that name: two corners, in either order."""
+    a, b = sorted(CORNERS.index(corner) for corner in name)
+    return EDGES.index((a, b))
+
+
+def face_named(name: str) -> int:
+    """Return the number of the face with that name: three corners."""
+    return FACES.index(tuple(sorted(CORNERS.index(corner) for corner in name)))
+
+
+@kernel
+def bit_of(edge: int) -> int:
+    """Place of the bit of an edge, counted from the least significant."""
+    return 5 - edge
+
+
+@kernel
+def is_cut(code: int, edge: int) -> bool:
+    """Whether that edge is cut."""
+    return (code >> bit_of(edge)) & 1 == 1
+
+
+def face_state(code: int, face: int) -> int:
+    """Return WHOLE, TIP or FULL: as many as there are cut edges.
+
+    Where the blade has left the tetrahedron the edges alone tell the states of the faces: a plane
+    crosses no or two edges of a face, and one of the two stays uncut where the tip passed between.
+    """
+    return sum(is_cut(code, e) for e, ends in enumerate(EDGES) if face not in ends)

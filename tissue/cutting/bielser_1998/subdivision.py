@@ -1,0 +1,148 @@
+"""Split one tetrahedron in seventeen, and open it along the triangles of its case (section 4.2)."""
+
+from tissue.core.jit import kernel
+from tissue.cutting.bielser_1998.mesh_records import Records, child_of, is_whole
+from tissue.cutting.bielser_1998.node_placement import place_nodes
+from tissue.cutting.bielser_1998.split_operators import refer_to_nodes
+from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN
+from tissue.cutting.bielser_1998.workspace import N_GUARDED, N_OF_CASE, N_OWN, Split
+from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
+from tissue.mesh.body import CUT, NODES, OUTER, TETRAHEDRA
+from tissue.mesh.changes import FULL, note_dirty
+from tissue.mesh.nonconforming import HANGING, join_list, leave_list
+
+MOST_NEW_NODES = 20
+"""Nodes that one split can make: two on each edge, two in each face."""
+
+
+@kernel
+def split_tetrahedron(s: Split, t: int, code: int) -> bool:
+    """Split the initial tetrahedron `t` by its code; whether there was room."""
+    body, records, change = s.body, s.records, s.change
+    if body.counts[NODES] + MOST_NEW_NODES > len(body.rest) or body.counts[
+        TETRAHEDRA
+    ] + N_CHILDREN - 1 > len(body.tetrahedra):
+        change.counts[FULL] = 1
+        return False
+    if place_nodes(records, s.table, s.placing, t, code):
+        s.tally[N_GUARDED] += 1
+    for k in range(4):
+        s.tally[N_OWN] += s.placing.is_own[k]
+    refer_to_nodes(s, t, code)
+    s.tally[N_OF_CASE + s.table.case[code]] += 1
+    volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
+    for i in range(4):
+        corner = records.tetrahedra[t, i]
+        leave_list(body.hanging, corner, t)
+        body.masses[corner] -= 0.25 * s.density * volume
+    records.first_child[t] = body.counts[TETRAHEDRA]
+    body.counts[TETRAHEDRA] += N_CHILDREN - 1
+    for c in range(N_CHILDREN):
+        _make_child(s, t, c)
+        _link_inside(s, t, c, code)
+    for k in range(4):
+        _link_outside(s, t, k)
+    return True
+
+
+@kernel
+def _make_child(s: Split, t: int, c: int) -> None:
+    body, table = s.body, s.table
+    child = child_of(s.records, t, c)
+    for k in range(4):
+        node = s.references[table.part[c], table.children[c, k]]
+        body.tetrahedra[child, k] = node
+        body.node_tetrahedron[node] = child
+        join_list(body.hanging, node, child, k)
+    mass = 0.25 * s.density * tetrahedron_volume(body.rest, body.tetrahedra, child)
+    for k in range(4):
+        _add_mass(s, t, table.children[c, k], body.tetrahedra[child, k], mass)
+    note_dirty(s.change, child)
+
+
+@kernel
+def _add_mass(s: Split, t: int, local: int, node: int, mass: float) -> None:
+    """Let `mass` [kg], which moved as the field of tetrahedron `t` does there, be part of `node`.
+
+    A node that a neighbour made moves by itself since: the two join like clay, and keep momentum.
+    """
+    body = s.body
+    total = body.masses[node] + mass
+    if local >= 4 and not body.fixed[node]:
+        for x in range(3):
+            velocity = 0.0
+            for i in range(4):
+                corner = s.records.tetrahedra[t, i]
+                velocity += s.placing.weights[local, i] * body.velocities[corner, x]
+            body.velocities[node, x] += mass / total * (velocity - body.velocities[node, x])
+    body.masses[node] = total
+
+
+@kernel
+def _link_inside(s: Split, t: int, c: int, code: int) -> None:
+    """Link a child to the others, or cut the link where the case opens a triangle (insertFace)."""
+    body, table = s.body, s.table
+    child = child_of(s.records, t, c)
+    for f in range(4):
+        link = table.inner[c, f]
+        if link < 0:
+            continue
+        triangle = table.triangle[c, f]
+        if triangle >= 0 and (table.opened[code] >> triangle) & 1 == 1:
+            body.links[child, f] = CUT
+            if link // 4 > c:
+                s.change.area[0] += face_area(body.rest, body.tetrahedra, child, f)
+        else:
+            body.links[child, f] = 4 * child_of(s.records, t, link // 4) + link % 4
+
+
+@kernel
+def _link_outside(s: Split, t: int, k: int) -> None:
+    """Link the six small faces in face `k` of `t` to what is behind it.
+
+    To the skin, to the six of a neighbour that is split too, or all to the one of a neighbour that
+    is whole: then the nodes on its edges and in its middle hang.
+    """
+    body, records, table = s.body, s.records, s.table
+    behind = records.links[t, k]
+    row = records.faces_of[t, k]
+    other = behind // 4
+    n = 0
+    for i in range(4):
+        for j in range(4):
+            if table.along[i, j] < 0 or k in (i, j):
+                continue
+            c = table.along[i, j]
+            child = child_of(records, t, c)
+            f = table.outer[c, k]
+            if behind == OUTER:
+                body.links[child, f] = OUTER
+            elif is_whole(records, other):
+                n += 1
+                body.links[child, f] = HANGING - row
+                body.hanging.faces[row, n] = child
+            else:
+                mate, g = _mate(s, t, i, j, other, behind % 4)
+                body.links[child, f] = 4 * mate + g
+                body.links[mate, g] = 4 * child + f
+    if n > 0:
+        body.hanging.faces[row, 0] = other
+        body.links[other, behind % 4] = HANGING - row
+
+
+@kernel
+def _mate(s: Split, t: int, i: int, j: int, other: int, k: int) -> tuple[int, int]:
+    """The child of `other` along the edge from corner `i` to `j` of `t`, and its face in face k."""
+    records, table = s.records, s.table
+    i_too = _corner_of(records, other, records.tetrahedra[t, i])
+    j_too = _corner_of(records, other, records.tetrahedra[t, j])
+    c = table.along[i_too, j_too]
+    return child_of(records, other, c), table.outer[c, k]
+
+
+@kernel
+def _corner_of(records: Records, t: int, node: int) -> int:
+    for i in range(4):
+        if records.tetrahedra[t, i] == node:
+            return i
+    return -1

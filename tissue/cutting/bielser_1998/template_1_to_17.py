@@ -1,0 +1,126 @@
+"""The generic 1:17 split of a tetrahedron (paper, section 4.2 and Figures 4 and 5).
+
+It has 14 nodes: the four corners, one on each edge and one in each face, none in the middle. Its 17
+tetrahedra make five parts: the one of a corner holds the corner's core and three tetrahedra along
+the edges that leave it; the fifth is the centre.
+
+    core of A        (A, node of ABC, node of ABD, node of ACD)       four of them
+    A's part of AB   (A, node of AB, node of ABC, node of ABD)        twelve
+    centre           (nodes of ABC, ABD, ACD, BCD)                    one
+
+Two parts touch in one triangle, of ten: I(AB), node of AB and nodes of the two faces at AB, between
+the corners A and B; J(A), the nodes of the three faces at A, between corner A and the centre.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import IntArray
+from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES
+
+N_CHILDREN = 17
+N_NODES = 14
+EDGE_NODE, FACE_NODE = 4, 10
+"""Local numbers of the first edge node and the first face node; the corners are 0 to 3."""
+
+CENTRE = 4
+"""The part that belongs to no corner."""
+CENTRE_CHILD = 16
+
+N_TRIANGLES = 10
+"""I of the six edges in the order of the code's bits, then J of the four corners."""
+FIRST_J = 6
+
+SUB_FACES = 6
+"""Triangles into which each face of the tetrahedron falls."""
+
+
+class Presplit(NamedTuple):
+    """The split by local numbers. Faces of children lie opposite their node, as everywhere."""
+
+    children: IntArray
+    """Local nodes of each, of positive volume where that of ABCD is; shape (17, 4)."""
+    part: IntArray
+    """Corner that each belongs to, or CENTRE; shape (17,)."""
+    inner: IntArray
+    """What is behind a face inside: 4 * child + its face; -1 on a face of ABCD. Shape (17, 4)."""
+    triangle: IntArray
+    """Which of the ten triangles between parts a face is, or -1; shape (17, 4)."""
+    along: IntArray
+    """Child of corner i along the edge to corner j, -1 for i = j; shape (4, 4)."""
+    outer: IntArray
+    """Which face of a child lies on face k of ABCD, or -1; shape (17, 4)."""
+
+
+def _edge_node(i: int, j: int) -> int:
+    return EDGE_NODE + EDGES.index((min(i, j), max(i, j)))
+
+
+def _children() -> tuple[list[list[int]], list[int], IntArray]:
+    children, part = [], []
+    along = np.full((4, 4), -1)
+    for i in range(4):
+        children.append([i, *(FACE_NODE + k for k in range(4) if k != i)])
+        part.append(i)
+    for i in range(4):
+        for j in range(4):
+            if i != j:
+                along[i, j] = len(children)
+                faces = [FACE_NODE + k for k in range(4) if k not in (i, j)]
+                children.append([i, _edge_node(i, j), *faces])
+                part.append(i)
+    children.append([FACE_NODE + k for k in range(4)])
+    part.append(CENTRE)
+    return children, part, along
+
+
+def generic_weights() -> np.ndarray:
+    """Return the barycentric weights of the nodes at midpoints and centroids, shape (14, 4)."""
+    weights = np.zeros((N_NODES, 4))
+    weights[:4] = np.eye(4)
+    for e, ends in enumerate(EDGES):
+        weights[EDGE_NODE + e, list(ends)] = 1.0 / 2.0
+    for k, corners in enumerate(FACES):
+        weights[FACE_NODE + k, list(corners)] = 1.0 / 3.0
+    return weights
+
+
+def _turned_positive(children: list[list[int]]) -> IntArray:
+    turned = np.array(children)
+    inverted = np.linalg.det(generic_weights()[turned]) < 0.0
+    turned[inverted, 2], turned[inverted, 3] = turned[inverted, 3], turned[inverted, 2]
+    return turned
+
+
+def _triangle_between(nodes: frozenset[int], one: int, other: int) -> int:
+    if one == other:
+        return -1
+    if CENTRE in (one, other):
+        return FIRST_J + min(one, other)
+    return min(nodes) - EDGE_NODE
+
+
+def presplit() -> Presplit:
+    """Return the split, with what follows from its nodes."""
+    listed, parts, along = _children()
+    children = _turned_positive(listed)
+    owners: dict[frozenset[int], list[int]] = {}
+    for c, nodes in enumerate(children.tolist()):
+        for f in range(4):
+            owners.setdefault(frozenset(nodes) - {nodes[f]}, []).append(4 * c + f)
+    inner, triangle, outer = (np.full((N_CHILDREN, 4), -1) for _ in range(3))
+    for nodes_of_face, halves in owners.items():
+        first = divmod(halves[0], 4)
+        if len(halves) == 1:
+            k = max(nodes_of_face) - FACE_NODE
+            outer[first[0], k] = first[1]
+            continue
+        second = divmod(halves[1], 4)
+        between = _triangle_between(nodes_of_face, parts[first[0]], parts[second[0]])
+        inner[first], inner[second] = halves[1], halves[0]
+        triangle[first] = triangle[second] = between
+    return Presplit(children, np.array(parts), inner, triangle, along, outer)
+
+
+PRESPLIT = presplit()

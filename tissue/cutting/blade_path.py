@@ -1,0 +1,165 @@
+"""The path of the cutting edge through the material in one step, and the sheet along it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
+from tissue.geometry.exact_predicates import Lattice, nearest
+from tissue.geometry.tetrahedron import nearest_on_segment, normalised
+
+SAME_WAY = 0.7
+"""Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
+
+
+class Path(Arrays):
+    """The way of the edge's samples through the material in one step. n samples."""
+
+    t0: FloatArray
+    """Rest positions at the start [m], shape (n, 3)."""
+    t1: FloatArray
+    """Rest positions at the end [m], shape (n, 3)."""
+    lattice_t0: IntArray
+    lattice_t1: IntArray
+    forward: FloatArray
+    """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
+    sideways: FloatArray
+    """Unit normal of the blade's flat, in the body at rest: the side +1; shape (1, 3)."""
+    seed: IntArray
+    """Tetrahedron at or beside the sample, shape (n,)."""
+    member: BoolArray
+    """Whether the sample is part of the chain at the end, shape (n,)."""
+    known: BoolArray
+    """Whether it was so in the step before, so that its `t1` tells where it was; shape (n,)."""
+    linked: BoolArray
+    """Whether sample and next sample span a piece of the sheet, shape (n,)."""
+    boxes: IntArray
+    """Lowest and highest lattice point of the quad from each sample to the next, shape (n, 6)."""
+
+
+def new_path(n: int) -> Path:
+    """Return a path of `n` samples that spans nothing yet."""
+    return Path(
+        t0=np.zeros((n, 3)),
+        t1=np.zeros((n, 3)),
+        lattice_t0=np.zeros((n, 3), np.int64),
+        lattice_t1=np.zeros((n, 3), np.int64),
+        forward=np.zeros((n, 3)),
+        sideways=np.zeros((1, 3)),
+        seed=np.full(n, -1, np.int64),
+        member=np.zeros(n, np.bool_),
+        known=np.zeros(n, np.bool_),
+        linked=np.zeros(n, np.bool_),
+        boxes=np.zeros((n, 6), np.int64),
+    )
+
+
+class Plane(NamedTuple):
+    """The sheet near a point: a point on it and its unit normal, towards side +1."""
+
+    point: Vec3
+    normal: Vec3
+
+
+@kernel
+def plane_at(path: Path, k: int, p: Vec3) -> Plane:
+    """The sheet at the point of segment `k` of the edge that is nearest to `p` [m]."""
+    tip = vec3(path.t1, k)
+    along = sub(vec3(path.t1, k + 1), tip)
+    normal = normalised(cross(vec3(path.forward, k), along))
+    # Where anchors are in disorder the normal of the path means nothing; that of the blade does.
+    sideways = vec3(path.sideways, 0)
+    if dot(normal, sideways) < SAME_WAY:
+        normal = sideways
+    return Plane(nearest_on_segment(tip, vec3(path.t1, k + 1), p), normal)
+
+
+class Nearest(NamedTuple):
+    """Where the edge is nearest to a point."""
+
+    segment: int
+    """-1 where the edge spans nothing."""
+    along: float
+    """Foot of the point on the segment's line: 0 at its first sample, 1 at its second. Outside of
+    that the point is beyond the segment's end."""
+
+
+@kernel
+def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
+    """Find the segment of the edge that is nearest to `p` [m] at the end of the step."""
+    best = np.inf
+    found = Nearest(-1, 0.0)
+    for k in range(len(path.linked) - 1):
+        if not path.linked[k]:
+            continue
+        start = vec3(path.t1, k)
+        way = sub(vec3(path.t1, k + 1), start)
+        squared = dot(way, way)
+        along = dot(sub(p, start), way) / squared if squared > 0.0 else 0.0
+        d = sub(p, axpy(min(1.0, max(0.0, along)), way, start))
+        if dot(d, d) < best:
+            best = dot(d, d)
+            found = Nearest(k, along)
+    return found
+
+
+@kernel
+def plane_near(path: Path, p: Vec3) -> Plane:
+    """The sheet at the point of the edge that is nearest to `p` [m]."""
+    segment = nearest_on_edge(path, p).segment
+    return plane_at(path, segment, p) if segment >= 0 else Plane(p, Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def put_on_lattice(path: Path, lattice: Lattice) -> None:
+    """Round the path to the lattice and box its quads, once for all decisions of the step."""
+    for k in range(len(path.linked)):
+        a = nearest(lattice, vec3(path.t0, k))
+        b = nearest(lattice, vec3(path.t1, k))
+        path.lattice_t0[k, 0] = a.x
+        path.lattice_t0[k, 1] = a.y
+        path.lattice_t0[k, 2] = a.z
+        path.lattice_t1[k, 0] = b.x
+        path.lattice_t1[k, 1] = b.y
+        path.lattice_t1[k, 2] = b.z
+    for k in range(len(path.linked) - 1):
+        for c in range(3):
+            path.boxes[k, c] = min(
+                min(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
+                min(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
+            )
+            path.boxes[k, 3 + c] = max(
+                max(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
+                max(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
+            )
+
+
+@kernel
+def path_travel(path: Path) -> float:
+    """The longest way of a sample through the material in this step [m]."""
+    longest = 0.0
+    for k in range(len(path.linked) - 1):
+        if path.linked[k]:
+            for j in range(k, k + 2):
+                longest = max(longest, norm(sub(vec3(path.t1, j), vec3(path.t0, j))))
+    return longest
+
+
+def resampled(rows: FloatArray, spacing: float, most: int) -> FloatArray:
+    """Return polylines, shape (n_rows, n, 3), with equally many points on each piece.
+
+    Points are at most `spacing` [m] apart in the longest row, but no more than `most`.
+    """
+    lengths = np.linalg.norm(np.diff(rows, axis=1), axis=2).max(axis=0)
+    n_parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), 1)
+    scale_down = min(1.0, (most - 1) / n_parts.sum())
+    n_parts = np.maximum((n_parts * scale_down).astype(np.int64), 1)
+    at = np.concatenate(
+        [i + np.arange(n) / n for i, n in enumerate(n_parts)] + [[float(len(n_parts))]]
+    )
+    i = np.minimum(at.astype(np.int64), len(n_parts) - 1)
+    share = (at - i)[None, :, None]
+    return (1.0 - share) * rows[:, i] + share * rows[:, i + 1]

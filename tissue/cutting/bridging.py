@@ -1,0 +1,108 @@
+"""Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the sheet.
+
+Every edge that the blade crosses gets a node on the sheet, so an edge between the two sides can
+only remain where the sheet turns within an element and a node was seen on the one side first, and
+on the other later. It is looked for when a tetrahedron leaves the list of active ones, and
+resolved.
+"""
+
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, dot, lerp, sub, vec3
+from tissue.cutting.blade_path import Path, Plane, nearest_on_edge, plane_at
+from tissue.cutting.cut_surface import on_sheet, see_side, side_of
+from tissue.cutting.snapping import insert_crossing, snap_distance
+from tissue.cutting.workspace import Cut, flag
+from tissue.mesh.changes import FULL, N_DIRTY
+
+
+@kernel
+def resolve_bridges(cut: Cut) -> None:
+    """Resolve the bridges among tetrahedra that were active or changed, and are active no more.
+
+    These stay in `work.previous`, for a last look at their faces.
+    """
+    work, visits = cut.work, cut.visits
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    for i in range(work.n_active[0]):
+        visits.tetrahedra[work.active[i]] = epoch
+    # `visits` is overwritten by the searches below, so the list is thinned out first.
+    n = 0
+    for i in range(work.n_previous[0]):
+        if visits.tetrahedra[work.previous[i]] != epoch:
+            work.previous[n] = work.previous[i]
+            n += 1
+    work.n_previous[0] = n
+    for i in range(n):
+        _resolve(cut, work.previous[i])
+        if cut.change.counts[FULL] != 0:
+            return
+
+
+@kernel
+def remember_active(cut: Cut) -> None:
+    """Note the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
+    work, change = cut.work, cut.change
+    n = 0
+    for i in range(work.n_active[0]):
+        if n < len(work.previous):
+            work.previous[n] = work.active[i]
+            n += 1
+    for i in range(change.counts[N_DIRTY]):
+        if n < len(work.previous):
+            work.previous[n] = change.dirty[i]
+            n += 1
+    work.n_previous[0] = n
+
+
+@kernel
+def _resolve(cut: Cut, t: int) -> None:
+    body, sheet = cut.body, cut.sheet
+    for p in range(3):
+        for q in range(p + 1, 4):
+            a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
+            b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
+            if on_sheet(sheet, a) or on_sheet(sheet, b):
+                continue
+            if side_of(sheet, a) * side_of(sheet, b) < 0:
+                _resolve_edge(cut, a, b)
+                return
+
+
+@kernel
+def _resolve_edge(cut: Cut, a: int, b: int) -> None:
+    """Cut an edge between the two sides, or correct a side that was seen from too far away."""
+    body, sheet = cut.body, cut.sheet
+    pa = vec3(body.rest, a)
+    pb = vec3(body.rest, b)
+    segment = _nearest_segment(cut.path, lerp(0.5, pa, pb))
+    if segment < 0:
+        return
+    height_a = _height(plane_at(cut.path, segment, pa), pa)
+    height_b = _height(plane_at(cut.path, segment, pb), pb)
+    if height_a * height_b < 0.0:
+        insert_crossing(cut, a, b, segment, height_a / (height_a - height_b))
+        return
+    side = 1 if height_a + height_b >= 0.0 else -1
+    wrong = a if side_of(sheet, a) != side else b
+    height = abs(height_a) if wrong == a else abs(height_b)
+    if height < snap_distance(cut, wrong):
+        flag(cut, wrong)
+    else:
+        see_side(sheet, wrong, side, True)
+
+
+@kernel
+def _height(plane: Plane, p: Vec3) -> float:
+    return dot(sub(p, plane.point), plane.normal)
+
+
+@kernel
+def _nearest_segment(path: Path, p: Vec3) -> int:
+    """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel: no cut there."""
+    near = nearest_on_edge(path, p)
+    last = len(path.linked) - 2
+    beyond = (near.segment == 0 and near.along <= 0.0) or (
+        near.segment == last and near.along >= 1.0
+    )
+    return -1 if beyond else near.segment

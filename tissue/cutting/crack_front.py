@@ -1,0 +1,253 @@
+"""The crack front: the path of an end of the blade through the tissue, as edges of the mesh.
+
+Where the tip passes a face, a node is put there, and successive nodes are joined by edges. Without
+them the sheet inside a tetrahedron that the tip passed through need not be a union of mesh faces:
+it failed for 20 to 50 % of the orders of insertion, and with them for none
+of 35,580.
+"""
+
+from typing import NamedTuple
+
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
+from tissue.cutting.blade_path import Path
+from tissue.cutting.snapping import insert_in_face
+from tissue.cutting.workspace import Cut
+from tissue.geometry.exact_predicates import Point, pierces, point
+from tissue.mesh.body import local_index
+from tissue.mesh.changes import FULL, N_DIRTY
+from tissue.mesh.star import star
+
+MOST_EVENTS = 32
+"""Faces that an end of the blade can pass in one step. It is moved by less than half an element."""
+
+PARAMETER_GAP = 1e-9
+"""Two events nearer than this share of the step are one."""
+
+OUTSIDE_TOLERANCE = 1e-6
+"""Weight by which a line through an edge or a corner may miss a face by rounding."""
+
+
+class Event(NamedTuple):
+    """The end of the blade passes a face."""
+
+    when: float
+    """Fraction of the step; 2 where there is none."""
+    a: int
+    b: int
+    c: int
+    weights: Vec3
+    half: int
+    """The face: 4 * tetrahedron + its local face."""
+    outer: bool
+    """Whether the face is on the skin or on a cut."""
+    leaving: bool
+
+
+class Way(NamedTuple):
+    """A straight way through the body at rest."""
+
+    start: Point
+    stop: Point
+    origin: Vec3
+    """Where it starts [m]."""
+    direction: Vec3
+    """From start to stop [m]."""
+
+
+@kernel
+def extend_fronts(cut: Cut) -> None:
+    """Extend the crack front at the tip and at the heel by their way in this step."""
+    path, front = cut.path, cut.sheet.front
+    last = len(path.seed) - 1
+    for end in range(2):
+        sample = 0 if end == 0 else last
+        if path.member[sample]:
+            front[end] = _lay_front(cut, way_of_sample(path, sample), front[end])
+        else:
+            front[end] = -1
+
+
+@kernel
+def way_of_sample(path: Path, sample: int) -> Way:
+    """The way of a sample of the edge in this step."""
+    origin = vec3(path.t0, sample)
+    return Way(
+        point(path.lattice_t0, sample),
+        point(path.lattice_t1, sample),
+        origin,
+        sub(vec3(path.t1, sample), origin),
+    )
+
+
+@kernel
+def bring_front_to_blade(cut: Cut) -> None:
+    """Lay the crack front along the edge itself, where it rests: the cut opens up to there.
+
+    Without, it opens up to the last faces that the edge has left behind, up to an element late.
+    While the edge moves on that is soon made good, and every front that is laid adds nodes.
+    """
+    path, front = cut.path, cut.sheet.front
+    last = len(path.seed) - 1
+    node = front[0] if path.member[0] else -1
+    for k in range(last):
+        if not path.linked[k]:
+            node = -1
+            continue
+        origin = vec3(path.t1, k)
+        way = Way(
+            point(path.lattice_t1, k),
+            point(path.lattice_t1, k + 1),
+            origin,
+            sub(vec3(path.t1, k + 1), origin),
+        )
+        node = _lay_front(cut, way, node)
+        if cut.change.counts[FULL] != 0:
+            return
+    if node >= 0 and path.member[last] and front[1] >= 0:
+        _join(cut, node, front[1])
+
+
+@kernel
+def _lay_front(cut: Cut, way: Way, before: int) -> int:
+    """Put a node where the way passes each face, and join them, the first one to node `before`.
+
+    Returns the last node; -1 where the way has left the body, or never was in it.
+    """
+    when = 0.0
+    for _ in range(MOST_EVENTS):
+        event = next_event(cut, way, when)
+        if event.when > 1.0:
+            return before
+        when = event.when + PARAMETER_GAP
+        node = insert_in_face(cut, event.a, event.b, event.c, event.weights)
+        if node < 0:
+            return before
+        if before >= 0 and not (event.outer and not event.leaving):
+            _join(cut, before, node)
+        before = -1 if event.outer and event.leaving else node
+        if cut.change.counts[FULL] != 0:
+            return before
+    return before
+
+
+@kernel
+def next_event(cut: Cut, way: Way, after: float) -> Event:
+    """The first face that the way pierces after that fraction of it."""
+    work, change = cut.work, cut.change
+    best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), -1, False, False)
+    for i in range(work.n_active[0]):
+        best = _earlier_event(cut, work.active[i], way, after, best)
+    for i in range(change.counts[N_DIRTY]):
+        best = _earlier_event(cut, change.dirty[i], way, after, best)
+    return best
+
+
+@kernel
+def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Event:
+    body = cut.body
+    if _is_beyond(cut, t, way):
+        return best
+    for f in range(4):
+        link = body.links[t, f]
+        if link >= 0 and link // 4 < t:
+            continue  # asked from the other side, unless that one is not active: then it is far
+        a = body.tetrahedra[t, (f + 1) % 4]
+        b = body.tetrahedra[t, (f + 2) % 4]
+        c = body.tetrahedra[t, (f + 3) % 4]
+        pa = point(body.lattice_rest, a)
+        pb = point(body.lattice_rest, b)
+        pc = point(body.lattice_rest, c)
+        if not pierces(way.start, way.stop, pa, pb, pc):
+            continue
+        when, w = _meet_plane(
+            way.origin, way.direction, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
+        )
+        when = min(max(when, PARAMETER_GAP), 1.0)
+        if not after < when < best.when:
+            continue
+        normal = cross(
+            sub(vec3(body.rest, b), vec3(body.rest, a)), sub(vec3(body.rest, c), vec3(body.rest, a))
+        )
+        apex = sub(vec3(body.rest, body.tetrahedra[t, f]), vec3(body.rest, a))
+        leaving = dot(normal, way.direction) * dot(normal, apex) < 0.0
+        best = Event(when, a, b, c, w, 4 * t + f, link < 0, leaving)
+    return best
+
+
+@kernel
+def _is_beyond(cut: Cut, t: int, way: Way) -> bool:
+    """Whether the boxes of a tetrahedron and a way are apart."""
+    grid, nodes = cut.body.lattice_rest, cut.body.tetrahedra
+    for x in range(3):
+        low = min(way.start[x], way.stop[x])
+        high = max(way.start[x], way.stop[x])
+        p = grid[nodes[t, 0], x]
+        q = grid[nodes[t, 1], x]
+        r = grid[nodes[t, 2], x]
+        s = grid[nodes[t, 3], x]
+        if min(min(p, q), min(r, s)) > high or max(max(p, q), max(r, s)) < low:
+            return True
+    return False
+
+
+@kernel
+def _meet_plane(origin: Vec3, way: Vec3, a: Vec3, b: Vec3, c: Vec3) -> tuple[float, Vec3]:
+    """Where the line meets the plane of abc: parameter along `way`, and weights of a, b, c."""
+    normal = cross(sub(b, a), sub(c, a))
+    slope = dot(normal, way)
+    squared = dot(normal, normal)
+    if slope == 0.0 or squared == 0.0:
+        return -1.0, Vec3(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
+    when = dot(normal, sub(a, origin)) / slope
+    p = Vec3(origin.x + when * way.x, origin.y + when * way.y, origin.z + when * way.z)
+    return when, Vec3(
+        dot(cross(sub(c, b), sub(p, b)), normal) / squared,
+        dot(cross(sub(a, c), sub(p, c)), normal) / squared,
+        dot(cross(sub(b, a), sub(p, a)), normal) / squared,
+    )
+
+
+@kernel
+def _join(cut: Cut, start: int, stop: int) -> None:
+    """Insert nodes along the segment between two nodes until edges of the mesh join them."""
+    body = cut.body
+    around = cut.work.around_too
+    a = start
+    for _ in range(MOST_EVENTS):
+        if a == stop:
+            return
+        n = star(body, cut.visits, a, body.node_tetrahedron[a], around)
+        goal = vec3(body.rest, stop)
+        origin = vec3(body.rest, a)
+        best = -1.0
+        best_when = 1.0
+        best_weights = Vec3(0.0, 0.0, 0.0)
+        b = c = d = 0
+        for i in range(n):
+            t = around[i]
+            if local_index(body, t, stop) >= 0:
+                return
+            k = local_index(body, t, a)
+            p = body.tetrahedra[t, (k + 1) % 4]
+            q = body.tetrahedra[t, (k + 2) % 4]
+            r = body.tetrahedra[t, (k + 3) % 4]
+            when, w = _meet_plane(
+                origin,
+                sub(goal, origin),
+                vec3(body.rest, p),
+                vec3(body.rest, q),
+                vec3(body.rest, r),
+            )
+            smallest = min(w.x, min(w.y, w.z))
+            if when > 0.0 and smallest > best:
+                best, best_when, best_weights = smallest, when, w
+                b, c, d = p, q, r
+        if best < -OUTSIDE_TOLERANCE or best_when >= 1.0:
+            return  # the segment leaves the body: the front goes on from `stop`
+        node = insert_in_face(cut, b, c, d, best_weights)
+        if node < 0:
+            return
+        if norm(sub(goal, vec3(body.rest, node))) >= norm(sub(goal, lerp(0.0, origin, goal))):
+            return  # snapping would lead away from the goal
+        a = node

@@ -1,0 +1,335 @@
+"""Open the sheet: cut the links across the faces that tile it, and give each lip its own nodes.
+
+A face is cut if its three nodes lie on the sheet and the tetrahedra on its two sides are on
+different sides of the sheet. A node whose tetrahedra then no longer hang together is doubled.
+"""
+
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, dot, sub, vec3
+from tissue.cutting.blade_path import plane_near
+from tissue.cutting.cut_surface import (
+    decide_side,
+    decided_side,
+    on_sheet,
+    put_on_sheet,
+    see_side,
+    side_of,
+)
+from tissue.cutting.workspace import Cut
+from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
+from tissue.mesh.body import CUT, NODES, Body, local_index
+from tissue.mesh.changes import FULL, N_DIRTY, N_FACES, N_FLAGGED, note_dirty
+from tissue.mesh.star import star
+
+CRUMB_TETRAHEDRA = 16
+"""A closed piece of more tetrahedra than this is never taken for a crumb."""
+
+
+@kernel
+def open_sheet(cut: Cut) -> None:
+    """Cut the faces that now tile the sheet."""
+    _mark(cut)
+    _keep_crumbs(cut)
+    change = cut.change
+    for i in range(change.counts[N_FACES]):
+        if change.faces[i, 1] >= 0:
+            change.area[0] += face_area(
+                cut.body.rest, cut.body.tetrahedra, change.faces[i, 0], change.faces[i, 1]
+            )
+            _unglue_face(cut, i)
+    for i in range(change.counts[N_FLAGGED]):
+        _unglue_fans(cut, change.flagged[i])
+
+
+@kernel
+def close_sheet(cut: Cut) -> None:
+    """Cut what is left to cut along the whole sheet: now the sides of all its nodes are known."""
+    sheet = cut.sheet
+    for i in range(sheet.n_nodes[0]):
+        _mark_star(cut, sheet.nodes[i])
+    open_sheet(cut)
+
+
+@kernel
+def _mark_star(cut: Cut, node: int) -> None:
+    around = cut.work.around_too
+    n = star(cut.body, cut.visits, node, cut.body.node_tetrahedron[node], around)
+    for i in range(n):
+        _mark_around(cut, around[i])
+
+
+@kernel
+def _mark(cut: Cut) -> None:
+    """Cut every face between the two sides, near the blade, behind it, and where nodes were put."""
+    work, change = cut.work, cut.change
+    for i in range(work.n_active[0]):
+        _mark_around(cut, work.active[i])
+    for i in range(work.n_previous[0]):  # by now the sides of all their nodes have been seen
+        _mark_around(cut, work.previous[i])
+    for i in range(change.counts[N_FLAGGED]):
+        _mark_star(cut, change.flagged[i])
+
+
+@kernel
+def _mark_around(cut: Cut, t: int) -> None:
+    body, sheet, change = cut.body, cut.sheet, cut.change
+    n_on = 0
+    for k in range(4):
+        if on_sheet(sheet, body.tetrahedra[t, k]):
+            n_on += 1
+    if n_on < 3:
+        return
+    for f in range(4):
+        link = body.links[t, f]
+        if link < 0 or (n_on == 3 and on_sheet(sheet, body.tetrahedra[t, f])):
+            continue
+        if n_on == 4 and not _face_is_on(cut, t, f):
+            continue
+        other = link // 4
+        side = tetrahedron_side(cut, t)
+        other_side = tetrahedron_side(cut, other)
+        if side * other_side >= 0:
+            continue
+        if _n_links(body, t) == 1 or _n_links(body, other) == 1:
+            continue  # the last link of a tetrahedron holds: it would be a crumb
+        if change.counts[N_FACES] == len(change.faces):
+            change.counts[FULL] = 1
+            return
+        decide_side(sheet, t, side)
+        decide_side(sheet, other, other_side)
+        row = change.counts[N_FACES]
+        change.counts[N_FACES] += 1
+        change.faces[row, 0] = t
+        change.faces[row, 1] = f
+        change.faces[row, 2] = other
+        change.faces[row, 3] = link % 4
+        body.links[t, f] = CUT
+        body.links[other, link % 4] = CUT
+
+
+@kernel
+def _face_is_on(cut: Cut, t: int, f: int) -> bool:
+    for k in range(4):
+        if k != f and not on_sheet(cut.sheet, cut.body.tetrahedra[t, k]):
+            return False
+    return True
+
+
+@kernel
+def _n_links(body: Body, t: int) -> int:
+    n = 0
+    for f in range(4):
+        if body.links[t, f] >= 0:
+            n += 1
+    return n
+
+
+@kernel
+def tetrahedron_side(cut: Cut, t: int) -> int:
+    """Side of the sheet that tetrahedron `t` is on: +1, -1, or 0 where it is on both.
+
+    What was decided stays. Else the side that its nodes off the sheet were seen on; else where they
+    lie; where all four are on the sheet, where the centroid lies.
+    """
+    decided = decided_side(cut.sheet, t)
+    if decided != 0:
+        return decided
+    body, sheet = cut.body, cut.sheet
+    seen = 0
+    n_off = 0
+    mixed = False
+    for k in range(4):
+        node = body.tetrahedra[t, k]
+        if on_sheet(sheet, node):
+            continue
+        n_off += 1
+        side = side_of(sheet, node)
+        if side != 0:
+            mixed = mixed or (seen != 0 and side != seen)
+            seen = side
+    if mixed:
+        return 0
+    if seen != 0:
+        return seen
+    centroid = Vec3(0.0, 0.0, 0.0)
+    for k in range(4):
+        p = vec3(body.rest, body.tetrahedra[t, k])
+        centroid = Vec3(centroid.x + 0.25 * p.x, centroid.y + 0.25 * p.y, centroid.z + 0.25 * p.z)
+    plane = plane_near(cut.path, centroid)
+    if n_off == 0:
+        return _geometric_side(centroid, plane.point, plane.normal)
+    geometric = 0
+    for k in range(4):
+        node = body.tetrahedra[t, k]
+        if not on_sheet(sheet, node):
+            side = _geometric_side(vec3(body.rest, node), plane.point, plane.normal)
+            if geometric != 0 and side != geometric:
+                return 0
+            geometric = side
+    return geometric
+
+
+@kernel
+def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
+    return 1 if dot(sub(p, on), normal) >= 0.0 else -1
+
+
+@kernel
+def _keep_crumbs(cut: Cut) -> None:
+    """Link small closed pieces that this step made back to the side of larger contact."""
+    change, body, work, visits = cut.change, cut.body, cut.work, cut.visits
+    n_faces = change.counts[N_FACES]
+    first = visits.epoch[0] + 1
+    for i in range(n_faces):
+        for j in range(0, 4, 2):
+            start = change.faces[i, j]
+            if change.faces[i, 1] < 0:
+                continue
+            n = _small_piece(cut, start, first)
+            if n == 0:
+                continue
+            volume = 0.0
+            for m in range(n):
+                volume += tetrahedron_volume(body.rest, body.tetrahedra, work.around[m])
+            if volume <= cut.quality.crumb:
+                _relink(cut, n)
+            for m in range(n):  # only what a search from `first` on left is known to be large
+                visits.tetrahedra[work.around[m]] = 0
+
+
+@kernel
+def _small_piece(cut: Cut, start: int, first: int) -> int:
+    """Collect the connected piece of `start` in `work.around`; 0 if it is not a small one.
+
+    What a search since visit `first` has seen belongs to a piece that is not small.
+    """
+    body, visits, piece = cut.body, cut.visits, cut.work.around
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    if visits.tetrahedra[start] >= first:
+        return 0
+    visits.tetrahedra[start] = epoch
+    piece[0] = start
+    n = 1
+    i = 0
+    while i < n:
+        for f in range(4):
+            link = body.links[piece[i], f]
+            if link >= 0 and visits.tetrahedra[link // 4] != epoch:
+                if n == CRUMB_TETRAHEDRA or visits.tetrahedra[link // 4] >= first:
+                    return 0
+                visits.tetrahedra[link // 4] = epoch
+                piece[n] = link // 4
+                n += 1
+        i += 1
+    return n
+
+
+@kernel
+def _relink(cut: Cut, n: int) -> None:
+    """Undo the cut faces between the piece in `work.around` and the side it touches most.
+
+    The piece was just collected, so its tetrahedra bear the current visit.
+    """
+    change, body, sheet = cut.change, cut.body, cut.sheet
+    epoch = cut.visits.epoch[0]
+    area_plus = 0.0
+    area_minus = 0.0
+    for row in range(change.counts[N_FACES]):
+        outside = _outside_of_piece(cut, row, epoch)
+        if outside >= 0:
+            area = face_area(body.rest, body.tetrahedra, change.faces[row, 0], change.faces[row, 1])
+            if decided_side(sheet, outside) > 0:
+                area_plus += area
+            else:
+                area_minus += area
+    if area_plus == 0.0 and area_minus == 0.0:
+        return
+    side = 1 if area_plus >= area_minus else -1
+    for row in range(change.counts[N_FACES]):
+        outside = _outside_of_piece(cut, row, epoch)
+        if outside >= 0 and decided_side(sheet, outside) == side:
+            t = change.faces[row, 0]
+            f = change.faces[row, 1]
+            other = change.faces[row, 2]
+            g = change.faces[row, 3]
+            body.links[t, f] = 4 * other + g
+            body.links[other, g] = 4 * t + f
+            change.faces[row, 1] = -1
+    for i in range(n):
+        decide_side(sheet, cut.work.around[i], side)
+
+
+@kernel
+def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
+    """The tetrahedron beyond cut face `row`, if just one of its two is in the piece; else -1."""
+    faces, seen = cut.change.faces, cut.visits.tetrahedra
+    if faces[row, 1] < 0:
+        return -1
+    first_in = seen[faces[row, 0]] == epoch
+    second_in = seen[faces[row, 2]] == epoch
+    if first_in == second_in:
+        return -1
+    return faces[row, 2] if first_in else faces[row, 0]
+
+
+@kernel
+def _unglue_face(cut: Cut, row: int) -> None:
+    """Double the nodes of cut face `row` whose tetrahedra it held together.
+
+    Every part of a star that fell apart lies at a face cut in this pass, on one side or the other.
+    """
+    change, body = cut.change, cut.body
+    for side in range(0, 4, 2):
+        t = change.faces[row, side]
+        note_dirty(change, t)
+        for k in range(4):
+            if k != change.faces[row, side + 1]:
+                _unglue(cut, body.tetrahedra[t, k], t)
+
+
+@kernel
+def _unglue_fans(cut: Cut, node: int) -> None:
+    """Double a node put into the rim of an old cut, if the tetrahedra around it are apart."""
+    body, change = cut.body, cut.change
+    for i in range(change.counts[N_DIRTY]):
+        t = change.dirty[i]
+        if local_index(body, t, node) >= 0:
+            _unglue(cut, node, t)
+
+
+@kernel
+def _unglue(cut: Cut, node: int, t: int) -> None:
+    """Give the part of the star of `node` that holds `t` a copy of it, if it is apart."""
+    body, work, change, visits = cut.body, cut.work, cut.change, cut.visits
+    star(body, visits, node, body.node_tetrahedron[node], work.around)
+    if visits.tetrahedra[t] == visits.epoch[0]:
+        return
+    n = star(body, visits, node, t, work.around)
+    copy = _copy_node(cut, node)
+    for i in range(n):
+        body.tetrahedra[work.around[i], local_index(body, work.around[i], node)] = copy
+        note_dirty(change, work.around[i])
+    body.node_tetrahedron[copy] = t
+
+
+@kernel
+def _copy_node(cut: Cut, node: int) -> int:
+    body, sheet = cut.body, cut.sheet
+    copy = body.counts[NODES]
+    body.counts[NODES] += 1
+    for x in range(3):
+        body.rest[copy, x] = body.rest[node, x]
+        body.positions[copy, x] = body.positions[node, x]
+        body.velocities[copy, x] = body.velocities[node, x]
+        body.lattice_rest[copy, x] = body.lattice_rest[node, x]
+    body.fixed[copy] = body.fixed[node]
+    body.masses[copy] = 0.0
+    body.twin[copy] = body.twin[node]
+    body.twin[node] = copy
+    body.off_path[copy] = body.off_path[node]
+    if on_sheet(sheet, node):
+        put_on_sheet(sheet, copy, sheet.offset[node])
+    see_side(sheet, copy, side_of(sheet, node), True)
+    sheet.past_offset[copy] = sheet.past_offset[node]
+    return copy

@@ -1,0 +1,214 @@
+"""Bring the sheet into the mesh: at each crossing use a node that is there, or insert one.
+
+The rule is one of distance, not of the fraction along the edge, so that the result does not depend
+on the order of crossings and no thin tetrahedron with four nodes on the sheet arises.
+"""
+
+import math
+
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
+from tissue.cutting.blade_path import SAME_WAY, plane_at
+from tissue.cutting.cut_surface import on_sheet, past_offset, see_side
+from tissue.cutting.stellar_subdivision import (
+    edge_split_is_good,
+    face_split_is_good,
+    split_edge,
+    split_face,
+)
+from tissue.cutting.workspace import Cut, flag
+from tissue.geometry.tetrahedron import normalised
+from tissue.mesh.body import CUT
+from tissue.mesh.changes import FULL
+from tissue.mesh.star import node_size, star
+
+EXPLAINED = 1.5
+"""A crossing is explained by an on-sheet end that is at most this many times as far from the sheet
+as when it was put there. Smaller: re-tracing a cut adds elements."""
+
+EXPLAINED_SHARE = 0.05
+"""... or at most this share of the edge's length away."""
+
+
+@kernel
+def snap_distance(cut: Cut, node: int) -> float:
+    """Distance within which a crossing moves to `node` [m].
+
+    A node on an earlier cut may lie further from that sheet than its smaller neighbours let a new
+    one be. It draws crossings from there too, so that the same cut again adds nothing.
+    """
+    size = node_size(cut.body, cut.visits, node, cut.work.around)
+    distance = max(cut.quality.snap * size, cut.quality.floor)
+    past = EXPLAINED * past_offset(cut.sheet, node)
+    if past > distance and _is_on_such_a_cut(cut, node):
+        return past
+    return distance
+
+
+@kernel
+def _is_on_such_a_cut(cut: Cut, node: int) -> bool:
+    """Whether the cut through `node` lies as the sheet does: a face of it, or all that is known."""
+    body, around = cut.body, cut.work.around
+    sideways = vec3(cut.path.sideways, 0)
+    n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
+    any_face = False
+    for i in range(n):
+        t = around[i]
+        for f in range(4):
+            if body.links[t, f] != CUT or body.tetrahedra[t, f] == node:
+                continue
+            any_face = True
+            a = vec3(body.rest, body.tetrahedra[t, (f + 1) % 4])
+            b = vec3(body.rest, body.tetrahedra[t, (f + 2) % 4])
+            c = vec3(body.rest, body.tetrahedra[t, (f + 3) % 4])
+            normal = normalised(cross(sub(b, a), sub(c, a)))
+            if abs(dot(normal, sideways)) >= SAME_WAY:
+                return True
+    return not any_face
+
+
+@kernel
+def sort_crossings(cut: Cut) -> None:
+    """Order the crossings by how near they are to the middle of their edge, then by its nodes.
+
+    Best-conditioned first; rounded, so that a turned body is cut in the same order.
+    """
+    work = cut.work
+    for i in range(work.n_crossings[0]):
+        work.crossing_at[i, 1] = math.floor(abs(work.crossing_at[i, 0] - 0.5) * 1e7 + 0.5)
+        j = i
+        while j > 0 and _comes_first(cut, i, work.order[j - 1]):
+            work.order[j] = work.order[j - 1]
+            j -= 1
+        work.order[j] = i
+
+
+@kernel
+def _comes_first(cut: Cut, i: int, j: int) -> bool:
+    work = cut.work
+    if work.crossing_at[i, 1] != work.crossing_at[j, 1]:
+        return work.crossing_at[i, 1] < work.crossing_at[j, 1]
+    if work.crossing[i, 0] != work.crossing[j, 0]:
+        return work.crossing[i, 0] < work.crossing[j, 0]
+    return work.crossing[i, 1] < work.crossing[j, 1]
+
+
+@kernel
+def insert_crossings(cut: Cut) -> None:
+    """Give every crossed edge a node on the sheet, and its ends a side."""
+    sort_crossings(cut)
+    work = cut.work
+    for i in range(work.n_crossings[0]):
+        row = work.order[i]
+        insert_crossing(
+            cut,
+            work.crossing[row, 0],
+            work.crossing[row, 1],
+            work.crossing[row, 2],
+            work.crossing_at[row, 0],
+        )
+        if cut.change.counts[FULL] != 0:
+            return
+
+
+@kernel
+def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
+    """Handle one crossing of edge ab, at fraction `t` from a, by that segment of the edge."""
+    sheet, body = cut.sheet, cut.body
+    if on_sheet(sheet, a) and on_sheet(sheet, b):
+        return  # the edge lies in the sheet; on a lip it must stay like its twin on the other
+    pa = vec3(body.rest, a)
+    pb = vec3(body.rest, b)
+    normal = plane_at(cut.path, segment, lerp(t, pa, pb)).normal
+    edge = sub(pa, pb)
+    height = abs(dot(edge, normal))
+    length = norm(edge)
+    side = 1 if dot(edge, normal) >= 0.0 else -1
+    explained_by_a = on_sheet(sheet, a) and _explained(cut, a, t * height, length)
+    explained_by_b = on_sheet(sheet, b) and _explained(cut, b, (1.0 - t) * height, length)
+    if explained_by_a or explained_by_b:
+        if not on_sheet(sheet, a):
+            see_side(sheet, a, side, False)
+        if not on_sheet(sheet, b):
+            see_side(sheet, b, -side, False)
+        return
+    see_side(sheet, a, side, True)
+    see_side(sheet, b, -side, True)
+    near_a = t * height / snap_distance(cut, a)
+    near_b = (1.0 - t) * height / snap_distance(cut, b)
+    if min(near_a, near_b) < 1.0 or not edge_split_is_good(cut, a, b, t):
+        flag(cut, a if near_a <= near_b else b)
+        return
+    node = split_edge(cut, a, b, t)
+    if node >= 0:
+        flag(cut, node)
+
+
+@kernel
+def _explained(cut: Cut, node: int, distance: float, length: float) -> bool:
+    """Whether an on-sheet node, that far from the sheet, explains a crossing of its edge."""
+    allowance = max(EXPLAINED_SHARE * length, snap_distance(cut, node))
+    return distance <= EXPLAINED * cut.sheet.offset[node] + allowance
+
+
+@kernel
+def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
+    """Return a node on the sheet at weights `w` of face abc: a corner, a node on a side, or inside.
+
+    Negative where the arrays must grow first.
+    """
+    rest = cut.body.rest
+    pa = vec3(rest, a)
+    pb = vec3(rest, b)
+    pc = vec3(rest, c)
+    total = max(w.x, 0.0) + max(w.y, 0.0) + max(w.z, 0.0)
+    w = Vec3(max(w.x, 0.0) / total, max(w.y, 0.0) / total, max(w.z, 0.0) / total)
+    p = Vec3(
+        w.x * pa.x + w.y * pb.x + w.z * pc.x,
+        w.x * pa.y + w.y * pb.y + w.z * pc.y,
+        w.x * pa.z + w.y * pb.z + w.z * pc.z,
+    )
+    snap_a = snap_distance(cut, a)
+    snap_b = snap_distance(cut, b)
+    snap_c = snap_distance(cut, c)
+    near_a = norm(sub(p, pa)) / snap_a
+    near_b = norm(sub(p, pb)) / snap_b
+    near_c = norm(sub(p, pc)) / snap_c
+    nearest = min(near_a, min(near_b, near_c))
+    lies_in_sheet = on_sheet(cut.sheet, a) and on_sheet(cut.sheet, b) and on_sheet(cut.sheet, c)
+    if nearest < 1.0 or lies_in_sheet:
+        corner = a if near_a == nearest else (b if near_b == nearest else c)
+        flag(cut, corner)
+        return corner
+    twice_area = norm(cross(sub(pb, pa), sub(pc, pa)))
+    near_bc = w.x * twice_area / norm(sub(pc, pb)) / min(snap_b, snap_c)
+    near_ca = w.y * twice_area / norm(sub(pa, pc)) / min(snap_c, snap_a)
+    near_ab = w.z * twice_area / norm(sub(pb, pa)) / min(snap_a, snap_b)
+    nearest = min(near_bc, min(near_ca, near_ab))
+    if nearest < 1.0 or not face_split_is_good(cut, a, b, c, w):
+        if near_bc == nearest:
+            return _insert_in_side(cut, b, c, w.z / (w.y + w.z), snap_b, snap_c)
+        if near_ca == nearest:
+            return _insert_in_side(cut, c, a, w.x / (w.z + w.x), snap_c, snap_a)
+        return _insert_in_side(cut, a, b, w.y / (w.x + w.y), snap_a, snap_b)
+    node = split_face(cut, a, b, c, w)
+    if node >= 0:
+        flag(cut, node)
+    return node
+
+
+@kernel
+def _insert_in_side(cut: Cut, a: int, b: int, t: float, snap_a: float, snap_b: float) -> int:
+    """Return a node on the sheet at fraction `t` of edge ab."""
+    closer = a if t < 0.5 else b
+    if on_sheet(cut.sheet, a) and on_sheet(cut.sheet, b):
+        return closer
+    length = norm(sub(vec3(cut.body.rest, a), vec3(cut.body.rest, b)))
+    near = min(t * length / snap_a, (1.0 - t) * length / snap_b)
+    if near < 1.0 or not edge_split_is_good(cut, a, b, t):
+        flag(cut, closer)
+        return closer
+    node = split_edge(cut, a, b, t)
+    if node >= 0:
+        flag(cut, node)
+    return node

@@ -1,0 +1,155 @@
+"""`Elasticity` owns what forces inside a body follow from; it follows the cuts."""
+
+import numpy as np
+
+from tissue.core.array_types import IntArray
+from tissue.elasticity.finite_elements import (
+    Law,
+    build_stars,
+    build_tetrahedra,
+    grown_solid,
+    n_blocks,
+    neo_hookean,
+    no_solid,
+    room_for_stars,
+    volume_term,
+)
+from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.frequency_refinement import tighten
+from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
+from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
+from tissue.elasticity.strained_frequency import strained_frequency
+from tissue.material import Material
+from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.changes import N_DIRTY, Change, largest_frequency
+from tissue.mesh.star import LARGEST_STAR, Visits
+
+ROOM_FOR_SPRINGS = 1 << 16
+"""Free springs that the body begins with, beyond its own; the pool doubles when they are used."""
+
+
+class Elasticity:
+    """The rows of a body, and a bound on its frequencies.
+
+    Args:
+        material: What it is made of.
+        body: The body; its masses are written.
+        visits: For searches.
+        is_tight: Whether the bound of tetrahedra is brought near the truth. The Runge-Kutta method
+            does not want it: near its limit it damps the fastest modes by itself, which no account
+            of the energy sees (0.7 % of the work of a blade that presses and lets go).
+    """
+
+    def __init__(
+        self, material: Material, body: Body, visits: Visits, *, is_tight: bool = False
+    ) -> None:
+        self._material = material
+        self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
+        n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
+        has_springs = material.law == "springs"
+        law = _law_of(material)
+        room = (n_nodes, n_tetrahedra) if law else (0, 0)
+        self.arrays = Elastic(
+            springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
+            solid=no_solid(law or volume_term(0.0), *room, room_for_stars(*room)),
+            has=np.array([has_springs, law is not None]),
+            frequency_squared=np.zeros(n_nodes),
+        )
+        self._has_solid = law is not None
+        self._is_tight = is_tight
+        self._solid_frequency_squared = 0.0
+        self.frequency_squared = 0.0
+        """Bound on the square of every angular frequency so far [1/s2]."""
+        self.damper_frequency_squared = 0.0
+        """The same of springs alone, whose stiffness the dampers have, whatever the law [1/s2]."""
+        n_nodes, n_tetrahedra = (int(body.counts[i]) for i in (NODES, TETRAHEDRA))
+        self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
+
+    def mesh_changed(
+        self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
+    ) -> None:
+        """Write anew what the tetrahedra that changed, and their `n` nodes, enter into."""
+        self._write(body, visits, change.dirty[: change.counts[N_DIRTY]], nodes[:n])
+
+    @property
+    def follows_strain(self) -> bool:
+        """Whether stiffness depends on how far the body is strained."""
+        return self._has_solid
+
+    def strained_frequency_squared(self, body: Body) -> float:
+        """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
+
+        It takes as long as a tenth of a Runge-Kutta step. To look at a part of them in each frame
+        is not enough: a lip that snaps back from the blade doubles its length in 2 ms.
+        """
+        if not self._has_solid:
+            return 0.0
+        blocks = n_blocks(int(body.counts[TETRAHEDRA]))
+        return strained_frequency(self.arrays, body.positions, self.arrays.solid.every, 0, blocks)
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        arrays, solid = self.arrays, self.arrays.solid
+        if self._has_solid:
+            pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
+            solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
+        frequencies = np.zeros(n_nodes)
+        frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
+        self.arrays = arrays.replaced(
+            springs=grown_springs(arrays.springs, n_nodes, len(arrays.springs.neighbour)),
+            solid=solid,
+            frequency_squared=frequencies,
+        )
+
+    def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
+        self._write_springs(body, visits, nodes)
+        bound_frequencies(body, self.arrays.springs, nodes, len(nodes))
+        of_dampers = self.arrays.springs.frequency_squared
+        highest = largest_frequency(body, of_dampers, nodes, len(nodes))
+        self.damper_frequency_squared = max(self.damper_frequency_squared, highest)
+        if self._has_solid:
+            build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
+            self._write_stars(body, visits, nodes)
+            solid = self.arrays.solid
+            n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
+            if self._is_tight:
+                n = tighten(solid, body, visits, n, self._solid_frequency_squared)
+                highest = largest_frequency(body, solid.frequency_squared, solid.listed, n)
+                self._solid_frequency_squared = max(self._solid_frequency_squared, highest)
+            nodes = solid.listed[:n]
+        bound_both_frequencies(self.arrays, nodes, len(nodes))
+        largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
+        self.frequency_squared = max(self.frequency_squared, largest)
+
+    def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
+        density, modulus = self._material.density, self._material.spring_modulus
+        left = nodes
+        while True:
+            springs = self.arrays.springs
+            rows = (body, visits, springs, left, len(left), density, modulus, self._around)
+            left = left[build_rows(*rows) :]
+            if not len(left):
+                return
+            larger = grown_springs(springs, len(springs.first), 2 * len(springs.neighbour))
+            self.arrays = self.arrays.replaced(springs=larger)
+
+    def _write_stars(self, body: Body, visits: Visits, nodes: IntArray) -> None:
+        left = nodes
+        while True:
+            solid = self.arrays.solid
+            left = left[build_stars(solid, body, visits, left, len(left), self._around) :]
+            if not len(left):
+                return
+            larger = grown_solid(
+                solid, len(solid.first), len(body.tetrahedra), 2 * len(solid.corner)
+            )
+            self.arrays = self.arrays.replaced(solid=larger)
+
+
+def _law_of(material: Material) -> Law | None:
+    """Return what the tetrahedra resist; None where the springs do it all."""
+    if material.law == "neo_hookean":
+        return neo_hookean(material.mu, material.lam)
+    if material.volume_modulus > 0.0:
+        return volume_term(material.volume_modulus)
+    return None

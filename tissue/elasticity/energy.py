@@ -1,0 +1,58 @@
+"""What is stored in the body, and what damping takes."""
+
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.simd import store_point
+from tissue.core.vec3 import Vec3, dot, vec3
+from tissue.elasticity.internal_forces import Elastic, Surroundings, elastic_energy, viscous_force
+from tissue.mesh.body import NODES, Body
+
+
+@kernel
+def kinetic_energy(body: Body) -> float:
+    """Of all nodes [J]."""
+    energy = 0.0
+    for node in range(body.counts[NODES]):
+        v = vec3(body.velocities, node)
+        energy += 0.5 * body.masses[node] * dot(v, v)
+    return energy
+
+
+@kernel
+def potential_energy(body: Body, gravity: Vec3) -> float:
+    """Of all nodes in gravity [J]."""
+    energy = 0.0
+    for node in range(body.counts[NODES]):
+        energy -= body.masses[node] * dot(gravity, vec3(body.positions, node))
+    return energy
+
+
+@kernel
+def body_energy(body: Body, elastic: Elastic, gravity: Vec3) -> float:
+    """Elastic, kinetic and potential energy [J]."""
+    stored = elastic_energy(elastic, body) + kinetic_energy(body)
+    return stored + potential_energy(body, gravity)
+
+
+@kernel
+def dissipated_power(
+    body: Body,
+    elastic: Elastic,
+    surroundings: Surroundings,
+    positions: FloatArray,
+    velocities: FloatArray,
+    scratch: FloatArray,
+) -> float:
+    """What viscosity and drag take at that motion [W]; `scratch` has the shape of positions."""
+    time = surroundings.retardation_time
+    power = 0.0
+    for node in range(body.counts[NODES]):
+        if body.fixed[node]:
+            continue
+        v = vec3(velocities, node)
+        power += surroundings.drag * body.masses[node] * dot(v, v)
+        if time > 0.0:
+            force = viscous_force(elastic, node, positions, velocities, time)
+            store_point(scratch, node, force)
+            power -= dot(vec3(scratch, node), v)
+    return power

@@ -1,0 +1,72 @@
+"""Weights with which the highest bound on the frequencies of a solid is near the truth.
+
+The bound of `tissue.elasticity.frequency_bound` holds for any positive weights x of the nodes, as
+the largest
+ratio (B x)_b / x_b does for a matrix B without negative entries, whose own largest eigenvalue is
+the least there is (Collatz and Wielandt). The power iteration x <- B x lowers that ratio in each
+round; here only nodes near the worst take part, for no other sets the time step. A mode that is
+fast lives on one or two nodes, and they are given a larger share of it than their masses say.
+
+On an organ after cuts that brings the bound from 1.28 to 1.06 times the highest frequency there is.
+"""
+
+from tissue.core.jit import kernel
+from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.frequency_bound import bound_around, with_neighbours, with_these
+from tissue.mesh.body import Body
+from tissue.mesh.star import Visits
+
+ROUNDS = 6
+"""Rounds at most. In the organ they get within 2 % of the least bound there is."""
+
+NEAR_WORST = 0.64
+"""Bound on w^2 over the highest, above which a node is weighed anew. Nearer to 1 takes more rounds,
+further from it more nodes."""
+
+WORTH_IT = 0.98
+"""A round that leaves more than that of the highest bound on w^2 is the last: in a regular mesh all
+nodes are alike, and there is nothing to gain."""
+
+
+@kernel
+def tighten(solid: Solid, body: Body, visits: Visits, n_listed: int, allowed: float) -> int:
+    """Weigh the worst of the first `n_listed` of `solid.listed` anew, until they are `allowed`.
+
+    Args:
+        solid: Weights and bounds are written.
+        body: For the masses.
+        visits: For searches.
+        n_listed: Nodes whose bound may be above `allowed`; other nodes are not.
+        allowed: Bound on w^2 that the body has elsewhere [1/s2]: to lower it further is no use.
+
+    Returns:
+        How many nodes `solid.listed` has with those whose bound has changed.
+    """
+    listed, raised = solid.listed, solid.raised
+    worst = _worst(solid, n_listed)
+    for _ in range(ROUNDS):
+        if worst <= allowed:
+            break
+        threshold = max(NEAR_WORST * worst, allowed)
+        n = 0
+        for i in range(n_listed):
+            node = listed[i]
+            if solid.frequency_squared[node] > threshold:
+                solid.weight[node] *= solid.frequency_squared[node] / threshold
+                raised[n] = node
+                n += 1
+        n = bound_around(solid, body, visits, raised, with_neighbours(solid, visits, raised, n))
+        n_listed = with_these(visits, listed, n_listed, raised, n)
+        before, worst = worst, _worst(solid, n_listed)
+        if worst > WORTH_IT * before:
+            break
+    return n_listed
+
+
+@kernel
+def _worst(solid: Solid, n_listed: int) -> float:
+    """Highest bound on w^2 of the nodes that are listed [1/s2]."""
+    worst = 0.0
+    for i in range(n_listed):
+        worst = max(worst, solid.frequency_squared[solid.listed[i]])
+    return worst

@@ -1,0 +1,112 @@
+"""What makes tissue elastic and viscous, and the force on a node that follows from it.
+
+Springs along the edges, tetrahedra as elements of a solid, or both: the law of the material says
+which. Dampers lie along the edges under either law.
+"""
+
+from typing import NamedTuple
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import Point, point_of
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3
+from tissue.elasticity.finite_elements import Solid, n_blocks
+from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
+from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
+from tissue.elasticity.springs import Springs, spring_energy
+from tissue.mesh.body import NODES, TETRAHEDRA, Body
+
+SPRINGS, TETRAHEDRA_TOO = 0, 1
+"""Places in `Elastic.has`."""
+
+
+class Elastic(Arrays):
+    """All that forces inside the body follow from."""
+
+    springs: Springs
+    solid: Solid
+    has: BoolArray
+    """Whether springs pull, and whether tetrahedra do; shape (2,)."""
+    frequency_squared: FloatArray
+    """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
+
+
+class Surroundings(NamedTuple):
+    """What slows and pulls every node besides its neighbours."""
+
+    gravity: Vec3
+    """[m/s2]."""
+    drag: float
+    """Rate at which free motion dies away [1/s]."""
+    retardation_time: float
+    """Damping along each edge, per its stiffness [s]."""
+
+
+@kernel
+def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
+    """Evaluate all tetrahedra at `positions` [m], for `internal_force`."""
+    if elastic.has[TETRAHEDRA_TOO]:
+        solid = elastic.solid
+        blocks, nodes = n_blocks(body.counts[TETRAHEDRA]), body.counts[NODES]
+        solid_forces(solid, positions, solid.every, blocks, solid.every, nodes)
+
+
+@inlined
+def internal_force(
+    elastic: Elastic,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """Force of the body on one of its nodes, elastic and viscous [N], after `deform`."""
+    springs = elastic.springs
+    total = point_of(0.0, 0.0, 0.0)
+    if not elastic.has[SPRINGS]:
+        if retardation_time > 0.0:
+            total = damping_force(springs, node, positions, velocities, retardation_time)
+    elif retardation_time > 0.0:
+        total = elastic_and_damping_force(springs, node, positions, velocities, retardation_time)
+    else:
+        total = elastic_force(springs, node, positions)
+    if elastic.has[TETRAHEDRA_TOO]:
+        total = total + solid_force(elastic.solid, node)
+    return total
+
+
+@inlined
+def viscous_force(
+    elastic: Elastic,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """The viscous part of it [N]; linear in the velocities."""
+    return damping_force(elastic.springs, node, positions, velocities, retardation_time)
+
+
+@kernel
+def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
+    """Write the bound at the first `n` of `nodes`: two stiffnesses together bound their sum."""
+    for i in range(n):
+        node = nodes[i]
+        bound = 0.0
+        if elastic.has[SPRINGS]:
+            bound += elastic.springs.frequency_squared[node]
+        if elastic.has[TETRAHEDRA_TOO]:
+            bound += elastic.solid.frequency_squared[node]
+        elastic.frequency_squared[node] = bound
+
+
+@kernel
+def elastic_energy(elastic: Elastic, body: Body) -> float:
+    """Elastic energy of the body as it is, less that at rest [J]."""
+    energy = 0.0
+    if elastic.has[SPRINGS]:
+        energy += spring_energy(elastic.springs, body)
+    if elastic.has[TETRAHEDRA_TOO]:
+        n_nodes, n_tetrahedra = body.counts[NODES], body.counts[TETRAHEDRA]
+        energy += solid_energy(elastic.solid, body.positions, n_tetrahedra, n_nodes)
+    return energy

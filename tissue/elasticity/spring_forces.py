@@ -1,0 +1,90 @@
+"""Forces of springs and dampers on a node: its row, eight slots at a time.
+
+Each spring is evaluated from both its ends, with the same bits, so action is reaction; what is
+summed up at a node is summed in the order of its row, by whatever thread.
+"""
+
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import inlined
+from tissue.core.simd import (
+    WIDTH,
+    Point,
+    eight_points,
+    filled,
+    lanes,
+    load,
+    square_root,
+    summed,
+    times,
+)
+from tissue.elasticity.springs import Springs
+
+NO_LENGTH = 1e-300
+"""Added to squared lengths [m2]: far below any, it keeps slots that hold no spring, and nodes that
+coincide, from a division by zero."""
+
+
+@inlined
+def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
+    """Pull of the springs on a node [N]: sum of k (l - l0) along each."""
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    fx = fy = fz = lanes(0.0)
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        length = square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        pull = load(springs.stiffness, slot) - load(springs.rest_pull, slot) / length
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+    return summed(fx, fy, fz)
+
+
+@inlined
+def damping_force(
+    springs: Springs,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """Force of the dampers along the springs on a node [N]: retardation time times k l'."""
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
+    fx = fy = fz = lanes(0.0)
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        du, dv, dw = eight_points(velocities, springs.neighbour, slot)
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
+        pull = load(springs.stiffness, slot) * approach / squared
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+    return times(retardation_time, summed(fx, fy, fz))
+
+
+@inlined
+def elastic_and_damping_force(
+    springs: Springs,
+    node: int,
+    positions: FloatArray,
+    velocities: FloatArray,
+    retardation_time: float,
+) -> Point:
+    """`elastic_force` and `damping_force` in one go [N]."""
+    x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
+    u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
+    time, one = lanes(retardation_time), lanes(1.0)
+    fx = fy = fz = lanes(0.0)
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        dx, dy, dz = eight_points(positions, springs.neighbour, slot)
+        dx, dy, dz = dx - x, dy - y, dz - z
+        du, dv, dw = eight_points(velocities, springs.neighbour, slot)
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        inverse = one / square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
+        stiffness = load(springs.stiffness, slot)
+        pull = stiffness - load(springs.rest_pull, slot) * inverse
+        pull = pull + stiffness * (time * approach * inverse * inverse)
+        fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+    return summed(fx, fy, fz)

@@ -1,0 +1,213 @@
+"""Masses at nodes and springs along edges, as one row of neighbours a node.
+
+Each spring stands in the rows of both its ends, so that the force on a node is a gather: no
+scatter, no race, the same bits for any number of threads. The rows follow from the tetrahedra
+around the node alone; after a cut only the rows of the nodes that it touched are written anew.
+A row is filled up to a multiple of eight with springs of no stiffness from the node to itself, so
+that forces are evaluated eight at a time (`spring_forces`).
+
+Stiffness of an edge (van Gelder): k = E * (volume of the tetrahedra around it) / (rest length)^2.
+Pull of a spring on its ends: k (l - l0).
+"""
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
+from tissue.core.jit import kernel
+from tissue.core.simd import WIDTH, filled
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import norm, sub, vec3
+from tissue.geometry.tetrahedron import (
+    add_square,
+    largest_eigenvalue,
+    nothing_symmetric,
+    tetrahedron_volume,
+)
+from tissue.mesh.body import NODES, TETRAHEDRA, Body, grown
+from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
+
+POOL_MARGIN = LARGEST_STAR + WIDTH
+"""Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
+
+
+class Springs(Arrays):
+    """The rows, and what follows from them for each node."""
+
+    first: IntArray
+    """Where each node's row begins in the pool, shape (capacity,)."""
+    room: IntArray
+    """Slots that the row has, shape (capacity,)."""
+    count: IntArray
+    """Slots that it uses, shape (capacity,)."""
+    neighbour: SlotArray
+    """Other end of the spring, shape (pool,)."""
+    stiffness: FloatArray
+    """k [N/m], shape (pool,)."""
+    rest_pull: FloatArray
+    """k times rest length [N], shape (pool,)."""
+    stiffness_per_mass: FloatArray
+    """Largest eigenvalue of the stiffness that holds the node in place, per mass [1/s2]."""
+    frequency_squared: FloatArray
+    """Bound on the square of the local angular frequency [1/s2], shape (capacity,)."""
+    used: IntArray
+    """Slots of the pool in use, shape (1,)."""
+
+
+def no_springs(n_nodes: int, pool: int) -> Springs:
+    """Return empty rows for that many nodes."""
+    return Springs(
+        first=np.zeros(n_nodes, dtype=np.int64),
+        room=np.zeros(n_nodes, dtype=np.int64),
+        count=np.zeros(n_nodes, dtype=np.int64),
+        neighbour=np.zeros(pool, dtype=np.int32),
+        stiffness=np.zeros(pool),
+        rest_pull=np.zeros(pool),
+        stiffness_per_mass=np.zeros(n_nodes),
+        frequency_squared=np.zeros(n_nodes),
+        used=np.zeros(1, dtype=np.int64),
+    )
+
+
+def grown_springs(springs: Springs, n_nodes: int, pool: int) -> Springs:
+    """Return the rows with room for that many nodes and springs."""
+    of_nodes = ("first", "room", "count", "stiffness_per_mass", "frequency_squared")
+    larger = {name: grown(getattr(springs, name), n_nodes) for name in of_nodes}
+    of_pool = ("neighbour", "stiffness", "rest_pull")
+    larger |= {name: grown(getattr(springs, name), pool) for name in of_pool}
+    return springs.replaced(**larger)
+
+
+@kernel
+def build_rows(
+    body: Body,
+    visits: Visits,
+    springs: Springs,
+    nodes: IntArray,
+    n: int,
+    density: float,
+    young_modulus: float,
+    around: IntArray,
+) -> int:
+    """Write the rows and masses of the first `n` of `nodes` anew; return how many it wrote.
+
+    Fewer than `n` means that the pool is full: give it room and go on from there. `around` is
+    scratch of shape (LARGEST_STAR,).
+    """
+    for i in range(n):
+        if springs.used[0] + POOL_MARGIN > len(springs.neighbour):
+            return i
+        _build_row(body, visits, springs, nodes[i], density, young_modulus, around)
+    return n
+
+
+@kernel
+def _build_row(
+    body: Body,
+    visits: Visits,
+    springs: Springs,
+    node: int,
+    density: float,
+    young_modulus: float,
+    around: IntArray,
+) -> None:
+    # Both ends of an edge must add the same volumes in the same order, or the two ends of a spring
+    # would differ in the last bit and action would not quite be reaction: hence sorted.
+    n_around = sorted_star(body, visits, node, around)
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    n = 0
+    for i in range(n_around):
+        for k in range(4):
+            other = body.tetrahedra[around[i], k]
+            if other != node and visits.nodes[other] != epoch:
+                visits.nodes[other] = epoch
+                visits.place[other] = n
+                n += 1
+    if n > springs.room[node]:
+        room = filled(n)
+        springs.first[node] = springs.used[0]
+        springs.room[node] = room
+        springs.used[0] += room
+    first = springs.first[node]
+    for slot in range(first, first + n):
+        springs.stiffness[slot] = 0.0
+    mass = 0.0
+    for i in range(n_around):
+        t = around[i]
+        volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
+        mass += density * volume / 4.0
+        for k in range(4):
+            other = body.tetrahedra[t, k]
+            if other != node:
+                slot = first + visits.place[other]
+                springs.neighbour[slot] = other
+                springs.stiffness[slot] += volume
+    springs.count[node] = n
+    body.masses[node] = mass
+    here = vec3(body.rest, node)
+    for slot in range(first, first + n):
+        length = norm(sub(vec3(body.rest, springs.neighbour[slot]), here))
+        k = young_modulus * springs.stiffness[slot] / (length * length)
+        springs.stiffness[slot] = k
+        springs.rest_pull[slot] = k * length
+    for slot in range(first + n, first + filled(n)):
+        springs.neighbour[slot] = node
+        springs.stiffness[slot] = 0.0
+        springs.rest_pull[slot] = 0.0
+    springs.stiffness_per_mass[node] = _stiffness_per_mass(body, springs, node)
+
+
+@kernel
+def _stiffness_per_mass(body: Body, springs: Springs, node: int) -> float:
+    """Largest eigenvalue of S = sum of k u u^T over the row, per mass of the node [1/s2]."""
+    here = vec3(body.rest, node)
+    stiffness = nothing_symmetric()
+    for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
+        d = sub(vec3(body.rest, springs.neighbour[slot]), here)
+        c = springs.stiffness[slot] / (d.x * d.x + d.y * d.y + d.z * d.z)
+        stiffness = add_square(stiffness, c, d)
+    return largest_eigenvalue(stiffness) / body.masses[node]
+
+
+@kernel
+def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> None:
+    """Write the bound on w^2 at the first `n` of `nodes`, whose rows are up to date.
+
+    Let every spring have a share of the mass of each end, in proportion to its stiffness: of node a
+    k / s_a, where s_a is the largest eigenvalue of S_a. Then the mass is more than used up in no
+    direction, and by Irons' theorem no mode of the body is faster than the fastest of the springs
+    alone, with its masses: w^2 = k (s_a / (k m_a) + s_b / (k m_b)) = s_a / m_a + s_b / m_b.
+    A fixed node is as one of infinite mass.
+    """
+    for i in range(n):
+        node = nodes[i]
+        beside = 0.0
+        for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
+            other = springs.neighbour[slot]
+            if not body.fixed[other]:
+                beside = max(beside, springs.stiffness_per_mass[other])
+        springs.frequency_squared[node] = springs.stiffness_per_mass[node] + beside
+
+
+@kernel
+def spring_energy(springs: Springs, body: Body) -> float:
+    """Energy stored in the springs [J]: sum of k (l - l0)^2 / 2, each spring once."""
+    energy = 0.0
+    for i in range(body.counts[NODES]):
+        here = vec3(body.positions, i)
+        for slot in range(springs.first[i], springs.first[i] + springs.count[i]):
+            j = springs.neighbour[slot]
+            if j > i:
+                k = springs.stiffness[slot]
+                stretch = norm(sub(vec3(body.positions, j), here)) - springs.rest_pull[slot] / k
+                energy += 0.5 * k * stretch * stretch
+    return energy
+
+
+@kernel
+def total_volume(body: Body) -> float:
+    """Volume of the body at rest [m3]."""
+    volume = 0.0
+    for t in range(body.counts[TETRAHEDRA]):
+        volume += tetrahedron_volume(body.rest, body.tetrahedra, t)
+    return volume

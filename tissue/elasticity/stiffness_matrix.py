@@ -1,0 +1,174 @@
+"""The body at small strain, as matrices: what calibration and comparison with theory need.
+
+The forces of the engine are nonlinear and never stored as a matrix. Here is their derivative at
+rest, assembled with NumPy: force = -K displacement, exactly that of the engine's kernels to first
+order (a test compares the two).
+
+Springs: K = sum of k u u^T, k by van Gelder. Change of volume: each node has the mean dilatation of
+the tetrahedra around it, by volume; beside springs, a share acts on each tetrahedron by itself
+(`OWN_SHARE`). Neo-Hookean law: shear of each tetrahedron by itself, and dilatation averaged over
+nodes (Smith, de Goes and Kim 2018; see `tissue.elasticity.neo_hookean`).
+"""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.elasticity.finite_elements import OWN_SHARE
+from tissue.material import Material
+from tissue.types import TetrahedralMesh
+
+if TYPE_CHECKING:  # imported where it is used: half a second that no cut has to wait for
+    from scipy.sparse import csr_array
+
+EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+"""Local nodes of a tetrahedron's edges."""
+
+LOCAL_DILATATION = 5.0 / 6.0
+"""Share of mu that the law of Smith, de Goes and Kim takes from the dilatation of the tetrahedron
+itself and gives back to that which is averaged: the two cancel where dilatation is uniform."""
+
+
+class EdgeSprings(NamedTuple):
+    """The springs of a mesh, each once."""
+
+    ends: IntArray
+    """Nodes, the lower first, shape (n_springs, 2)."""
+    stiffness: FloatArray
+    """[N/m], shape (n_springs,)."""
+
+
+class Gradients(NamedTuple):
+    """What differentiates over the tetrahedra of a mesh."""
+
+    shape: FloatArray
+    """Gradients of the four shape functions [1/m], shape (n_tets, 4, 3)."""
+    volume: FloatArray
+    """[m3], shape (n_tets,)."""
+
+
+def gradients(mesh: TetrahedralMesh) -> Gradients:
+    """Return the gradients of the linear shape functions, and volumes."""
+    corners = mesh.positions[mesh.tetrahedra]
+    edges = corners[:, 1:] - corners[:, :1]
+    inverse = np.linalg.inv(edges)  # columns: gradients of the shape functions of corners 1, 2, 3
+    of_others = np.swapaxes(inverse, 1, 2)
+    shape = np.concatenate([-of_others.sum(axis=1, keepdims=True), of_others], axis=1)
+    return Gradients(shape, np.abs(np.linalg.det(edges)) / 6.0)
+
+
+def edge_springs(mesh: TetrahedralMesh, modulus: float) -> EdgeSprings:
+    """Return the springs of van Gelder's formula, k = E V / l^2; `modulus` is E [Pa]."""
+    volume = gradients(mesh).volume
+    ends = np.sort(mesh.tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
+    unique, which = np.unique(ends, axis=0, return_inverse=True)
+    around = np.bincount(which.ravel(), weights=np.repeat(volume, len(EDGES)))
+    span = mesh.positions[unique[:, 1]] - mesh.positions[unique[:, 0]]
+    return EdgeSprings(unique, modulus * around / np.sum(span**2, axis=1))
+
+
+def masses(mesh: TetrahedralMesh, density: float) -> FloatArray:
+    """Return the mass of each node [kg], a quarter of each tetrahedron around it."""
+    share = np.repeat(density * gradients(mesh).volume / 4.0, 4)
+    return _at_nodes(mesh, share)
+
+
+def stiffness_matrix(
+    mesh: TetrahedralMesh, material: Material, *, averaged: bool = True
+) -> "csr_array":
+    """Return K of the body at rest [N/m], shape (3 n_nodes, 3 n_nodes), x y z of each node in turn.
+
+    Args:
+        mesh: The body at rest.
+        material: What it is made of, and under which law.
+        averaged: Whether dilatation is averaged over nodes, as in the engine; False for plain
+            linear tetrahedra, which lock (for comparison).
+    """
+    if material.law == "springs":
+        springs = _of_springs(mesh, edge_springs(mesh, material.spring_modulus))
+        if material.volume_modulus == 0.0:
+            return springs
+        own = OWN_SHARE if averaged else 1.0
+        mixed = own * _own_dilatation(mesh) + (1.0 - own) * _mean_dilatation(mesh)
+        return springs + material.volume_modulus * mixed
+    dilatation = _mean_dilatation if averaged else _own_dilatation
+    taken = LOCAL_DILATATION * material.mu
+    return (
+        _of_shear(mesh, material.mu)
+        - taken * _own_dilatation(mesh)
+        + (material.lam + taken) * dilatation(mesh)
+    )
+
+
+def _of_springs(mesh: TetrahedralMesh, springs: EdgeSprings) -> "csr_array":
+    """Return the sum of k u u^T, u the unit vector along each spring."""
+    ends, stiffness = springs
+    span = mesh.positions[ends[:, 1]] - mesh.positions[ends[:, 0]]
+    way = span / np.linalg.norm(span, axis=1, keepdims=True)
+    signed = np.stack([-way, way], axis=1)  # elongation per displacement of the two ends
+    return _squared(_rows(ends, signed, len(mesh.positions)), stiffness)
+
+
+def _own_dilatation(mesh: TetrahedralMesh) -> "csr_array":
+    """Return the Hessian of the sum of V (div u)^2 / 2 over tetrahedra [m]."""
+    shape, volume = gradients(mesh)
+    return _squared(_rows(mesh.tetrahedra, shape, len(mesh.positions)), volume)
+
+
+def _mean_dilatation(mesh: TetrahedralMesh) -> "csr_array":
+    """Return the same with the dilatation averaged over the tetrahedra around each node [m]."""
+    from scipy.sparse import csr_array
+
+    shape, volume = gradients(mesh)
+    n_nodes, n_tets = len(mesh.positions), len(volume)
+    quarter = np.repeat(volume / 4.0, 4)
+    at_node = _at_nodes(mesh, quarter)
+    where = (mesh.tetrahedra.ravel(), np.repeat(np.arange(n_tets), 4))
+    mean = csr_array((quarter / at_node[where[0]], where), shape=(n_nodes, n_tets))
+    return _squared(mean @ _rows(mesh.tetrahedra, shape, n_nodes), at_node)
+
+
+def _of_shear(mesh: TetrahedralMesh, mu: float) -> "csr_array":
+    """Return the Hessian of the sum of mu V eps:eps over tetrahedra [N/m]."""
+    from scipy.sparse import csr_array
+
+    shape, volume = gradients(mesh)
+    # eps:eps = (grad u : grad u + grad u : grad u^T) / 2
+    same = np.einsum("tic,tjc->tij", shape, shape)
+    blocks = np.einsum("tij,cd->ticjd", same, np.eye(3))
+    blocks += np.einsum("tid,tjc->ticjd", shape, shape)
+    blocks *= (mu * volume)[:, None, None, None, None]
+    dofs = (3 * mesh.tetrahedra[:, :, None] + np.arange(3)).reshape(len(volume), 12)
+    rows = np.repeat(dofs, 12, axis=1).ravel()
+    columns = np.tile(dofs, (1, 12)).ravel()
+    size = 3 * len(mesh.positions)
+    return csr_array((blocks.ravel(), (rows, columns)), shape=(size, size))
+
+
+def _at_nodes(mesh: TetrahedralMesh, shares: FloatArray) -> FloatArray:
+    """Return what the corners of tetrahedra add up to at each node."""
+    n_nodes = len(mesh.positions)
+    return np.asarray(
+        np.bincount(mesh.tetrahedra.ravel(), weights=shares, minlength=n_nodes), float
+    )
+
+
+def _rows(nodes: IntArray, vectors: FloatArray, n_nodes: int) -> "csr_array":
+    """Return the matrix that has, in row r, vector [r, i] in the columns of node [r, i]."""
+    from scipy.sparse import csr_array
+
+    n, width = nodes.shape
+    columns = (3 * nodes[:, :, None] + np.arange(3)).ravel()
+    rows: npt.NDArray[np.int64] = np.repeat(np.arange(n), 3 * width)
+    return csr_array((vectors.ravel(), (rows, columns)), shape=(n, 3 * n_nodes))
+
+
+def _squared(rows: "csr_array", weights: FloatArray) -> "csr_array":
+    """Return the sum over rows of weight times row^T row."""
+    from scipy.sparse import csr_array
+
+    scaled = rows.multiply(np.sqrt(weights)[:, None])
+    half = csr_array(scaled)
+    return csr_array(half.T @ half)

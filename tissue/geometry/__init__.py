@@ -1,0 +1,1 @@
+"""Geometry of points, boxes and tetrahedra, without a mesh."""

@@ -1,0 +1,206 @@
+"""What the engine is given is checked here, once, and refused by name."""
+
+import math
+import os
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.blade.anchors import Edge
+from tissue.core.array_types import BoolArray, FloatArray
+from tissue.core.vec3 import Vec3
+from tissue.integrators.options import Global, Relaxing
+from tissue.types import BladeSweep
+
+ALONG_EDGE = 1e-6
+"""Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
+
+
+def checked_gravity(gravity: Sequence[float]) -> Vec3:
+    """Return gravity as a vector.
+
+    Raises:
+        ValueError: it is not three finite numbers.
+    """
+    array = np.array(gravity, dtype=np.float64)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"gravity is {gravity}; it is three finite numbers, in m/s2")
+    return Vec3(*array.tolist())
+
+
+def checked_fixed(fixed: npt.ArrayLike | None, n_nodes: int) -> BoolArray:
+    """Return the mask of nodes that do not move; None holds nothing.
+
+    Raises:
+        ValueError: it is not one truth value a node.
+    """
+    if fixed is None:
+        return np.zeros(n_nodes, dtype=np.bool_)
+    array = np.array(fixed)
+    if array.shape != (n_nodes,) or array.dtype != np.bool_:
+        raise ValueError(
+            f"fixed has shape {array.shape} and type {array.dtype}; it is one truth value for each "
+            f"of the {n_nodes} nodes"
+        )
+    return array
+
+
+def checked_positions(positions: npt.ArrayLike | None, rest: FloatArray) -> FloatArray:
+    """Return where the nodes are at first [m]; None is at rest.
+
+    Raises:
+        ValueError: it is not three finite numbers a node.
+    """
+    if positions is None:
+        return rest.copy()
+    array = np.array(positions, dtype=np.float64)
+    if array.shape != rest.shape:
+        raise ValueError(f"positions have shape {array.shape}; the mesh's nodes have {rest.shape}")
+    if not np.isfinite(array).all():
+        first = np.flatnonzero(~np.isfinite(array).all(axis=1))[:5].tolist()
+        raise ValueError(f"positions of nodes {first} are not finite")
+    return array
+
+
+def checked_edge(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step.
+
+    Raises:
+        ValueError: a number is not finite, the blade has no length, or it would cut along itself.
+    """
+    points, ways = [], []
+    for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
+        parts = [np.asarray(part, dtype=np.float64) for part in segment]
+        rows = [part.tolist() for part in parts]
+        if any(part.shape != (3,) for part in parts) or not all(map(_is_finite, rows)):
+            raise ValueError(
+                f"the blade at the {when} of the step is {rows}; tip, heel and forward are three "
+                "finite numbers each"
+            )
+        # Plain floats: with arrays of three these checks cost more than a step of a small body.
+        tip, heel, forward = (Vec3(*row) for row in rows)
+        x, y, z = heel.x - tip.x, heel.y - tip.y, heel.z - tip.z
+        u, v, w = forward
+        length = math.hypot(x, y, z)
+        if not length > 0.0:
+            raise ValueError(
+                f"the blade at the {when} of the step has no length: {[[*tip], [*heel]]}"
+            )
+        across = math.hypot(y * w - z * v, z * u - x * w, x * v - y * u)
+        if not across > ALONG_EDGE * length * math.hypot(u, v, w):
+            raise ValueError(
+                f"the blade at the {when} of the step cuts along its own edge: forward is "
+                f"{[*forward]}, from tip to heel is {[x, y, z]}"
+            )
+        points += [tip, heel, forward]
+        ways.append((x, y, z))
+    edge = Edge(*points)
+    (x, y, z), (u, v, w) = ways
+    (a, b, c), (f, g, h) = edge.forward_t0, edge.forward_t1
+    if not (x * u + y * v + z * w > 0.0 and a * f + b * g + c * h > 0.0):
+        expect_small_turn(np.array(ways), np.array([edge.forward_t0, edge.forward_t1]))
+    return edge
+
+
+def _is_finite(row: list[float]) -> bool:
+    """Whether all are. A sum is, if all its parts are, and costs less than asking each."""
+    return math.isfinite(sum(row)) or all(map(math.isfinite, row))
+
+
+def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:
+    """Check that the blade turns by less than a right angle from each place to the next.
+
+    Between two places it is interpolated; halfway round it would have no direction.
+
+    Args:
+        along: From tip to heel, shape (n_places, 3).
+        forward: Where it faces, shape (n_places, 3).
+
+    Raises:
+        ValueError: it turns further.
+    """
+    for what, way in (("edge", along), ("forward", forward)):
+        wrong = np.flatnonzero(~((way[1:] * way[:-1]).sum(axis=1) > 0.0))
+        if len(wrong):
+            i = int(wrong[0])
+            raise ValueError(
+                f"the blade's {what} turns by a right angle or more in one step, from "
+                f"{way[i].tolist()} to {way[i + 1].tolist()}; turn it in smaller steps"
+            )
+
+
+def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the places of a cutting edge, and where it faces in each.
+
+    Raises:
+        ValueError: an array has another shape, is not finite, or an edge faces along itself.
+    """
+    rows = np.array(edges, dtype=np.float64)
+    if rows.ndim != 3 or rows.shape[2] != 3 or min(rows.shape[:2]) < 2:
+        raise ValueError(
+            f"edges have shape {rows.shape}; they are two or more places of two or more points: "
+            "(n_places, n_points, 3)"
+        )
+    ways = np.array(forward, dtype=np.float64)
+    if ways.shape not in ((3,), (len(rows), 3)):
+        raise ValueError(f"forward has shape {ways.shape}; it is (3,) or ({len(rows)}, 3)")
+    if not (np.isfinite(rows).all() and np.isfinite(ways).all()):
+        raise ValueError("edges and forward hold a number that is not finite")
+    ways = np.broadcast_to(ways, (len(rows), 3)).copy()
+    along = rows[:, -1] - rows[:, 0]
+    across = np.linalg.norm(np.cross(along, ways), axis=1)
+    limit = ALONG_EDGE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
+    wrong = np.flatnonzero(~(across > limit))
+    if len(wrong):
+        i = int(wrong[0])
+        raise ValueError(
+            f"the edge in place {i} has no length or cuts along itself: forward is "
+            f"{ways[i].tolist()}, from tip to heel is {along[i].tolist()}"
+        )
+    expect_small_turn(along, ways)
+    return rows, ways / np.linalg.norm(ways, axis=1)[:, None]
+
+
+def checked_floor(floor: float | None, lowest: float) -> None:
+    """Refuse a floor that is no height, or that the body, whose lowest node is there, is under.
+
+    Raises:
+        ValueError: it is not finite, or not below the body.
+    """
+    if floor is None:
+        return
+    if not np.isfinite(floor):
+        raise ValueError(f"floor is {floor} m; it must be a finite height, or None for no floor")
+    if floor > lowest:
+        raise ValueError(
+            f"the floor is at {floor:g} m and the body reaches down to {lowest:g} m: put the floor "
+            "at that height or below, or lift the body's positions"
+        )
+
+
+def checked_threads(threads: int) -> int:
+    """Return the number of threads.
+
+    Raises:
+        ValueError: it is not from 1 to the number of cores.
+    """
+    cores = os.cpu_count() or 1
+    if isinstance(threads, bool) or not isinstance(threads, int) or not 1 <= threads <= cores:
+        raise ValueError(
+            f"threads is {threads!r}; it is a whole number from 1 to {cores}, the cores"
+        )
+    return threads
+
+
+def checked_audit(audit: bool, relaxing: Relaxing) -> None:
+    """Refuse an account of energy for a relaxation that has none.
+
+    Raises:
+        ValueError: the relaxation is not global.
+    """
+    if audit and not isinstance(relaxing, Global):
+        raise ValueError(
+            "an audit needs relaxation='global': in the others nodes are at different instants, "
+            "so that the energy of the whole is not known. Leave audit away, or relax globally"
+        )

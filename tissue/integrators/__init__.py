@@ -1,0 +1,1 @@
+"""Methods that advance the motion of the body: the relaxation (RX) of the paper's Table 1."""

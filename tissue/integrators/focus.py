@@ -1,0 +1,87 @@
+"""The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
+
+from tissue.blade.anchors import ANCHORED
+from tissue.blade.forces import Tool
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.elasticity.springs import Springs
+from tissue.integrators.node_rings import EPOCH, N_FOUND, Rings, add_focus, begin_search, search
+from tissue.mesh.body import Body
+
+N_CORNERS = 4
+"""Nodes of a tetrahedron."""
+
+
+@kernel
+def find_held(held: Rings, body: Body, tool: Tool) -> bool:
+    """Make the nodes that the blade acts on ring 0 of `held`; return whether there are any.
+
+    Those of the anchor nearest to the tip come first. Where there are none, `held` stays as it was.
+    """
+    anchors, flanks = tool.anchors, tool.flanks
+    n = 0
+    for k in range(len(anchors.state)):
+        if anchors.state[k] == ANCHORED:
+            if n == 0:
+                begin_search(held)
+            n += 1
+            for q in range(N_CORNERS):
+                add_focus(held, body.tetrahedra[anchors.tetrahedron[k], q])
+    for i in range(flanks.count[0]):
+        if n == 0:
+            begin_search(held)
+        n += 1
+        for corner in range(3):
+            add_focus(held, flanks.node[i, corner])
+    return n > 0
+
+
+@kernel
+def find_rings(
+    rings: Rings, held: Rings, springs: Springs, last_ring: int, scratch: IntArray
+) -> None:
+    """Find the rings around the tip of the blade: the active point tetrahedron is the focus.
+
+    The other nodes that the blade holds, along its edge, are put into ring 0 as well, so that all
+    of them are at the same instant whenever it pulls on them; but no rings grow around them.
+
+    Args:
+        rings: Written.
+        held: Of `find_held`.
+        springs: The rows.
+        last_ring: Where the search ends.
+        scratch: Shape (capacity,).
+    """
+    begin_search(rings)
+    for k in range(min(N_CORNERS, held.state[N_FOUND])):
+        add_focus(rings, held.order[k])
+    search(rings, springs, last_ring)
+    n = rings.state[N_FOUND]
+    for k in range(n):
+        scratch[k] = rings.order[k]
+    rings.state[N_FOUND] = 0
+    for k in range(held.state[N_FOUND]):
+        _append(rings, held.order[k], 0)
+    for k in range(n):
+        if rings.ring[scratch[k]] > 0:
+            _append(rings, scratch[k], rings.ring[scratch[k]])
+    _see_neighbours(rings, held, springs, last_ring)
+
+
+@kernel
+def _see_neighbours(rings: Rings, held: Rings, springs: Springs, last_ring: int) -> None:
+    """Find the neighbours of held nodes that were beyond the last ring: they are seen too."""
+    for k in range(held.state[N_FOUND]):
+        first = springs.first[held.order[k]]
+        for slot in range(first, first + springs.count[held.order[k]]):
+            other = springs.neighbour[slot]
+            if rings.seen[other] != rings.state[EPOCH]:
+                _append(rings, other, last_ring)
+
+
+@kernel
+def _append(rings: Rings, node: int, ring: int) -> None:
+    rings.seen[node] = rings.state[EPOCH]
+    rings.ring[node] = ring
+    rings.order[rings.state[N_FOUND]] = node
+    rings.state[N_FOUND] += 1

@@ -1,0 +1,1 @@
+"""The paper's hierarchical relaxation (section 5.2): rings of nodes around the blade."""

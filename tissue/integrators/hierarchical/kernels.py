@@ -1,0 +1,328 @@
+"""The paper's hierarchical relaxation (section 5.2): near the blade nodes are moved more often.
+
+In a frame of length T a node of ring s takes i(s) = I 2^-s steps of T / i(s) (equations 7 and 8);
+in rings that would be unstable so, twice as many, or four times (`ring_steps`).
+Each step moves one node alone, in place, by the two-level Runge-Kutta method; its neighbours are
+seen where their own last position and velocity put them at that instant.
+
+What was reconstructed, and is not in the paper: a node that comes into the rings takes the clock of
+the frame; with the time stamp of when it was moved last, a node frozen for ten seconds would take
+a single step of ten seconds. Nodes are moved in place (Gauss-Seidel): with the positions of one
+instant for all (Jacobi) the scheme gains energy.
+
+The two ends of a spring see each other at different times, so that action is not quite reaction:
+momentum drifts by parts in a thousand, the order is 2 without damping along springs and 1 with it.
+At rest all that is gone: the equilibrium is that of all nodes moved together.
+"""
+
+import numpy as np
+
+from tissue.blade.anchors import Edge
+from tissue.blade.forces import Tool, act, clear_tool
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import (
+    WIDTH,
+    Point,
+    aligned,
+    eight_points,
+    filled,
+    lanes,
+    load,
+    point,
+    point_of,
+    room_for_points,
+    spread,
+    square_root,
+    store,
+    store_point,
+    summed,
+    times,
+)
+from tissue.core.structs import Arrays
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.spring_forces import NO_LENGTH
+from tissue.elasticity.springs import Springs
+from tissue.integrators.node_rings import N_FOUND, Rings, ring_of
+from tissue.mesh.body import NODES, Body, grown
+from tissue.mesh.star import LARGEST_STAR
+
+FRAME, N_KNOWN = 0, 1
+"""Places in `Trails.counts`."""
+
+
+N_SEEN = 10
+"""Numbers in `Trails.seen` for each neighbour."""
+
+LARGEST_ROW = LARGEST_STAR + WIDTH
+"""Neighbours of a node at most: each further tetrahedron around it, through a face, adds one to the
+three of the first; and a row is filled up."""
+
+
+class Trails(Arrays):
+    """How a neighbour sees each node: on a straight line since the node was moved last."""
+
+    origins: FloatArray
+    """Position that the line has at the begin of the frame [m], shape (capacity, 3). Its direction
+    is the velocity of the node."""
+    clocks: FloatArray
+    """When the node was moved last, since the begin of the frame [s]; shape (capacity,)."""
+    frames: IntArray
+    """Number of the frame that moved it last, shape (capacity,)."""
+    seen: FloatArray
+    """What the node that is being moved sees of its neighbours, eight after eight: origins and
+    velocities of their trails, ways to them [m], and stiffness by squared length [N/m3]."""
+    counts: IntArray
+    """Number of the last frame, and of the nodes that there were; shape (2,)."""
+
+
+def new_trails(n_nodes: int) -> Trails:
+    """Return trails of that many nodes."""
+    return Trails(
+        origins=room_for_points(n_nodes),
+        clocks=np.zeros(n_nodes),
+        frames=np.zeros(n_nodes, np.int64),
+        seen=aligned(N_SEEN * LARGEST_ROW),
+        counts=np.zeros(2, np.int64),
+    )
+
+
+def grown_trails(trails: Trails, n_nodes: int) -> Trails:
+    """Return the trails with room for that many nodes."""
+    of_nodes = ("origins", "clocks", "frames")
+    return trails.replaced(**{name: grown(getattr(trails, name), n_nodes) for name in of_nodes})
+
+
+@kernel
+def hierarchical_frame(
+    body: Body,
+    springs: Springs,
+    tool: Tool,
+    edge: Edge,
+    rings: Rings,
+    trails: Trails,
+    external: FloatArray,
+    surroundings: Surroundings,
+    dt: float,
+    at: float,
+    share: float,
+    n: int,
+    every: IntArray,
+    last_ring: int,
+    is_far_frozen: bool,
+) -> None:
+    """Advance the body by one frame, from fraction `at` of the time step by `share` of it.
+
+    Args:
+        body: Positions and velocities are written.
+        springs: The rows.
+        tool: Acts in every micro step; all nodes that it acts on should be in ring 0.
+        edge: The cutting edge over the whole time step of length `dt` [s].
+        rings: Searched up to `last_ring + 1`: the ring beyond the last is seen, but not moved.
+        trails: Scratch.
+        external: Scratch for the forces of the blade [N], shape (capacity, 3).
+        surroundings: Gravity and damping.
+        dt: Length of the time step [s].
+        at: Where in the time step the frame begins.
+        share: Which share of it the frame is.
+        n: Micro steps.
+        every: Micro steps between two moves of a node of each ring, and last of those beyond; each
+            divides the next. The nodes of ring 0 are moved in each micro step.
+        last_ring: s_max.
+        is_far_frozen: Whether nodes beyond the last ring stay where they are (the paper's rule).
+    """
+    _lay_trails(body, rings, trails, last_ring, is_far_frozen)
+    span = share * dt
+    n_far = every[last_ring + 1]
+    for j in range(1, n + 1):
+        begin = at + share * (j - 1) / n
+        act(tool, body, edge, body.positions, begin, share / n, dt, external)
+        t1 = span * j / n
+        for k in range(rings.state[N_FOUND]):
+            node = rings.order[k]
+            ring = rings.ring[node]
+            # The rings come in order, so that none further out is due either.
+            if ring > last_ring or j % every[ring] != 0:
+                break
+            _move(body, springs, trails, external, surroundings, node, t1)
+        if j % n_far == 0 and not is_far_frozen:
+            for node in range(body.counts[NODES]):
+                if not 0 <= ring_of(rings, node) <= last_ring:
+                    _move(body, springs, trails, external, surroundings, node, t1)
+    clear_tool(tool, body, external)
+
+
+@kernel
+def _lay_trails(
+    body: Body, rings: Rings, trails: Trails, last_ring: int, is_far_frozen: bool
+) -> None:
+    """Give every node that takes part, or is seen by one that does, the clock of the frame."""
+    counts = trails.counts
+    if is_far_frozen:
+        for k in range(rings.state[N_FOUND]):
+            node = rings.order[k]
+            was_frozen = node < counts[N_KNOWN] and trails.frames[node] != counts[FRAME]
+            if was_frozen or rings.ring[node] > last_ring:
+                store_point(body.velocities, node, point_of(0.0, 0.0, 0.0))
+            if rings.ring[node] <= last_ring:
+                trails.frames[node] = counts[FRAME] + 1
+            _lay_trail(body, trails, node, 0.0)
+    else:
+        for node in range(body.counts[NODES]):
+            _lay_trail(body, trails, node, 0.0)
+    counts[FRAME] += 1
+    counts[N_KNOWN] = body.counts[NODES]
+
+
+@inlined
+def _lay_trail(body: Body, trails: Trails, node: int, clock: float) -> None:
+    trails.clocks[node] = clock
+    origin = point(body.positions, node) - times(clock, point(body.velocities, node))
+    store_point(trails.origins, node, origin)
+
+
+@kernel
+def _move(
+    body: Body,
+    springs: Springs,
+    trails: Trails,
+    external: FloatArray,
+    surroundings: Surroundings,
+    node: int,
+    t1: float,
+) -> None:
+    """Move one node alone, from its own clock to `t1` [s] since the begin of the frame."""
+    if body.fixed[node]:
+        return
+    t0 = trails.clocks[node]
+    h = t1 - t0
+    x, v = point(body.positions, node), point(body.velocities, node)
+    time, drag = surroundings.retardation_time, surroundings.drag
+    per_mass = 1.0 / body.masses[node]
+    constant = point_of(*surroundings.gravity) + times(per_mass, point(external, node))
+    net = (springs, trails, node)
+    _look(body, *net)
+
+    a1 = constant - times(drag, v) + times(per_mass, _force(*net, t0, x, v, time))
+    middle, v2 = x + times(0.5 * h, v) + times(0.125 * h * h, a1), v + times(0.5 * h, a1)
+    a2 = constant - times(drag, v2) + times(per_mass, _force(*net, t0 + 0.5 * h, middle, v2, time))
+    change = times(0.5 * h, a2 - a1)
+    a3 = a2 - times(drag, change)
+    if time > 0.0:
+        a3 = a3 - times(per_mass * time, _resistance(*net, change))
+    ahead, v4 = x + times(h, v) + times(0.5 * h * h, a3), v + times(h, a3)
+    a4 = constant - times(drag, v4) + times(per_mass, _force(*net, t1, ahead, v4, time))
+
+    both = a2 + a3
+    store_point(body.positions, node, x + times(h, v) + times(h * h / 6.0, a1 + both))
+    store_point(body.velocities, node, v + times(h / 6.0, a1 + both + both + a4))
+    _lay_trail(body, trails, node, t1)
+
+
+@inlined
+def _look(body: Body, springs: Springs, trails: Trails, node: int) -> None:
+    """Note the trails of the neighbours of a node, eight after eight."""
+    seen = trails.seen
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        at = N_SEEN * (slot - first)
+        x, y, z = eight_points(trails.origins, springs.neighbour, slot)
+        u, v, w = eight_points(body.velocities, springs.neighbour, slot)
+        store(seen, at, x)
+        store(seen, at + WIDTH, y)
+        store(seen, at + 2 * WIDTH, z)
+        store(seen, at + 3 * WIDTH, u)
+        store(seen, at + 4 * WIDTH, v)
+        store(seen, at + 5 * WIDTH, w)
+
+
+@inlined
+def _force(
+    springs: Springs,
+    trails: Trails,
+    node: int,
+    t: float,
+    position: Point,
+    velocity: Point,
+    retardation_time: float,
+) -> Point:
+    """Force [N] on a node at `position`, moving at `velocity`, among its neighbours at time `t`.
+
+    Notes what `_resistance` needs.
+    """
+    seen = trails.seen
+    x, y, z = spread(position)
+    u, v, w = spread(velocity)
+    clock, time, one = lanes(t), lanes(retardation_time), lanes(1.0)
+    fx = fy = fz = lanes(0.0)
+    first = springs.first[node]
+    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+        at = N_SEEN * (slot - first)
+        du, dv, dw = (
+            load(seen, at + 3 * WIDTH),
+            load(seen, at + 4 * WIDTH),
+            load(seen, at + 5 * WIDTH),
+        )
+        dx = load(seen, at) + clock * du - x
+        dy = load(seen, at + WIDTH) + clock * dv - y
+        dz = load(seen, at + 2 * WIDTH) + clock * dw - z
+        approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
+        squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
+        per_squared = one / squared  # beside the root, not after it: nodes are moved one by one
+        stiffness = load(springs.stiffness, slot)
+        viscous = stiffness * per_squared
+        elastic = stiffness - load(springs.rest_pull, slot) * per_squared * square_root(squared)
+        along = elastic + time * approach * viscous
+        fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
+        store(seen, at + 6 * WIDTH, dx)
+        store(seen, at + 7 * WIDTH, dy)
+        store(seen, at + 8 * WIDTH, dz)
+        store(seen, at + 9 * WIDTH, viscous)
+    return summed(fx, fy, fz)
+
+
+@inlined
+def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Point:
+    """Force per retardation time [N/s] by which the dampers resist a speed of the node alone.
+
+    At the position of the last `_force`.
+    """
+    seen = trails.seen
+    u, v, w = spread(speed)
+    fx = fy = fz = lanes(0.0)
+    for at in range(0, N_SEEN * filled(springs.count[node]), N_SEEN * WIDTH):
+        dx, dy, dz = (
+            load(seen, at + 6 * WIDTH),
+            load(seen, at + 7 * WIDTH),
+            load(seen, at + 8 * WIDTH),
+        )
+        along = load(seen, at + 9 * WIDTH) * (u * dx + v * dy + w * dz)
+        fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
+    return summed(fx, fy, fz)
+
+
+@kernel
+def ring_frequencies(
+    body: Body,
+    frequency_squared: FloatArray,
+    rings: Rings,
+    last_ring: int,
+    is_far_frozen: bool,
+    out: FloatArray,
+) -> None:
+    """Write the largest bound on w^2 [1/s2] of the nodes in each ring to `out`.
+
+    Shape (last_ring + 2,); last that of all nodes beyond, 0 where they are frozen.
+    """
+    for s in range(last_ring + 2):
+        out[s] = 0.0
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        ring = rings.ring[node]
+        if ring <= last_ring and not body.fixed[node]:
+            out[ring] = max(out[ring], frequency_squared[node])
+    if is_far_frozen:
+        return
+    for node in range(body.counts[NODES]):
+        if not (0 <= ring_of(rings, node) <= last_ring or body.fixed[node]):
+            out[last_ring + 1] = max(out[last_ring + 1], frequency_squared[node])

@@ -1,0 +1,1 @@
+"""Local time stepping: small elements take substeps, and what is at rest sleeps."""

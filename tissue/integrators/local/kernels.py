@@ -1,0 +1,352 @@
+"""Local time stepping: small elements take substeps, their neighbours do not (heir of section 5.2).
+
+Leap-frog with steps of H for the whole body, and p substeps for the fine nodes: those whose
+frequency bound, with what the blade adds, exceeds what H bears; and the rings around the blade that
+were asked for. It differs from the paper's hierarchy in that both ends of a spring see each other
+at the same times: linear momentum is kept to rounding, the equilibrium is that of all nodes moved
+together, the order is 2.
+
+    V <- V + 2 e_p / H,   x <- x + H V                       V: velocity half a step ago
+
+where e is found by the recursion of `chebyshev` for the fine nodes and those that share a force
+with one; for the others 2 e_p = H^2 r(0).
+
+Drag acts exactly, half before the kick and half after. Dampers between nodes that are not fine are
+evaluated once a step with the velocities of half a step ago; those at a fine node, where such a
+damper could be unstable, follow the kick one by one (Shardlow 2003): each takes from the relative
+velocity of its two ends what it would in that time if it were alone, by equal and opposite
+impulses.
+
+Within a step the blade is where it is at its begin: the recursion stands for a motion that runs to
+both sides of that instant alike, so that a steady motion of the blade cancels.
+"""
+
+import math
+
+import numpy as np
+
+from tissue.blade.anchors import Edge
+from tissue.blade.forces import Tool, act, clear_tool, give_way
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.simd import Point, point, point_of, store_point, times
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
+from tissue.elasticity.internal_forces import Elastic, Surroundings, internal_force
+from tissue.elasticity.spring_forces import damping_force
+from tissue.elasticity.springs import Springs
+from tissue.integrators.local.chebyshev import Chebyshev
+from tissue.integrators.local.element_subsets import Patch, deform_patch, new_patch
+from tissue.integrators.local.sleeping import AWAKE, N_LISTED, VERSION, Activity, wake_pulled
+from tissue.integrators.node_rings import (
+    N_FOUND,
+    UNREACHED,
+    Rings,
+    grown_rings,
+    new_rings,
+    ring_of,
+)
+from tissue.mesh.body import Body, grown
+from tissue.mesh.star import Visits
+
+
+class Zone(Arrays):
+    """The fine nodes and what they touch; scratch of shape (capacity, 3) each."""
+
+    rings: Rings
+    """Ring 0: fine nodes; further out, up to `reach_of`: nodes that feel one move."""
+    patch: Patch
+    """What the nodes in the rings feel of the fine ones."""
+    fine: IntArray
+    """Scratch for the list of fine nodes, shape (capacity,)."""
+    bound: FloatArray
+    """Bound on w^2 of every listed node, with what the blade adds [1/s2]; shape (capacity,)."""
+    start: FloatArray
+    """Positions of the fine nodes at the begin of the step [m]."""
+    way: FloatArray
+    """e_m [m]."""
+    way_before: FloatArray
+    """e_{m-1} [m]."""
+    steady: FloatArray
+    """Share of the acceleration that is the same in all substeps [m/s2]."""
+    accelerations: FloatArray
+    """At the begin of the step [m/s2], of every listed node."""
+
+
+def new_zone(n_nodes: int, n_tetrahedra: int) -> Zone:
+    """Return a zone without nodes, with room for that many nodes and tetrahedra."""
+    of_nodes = ("start", "way", "way_before", "steady", "accelerations")
+    return Zone(
+        rings=new_rings(n_nodes),
+        patch=new_patch(n_nodes, n_tetrahedra),
+        fine=np.zeros(n_nodes, np.int64),
+        bound=np.zeros(n_nodes),
+        **{name: np.zeros((n_nodes, 3)) for name in of_nodes},
+    )
+
+
+def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
+    """Return the zone with room for that many nodes and tetrahedra, its patch empty."""
+    of_nodes = ("fine", "bound", "start", "way", "way_before", "steady", "accelerations")
+    larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
+    patch = new_patch(n_nodes, n_tetrahedra)
+    return zone.replaced(rings=grown_rings(zone.rings, n_nodes), patch=patch, **larger)
+
+
+@kernel
+def macro_steps(
+    body: Body,
+    elastic: Elastic,
+    tool: Tool,
+    edge: Edge,
+    visits: Visits,
+    activity: Activity,
+    listed: Patch,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    surroundings: Surroundings,
+    reach: float,
+    queue: IntArray,
+    dt: float,
+    begin: float,
+    share: float,
+    kick: float,
+    first: int,
+    end: int,
+    is_free: bool,
+) -> int:
+    """Take macro steps from `first` to before `end`; return the next one.
+
+    Where nothing touches (`is_free`), what the blade does not hold gives way after each, and what
+    is pulled wakes: `listed` must then be found anew before another step. `visits`, `reach` and
+    `queue`: see `tissue.blade.forces.give_way`; the rest: see `macro_step`.
+    """
+    version = activity.counts[VERSION]
+    for i in range(first, end):
+        at = begin + i * share
+        macro_step(
+            body,
+            elastic,
+            tool,
+            edge,
+            activity,
+            listed,
+            zone,
+            chebyshev,
+            external,
+            surroundings,
+            dt,
+            at,
+            share,
+            kick,
+        )
+        if is_free:
+            give_way(tool, body, visits, edge, external, at + share, share * dt, reach, queue)
+            wake_pulled(activity, body, elastic.springs, zone.accelerations)
+            if activity.counts[VERSION] != version:
+                return i + 1
+    return end
+
+
+@kernel
+def macro_step(
+    body: Body,
+    elastic: Elastic,
+    tool: Tool,
+    edge: Edge,
+    activity: Activity,
+    listed: Patch,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    surroundings: Surroundings,
+    dt: float,
+    at: float,
+    share: float,
+    kick: float,
+) -> None:
+    """Advance the listed nodes from fraction `at` of the time step by `share` of it.
+
+    Args:
+        body: Positions and velocities are written.
+        elastic: What the forces inside the body follow from.
+        tool: Acts in every substep.
+        edge: The cutting edge over the whole time step of length `dt` [s].
+        activity: Only awake nodes move.
+        listed: What the listed nodes feel.
+        zone: Of `find_zone`.
+        chebyshev: Coefficients for the substeps.
+        external: Scratch for the forces of the blade [N], shape (capacity, 3).
+        surroundings: Gravity and damping.
+        dt: Length of the time step [s].
+        at: Where in the time step the macro step begins.
+        share: Which share of it the macro step is.
+        kick: 1, or 0.5 where the velocities are those of this instant: the first step of all.
+    """
+    h = share * dt
+    springs = elastic.springs
+    deform_patch(listed, elastic, body.positions)
+    for m in range(len(chebyshev.push)):
+        part = kick * share * chebyshev.weight[m]
+        act(tool, body, edge, body.positions, at, part, dt, external)
+        if m == 0:
+            _accelerate_coarse(body, elastic, activity, zone, external, surroundings)
+            _begin_fine(body, springs, zone, surroundings)
+        else:
+            deform_patch(zone.patch, elastic, body.positions)
+        _substep(body, elastic, activity, zone, chebyshev, external, h, m)
+    clear_tool(tool, body, external)
+    _kick(body, activity, zone, surroundings.drag, h, kick)
+    if surroundings.retardation_time > 0.0:
+        _damp_fine(body, springs, activity, zone.rings, surroundings.retardation_time * h)
+    _drift(body, activity, zone, h)
+
+
+@kernel
+def _accelerate_coarse(
+    body: Body,
+    elastic: Elastic,
+    activity: Activity,
+    zone: Zone,
+    external: FloatArray,
+    surroundings: Surroundings,
+) -> None:
+    """Accelerations of the nodes that feel no fine one move: they are the same in all substeps."""
+    gravity = point_of(*surroundings.gravity)
+    time = surroundings.retardation_time
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if body.fixed[node] or ring_of(zone.rings, node) != UNREACHED:
+            continue
+        force = internal_force(elastic, node, body.positions, body.velocities, time)
+        force = force + point(external, node)
+        store_point(zone.accelerations, node, gravity + times(1.0 / body.masses[node], force))
+
+
+@kernel
+def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surroundings) -> None:
+    rings = zone.rings
+    nowhere = point_of(0.0, 0.0, 0.0)
+    time = surroundings.retardation_time
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        steady = point_of(*surroundings.gravity)
+        if rings.ring[node] == 0:
+            store_point(zone.start, node, point(body.positions, node))
+        elif time > 0.0:
+            if rings.ring[node] > 1:  # no neighbour is fine
+                force = damping_force(springs, node, body.positions, body.velocities, 1.0)
+            else:
+                force = _coarse_damping(springs, body, rings, node)
+            steady = steady + times(time / body.masses[node], force)
+        store_point(zone.steady, node, steady)
+        store_point(zone.way, node, nowhere)
+        store_point(zone.way_before, node, nowhere)
+
+
+@kernel
+def _substep(
+    body: Body,
+    elastic: Elastic,
+    activity: Activity,
+    zone: Zone,
+    chebyshev: Chebyshev,
+    external: FloatArray,
+    h: float,
+    m: int,
+) -> None:
+    """From e_m to e_{m+1}."""
+    rings, way, way_before = zone.rings, zone.way, zone.way_before
+    onward, back, push = chebyshev.onward[m], chebyshev.back[m], chebyshev.push[m] * h * h
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        if body.fixed[node]:
+            continue
+        force = internal_force(elastic, node, body.positions, body.velocities, 0.0)
+        force = force + point(external, node)
+        r = point(zone.steady, node) + times(1.0 / body.masses[node], force)
+        if m == 0:
+            store_point(zone.accelerations, node, r)
+        if activity.state[node] != AWAKE:
+            continue
+        e = point(way, node)
+        moved = times(onward, e) - times(back, point(way_before, node)) + times(push, r)
+        store_point(way_before, node, e)
+        store_point(way, node, moved)
+    # Only now: until here the nodes saw each other at e_m.
+    for k in range(rings.state[N_FOUND]):
+        node = rings.order[k]
+        if rings.ring[node] > 0:
+            break
+        store_point(body.positions, node, point(zone.start, node) + point(way, node))
+
+
+@kernel
+def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kick: float) -> None:
+    half = math.exp(-0.5 * drag * h)
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] != AWAKE:
+            continue
+        gain = scale(kick * h, vec3(zone.accelerations, node))
+        if ring_of(zone.rings, node) != UNREACHED:
+            gain = scale(2.0 * kick / h, vec3(zone.way, node))
+        v = axpy(half * half, vec3(body.velocities, node), scale(half, gain))
+        store(body.velocities, node, v)
+
+
+@kernel
+def _damp_fine(
+    body: Body, springs: Springs, activity: Activity, rings: Rings, seconds: float
+) -> None:
+    """Let the dampers at fine nodes act one after the other; `seconds` is h times retardation."""
+    x, v = body.positions, body.velocities
+    for i in range(rings.state[N_FOUND]):
+        a = rings.order[i]
+        if rings.ring[a] > 0:
+            break
+        inverse_a = 1.0 / body.masses[a]
+        for slot in range(springs.first[a], springs.first[a] + springs.count[a]):
+            b = springs.neighbour[slot]
+            if b < a and ring_of(rings, b) == 0:
+                continue  # its turn was, or will be, in the row of b
+            is_free = activity.state[b] == AWAKE
+            inverse_b = 1.0 / body.masses[b] if is_free else 0.0
+            d = sub(vec3(x, b), vec3(x, a))
+            inverse = inverse_a + inverse_b
+            taken = -math.expm1(-seconds * springs.stiffness[slot] * inverse)
+            approach = dot(sub(vec3(v, b), vec3(v, a)), d)
+            impulse = taken * approach / (inverse * dot(d, d))
+            store(v, a, axpy(impulse * inverse_a, d, vec3(v, a)))
+            if is_free:
+                store(v, b, axpy(-impulse * inverse_b, d, vec3(v, b)))
+
+
+@kernel
+def _drift(body: Body, activity: Activity, zone: Zone, h: float) -> None:
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] == AWAKE:
+            is_fine = ring_of(zone.rings, node) == 0
+            x = vec3(zone.start, node) if is_fine else vec3(body.positions, node)
+            store(body.positions, node, axpy(h, vec3(body.velocities, node), x))
+
+
+@kernel
+def _coarse_damping(springs: Springs, body: Body, rings: Rings, node: int) -> Point:
+    """Force per retardation time [N/s] of the dampers to nodes that are not fine."""
+    x, v = body.positions, body.velocities
+    here, speed = vec3(x, node), vec3(v, node)
+    fx = fy = fz = 0.0
+    first = springs.first[node]
+    for slot in range(first, first + springs.count[node]):
+        other = springs.neighbour[slot]
+        if ring_of(rings, other) == 0:
+            continue
+        d = sub(vec3(x, other), here)
+        along = springs.stiffness[slot] * dot(sub(vec3(v, other), speed), d) / dot(d, d)
+        fx += along * d.x
+        fy += along * d.y
+        fz += along * d.z
+    return point_of(fx, fy, fz)

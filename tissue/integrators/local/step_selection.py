@@ -1,0 +1,176 @@
+"""Which nodes take substeps, and how many: from their stiffness, and from where the blade is."""
+
+import math
+
+import numpy as np
+
+from tissue.blade.forces import Tool, add_tool_frequency
+from tissue.core.array_types import BoolArray, FloatArray
+from tissue.core.jit import kernel
+from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
+from tissue.elasticity.springs import Springs
+from tissue.integrators.focus import find_held
+from tissue.integrators.local.element_subsets import Patch, find_patch, reach_of
+from tissue.integrators.local.kernels import Zone
+from tissue.integrators.local.sleeping import AWAKE, N_LISTED, Activity
+from tissue.integrators.node_rings import N_FOUND, Rings, add_focus, begin_search, search
+from tissue.mesh.body import Body
+
+SAFETY = 0.8
+"""Share of the stable step that is used: that of the Runge-Kutta method, for the same reason."""
+
+MOST_STEPS = 64
+"""Divisions of a time step that are considered."""
+
+COST_OF_FINE = 3.0
+"""What a substep of a fine node costs, with the neighbours that take part, in steps of others."""
+
+
+@kernel
+def plan(
+    activity: Activity,
+    fixed: BoolArray,
+    frequency_squared: FloatArray,
+    n_near: int,
+    span: float,
+    retardation_time: float,
+    substep_limits: FloatArray,
+    limits: FloatArray,
+    n_above: FloatArray,
+) -> tuple[int, int, float]:
+    """Return how many macro steps to take, in how many substeps each, and what is fine.
+
+    Of all pairs that are stable, the one that costs least. The third is the bound on w^2 [1/s2]
+    above which a node is fine.
+
+    Args:
+        activity: The nodes.
+        fixed: Which nodes do not move.
+        frequency_squared: Bound on w^2 of each, with what the blade adds [1/s2].
+        n_near: Fine nodes anyway, around the blade.
+        span: What is to be divided [s].
+        retardation_time: Damping along springs [s].
+        substep_limits: Of `chebyshev`.
+        limits: Scratch, shape (MOST_STEPS + 1,).
+        n_above: Scratch, shape (MOST_STEPS + 1,).
+    """
+    highest = 0.0
+    for k in range(activity.counts[N_LISTED]):
+        if not fixed[activity.listed[k]]:
+            highest = max(highest, frequency_squared[activity.listed[k]])
+    most = 1
+    while True:
+        limits[most] = coarse_limit(span / most, retardation_time)
+        n_above[most] = 0.0
+        if limits[most] >= highest or most == MOST_STEPS:
+            break
+        most += 1
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        w2 = 0.0 if fixed[node] else frequency_squared[node]
+        n = 1
+        while n <= most and w2 > limits[n]:
+            n_above[n] += 1.0
+            n += 1
+    best, best_substeps, best_cost = most, len(substep_limits) - 1, np.inf
+    for n in range(1, most + 1):
+        p = n_substeps(highest, span / n, substep_limits)
+        if p == len(substep_limits):
+            continue
+        cost = n * (activity.counts[N_LISTED] + p * COST_OF_FINE * (n_near + n_above[n]))
+        if cost < best_cost:
+            best, best_substeps, best_cost = n, p, cost
+    return best, best_substeps, limits[best]
+
+
+@kernel
+def coarse_limit(h: float, retardation_time: float) -> float:
+    """Highest bound on w^2 [1/s2] that a step of `h` [s] bears where dampers lag by half a step.
+
+    The exact limit of x'' = -w^2 (x + b x') is (w h)^2 / 4 + w^2 b h / 2 = 1.
+    """
+    return SAFETY * SAFETY / (0.25 * h * h + 0.5 * retardation_time * h)
+
+
+@kernel
+def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -> int:
+    """Substeps of a step of `h` [s] that bear frequencies up to that, w^2 [1/s2]; see `chebyshev`.
+
+    One more than there may be where that many do not suffice.
+    """
+    p = 1
+    phase = math.sqrt(frequency_squared) * h
+    while p < len(substep_limits) and phase > SAFETY * substep_limits[p]:
+        p += 1
+    return p
+
+
+@kernel
+def find_bounds(
+    body: Body,
+    elastic: Elastic,
+    tool: Tool,
+    activity: Activity,
+    zone: Zone,
+    scratch: FloatArray,
+) -> None:
+    """Write the bounds of the listed nodes to `zone.bound` [1/s2], with what the blade adds.
+
+    All nodes that it acts on are listed, but for those that are fixed. `scratch`: see
+    `add_tool_frequency`.
+    """
+    for k in range(activity.counts[N_LISTED]):
+        zone.bound[activity.listed[k]] = elastic.frequency_squared[activity.listed[k]]
+    add_tool_frequency(tool, body, zone.bound, scratch)
+
+
+@kernel
+def find_near(body: Body, springs: Springs, tool: Tool, zone: Zone, n_rings: int) -> int:
+    """Write the nodes that the blade acts on, and rings around, to `zone.fine`; return how many.
+
+    Only those that can move.
+    """
+    rings = zone.rings
+    if not find_held(rings, body, tool):
+        return 0
+    search(rings, springs, n_rings)
+    n = 0
+    for k in range(rings.state[N_FOUND]):
+        if not body.fixed[rings.order[k]]:
+            zone.fine[n] = rings.order[k]
+            n += 1
+    return n
+
+
+@kernel
+def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, limit: float) -> None:
+    """Make the nodes near the blade, and those above the limit [1/s2], the fine ones.
+
+    `n_near` is what `find_near` returned; those are awake.
+    """
+    rings = zone.rings
+    begin_search(rings)
+    for k in range(n_near):
+        add_focus(rings, zone.fine[k])
+    for k in range(activity.counts[N_LISTED]):
+        node = activity.listed[k]
+        if activity.state[node] == AWAKE and zone.bound[node] > limit:
+            add_focus(rings, node)
+    reach = reach_of(elastic)
+    search(rings, elastic.springs, reach)
+    find_patch(zone.patch, elastic, rings, 0, reach - 1)
+
+
+@kernel
+def find_listed_patch(patch: Patch, elastic: Elastic, activity: Activity, around: Rings) -> None:
+    """List what to evaluate for the forces on all listed nodes; `around` is scratch.
+
+    One ring beyond them takes part: what sleeps there has a pressure that they feel.
+    """
+    if not elastic.has[TETRAHEDRA_TOO]:
+        return
+    begin_search(around)
+    for k in range(activity.counts[N_LISTED]):
+        add_focus(around, activity.listed[k])
+    search(around, elastic.springs, 1)
+    find_patch(patch, elastic, around, 1, 0)

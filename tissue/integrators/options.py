@@ -1,0 +1,109 @@
+"""The ways to relax a body that a user can choose, and their settings."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from tissue.material import Material
+
+Far = Literal["moved", "frozen"]
+"""What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
+
+
+@dataclass(frozen=True)
+class Global:
+    """All nodes together, by the two-level Runge-Kutta method."""
+
+
+@dataclass(frozen=True)
+class Hierarchical:
+    """The paper's hierarchical relaxation (section 5.2), for springs.
+
+    Raises:
+        ValueError: a setting is none that it can have.
+    """
+
+    updates: int = 64
+    """I: steps that the nodes at the tip of the blade, and those along its edge that it holds, take
+    in a frame. Where the steps of a ring would be too long for its stiffest node, it takes twice as
+    many, or four times, and so on."""
+    rings: int = 6
+    """s_max: up to which ring s, counted in edges from the tip, nodes take I 2^-s steps."""
+    far: Far = "moved"
+    """Nodes beyond. Where they are frozen, as the paper prints it, a frame costs what the rings
+    cost, however large the body; but what is frozen does not come to equilibrium."""
+
+    def __post_init__(self) -> None:
+        if self.far not in get_args(Far):
+            raise ValueError(f"far is {self.far!r}; it must be one of {', '.join(get_args(Far))}")
+        if self.rings < 0:
+            raise ValueError(f"rings is {self.rings}; it must not be negative")
+        if self.updates < 1 or self.updates % (1 << self.rings) != 0:
+            raise ValueError(
+                f"updates is {self.updates} with {self.rings} rings; nodes of the last ring take "
+                f"updates / 2^rings steps in a frame, so updates must be a multiple of "
+                f"{1 << self.rings}"
+            )
+
+
+@dataclass(frozen=True)
+class LocalTimeStepping:
+    """Leap-frog in which small elements take substeps, and what is at rest sleeps.
+
+    Raises:
+        ValueError: a setting is none that it can have.
+    """
+
+    rings: int = 0
+    """Rings of nodes that take substeps however soft they are, the first of which are those that
+    the blade holds. At 0 only nodes do that are too stiff for the step, with what the blade adds to
+    the stiffness of those that it holds."""
+    sleep: bool = True
+    """Whether nodes at rest sleep until they are pulled, so that a step costs what moves."""
+    stabilisation: float = 1.0
+    """nu of the scheme; see `tissue.integrators.local.chebyshev`."""
+
+    def __post_init__(self) -> None:
+        if self.rings < 0:
+            raise ValueError(f"rings is {self.rings}; it must not be negative")
+        if not (math.isfinite(self.stabilisation) and self.stabilisation > 0.0):
+            raise ValueError(
+                f"stabilisation is {self.stabilisation}; it must be positive and finite: without "
+                "it the scheme is unstable at many steps far below its limit"
+            )
+
+
+Relaxing = Global | Hierarchical | LocalTimeStepping
+
+BY_NAME: dict[str, Relaxing] = {
+    "global": Global(),
+    "hierarchical": Hierarchical(),
+    "local": LocalTimeStepping(),
+}
+"""With the default settings."""
+
+
+def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
+    """Return the settings that a name stands for, or those given, for a body of that material.
+
+    Raises:
+        ValueError: there is no such way to relax, or it is not for that material.
+    """
+    if isinstance(choice, str):
+        if choice not in BY_NAME:
+            raise ValueError(f"no relaxation is called {choice!r}. Known: {', '.join(BY_NAME)}")
+        choice = BY_NAME[choice]
+    if not isinstance(choice, Relaxing):
+        raise ValueError(
+            f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
+            "or LocalTimeStepping with settings"
+        )
+    has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
+    if isinstance(choice, Hierarchical) and has_tetrahedra:
+        raise ValueError(
+            "hierarchical relaxation moves one node at a time, on its springs alone; with law "
+            f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
+            "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for every "
+            "law"
+        )
+    return choice

@@ -1,0 +1,88 @@
+"""Runge-Kutta steps whose loops over the body are shared by several threads.
+
+Each node and each tetrahedron is written by one thread, and sums are gathered in the order of rows:
+the bits are those of one thread. Between loops the threads wait for each other, which costs 30 to
+80 us a loop. Two threads measured: 60,000 tetrahedra step 1.35 (springs) to 1.8 times as fast,
+20,000 at 0.9 of the speed of one.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from tissue.blade.forces import act
+from tissue.contact.resolve import prepare
+from tissue.core.array_types import FloatArray
+from tissue.elasticity.finite_elements import n_blocks
+from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
+from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
+from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
+from tissue.integrators.step_context import Motion, end_step
+from tissue.mesh.body import NODES, TETRAHEDRA, Body
+
+
+class Threads:
+    """A number of threads that step a body.
+
+    Args:
+        n: How many, the caller's own included; at least 2.
+    """
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._pool = ThreadPoolExecutor(n - 1, thread_name_prefix="tissue")
+
+    def relax_by(self, motion: Motion, n: int) -> None:
+        """Advance the motion by `n` Runge-Kutta steps (see
+        `tissue.integrators.runge_kutta.relax`)."""
+        share = (motion.end - motion.begin) / n
+        for i in range(n):
+            at = motion.begin + i * share
+            if motion.contact.is_awake:
+                prepare(motion.contact.arrays, motion.body)
+            self._step(motion, at, share)
+            end_step(motion, share * motion.dt, at + share)
+
+    def _step(self, motion: Motion, at: float, share: float) -> None:
+        """One step of Nystroem's form (see `runge_kutta_nystroem`)."""
+        body, elastic, stages = motion.body, motion.elasticity.arrays, motion.stages
+        n = int(body.counts[NODES])
+        arguments = (body, elastic, stages, motion.surroundings, share * motion.dt)
+        self._act(motion, body.positions, at, share / 6.0)
+        self._deform(body, elastic, body.positions)
+        self._share(n, first_stage, *arguments)
+        self._act(motion, stages.positions, at + 0.5 * share, share * 2.0 / 3.0)
+        self._deform(body, elastic, stages.positions)
+        self._share(n, second_stage, *arguments)
+        if motion.surroundings.retardation_time > 0.0:
+            self._share(n, third_stage, *arguments)
+        self._act(motion, stages.positions_4, at + share, share / 6.0)
+        self._deform(body, elastic, stages.positions_4)
+        self._share(n, fourth_stage, *arguments)
+
+    @staticmethod
+    def _act(motion: Motion, positions: FloatArray, when: float, share: float) -> None:
+        """Let the blade act on the nodes at `positions` [m]."""
+        edge, dt, external = motion.edge, motion.dt, motion.stages.external
+        act(motion.tool, motion.body, edge, positions, when, share, dt, external)
+
+    def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
+        """Evaluate all tetrahedra (see `tissue.elasticity.internal_forces.deform`)."""
+        if not elastic.has[TETRAHEDRA_TOO]:
+            return
+        solid = elastic.solid
+        blocks = n_blocks(int(body.counts[TETRAHEDRA]))
+        if has_averaged_volumes(solid):
+            self._share(blocks, volumes, solid, positions, solid.every)
+            self._share(int(body.counts[NODES]), pressures, solid, solid.every)
+        self._share(blocks, corner_forces, solid, positions, solid.every)
+
+    def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:
+        """Run `loop(*arguments, begin, end)` over 0 to `n`, a part of it on each thread."""
+        bounds = [n * i // self._n for i in range(self._n + 1)]
+        others = [
+            self._pool.submit(loop, *arguments, bounds[i], bounds[i + 1]) for i in range(1, self._n)
+        ]
+        loop(*arguments, bounds[0], bounds[1])
+        for other in others:
+            other.result()

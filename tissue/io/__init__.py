@@ -1,0 +1,1 @@
+"""Tetrahedral meshes from files, and bodies to files: one format a module."""

@@ -1,0 +1,152 @@
+"""Gmsh 4.1, text and binary: nodes and elements stand in blocks, one an entity of the geometry."""
+
+from typing import Protocol
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.io.gmsh_elements import Elements, kind_of
+from tissue.io.source import Source, as_floats, as_ints
+from tissue.types import TetrahedralMesh
+
+LARGEST_EXACT = 2**53
+"""Whole numbers up to this are exact in double precision, in which text is read."""
+
+
+def read_gmsh_4(source: Source, byte_order: str) -> TetrahedralMesh:
+    """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
+    tags, positions = _nodes(_section(source, "Nodes", byte_order))
+    elements = _elements(_section(source, "Elements", byte_order))
+    return elements.mesh(tags, positions)
+
+
+class _Section(Protocol):
+    """Numbers of a section in their order, whatever way they are written."""
+
+    source: Source
+
+    def ints(self, count: int, what: str) -> IntArray:
+        """Take C's `int`s."""
+
+    def sizes(self, count: int, what: str) -> IntArray:
+        """Take C's `size_t`s."""
+
+    def floats(self, count: int, what: str) -> FloatArray:
+        """Take C's `double`s."""
+
+    def end(self) -> None:
+        """Fail unless all has been taken."""
+
+
+def _section(source: Source, name: str, byte_order: str) -> _Section:
+    """Return the numbers of a section."""
+    source.at = source.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
+    return _Binary(source, name, byte_order) if byte_order else _Text(source, name)
+
+
+class _Text:
+    """Numbers written as text."""
+
+    def __init__(self, source: Source, name: str) -> None:
+        self.source = source
+        self._start = source.at
+        end = source.find(rb"\$End" + name.encode(), f"$End{name}").start()
+        self._numbers = source.floats(end, "numbers")
+        self._at = 0
+
+    def floats(self, count: int, what: str) -> FloatArray:
+        left = len(self._numbers) - self._at
+        if count > left:
+            self.source.fail(f"expected {count} {what}, found {left} to the end", self._start)
+        self._at += count
+        return self._numbers[self._at - count : self._at]
+
+    def sizes(self, count: int, what: str) -> IntArray:
+        numbers = self.floats(count, what)
+        whole = np.abs(numbers) <= LARGEST_EXACT  # false for NaN
+        whole &= np.floor(numbers) == numbers
+        if not whole.all():
+            wrong = numbers[~whole][0]
+            self.source.fail(f"expected whole {what}, found {wrong:g}", self._start)
+        return numbers.astype(np.int64)
+
+    ints = sizes
+
+    def end(self) -> None:
+        left = len(self._numbers) - self._at
+        if left:
+            self.source.fail(f"expected the end of the section, found {left} more", self._start)
+
+
+class _Binary:
+    """Numbers as the computer that wrote them holds them."""
+
+    def __init__(self, source: Source, name: str, byte_order: str) -> None:
+        self.source = source
+        self._name = name
+        self._byte_order = byte_order
+
+    def ints(self, count: int, what: str) -> IntArray:
+        return as_ints(self.source.binary(count, self._byte_order + "i4", what))
+
+    def sizes(self, count: int, what: str) -> IntArray:
+        return as_ints(self.source.binary(count, self._byte_order + "u8", what))
+
+    def floats(self, count: int, what: str) -> FloatArray:
+        return as_floats(self.source.binary(count, self._byte_order + "f8", what))
+
+    def end(self) -> None:
+        at = self.source.at
+        line = self.source.line_with_text()
+        if line != f"$End{self._name}":
+            self.source.fail(f"expected $End{self._name} after what was counted", at)
+
+
+def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:
+    """Return tags, shape (n_nodes,), and positions, shape (n_nodes, 3)."""
+    n_blocks, n_nodes, _, _ = section.sizes(4, "numbers before the nodes").tolist()
+    tags, positions = [np.zeros(0, dtype=np.int64)], [np.zeros((0, 3))]
+    for _ in range(n_blocks):
+        dimension, _, is_parametric = section.ints(3, "numbers before a block of nodes").tolist()
+        (n_here,) = _counts(section, 1, "nodes in a block")
+        if is_parametric not in (0, 1) or not 0 <= dimension <= 3:
+            section.source.fail(
+                "expected a block of nodes of dimension 0 to 3, parametric 0 or 1; found "
+                f"{dimension} and {is_parametric}"
+            )
+        width = 3 + is_parametric * dimension  # parameters u, v, w may follow x, y, z
+        tags.append(section.sizes(n_here, "tags of nodes"))
+        coordinates = section.floats(n_here * width, "coordinates").reshape(n_here, width)
+        positions.append(coordinates[:, :3])
+    section.end()
+    found = sum(len(block) for block in tags)
+    if found != n_nodes:
+        section.source.fail(f"expected {n_nodes} nodes, found {found}")
+    return np.concatenate(tags), np.concatenate(positions)
+
+
+def _elements(section: _Section) -> Elements:
+    """Read the blocks of elements."""
+    n_blocks, n_elements, _, _ = section.sizes(4, "numbers before the elements").tolist()
+    elements = Elements()
+    found = 0
+    for _ in range(n_blocks):
+        _, _, number = section.ints(3, "numbers before a block of elements").tolist()
+        (n_here,) = _counts(section, 1, "elements in a block")
+        kind = kind_of(section.source, number)
+        width = 1 + kind.n_nodes
+        records = section.sizes(n_here * width, f"numbers of {kind.name}").reshape(n_here, width)
+        elements.add(number, records[:, 1:])
+        found += n_here
+    section.end()
+    if found != n_elements:
+        section.source.fail(f"expected {n_elements} elements, found {found}")
+    return elements
+
+
+def _counts(section: _Section, count: int, what: str) -> list[int]:
+    """Take numbers of things, which cannot be negative."""
+    counts = section.sizes(count, what).tolist()
+    if min(counts) < 0:
+        section.source.fail(f"expected the number of {what}, found {min(counts)}")
+    return counts

@@ -1,0 +1,83 @@
+"""The state of a body as a VTK unstructured grid (`.vtu`), for ParaView, meshio and `read_mesh`."""
+
+import base64
+import os
+import struct
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.mesh.pieces import piece_of_tetrahedra
+from tissue.types import Snapshot
+
+VTK_TETRA = 10
+"""VTK's number for a tetrahedron with four nodes."""
+
+_TYPE_NAMES = {"f8": "Float64", "i8": "Int64", "u1": "UInt8"}
+
+
+def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
+    """Write `snapshot` to `path`.
+
+    The points are the current positions [m]; the point data are `rest_position` [m],
+    `velocity` [m/s], `mass` [kg] and `fixed` (0 or 1); the cell data are `piece`, the connected
+    piece that a tetrahedron is in, 0 for the largest. Numbers keep all their bits. The file
+    appears under its name only when it is complete, so an interrupted write leaves the old one.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        with unfinished.open("wb") as file:
+            for line in _lines(snapshot):
+                file.write(line.encode("ascii") + b"\n")
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _lines(snapshot: Snapshot) -> Iterator[str]:
+    """Yield the lines of the file."""
+    n_tets = len(snapshot.tetrahedra)
+    byte_order = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
+    yield '<?xml version="1.0"?>'
+    yield (
+        f'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="{byte_order}" '
+        'header_type="UInt64">'
+    )
+    yield "<UnstructuredGrid>"
+    yield f'<Piece NumberOfPoints="{len(snapshot.positions)}" NumberOfCells="{n_tets}">'
+    yield "<Points>"
+    yield from _data_array("Points", snapshot.positions, "f8")
+    yield "</Points>"
+    yield "<Cells>"
+    yield from _data_array("connectivity", snapshot.tetrahedra.ravel(), "i8")
+    yield from _data_array("offsets", 4 * np.arange(1, n_tets + 1), "i8")
+    yield from _data_array("types", np.full(n_tets, VTK_TETRA), "u1")
+    yield "</Cells>"
+    yield "<PointData>"
+    yield from _data_array("rest_position", snapshot.rest_positions, "f8")
+    yield from _data_array("velocity", snapshot.velocities, "f8")
+    yield from _data_array("mass", snapshot.masses, "f8")
+    yield from _data_array("fixed", snapshot.fixed, "u1")
+    yield "</PointData>"
+    yield "<CellData>"
+    yield from _data_array("piece", piece_of_tetrahedra(snapshot), "i8")
+    yield "</CellData>"
+    yield "</Piece>"
+    yield "</UnstructuredGrid>"
+    yield "</VTKFile>"
+
+
+def _data_array(name: str, values: npt.NDArray[np.generic], dtype: str) -> Iterator[str]:
+    """Yield one array: its size in bytes, then its bytes, in base 64."""
+    data = np.ascontiguousarray(values, dtype=dtype)
+    components = f' NumberOfComponents="{data.shape[1]}"' if data.ndim == 2 else ""
+    yield f'<DataArray type="{_TYPE_NAMES[dtype]}" Name="{name}"{components} format="binary">'
+    yield base64.b64encode(struct.pack("=Q", data.nbytes) + data.tobytes()).decode("ascii")
+    yield "</DataArray>"

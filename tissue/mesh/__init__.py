@@ -1,0 +1,1 @@
+"""The topology container: the body's arrays, and what is looked up in them."""

@@ -1,0 +1,210 @@
+"""The arrays of a tetrahedral body, how they grow, and how to walk from tetrahedron to tetrahedron.
+
+Face `f` of a tetrahedron lies opposite its local node `f`. `links[t, f]` names what is behind it:
+4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went;
+or less where faces of two sizes meet (see hanging).
+Nodes and tetrahedra keep their numbers while they live; both are only ever appended.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.simd import room_for_points
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3
+from tissue.geometry.exact_predicates import Lattice, lattice_around
+from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
+from tissue.mesh.nonconforming import (
+    Hanging,
+    behind,
+    grown_hanging,
+    is_open,
+    n_behind,
+    nothing_hanging,
+)
+from tissue.types import TetrahedralMesh
+
+OUTER = -1
+"""Link of a face on the skin."""
+CUT = -2
+"""Link of a face that a blade made."""
+
+INSIDE_TOLERANCE = 1e-9
+"""A barycentric weight this far below 0 still counts as inside: rounding, not distance."""
+
+LONGEST_WALK = 128
+"""Tetrahedra that `walk` passes through at most. A step of the edge passes through two or three."""
+
+NODES, TETRAHEDRA = 0, 1
+"""Places in `Body.counts`."""
+
+
+class Body(Arrays):
+    """Every node and tetrahedron. Rows beyond `counts` are room to grow."""
+
+    rest: FloatArray
+    """Rest positions [m], shape (capacity, 3)."""
+    lattice_rest: IntArray
+    """Rest positions on the lattice, shape (capacity, 3)."""
+    positions: FloatArray
+    """[m], shape (capacity, 3)."""
+    velocities: FloatArray
+    """[m/s], shape (capacity, 3)."""
+    masses: FloatArray
+    """Lumped [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
+    fixed: BoolArray
+    """Nodes that do not move, shape (capacity,)."""
+    off_path: FloatArray
+    """How far a cut's node lies from where the blade passed [m], 0 for others; shape (capacity,).
+    Of several cuts through it, the largest."""
+    node_tetrahedron: IntArray
+    """One tetrahedron around each node; the others follow through links. Shape (capacity,)."""
+    twin: IntArray
+    """Ring of the nodes that were one before a cut doubled it: the next one. Shape (capacity,)."""
+    tetrahedra: IntArray
+    """Node indices, shape (capacity, 4)."""
+    links: IntArray
+    """What is behind each face, shape (capacity, 4)."""
+    counts: IntArray
+    """Number of nodes and of tetrahedra, shape (2,)."""
+    lattice: Lattice
+    hanging: Hanging
+
+
+def build_links(tetrahedra: IntArray) -> IntArray:
+    """Return what is behind each face of each tetrahedron, shape (n_tets, 4).
+
+    Raises:
+        ValueError: a face belongs to more than two tetrahedra.
+    """
+    n = len(tetrahedra)
+    faces = np.empty((4 * n, 3), dtype=np.int64)
+    for f in range(4):
+        faces[f::4] = tetrahedra[:, [k for k in range(4) if k != f]]
+    faces.sort(axis=1)
+    order = np.lexsort(faces.T)
+    same = (faces[order[1:]] == faces[order[:-1]]).all(axis=1)
+    if (same[1:] & same[:-1]).any():
+        at = int(order[np.flatnonzero(same[1:] & same[:-1])[0]]) // 4
+        raise ValueError(f"a face of tetrahedron {at} belongs to three or more tetrahedra")
+    links = np.full(4 * n, OUTER, dtype=np.int64)
+    first, second = order[:-1][same], order[1:][same]
+    links[first], links[second] = second, first
+    return links.reshape(n, 4)
+
+
+def build_body(
+    mesh: TetrahedralMesh, positions: FloatArray | None, fixed: BoolArray | None
+) -> Body:
+    """Return the body of a mesh at rest, its nodes at `positions` [m] (default: at rest)."""
+    rest = np.ascontiguousarray(mesh.positions, dtype=np.float64)
+    tetrahedra = np.ascontiguousarray(mesh.tetrahedra, dtype=np.int64)
+    n = len(rest)
+    lattice = lattice_around(rest)
+    node_tetrahedron = np.zeros(n, dtype=np.int64)
+    node_tetrahedron[tetrahedra[::-1]] = np.arange(len(tetrahedra))[::-1, None]
+    return Body(
+        rest=grown(rest, n),
+        lattice_rest=np.floor((rest - lattice.origin) / lattice.spacing + 0.5).astype(np.int64),
+        positions=grown(rest if positions is None else positions, n),
+        velocities=room_for_points(n),
+        masses=np.zeros(n),
+        fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
+        off_path=np.zeros(n),
+        node_tetrahedron=node_tetrahedron,
+        twin=np.arange(n),
+        tetrahedra=tetrahedra.copy(),
+        links=build_links(tetrahedra),
+        counts=np.array([n, len(tetrahedra)], dtype=np.int64),
+        lattice=lattice,
+        hanging=nothing_hanging(),
+    )
+
+
+def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
+    """Return a copy of `array` with `capacity` rows, the new ones filled with `fill`."""
+    if array.shape[1:] == (3,) and array.dtype == np.float64:
+        larger = room_for_points(capacity)
+        larger[len(array) :] = fill
+    else:
+        larger = np.full((capacity, *array.shape[1:]), fill, dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
+
+
+def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
+    """Return the body with room for that many nodes and tetrahedra."""
+    of_tetrahedra = ("tetrahedra", "links")
+    of_nodes = set(Body.__annotations__) - {*of_tetrahedra, "counts", "lattice", "hanging"}
+    larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
+    larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in of_tetrahedra}
+    hanging = grown_hanging(body.hanging, n_nodes, n_tetrahedra)
+    return body.replaced(**larger, hanging=hanging)
+
+
+@kernel
+def local_index(body: Body, t: int, node: int) -> int:
+    """Return which of the four nodes of tetrahedron `t` is `node`, or -1."""
+    for k in range(4):
+        if body.tetrahedra[t, k] == node:
+            return k
+    return -1
+
+
+class Walk(NamedTuple):
+    """Where a walk through the body at rest ended."""
+
+    tetrahedron: int
+    inside: bool
+    """Whether the point is in that tetrahedron."""
+    link: int
+    """Where it is not: OUTER or CUT, what stopped the walk; 0 if it was too long."""
+
+
+@kernel
+def walk(body: Body, p: Vec3, start: int) -> Walk:
+    """Walk from tetrahedron `start` towards the rest point `p` [m], through faces.
+
+    The paper's search for the new active point tetrahedron "in the direct neighbourhood of the
+    old one" (section 3), continued as far as it takes.
+    """
+    t = start
+    for _ in range(LONGEST_WALK):
+        w = barycentric_in(p, body.rest, body.tetrahedra, t)
+        if smallest_weight(w) >= -INSIDE_TOLERANCE:
+            return Walk(t, True, 0)
+        stopped_by = OUTER
+        way = -1
+        lowest = -INSIDE_TOLERANCE
+        for f in range(4):
+            weight = w[f]
+            if weight < -INSIDE_TOLERANCE:
+                if not is_open(body.links[t, f]):
+                    if weight < lowest:
+                        lowest = weight
+                        way = f
+                elif body.links[t, f] == CUT:
+                    stopped_by = CUT
+        if way < 0:
+            return Walk(t, False, stopped_by)
+        t = _beyond(body, p, t, body.links[t, way])
+    return Walk(t, False, 0)
+
+
+@kernel
+def _beyond(body: Body, p: Vec3, t: int, link: int) -> int:
+    """The tetrahedron behind a face of `t`; of six, the one that `p` [m] is least outside of."""
+    if link >= 0:
+        return link // 4
+    nearest = -1
+    largest = -np.inf
+    for i in range(n_behind(body.hanging, t, link)):
+        other = behind(body.hanging, t, link, i)
+        weight = smallest_weight(barycentric_in(p, body.rest, body.tetrahedra, other))
+        if weight > largest:
+            largest = weight
+            nearest = other
+    return nearest

@@ -1,0 +1,64 @@
+"""What cuts left behind: how far off the blade's path they lie, and the thinnest tetrahedron."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray
+from tissue.core.jit import kernel
+from tissue.core.vec3 import vec3
+from tissue.geometry.tetrahedron import smallest_altitude
+from tissue.mesh.body import CUT, NODES, TETRAHEDRA, Body
+
+
+class PathError(NamedTuple):
+    """How far nodes on cut faces lie from where the blade passed."""
+
+    n_nodes: int
+    mean: float
+    """[m]."""
+    largest: float
+    """[m]."""
+
+
+def path_error(body: Body) -> PathError:
+    """Return the path error of every cut in the body, in O(its tetrahedra)."""
+    return PathError(*_path_error(body, np.zeros(int(body.counts[NODES]), dtype=np.bool_)))
+
+
+@kernel
+def _path_error(body: Body, seen: BoolArray) -> tuple[int, float, float]:
+    """Number of nodes on cut faces, mean and largest of `Body.off_path` [m]."""
+    n = 0
+    total = 0.0
+    largest = 0.0
+    for t in range(body.counts[TETRAHEDRA]):
+        for f in range(4):
+            if body.links[t, f] != CUT:
+                continue
+            for k in range(4):
+                node = body.tetrahedra[t, k]
+                if k == f or seen[node]:
+                    continue
+                seen[node] = True
+                n += 1
+                total += body.off_path[node]
+                largest = max(largest, body.off_path[node])
+    return n, total / max(n, 1), largest
+
+
+@kernel
+def lowest_altitude(body: Body) -> float:
+    """Smallest altitude of all tetrahedra at rest [m]."""
+    lowest = np.inf
+    for t in range(body.counts[TETRAHEDRA]):
+        lowest = min(
+            lowest,
+            smallest_altitude(
+                vec3(body.rest, body.tetrahedra[t, 0]),
+                vec3(body.rest, body.tetrahedra[t, 1]),
+                vec3(body.rest, body.tetrahedra[t, 2]),
+                vec3(body.rest, body.tetrahedra[t, 3]),
+            ),
+        )
+    return lowest

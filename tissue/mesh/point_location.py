@@ -1,0 +1,238 @@
+"""A grid of cells that lists the tetrahedra near each: where a point is, without asking them all.
+
+Each tetrahedron is listed in the cells that its box meets, widened by a margin. Where a node has
+gone further than the margin, the tetrahedra around it are listed again where they are now: what is
+listed in vain costs a look, never a wrong answer. So the cost of a step is that of the nodes that
+went far, and of one pass over those that moved to find them.
+"""
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3
+from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
+from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.star import Visits, star
+
+TETRAHEDRA_PER_CELL = 4.0
+"""Cells are so large that the body fills this many tetrahedra a cell on average. Fewer make long
+lists of cells, more make long lists in each."""
+
+MOST_CELLS = 1 << 20
+"""Cells at most, for a body that fills little of its box."""
+
+ENTRIES_PER_TETRAHEDRON = 16
+"""Room for entries. A tetrahedron meets some eight cells; when the room is used up the grid is
+built anew."""
+
+LEAST_ENTRIES = 1 << 14
+"""Room for entries at least."""
+
+LISTED, ENTRIES = 0, 1
+"""Places in `TetrahedronGrid.counts`."""
+
+
+class TetrahedronGrid(Arrays):
+    """Linked lists of tetrahedra, one a cell."""
+
+    origin: FloatArray
+    """Lowest corner [m], shape (3,)."""
+    spacing: float
+    """Edge of a cell [m]."""
+    shape: IntArray
+    """Cells along each axis, shape (3,). Those on the rim reach to infinity."""
+    head: IntArray
+    """First entry of each cell's list, -1 if it is empty; shape (n_cells,)."""
+    following: IntArray
+    """The next entry of the same list, -1 at its end; shape (room,)."""
+    entry: IntArray
+    """Tetrahedron of each entry, shape (room,)."""
+    counts: IntArray
+    """How many tetrahedra are listed, and how many entries there are; shape (2,)."""
+    listed_at: FloatArray
+    """Where the nodes were when they were listed last [m], shape (node capacity, 3)."""
+    margin: float
+    """By how much the boxes are widened [m]."""
+
+
+def no_grid() -> TetrahedronGrid:
+    """Return a grid that lists nothing."""
+    return TetrahedronGrid(
+        origin=np.zeros(3),
+        spacing=1.0,
+        shape=np.ones(3, np.int64),
+        head=np.full(1, -1, np.int64),
+        following=np.zeros(0, np.int64),
+        entry=np.zeros(0, np.int64),
+        counts=np.zeros(2, np.int64),
+        listed_at=np.zeros((0, 3)),
+        margin=0.0,
+    )
+
+
+def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronGrid:
+    """Return the grid of all tetrahedra at `positions` [m], widened by `margin` [m]."""
+    n_nodes, n_tetrahedra = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    low = positions[:n_nodes].min(axis=0) - margin
+    size = positions[:n_nodes].max(axis=0) + margin - low
+    n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), MOST_CELLS)
+    spacing = float(max(np.cbrt(size.prod() / n_cells), size.max() / n_cells))
+    shape = np.floor(size / spacing).astype(np.int64) + 1
+    room = max(ENTRIES_PER_TETRAHEDRON * n_tetrahedra, LEAST_ENTRIES)
+    while True:
+        grid = TetrahedronGrid(
+            origin=low,
+            spacing=spacing,
+            shape=shape,
+            head=np.full(int(shape.prod()), -1, np.int64),
+            following=np.empty(room, np.int64),
+            entry=np.empty(room, np.int64),
+            counts=np.zeros(2, np.int64),
+            listed_at=positions.copy(),
+            margin=margin,
+        )
+        if list_appended(body, positions, grid):
+            return grid
+        room *= 2
+
+
+@kernel
+def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> bool:
+    """List the tetrahedra that were appended since the last call; return whether there was room."""
+    while grid.counts[LISTED] < body.counts[TETRAHEDRA]:
+        t = grid.counts[LISTED]
+        for k in range(4):
+            node = body.tetrahedra[t, k]
+            for c in range(3):
+                grid.listed_at[node, c] = positions[node, c]
+        if not _list_tetrahedron(body, positions, grid, t):
+            return False
+        grid.counts[LISTED] += 1
+    return True
+
+
+@kernel
+def list_moved(
+    body: Body,
+    visits: Visits,
+    grid: TetrahedronGrid,
+    nodes: IntArray,
+    n_nodes: int,
+    around: IntArray,
+) -> bool:
+    """List the tetrahedra around nodes that went far again; return whether there was room.
+
+    The first `n_nodes` of `nodes` are all that moved since the last call. `around` is scratch of
+    shape (LARGEST_STAR,).
+    """
+    x = body.positions
+    limit = grid.margin * grid.margin
+    for i in range(n_nodes):
+        node = nodes[i]
+        dx = x[node, 0] - grid.listed_at[node, 0]
+        dy = x[node, 1] - grid.listed_at[node, 1]
+        dz = x[node, 2] - grid.listed_at[node, 2]
+        if dx * dx + dy * dy + dz * dz <= limit:
+            continue
+        for c in range(3):
+            grid.listed_at[node, c] = x[node, c]
+        n = star(body, visits, node, body.node_tetrahedron[node], around)
+        for k in range(n):
+            if not _list_tetrahedron(body, x, grid, around[k]):
+                return False
+    return True
+
+
+@kernel
+def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int) -> bool:
+    x0, x1 = _cell_range(body, positions, grid, t, 0)
+    y0, y1 = _cell_range(body, positions, grid, t, 1)
+    z0, z1 = _cell_range(body, positions, grid, t, 2)
+    if grid.counts[ENTRIES] + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
+        return False
+    for i in range(x0, x1 + 1):
+        for j in range(y0, y1 + 1):
+            for k in range(z0, z1 + 1):
+                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
+                at = grid.counts[ENTRIES]
+                grid.counts[ENTRIES] += 1
+                grid.entry[at] = t
+                grid.following[at] = grid.head[cell]
+                grid.head[cell] = at
+    return True
+
+
+@kernel
+def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, float]:
+    """Least and greatest coordinate along axis `c` of tetrahedron `t` [m]."""
+    p = positions[body.tetrahedra[t, 0], c]
+    q = positions[body.tetrahedra[t, 1], c]
+    r = positions[body.tetrahedra[t, 2], c]
+    s = positions[body.tetrahedra[t, 3], c]
+    return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
+
+
+@kernel
+def _cell_range(
+    body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int, c: int
+) -> tuple[int, int]:
+    """First and last cell along axis `c` that the widened box of tetrahedron `t` meets."""
+    low, high = _extent(body, positions, t, c)
+    return cell_along(grid, low - grid.margin, c), cell_along(grid, high + grid.margin, c)
+
+
+@kernel
+def cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
+    """The cell along axis `c` that holds a coordinate [m]."""
+    cell = (coordinate - grid.origin[c]) / grid.spacing
+    return int(min(max(cell, 0.0), grid.shape[c] - 1.0))
+
+
+@kernel
+def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: Vec3) -> int:
+    """The tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
+
+    It is the one of the lowest number, so that a point on a face is always found in the same one.
+    """
+    i = cell_along(grid, p.x, 0)
+    j = cell_along(grid, p.y, 1)
+    k = cell_along(grid, p.z, 2)
+    found = -1
+    at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
+    while at >= 0:
+        t = grid.entry[at]
+        is_candidate = (found < 0 or t < found) and _meets_box(body, positions, t, p, p)
+        if (
+            is_candidate
+            and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0
+        ):
+            found = t
+        at = grid.following[at]
+    return found
+
+
+@kernel
+def tetrahedron_in_box(
+    body: Body, grid: TetrahedronGrid, positions: FloatArray, low: Vec3, high: Vec3
+) -> int:
+    """A tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
+    for i in range(cell_along(grid, low.x, 0), cell_along(grid, high.x, 0) + 1):
+        for j in range(cell_along(grid, low.y, 1), cell_along(grid, high.y, 1) + 1):
+            for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):
+                at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
+                while at >= 0:
+                    if _meets_box(body, positions, grid.entry[at], low, high):
+                        return grid.entry[at]
+                    at = grid.following[at]
+    return -1
+
+
+@kernel
+def _meets_box(body: Body, positions: FloatArray, t: int, low: Vec3, high: Vec3) -> bool:
+    for c in range(3):
+        smallest, largest = _extent(body, positions, t, c)
+        if smallest > high[c] or largest < low[c]:
+            return False
+    return True

@@ -1,0 +1,136 @@
+"""The tetrahedra around a node, found through links: each star hangs together through faces."""
+
+import numpy as np
+
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.geometry.tetrahedron import node_altitude
+from tissue.mesh.body import NODES, Body, local_index
+from tissue.mesh.nonconforming import END
+
+LARGEST_STAR = 4096
+"""Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at the worst."""
+
+
+class Visits(Arrays):
+    """Which tetrahedra and nodes a search has seen. A new epoch forgets all, without clearing."""
+
+    epoch: IntArray
+    """Number of the current search, shape (1,)."""
+    tetrahedra: IntArray
+    """Search that saw each tetrahedron last, shape (capacity,)."""
+    nodes: IntArray
+    """Search that saw each node last, shape (capacity,)."""
+    place: IntArray
+    """Where in a list of that search a node is, shape (capacity,)."""
+
+
+def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
+    """Return visits for that many nodes and tetrahedra."""
+    return Visits(
+        epoch=np.zeros(1, np.int64),
+        tetrahedra=np.zeros(n_tetrahedra, np.int64),
+        nodes=np.zeros(n_nodes, np.int64),
+        place=np.zeros(n_nodes, np.int64),
+    )
+
+
+@kernel
+def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> int:
+    """Write the tetrahedra around `node` that hang together with `start` to `out`; return how many.
+
+    They come in breadth-first order, `start` first. Where nodes may hang they are those of the list
+    of `node`.
+    """
+    visits.epoch[0] += 1
+    epoch = visits.epoch[0]
+    if len(body.hanging.first) > 0:
+        return _listed(body, visits, node, out)
+    visits.tetrahedra[start] = epoch
+    out[0] = start
+    n = 1
+    i = 0
+    while i < n:
+        t = out[i]
+        i += 1
+        for f in range(4):
+            if body.tetrahedra[t, f] == node:
+                continue
+            link = body.links[t, f]
+            if link < 0:
+                continue
+            other = link // 4
+            if visits.tetrahedra[other] != epoch and n < LARGEST_STAR:
+                visits.tetrahedra[other] = epoch
+                out[n] = other
+                n += 1
+    return n
+
+
+@kernel
+def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
+    n = 0
+    corner = body.hanging.first[node]
+    while corner != END and n < LARGEST_STAR:
+        out[n] = corner // 4
+        visits.tetrahedra[out[n]] = visits.epoch[0]
+        n += 1
+        corner = body.hanging.next[corner]
+    return n
+
+
+@kernel
+def edge_star(body: Body, visits: Visits, a: int, b: int, out: IntArray) -> int:
+    """Write the tetrahedra around edge ab to `out`; return how many.
+
+    They are the part of the star of `a` that holds `b`: around the rim of a cut an edge can have
+    two fans of tetrahedra, which rotating about the edge would not find.
+    """
+    n = star(body, visits, a, body.node_tetrahedron[a], out)
+    kept = 0
+    for i in range(n):
+        if local_index(body, out[i], b) >= 0:
+            out[kept] = out[i]
+            kept += 1
+    return kept
+
+
+@kernel
+def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
+    """Smallest altitude from `node` over the tetrahedra around it, at rest [m]."""
+    n = star(body, visits, node, body.node_tetrahedron[node], out)
+    size = np.inf
+    for i in range(n):
+        t = out[i]
+        k = local_index(body, t, node)
+        h = node_altitude(body.rest, body.tetrahedra, t, k)
+        size = min(size, h)
+    return size
+
+
+@kernel
+def mean_node_size(body: Body, visits: Visits, out: IntArray) -> float:
+    """Mean over all nodes of `node_size` [m]."""
+    total = 0.0
+    for node in range(body.counts[NODES]):
+        total += node_size(body, visits, node, out)
+    return total / body.counts[NODES]
+
+
+@kernel
+def sorted_star(body: Body, visits: Visits, node: int, out: IntArray) -> int:
+    """Write the tetrahedra around `node` to `out` in order of their numbers; return how many.
+
+    Sums over a star must not depend on where the search began, or action would not quite be
+    reaction.
+    """
+    n = star(body, visits, node, body.node_tetrahedron[node], out)
+    for i in range(1, n):  # insertion sort: stars are short
+        t = out[i]
+        j = i
+        while j > 0 and out[j - 1] > t:
+            out[j] = out[j - 1]
+            j -= 1
+        out[j] = t
+    return n

@@ -1,0 +1,42 @@
+"""The boundary triangles of the body, skin and cut faces apart."""
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray, IntArray
+from tissue.core.jit import kernel
+from tissue.mesh.body import CUT, NODES, TETRAHEDRA, Body
+from tissue.mesh.nonconforming import is_open
+from tissue.types import Surface
+
+OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+"""Nodes of each face of a tetrahedron, counter-clockwise seen from outside."""
+
+
+@kernel
+def boundary_triangles(
+    body: Body, triangles: IntArray, is_cut: BoolArray, outward: IntArray
+) -> int:
+    """Write the triangles without a neighbour; return how many. Room: 4 a tetrahedron."""
+    n = 0
+    for t in range(body.counts[TETRAHEDRA]):
+        for f in range(4):
+            if is_open(body.links[t, f]):
+                for k in range(3):
+                    triangles[n, k] = body.tetrahedra[t, outward[f, k]]
+                is_cut[n] = body.links[t, f] == CUT
+                n += 1
+    return n
+
+
+def boundary_surface(body: Body) -> Surface:
+    """Return the boundary with its own vertices: only nodes that some triangle uses."""
+    room = 4 * int(body.counts[TETRAHEDRA])
+    triangles = np.empty((room, 3), dtype=np.int64)
+    is_cut = np.empty(room, dtype=np.bool_)
+    n = boundary_triangles(body, triangles, is_cut, OUTWARD)
+    triangles = triangles[:n]
+    used = np.zeros(int(body.counts[NODES]), dtype=np.bool_)
+    used[triangles] = True
+    nodes = np.flatnonzero(used)
+    vertex = np.cumsum(used) - 1
+    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut[:n].copy())

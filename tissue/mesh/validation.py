@@ -1,0 +1,378 @@
+"""A mesh that the engine can work with, or an error that names what is wrong with it."""
+
+import logging
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.geometry.connected_components import components
+from tissue.mesh.faces import FACES, SortedFaces, sorted_faces
+from tissue.types import TetrahedralMesh
+
+logger = logging.getLogger("tissue")
+
+MAX_EXTENT = 1e3
+"""A body larger than this [m] is in other units than metres."""
+MIN_EXTENT = 1e-5
+"""A body smaller than this [m], the size of a cell, is in other units than metres."""
+USUAL_EXTENT = 1.0
+"""A body larger than this [m] may well be in millimetres; no organ and no blade is that long."""
+
+FLAT_QUALITY = 1e-4
+"""Below this quality a tetrahedron counts as flat: it has no inside that a computer can tell.
+
+A tetrahedron whose nodes lie in a plane but for single precision has 1e-7; a cell of a grid that
+is 200 times as wide as high still has 4e-3.
+"""
+SLIVER_QUALITY = 1e-2
+"""Below this quality a tetrahedron works, but forces short time steps and poor cuts."""
+
+N_NAMED = 5
+"""How many elements an error names."""
+
+
+class MeshError(ValueError):
+    """A mesh, or the file that should hold one, cannot be used. The message says why."""
+
+
+class CheckedMesh(NamedTuple):
+    """A mesh that is sound, and what had to be done for that."""
+
+    mesh: TetrahedralMesh
+    """Signed volumes are positive, every node is used, tetrahedra around it share faces."""
+    origin: IntArray
+    """Which node of the mesh as given each node was, shape (n_nodes,)."""
+    warnings: tuple[str, ...]
+    """What was repaired, and what is doubtful."""
+
+
+def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
+    """Refuse a broken mesh, repair a harmless fault, and warn of what looks odd.
+
+    Repaired, with a warning: unused nodes (dropped), tetrahedra that all turn right (turned), and
+    nodes or edges where tetrahedra meet that share no face there (the node is split). Doubtful,
+    with a warning: several pieces, slivers, a body over a metre. Warnings go to the logger
+    "tissue" too.
+
+    Some tetrahedra inverted and others not is an error, for it is rarely a slip in the order of
+    nodes but mostly a body folded over itself, which turning the tetrahedron round would hide.
+
+    Args:
+        mesh: The mesh as it comes; other integer and floating point types are converted.
+        name: What to call it in messages, for example the name of its file.
+
+    Raises:
+        MeshError: No tetrahedra; an index out of range; NaN or infinity; a body larger than
+            `MAX_EXTENT` or smaller than `MIN_EXTENT`; a tetrahedron that names a node twice, is
+            there twice, is flat, or is inverted while others are not; a face with three
+            tetrahedra, or with two on the same side.
+    """
+    try:
+        result = _checked(mesh)
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+    for warning in result.warnings:
+        logger.warning("%s: %s", name, warning)
+    return result
+
+
+def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
+    """Refuse a mesh that is broken, or that `checked` would have to repair.
+
+    For those who are given a mesh together with something that is counted by its nodes, and
+    therefore must not change it.
+
+    Raises:
+        MeshError: See `checked`.
+    """
+    try:
+        result = _checked(mesh)
+    except MeshError as error:
+        raise MeshError(f"{name}: {error}") from None
+    n_nodes = len(result.mesh.positions)
+    is_same = n_nodes == len(mesh.positions) and np.array_equal(
+        result.mesh.tetrahedra, mesh.tetrahedra
+    )
+    if not is_same:
+        raise MeshError(
+            f"{name}: it would have to be repaired ({'; '.join(result.warnings)}): pass it through "
+            "tissue.mesh.validation.checked first"
+        )
+
+
+def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
+    """See `checked`: one question after the other, each relying on those before."""
+    warnings: list[str] = []
+    positions, tetrahedra = _as_arrays(mesh)
+    _refuse_wrong_indices(tetrahedra, len(positions))
+    _refuse_not_finite(positions)
+    positions, tetrahedra, origin = _without_unused(positions, tetrahedra, warnings)
+    _refuse_wrong_extent(positions, warnings)
+    _refuse_repeated(tetrahedra)
+    _refuse_flat(positions, tetrahedra, warnings)
+    tetrahedra = _turned_left(positions, tetrahedra, warnings)
+    faces = sorted_faces(tetrahedra)
+    _refuse_wrong_faces(tetrahedra, faces)
+    pairs = faces.halves[faces.starts[faces.counts == 2][:, None] + [0, 1]]
+    tetrahedra, copied = _with_stars_joined(tetrahedra, pairs, len(positions), warnings)
+    _count_pieces(len(tetrahedra), pairs // 4, warnings)
+    sound = TetrahedralMesh(np.concatenate([positions, positions[copied]]), tetrahedra)
+    return CheckedMesh(sound, np.concatenate([origin, origin[copied]]), tuple(warnings))
+
+
+def _as_arrays(mesh: TetrahedralMesh) -> tuple[FloatArray, IntArray]:
+    """Return positions and tetrahedra as arrays of our types and shapes."""
+    positions, tetrahedra = np.asarray(mesh.positions), np.asarray(mesh.tetrahedra)
+    if tetrahedra.size == 0:
+        raise MeshError("there are no tetrahedra")
+    if positions.ndim != 2 or positions.shape[1] != 3 or positions.dtype.kind not in "fiu":
+        raise MeshError(
+            f"positions are {positions.dtype} of shape {positions.shape}; "
+            "they must be numbers of shape (n_nodes, 3)"
+        )
+    if tetrahedra.ndim != 2 or tetrahedra.shape[1] != 4 or tetrahedra.dtype.kind not in "iu":
+        raise MeshError(
+            f"tetrahedra are {tetrahedra.dtype} of shape {tetrahedra.shape}; "
+            "they must be whole numbers of shape (n_tets, 4)"
+        )
+    return positions.astype(np.float64), tetrahedra.astype(np.int64)
+
+
+def _refuse_wrong_indices(tetrahedra: IntArray, n_nodes: int) -> None:
+    """Every tetrahedron names four different nodes that exist."""
+    wrong = (tetrahedra < 0) | (tetrahedra >= n_nodes)
+    if wrong.any():
+        tets = np.flatnonzero(wrong.any(axis=1))
+        raise MeshError(
+            f"{_tetrahedra(tets)} an index out of range, such as {tetrahedra[wrong][0]}; "
+            f"there are the nodes 0 to {n_nodes - 1}"
+            if n_nodes
+            else "there are tetrahedra but no nodes"
+        )
+    in_order = np.sort(tetrahedra, axis=1)
+    twice = np.flatnonzero((in_order[:, 1:] == in_order[:, :-1]).any(axis=1))
+    if twice.size:
+        raise MeshError(f"{_tetrahedra(twice)} a repeated node: {tetrahedra[twice[0]].tolist()}")
+
+
+def _refuse_not_finite(positions: FloatArray) -> None:
+    """Every coordinate is a number."""
+    wrong = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if wrong.size:
+        raise MeshError(
+            f"{_some('node', wrong)} a coordinate that is NaN or infinite: "
+            f"{positions[wrong[0]].tolist()}"
+        )
+
+
+def _without_unused(
+    positions: FloatArray, tetrahedra: IntArray, warnings: list[str]
+) -> tuple[FloatArray, IntArray, IntArray]:
+    """Drop nodes that no tetrahedron names; return what is left, and which nodes it was."""
+    used = np.zeros(len(positions), dtype=bool)
+    used[tetrahedra] = True
+    kept = np.flatnonzero(used)
+    n_unused = len(positions) - len(kept)
+    if n_unused:
+        nodes = (
+            "node that no tetrahedron uses" if n_unused == 1 else "nodes that no tetrahedron uses"
+        )
+        warnings.append(f"dropped {n_unused} {nodes}, the first {_ids(np.flatnonzero(~used))}")
+    return positions[kept], (np.cumsum(used) - 1)[tetrahedra], kept
+
+
+def _refuse_wrong_extent(positions: FloatArray, warnings: list[str]) -> None:
+    """The body is of a size that makes sense in metres."""
+    with np.errstate(over="ignore"):
+        extent = float(np.ptp(positions, axis=0).max())
+    if extent > MAX_EXTENT:
+        raise MeshError(
+            f"extent {extent:.4g} m, over {MAX_EXTENT:g} m: millimetres? use --scale 0.001"
+        )
+    if extent < MIN_EXTENT:
+        raise MeshError(
+            f"extent {extent:.4g} m, under {MIN_EXTENT:g} m: in what units is it? "
+            "--scale is what one of them is in metres"
+        )
+    if extent > USUAL_EXTENT:
+        warnings.append(f"extent {extent:.4g} m: millimetres? use --scale 0.001")
+
+
+def _refuse_repeated(tetrahedra: IntArray) -> None:
+    """No tetrahedron is there twice."""
+    in_order = np.sort(tetrahedra, axis=1)
+    order = np.lexsort(in_order.T)
+    equal = (in_order[order[1:]] == in_order[order[:-1]]).all(axis=1)
+    if equal.any():
+        k = int(np.flatnonzero(equal)[0])
+        twins = sorted((int(order[k]), int(order[k + 1])))
+        raise MeshError(
+            f"duplicate tetrahedra: {twins[0]} and {twins[1]} have the same nodes "
+            f"{in_order[order[k]].tolist()}; {int(equal.sum())} in all"
+        )
+
+
+def signed_volumes(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
+    """Return the volumes [m3], shape (n_tets,); positive where abc turns left seen from d."""
+    a, b, c, d = (positions[tetrahedra[:, k]] for k in range(4))
+    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+
+
+def quality(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
+    """Return 6 sqrt(2) V / l^3, shape (n_tets,), with l the root mean square of the six edges.
+
+    1 for a regular tetrahedron, 0 for a flat one, negative for an inverted one.
+    """
+    squares = np.zeros(len(tetrahedra))
+    for i, j in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
+        squares += ((positions[tetrahedra[:, i]] - positions[tetrahedra[:, j]]) ** 2).sum(axis=1)
+    lengths = np.maximum(np.sqrt(squares / 6.0), np.finfo(np.float64).tiny ** (1 / 3))
+    return 6.0 * np.sqrt(2.0) * signed_volumes(positions, tetrahedra) / lengths**3
+
+
+def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> None:
+    """Every tetrahedron has an inside."""
+    shape = np.abs(quality(positions, tetrahedra))
+    worst = np.argsort(shape, kind="stable")[:N_NAMED]
+    flat = worst[shape[worst] < FLAT_QUALITY]
+    if flat.size:
+        named = ", ".join(f"{t} (quality {shape[t]:.1e})" for t in flat)
+        raise MeshError(
+            f"{int((shape < FLAT_QUALITY).sum())} flat tetrahedra, the worst: {named}; quality is "
+            f"1 for a regular one and must be at least {FLAT_QUALITY:g}. Merge nodes that lie in "
+            "the same place, or mesh the body again with the mesher's optimisation on"
+        )
+    n_slivers = int((shape < SLIVER_QUALITY).sum())
+    if n_slivers:
+        warnings.append(
+            f"{n_slivers} slivers (quality below {SLIVER_QUALITY:g}), the worst tetrahedron "
+            f"{worst[0]} ({shape[worst[0]]:.1e}): time steps will be short and cuts poor. The "
+            "mesher's optimisation removes them"
+        )
+
+
+def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> IntArray:
+    """Return the tetrahedra with positive volumes, if they all turn the same way."""
+    inverted = signed_volumes(positions, tetrahedra) < 0.0
+    if inverted.all():
+        warnings.append(
+            f"all {len(tetrahedra)} tetrahedra turn right (negative volumes); turned them"
+        )
+        return tetrahedra[:, [0, 1, 3, 2]]
+    if inverted.any():
+        # Where most are inverted, the few others are the odd ones for whoever looks for the fault.
+        most = inverted.mean() > 0.5
+        odd = np.flatnonzero(inverted != most)
+        kind = "not inverted while the others are" if most else "inverted"
+        raise MeshError(
+            f"{kind} tetrahedra: {_ids(odd)} ({len(odd)} of {len(tetrahedra)}). The body is folded "
+            "over itself there, or their nodes are in the wrong order"
+        )
+    return tetrahedra
+
+
+def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:
+    """Every face belongs to one tetrahedron, or to two on its two sides."""
+    crowded = np.flatnonzero(faces.counts > 2)
+    if crowded.size:
+        start = faces.starts[crowded[0]]
+        halves = faces.halves[start : start + faces.counts[crowded[0]]]
+        raise MeshError(
+            f"the face {_face(tetrahedra, halves[0])} is shared by {len(halves)} tetrahedra, "
+            f"{_ids(np.sort(halves // 4))}; a face has at most two. "
+            f"{_count(crowded.size, 'such face')}"
+        )
+    first, second = faces.halves[faces.starts[faces.counts == 2][:, None] + [0, 1]].T
+    overlapping = np.flatnonzero(_is_even(tetrahedra, first) == _is_even(tetrahedra, second))
+    if overlapping.size:
+        a, b = first[overlapping[0]], second[overlapping[0]]
+        raise MeshError(
+            f"tetrahedra {a // 4} and {b // 4} overlap: both lie on the same side of their common "
+            f"face {_face(tetrahedra, a)}. {_count(overlapping.size, 'such pair')}"
+        )
+
+
+def _face(tetrahedra: IntArray, half: int) -> list[int]:
+    """Return the nodes of a face in order."""
+    return sorted(tetrahedra[half // 4, FACES[half % 4]].tolist())
+
+
+def _is_even(tetrahedra: IntArray, halves: IntArray) -> BoolArray:
+    """Whether sorting the face's nodes takes an even number of swaps, for each face."""
+    a, b, c = np.take_along_axis(tetrahedra[halves // 4], FACES[halves % 4], axis=1).T
+    return (a < b) ^ (b < c) ^ (a < c)
+
+
+def _with_stars_joined(
+    tetrahedra: IntArray, pairs: IntArray, n_nodes: int, warnings: list[str]
+) -> tuple[IntArray, IntArray]:
+    """Split each node whose tetrahedra do not hang together through faces that hold it.
+
+    Args:
+        tetrahedra: Node indices, shape (n_tets, 4).
+        pairs: Faces that lie on each other, as 4 * tetrahedron + local face, shape (n_pairs, 2).
+        n_nodes: Number of nodes.
+        warnings: Where to say what was done.
+
+    Returns:
+        The tetrahedra, with new nodes from `n_nodes` on, and of which node each new one is a copy.
+    """
+    # A corner is a tetrahedron's share of a node, numbered 4 * tetrahedron + local node. Corners
+    # of one node are joined where their tetrahedra share a face that holds the node.
+    tets, local = np.divmod(pairs, 4)
+    corners = 4 * tets[:, :, None] + FACES[local]
+    nodes = tetrahedra.ravel()[corners]
+    corners = np.take_along_axis(corners, np.argsort(nodes, axis=2), axis=2)
+    n_stars, star = components(tetrahedra.size, corners.transpose(0, 2, 1).reshape(-1, 2))
+    if n_stars == n_nodes:
+        return tetrahedra, np.zeros(0, dtype=np.int64)
+
+    node_of_star = np.empty(n_stars, dtype=np.int64)
+    node_of_star[star] = tetrahedra.ravel()
+    _, first = np.unique(node_of_star, return_index=True)  # the first star keeps the node
+    new_node = np.full(n_stars, -1)
+    new_node[first] = node_of_star[first]
+    copies = np.flatnonzero(new_node < 0)
+    new_node[copies] = n_nodes + np.arange(len(copies))
+    copied = node_of_star[copies]
+    split = np.unique(copied)
+    warnings.append(
+        f"split {_count(split.size, 'node')} ({_ids(split)}) where tetrahedra meet in an edge or a "
+        "node but share no face"
+    )
+    return new_node[star].reshape(tetrahedra.shape), copied
+
+
+def _count_pieces(n_tets: int, neighbours: IntArray, warnings: list[str]) -> None:
+    """Warn of a body in pieces."""
+    n_pieces, piece = components(n_tets, neighbours)
+    if n_pieces > 1:
+        sizes = np.sort(np.bincount(piece))[::-1]
+        warnings.append(
+            f"the body is in {n_pieces} pieces that share no face, of {_ids(sizes)} tetrahedra"
+        )
+
+
+def _tetrahedra(tets: IntArray) -> str:
+    """Name tetrahedra as the subject of "have"."""
+    return _some("tetrahedron", tets)
+
+
+def _some(noun: str, ids: IntArray) -> str:
+    """Name elements as the subject of a sentence, with its verb."""
+    if len(ids) == 1:
+        return f"{noun} {ids[0]} has"
+    plural = "tetrahedra" if noun == "tetrahedron" else f"{noun}s"
+    return f"{len(ids)} {plural} ({_ids(ids)}) have"
+
+
+def _count(n: int, noun: str) -> str:
+    """Write a number of things."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def _ids(ids: IntArray | Sequence[int]) -> str:
+    """List the first few numbers."""
+    return ", ".join(str(i) for i in ids[:N_NAMED]) + (", ..." if len(ids) > N_NAMED else "")

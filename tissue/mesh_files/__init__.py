@@ -1,1 +1,0 @@
-"""Files that hold tetrahedra, one format a module."""

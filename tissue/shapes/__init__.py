@@ -1,0 +1,1 @@
+"""Bodies made from numbers: blocks, and a lobe of a liver."""

@@ -1,0 +1,85 @@
+"""Rectangular blocks of cells, each cell divided into six tetrahedra."""
+
+import itertools
+import math
+import operator
+from collections.abc import Sequence
+
+import numpy as np
+
+from tissue.core.array_types import IntArray
+from tissue.types import TetrahedralMesh
+
+MAX_TETRAHEDRA = 50_000_000
+"""A larger grid would take tens of gigabytes; it is a slip of the keyboard, not a wish."""
+
+
+def block(
+    cells: Sequence[int] = (4, 6, 4), size: Sequence[float] = (0.04, 0.06, 0.04)
+) -> TetrahedralMesh:
+    """Return a block of `cells` in x, y and z, its lowest corner at the origin.
+
+    Every cell is cut into six tetrahedra around the diagonal from its lowest to its highest corner
+    (Kuhn's, or Freudenthal's, subdivision), so that neighbours agree on the diagonal of their
+    common face. The defaults are the block of the paper's Figure 10.
+
+    Args:
+        cells: Number of cells along x, y and z.
+        size: Edges of the block along x, y and z [m].
+
+    Raises:
+        ValueError: `cells` are not three whole numbers of at least 1, `size` not three finite
+            positive numbers, or there would be more than `MAX_TETRAHEDRA`.
+    """
+    n_x, n_y, n_z = _checked_cells(cells)
+    axes = (
+        np.linspace(0.0, length, n + 1)
+        for length, n in zip(_checked_size(size), (n_x, n_y, n_z), strict=True)
+    )
+    positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    strides = np.array([(n_y + 1) * (n_z + 1), n_z + 1, 1])
+    lowest_corners = np.indices((n_x, n_y, n_z)).reshape(3, -1).T @ strides
+    tetrahedra = lowest_corners[:, None, None] + _kuhn_corners() @ strides
+    return TetrahedralMesh(positions, tetrahedra.reshape(-1, 4))
+
+
+def _kuhn_corners() -> IntArray:
+    """Return the corners of a cell's six tetrahedra as offsets of 0 or 1, shape (6, 4, 3).
+
+    Each tetrahedron walks from the lowest corner to the highest, one axis at a time.
+    """
+    steps = np.eye(3, dtype=np.int64)
+    corners = np.zeros((6, 4, 3), dtype=np.int64)
+    for tetrahedron, order in zip(corners, itertools.permutations(range(3)), strict=True):
+        tetrahedron[1:] = np.cumsum(steps[list(order)], axis=0)
+        if np.linalg.det(tetrahedron[1:]) < 0.0:  # an odd order of axes turns right
+            tetrahedron[[2, 3]] = tetrahedron[[3, 2]]
+    return corners
+
+
+def _checked_cells(cells: Sequence[int]) -> tuple[int, int, int]:
+    """Return the numbers of cells, or say what is wrong with them."""
+    try:
+        n_x, n_y, n_z = (operator.index(n) for n in cells)
+    except (TypeError, ValueError):
+        raise ValueError(f"cells are {cells!r}; they must be three whole numbers") from None
+    if min(n_x, n_y, n_z) < 1:
+        raise ValueError(f"cells are {(n_x, n_y, n_z)}; each must be at least 1")
+    if 6 * n_x * n_y * n_z > MAX_TETRAHEDRA:
+        raise ValueError(
+            f"{n_x} x {n_y} x {n_z} cells are {6 * n_x * n_y * n_z} tetrahedra; "
+            f"at most {MAX_TETRAHEDRA} are possible"
+        )
+    return n_x, n_y, n_z
+
+
+def _checked_size(size: Sequence[float]) -> tuple[float, float, float]:
+    """Return the edges of the block [m], or say what is wrong with them."""
+    try:
+        x, y, z = (float(length) for length in size)
+    except (TypeError, ValueError):
+        raise ValueError(f"size is {size!r}; it must be three lengths in m") from None
+    if not all(math.isfinite(length) and length > 0.0 for length in (x, y, z)):
+        raise ValueError(f"size is {(x, y, z)} m; each length must be finite and positive")
+    return x, y, z
