@@ -6,14 +6,14 @@ import numpy as np
 
 from tissue import BladeSegment, FloatArray
 
-SHORTEST_EDGE = 1e-6
+_SHORTEST_EDGE = 1e-6
 """[m]. A shorter cutting edge has no direction that a swept box could be aligned with."""
 
 LARGEST_COSINE = 0.99
 """Of the angle between `forward` and the edge. `forward` should be across the edge (0); nearer than
 eight degrees to it, the plane of the blade is a matter of rounding."""
 
-UNIT_TOLERANCE = 1e-6
+_UNIT_TOLERANCE = 1e-6
 """How far the length of `forward` may be from 1: what single precision leaves."""
 
 
@@ -30,9 +30,9 @@ def check_pose(segment: BladeSegment) -> None:
     length, forward_length = math.hypot(ex, ey, ez), math.hypot(fx, fy, fz)
     if not math.isfinite(length + forward_length):
         raise ValueError(f"the blade's pose is not finite: {segment}")
-    if length < SHORTEST_EDGE:
-        raise ValueError(f"the cutting edge is {length} m long; at least {SHORTEST_EDGE} m")
-    if abs(forward_length - 1.0) > UNIT_TOLERANCE:
+    if length < _SHORTEST_EDGE:
+        raise ValueError(f"the cutting edge is {length} m long; at least {_SHORTEST_EDGE} m")
+    if abs(forward_length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
     cosine = abs(ex * fx + ey * fy + ez * fz) / length
     if cosine > LARGEST_COSINE:

@@ -15,7 +15,7 @@ from scalpel_sim.viewer.pictures import add_to, into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue.mesh.pieces import pieces_of
 
-log = logging.getLogger(__name__)
+_log = logging.getLogger(__name__)
 
 REST_AFTER_STROKE = 0.3
 """How long a run goes on after the stroke's end [s]: the tissue swings out, and the cut gapes."""
@@ -123,7 +123,7 @@ def _warn_if_slow(simulation: Simulation) -> None:
     """Say so where a frame takes so many Runge-Kutta steps that one would think it hangs."""
     n_substeps = simulation.result.n_substeps
     if n_substeps > MANY_SUBSTEPS:
-        log.warning(
+        _log.warning(
             "a frame takes %s Runge-Kutta steps, because the tissue's elements are small, stiff or "
             "light: the run will take long. Check --scale, or lower --young, or raise --density",
             f"{n_substeps:,}",
@@ -143,7 +143,7 @@ class _Attempts:
         if not isinstance(error, (RunError, LinkError)):
             return False
         self.errors.append(error)
-        log.warning("%s", error)
+        _log.warning("%s", error)
         return True
 
 

@@ -9,7 +9,7 @@ from scalpel_sim.scenes import Scene, check_motion
 from tissue import FloatArray, Tissue, fixed_nodes
 from tissue.blade.toughness import resistance_of
 
-log = logging.getLogger("scalpel_sim")
+_log = logging.getLogger("scalpel_sim")
 
 LONG_DRAG = 0.1
 """How far a blade may drag the tissue without a word, as a fraction of the body's middle extent."""
@@ -60,7 +60,7 @@ def check(scene: Scene) -> None:
     drag = toughest(scene) / scene.material.young_modulus
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
     if drag > LONG_DRAG * extent:
-        log.warning(
+        _log.warning(
             "the blade will drag the tissue along by some %.2g mm (toughness / Young's modulus) "
             "before it parts, and the body measures %.3g mm: the cut may stay unfinished. A larger "
             "--young or a smaller --toughness cuts cleanly",

@@ -31,7 +31,7 @@ SCHEMES = ("stellar", "paper")
 
 COUPLINGS = ("rigid", "virtual")
 
-ARMS = ("auto", "touch", "premium")
+_ARMS = ("auto", "touch", "premium")
 
 PHANTOM = Material(
     young_modulus=10e3,
@@ -281,8 +281,8 @@ def check_motion(scene: Scene) -> None:
         UsageError: neither a known name nor a CSV file; an arm that is not known.
     """
     read_stroke(scene)
-    if scene.arm not in ARMS:
-        raise unknown("arm", scene.arm, ARMS)
+    if scene.arm not in _ARMS:
+        raise unknown("arm", scene.arm, _ARMS)
 
 
 def read_stroke(scene: Scene) -> Stroke | None:

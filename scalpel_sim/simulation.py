@@ -17,7 +17,7 @@ from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
 
-AT_REST = StageTimes(0.0, 0.0, 0.0)
+_AT_REST = StageTimes(0.0, 0.0, 0.0)
 """Of a frame in which the tissue was not asked."""
 
 EveryFrame = Callable[["Simulation"], bool | None]
@@ -117,7 +117,7 @@ class Simulation:
             picture(self)
         drawn = time.perf_counter()
 
-        profile = self.result.profile if self.bridge.answered else AT_REST
+        profile = self.result.profile if self.bridge.answered else _AT_REST
         self.recording.append(
             row_of(
                 self.time,

@@ -10,10 +10,10 @@ import numpy as np
 from tissue import BladeSegment, BladeShape, BladeSweep, TetrahedralMesh, Tissue, block, fixed_nodes
 from tissue.core.jit import cache_directory
 
-SIDE = 0.02
+_SIDE = 0.02
 """Of the block that is cut [m]."""
 N_STEPS = 20
-DT = 1e-3
+_DT = 1e-3
 
 
 def kernels_are_compiled() -> bool:
@@ -27,7 +27,7 @@ def warm_up() -> None:
     A small block is settled, cut half through and looked at: the run that follows does nothing
     that this did not do.
     """
-    mesh = block((2, 2, 2), (SIDE, SIDE, SIDE))
+    mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
     if not kernels_are_compiled():
         with _motion_compiled_beside():
             places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
@@ -37,9 +37,9 @@ def warm_up() -> None:
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 0.6, N_STEPS):
         after = _edge(fraction)
-        tissue.step(BladeSweep(before, after), DT)
+        tissue.step(BladeSweep(before, after), _DT)
         before = after
-    tissue.step(None, DT)
+    tissue.step(None, _DT)
     tissue.surface()
     tissue.snapshot()
     tissue.n_pieces()
@@ -49,10 +49,10 @@ def warm_up() -> None:
 
 def move_two_pieces() -> None:
     """Let two pieces fall for a step, which may touch: forces, steps and contact."""
-    mesh = block((2, 2, 2), (SIDE, SIDE, SIDE))
-    apart = np.vstack([mesh.positions, mesh.positions + 2.0 * SIDE])
+    mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
+    apart = np.vstack([mesh.positions, mesh.positions + 2.0 * _SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
-    Tissue(TetrahedralMesh(apart, both)).step(None, DT)
+    Tissue(TetrahedralMesh(apart, both)).step(None, _DT)
 
 
 @contextmanager
@@ -76,10 +76,10 @@ def _motion_compiled_beside() -> Iterator[None]:
 
 def _edge(fraction: float) -> BladeSegment:
     """Return an upright edge in the block's middle, `fraction` of the way from front to back."""
-    x, y = SIDE / 2.0, fraction * SIDE
+    x, y = _SIDE / 2.0, fraction * _SIDE
     return BladeSegment(
-        tip=np.array([x, y, -SIDE]),
-        heel=np.array([x, y, 2.0 * SIDE]),
+        tip=np.array([x, y, -_SIDE]),
+        heel=np.array([x, y, 2.0 * _SIDE]),
         forward=np.array([0.0, 1.0, 0.0]),
     )
 

@@ -13,7 +13,7 @@ from tissue.shapes.block import block
 from tissue.tissue import Tissue, TissueError
 from tissue.types import BladeSegment, BladeSweep, StepResult, TetrahedralMesh
 
-DT = 1e-3
+_DT = 1e-3
 """Length of a frame [s]: 1 kHz, the rate of a haptic device."""
 
 LEAN = 0.25
@@ -23,7 +23,7 @@ upright one could follow a plane of the grid."""
 AHEAD = 0.1
 """Where the blade starts, before the front of the block, per depth of it."""
 
-STAGES = {
+_STAGES = {
     "CD": ("collision", "active tetrahedra, crossed edges"),
     "GC": ("topology", "insertion, marking, un-gluing"),
     "RX": ("relaxation", "forces, anchors, Runge-Kutta"),
@@ -55,7 +55,7 @@ def cut_through(mesh: TetrahedralMesh, steps: int) -> CutThrough:
     for i in range(2 * steps):
         y = low[1] - AHEAD * depth + i * advance
         sweep = BladeSweep(_blade(low, high, y), _blade(low, high, y + advance))
-        results.append(tissue.step(sweep, DT))
+        results.append(tissue.step(sweep, _DT))
         if i + 1 >= steps and results[-1].anchored_length == 0.0:
             break
     return CutThrough(tissue, results, before)
@@ -69,15 +69,15 @@ def _blade(low: FloatArray, high: FloatArray, y: float) -> BladeSegment:
     return BladeSegment(middle - half, middle + half, np.array([0.0, 1.0, 0.0]))
 
 
-def report(cut: CutThrough) -> str:
+def _report(cut: CutThrough) -> str:
     """Return the table: time per stage and frame, and what the cut left."""
     results = cut.results
     times = {
-        name: np.array([getattr(r.profile, f) for r in results]) for name, (f, _) in STAGES.items()
+        name: np.array([getattr(r.profile, f) for r in results]) for name, (f, _) in _STAGES.items()
     }
     frame = np.sum(list(times.values()), axis=0)
     lines = [f"{'per frame [us]':<40}{'median':>10}{'99 %':>10}"]
-    for name, (_, what) in STAGES.items():
+    for name, (_, what) in _STAGES.items():
         lines.append(_row(f"{name}  {what}", times[name]))
     lines.append(_row("all", frame))
     in_contact = [np.linalg.norm(r.wrench.force) for r in results if r.anchored_length > 0.0]
@@ -130,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         mesh = block(options.cells, options.size)
         cut_through(block((2, 2, 2)), 40)  # compiles, or loads what was compiled: not on the clock
-        print(report(cut_through(mesh, options.steps)))
+        print(_report(cut_through(mesh, options.steps)))
     except ValueError as error:
         parser.error(str(error))
     except TissueError as error:

@@ -35,7 +35,7 @@ MIN_FLAT_COVER = 0.05
 Less is a chance facet of a round body, too small to hold it by.
 """
 
-DEPTH = 0.05
+_DEPTH = 0.05
 """A round side reaches this deep, as a fraction of the body's extent along the axis.
 
 On an ellipsoid that is a cap of 44 % of its width.
@@ -47,7 +47,7 @@ DEPTH_GROWTH = 1.25
 MIN_SPREAD = 1e-3
 """Three nodes are off a line if they spread across it by this fraction of how they spread along."""
 
-ROUNDING = 1e-9
+_ROUNDING = 1e-9
 """Nodes this close to a box or a plane, in units of the body's extent, are on it."""
 
 
@@ -74,7 +74,8 @@ def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
     """Return the boundary nodes of the sides in `names`, together.
 
     left and right are the low and the high end of x, front and back of y, bottom and top of z.
-    Of a flat side these are the nodes in its plane, exactly; of a round one those less than `DEPTH`
+    Of a flat side these are the nodes in its plane, exactly; of a round one those less than
+    `_DEPTH`
     of the body's extent deep, and deeper where those would not hold the body: three nodes that are
     not on a line.
 
@@ -101,7 +102,7 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
             f"the box goes from {_text(low)} to {_text(high)} m; "
             "each coordinate of the first corner must be the smaller"
         )
-    slack = ROUNDING * np.ptp(mesh.positions, axis=0).max()
+    slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
     mask = np.all((mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1)
     if not mask.any():
         raise ValueError(
@@ -122,7 +123,7 @@ def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLi
     length = np.linalg.norm(normal)
     if length == 0.0:
         raise ValueError("the normal of the plane is zero; it must point to the nodes to hold")
-    slack = ROUNDING * np.ptp(mesh.positions, axis=0).max()
+    slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
     mask = (mesh.positions - point) @ (normal / length) >= -slack
     if not mask.any():
         raise ValueError(
@@ -180,7 +181,7 @@ def _one_side(
         MIN_FLAT_COVER * np.prod(np.delete(extent, axis))
     ):
         return in_plane
-    depth = DEPTH
+    depth = _DEPTH
     while True:  # ends: at depth 1 a body holds three nodes off a line, else it has no volume
         side = on_boundary & (below <= depth * extent[axis])
         if _holds(positions[side]) or depth >= 1.0:

@@ -14,7 +14,7 @@ tetrahedra 3 % at 1.27, 5 % at 2.0 and 16 % at 2.5."""
 HOW_LOW = {"springs": 20, "neo_hookean": 15}
 """Percent by which it was below it at most, beyond that."""
 
-log = logging.getLogger("tissue")
+_log = logging.getLogger("tissue")
 
 
 def warn_of_toughness(material: Material, node_size: float) -> None:
@@ -26,7 +26,7 @@ def warn_of_toughness(material: Material, node_size: float) -> None:
     """
     length = material.toughness / material.young_modulus
     if length > TOUGHEST[material.law] * node_size:
-        log.warning(
+        _log.warning(
             "toughness / young_modulus is %.1f mm, %.1f times the mean node size of %.1f mm: "
             "tetrahedra ahead of the blade are strained beyond what law %s bears, and the cutting "
             "force reads up to %d %% low. Use a lower toughness, a stiffer material, or %s",
@@ -43,7 +43,7 @@ def warn_of_ratio(material: Material) -> None:
     """Say so where the resistance to compression makes time steps very short."""
     ratio = material.poisson_ratio
     if ratio > NEARLY_INCOMPRESSIBLE:
-        log.warning(
+        _log.warning(
             "poisson_ratio is %g: time steps are %.1f times shorter than at 0.45, because waves of "
             "compression are that much faster. 0.45 to 0.49 is as incompressible as a soft body "
             "looks",

@@ -20,7 +20,7 @@ from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
 from tissue import BladeShape, BladeSweep, Chunks, FloatArray
 
 
-class Contacts(NamedTuple):
+class _Contacts(NamedTuple):
     """What the swept box of the blade meets."""
 
     tissue: bool
@@ -72,7 +72,7 @@ class BroadPhase:
         self._has_fixtures = bool(standing)
         self._fixtures = Obstacles(standing)
 
-    def contacts(self, sweep: BladeSweep, dt: float, *, engaged: bool = False) -> Contacts:
+    def contacts(self, sweep: BladeSweep, dt: float, *, engaged: bool = False) -> _Contacts:
         """Return what the blade can touch while it does `sweep` in `dt` [s].
 
         Args:
@@ -81,11 +81,11 @@ class BroadPhase:
             engaged: Whether the blade holds tissue already, which it may drag out of any box.
         """
         if engaged and not self._has_fixtures:
-            return Contacts(True, ())
+            return _Contacts(True, ())
         box = swept_blade(sweep, self._blade_shape)
         self._blade.place(box)
         fixtures = self._fixtures.met_by(self._blade.object)
-        return Contacts(engaged or self._meets_tissue(box, dt), fixtures)
+        return _Contacts(engaged or self._meets_tissue(box, dt), fixtures)
 
     def tissue_moved(self, bounds: FloatArray, dt: float) -> None:
         """Take note of where the tissue is after a step of `dt` [s]."""

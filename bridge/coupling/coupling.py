@@ -23,7 +23,7 @@ ABSURD_FRAMES_IN_A_ROW = 10
 """After so many frames in a row with an absurd wrench the run stops: 10 ms at 1 kHz, as far back as
 a run may be rolled. A single one may be a node that the blade flicks and that comes to rest."""
 
-AT_REST = Travel(np.zeros(6), 0.0, 0.0)
+_AT_REST = Travel(np.zeros(6), 0.0, 0.0)
 
 
 class CouplingError(RuntimeError):
@@ -62,7 +62,7 @@ class Coupling:
         self.n_absurd = 0
 
     def felt(
-        self, wrench: Wrench, dt: float, travel: Travel = AT_REST, silence: float = 0.0
+        self, wrench: Wrench, dt: float, travel: Travel = _AT_REST, silence: float = 0.0
     ) -> Wrench:
         """Return what the arm feels for the next `dt` [s].
 

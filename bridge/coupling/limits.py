@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 
 from tissue import FloatArray
 
-ROUNDING = 1e-15
+_ROUNDING = 1e-15
 """By which fraction to stay below a limit, so that rounding never carries a force above it."""
 
 
@@ -43,4 +43,4 @@ def size_of(vector: FloatArray) -> float:
 
 def factor_within(limit: float, size: float) -> float:
     """Return by what to multiply something of this size to keep it within its limit."""
-    return limit / size * (1.0 - ROUNDING) if size > limit else 1.0
+    return limit / size * (1.0 - _ROUNDING) if size > limit else 1.0

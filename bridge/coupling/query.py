@@ -10,7 +10,7 @@ from bridge.link import TissueLink
 from bridge.poses import motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
 
-LONGEST_STEP = 0.5
+_LONGEST_STEP = 0.5
 """[s]. A tissue that was silent for longer has lost the rest of the time: it would otherwise come
 ever later, by the time that making up for it takes."""
 
@@ -88,7 +88,7 @@ class Inquiry:
         return answer
 
     def _step(self, legs: Sequence[Leg], pose: BladeSegment) -> Answer:
-        results = [self._link.step(leg.sweep, min(leg.seconds, LONGEST_STEP)) for leg in legs]
+        results = [self._link.step(leg.sweep, min(leg.seconds, _LONGEST_STEP)) for leg in legs]
         seconds = [leg.seconds for leg in legs]
         last_leg = results[-1].wrench
         return Answer(_together(results, seconds), pose, sum(seconds), last_leg, legs[-1].sweep)

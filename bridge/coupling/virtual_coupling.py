@@ -13,7 +13,7 @@ import numpy as np
 from bridge.poses import half_length, motion, moved
 from tissue import BladeSegment, FloatArray
 
-log = logging.getLogger(__name__)
+_log = logging.getLogger(__name__)
 
 DELAY = 1
 """Frames between the arm's pose and the answer that it feels, for which a damping is chosen that is
@@ -132,7 +132,7 @@ def _warn_if_unstable(stiffness: FloatArray, damping: FloatArray, dt: float) -> 
         spring, damper = stiffness[axis, axis], damping[axis, axis]
         least = least_damping(spring, dt)
         if damper < least:
-            log.warning(
+            _log.warning(
                 "a coupling of %.4g %s at %g ms takes a %sdamping of more than "
                 "(%d + 1/2) K T = %.3g, and has %.3g: it may vibrate. Raise the damping, or lower "
                 "the stiffness to %.3g",

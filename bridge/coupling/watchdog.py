@@ -2,7 +2,7 @@
 
 import logging
 
-log = logging.getLogger(__name__)
+_log = logging.getLogger(__name__)
 
 WARN_AFTER = 0.010
 """[s] of silence: ten periods of a haptic device. Longer than a busy machine's usual hiccup."""
@@ -46,7 +46,7 @@ class Watchdog:
         if silence >= WARN_AFTER:
             self.n_silent += 1
             if not self._is_silent:
-                log.warning(
+                _log.warning(
                     "the tissue has been silent for %.0f ms: what the arm feels is its last "
                     "answer, and fades from %.0f ms on",
                     1e3 * silence,

@@ -29,7 +29,7 @@ from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, Kind, MessageError
 if TYPE_CHECKING:  # only its maker needs the engine
     from tissue import Tissue
 
-logger = logging.getLogger(__name__)
+_logger = logging.getLogger(__name__)
 
 MOST_CONNECTIONS = 8
 """Connections that are open at a time: the client's, and those that want to be it."""
@@ -59,12 +59,12 @@ def serve(
         LinkError: the port is in use or not allowed.
     """
     with TissueServer(make_tissue, scene=scene, host=host, port=port, key=key) as server:
-        logger.info("serving %s at %s", scene or "a tissue", server.address)
+        _logger.info("serving %s at %s", scene or "a tissue", server.address)
         with _terminate_as_interrupt(), contextlib.suppress(KeyboardInterrupt):
             if on_listening is not None:
                 on_listening(server.address)
             server.run()
-    logger.info("stopped")
+    _logger.info("stopped")
 
 
 class TissueServer:
@@ -143,7 +143,7 @@ class TissueServer:
         try:
             connection, where = self._listener.accept()
         except OSError as error:  # gone again, or no file descriptor left
-            logger.warning("a connection could not be accepted: %s", error)
+            _logger.warning("a connection could not be accepted: %s", error)
             return
         peer = Peer(connection, name_of(where))
         self._peers.append(peer)
@@ -170,7 +170,7 @@ class TissueServer:
                     self._answer(peer, frame)
         except MessageError as error:  # nobody knows where the next message begins
             if peer is not self._client and peer.channel.is_sealed:
-                logger.warning("%s has another key", peer.name)
+                _logger.warning("%s has another key", peer.name)
                 return self._refuse(peer, "your key is not the one of this server")
             return self._refuse(peer, str(error))
 
@@ -197,7 +197,7 @@ class TissueServer:
                 peer.sequence = frame.sequence - 1
             peer.take_seat()
             self._client = peer
-            logger.info("client %s has the tissue", peer.name)
+            _logger.info("client %s has the tissue", peer.name)
             return True
         return False
 
@@ -220,10 +220,10 @@ class TissueServer:
             if len(reply) > LARGEST_REPLY:
                 raise MessageError(f"the reply has {len(reply)} bytes, over {LARGEST_REPLY}")
         except MessageError as error:
-            logger.warning("refused a request of %s: %s", peer.name, error)
+            _logger.warning("refused a request of %s: %s", peer.name, error)
             self._send(peer, Kind.ERROR, pack_error(str(error)), frame.sequence)
         except Exception as error:  # the tissue's failure is the client's to hear of, not our end
-            logger.exception("the tissue of %s failed", peer.name)
+            _logger.exception("the tissue of %s failed", peer.name)
             text = f"{type(error).__name__}: {error}"
             self._send(peer, Kind.ERROR, pack_error(text), frame.sequence)
         else:
@@ -271,7 +271,7 @@ class TissueServer:
         self._drop(peer, reason, words)
 
     def _drop(self, peer: Peer, reason: str, last_words: bytes = b"") -> None:
-        logger.info("dropped %s: %s", peer.name, reason)
+        _logger.info("dropped %s: %s", peer.name, reason)
         self._peers.remove(peer)
         self._selector.unregister(peer.socket)
         peer.close(last_words)

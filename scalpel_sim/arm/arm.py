@@ -29,10 +29,10 @@ no limit of the device belongs here. 0.33 N m is 3.3 N on a lever of 10 cm, the 
 
 JOINTS = ("waist", "shoulder", "elbow", "yaw", "pitch", "roll")
 
-BLADE_HEIGHT, BLADE_THICKNESS, STEEL = 6e-3, 0.4e-3, 7800.0
+BLADE_HEIGHT, BLADE_THICKNESS, _STEEL = 6e-3, 0.4e-3, 7800.0
 """Of a no. 11 scalpel blade [m], [m], and its density [kg/m3]."""
 
-log = logging.getLogger("scalpel_sim")
+_log = logging.getLogger("scalpel_sim")
 
 
 class ArmError(RuntimeError):
@@ -156,7 +156,7 @@ def route_warnings() -> None:
 
 
 def _log_warning(text: str) -> None:
-    log.warning("MuJoCo: %s", text)
+    _log.warning("MuJoCo: %s", text)
 
 
 def _put_base(spec: mujoco.MjSpec, position: FloatArray, yaw: float) -> None:
@@ -178,7 +178,7 @@ def _make_blade(spec: mujoco.MjSpec, length: float, mount_angle: float) -> None:
     blade = spec.body("blade")
     blade.quat = [math.cos(mount_angle / 2.0), math.sin(mount_angle / 2.0), 0.0, 0.0]
     size = np.array([BLADE_THICKNESS, length, BLADE_HEIGHT])
-    blade.mass = STEEL * size.prod()
+    blade.mass = _STEEL * size.prod()
     blade.inertia = blade.mass / 12.0 * ((size**2).sum() - size**2)
     blade.ipos = [0.0, length / 2.0, 0.0]
     sheet = spec.geom("blade")

@@ -9,7 +9,7 @@ import numpy as np
 from bridge.coupling.coupling import ABSURD_FORCE, ABSURD_TORQUE
 from tissue import BladeSegment, FloatArray, Wrench
 
-SHORTEST_EDGE = 1e-4
+_SHORTEST_EDGE = 1e-4
 """[m]. A shorter cutting edge is a mistake in the model: its direction would be noise."""
 
 
@@ -64,10 +64,10 @@ class Blade:
         edge = np.array(model.site_pos[tip_id] - model.site_pos[heel_id])
         self.length = float(np.linalg.norm(edge))
         """From heel to tip [m]."""
-        if self.length < SHORTEST_EDGE:
+        if self.length < _SHORTEST_EDGE:
             raise BladeError(
                 f"sites '{heel}' and '{tip}' are {self.length:.1e} m apart; an edge needs at least "
-                f"{SHORTEST_EDGE} m"
+                f"{_SHORTEST_EDGE} m"
             )
         self.body_id = body_id
         """MuJoCo's number for the body that feels the wrench."""

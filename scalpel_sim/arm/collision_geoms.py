@@ -7,7 +7,7 @@ from bridge import FixtureBox
 from bridge.collision.arm_geoms import N_SIZES, Kind, Part
 from tissue import FloatArray
 
-KINDS: dict[int, Kind] = {
+_KINDS: dict[int, Kind] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
@@ -39,14 +39,14 @@ class ArmParts:
         self._geoms = [
             i
             for i in range(model.ngeom)
-            if int(model.geom_type[i]) in KINDS
+            if int(model.geom_type[i]) in _KINDS
             and int(model.geom_bodyid[i]) != WORLD
             and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is not there to be met
         ]
         self.parts = []
         for i in self._geoms:
             body = int(model.geom_bodyid[i])
-            kind = KINDS[int(model.geom_type[i])]
+            kind = _KINDS[int(model.geom_type[i])]
             self.parts.append(
                 Part(
                     model.geom(i).name or f"{model.body(body).name} geom {i}",

@@ -16,7 +16,7 @@ FLOOR_MARGIN = 0.02
 """[m], by which the floor reaches beyond the body. For the tissue it has no end; where the arm's
 base stands there is none."""
 
-log = logging.getLogger("scalpel_sim")
+_log = logging.getLogger("scalpel_sim")
 
 
 class Touching:
@@ -55,7 +55,7 @@ class Touching:
         self._now = self._collisions.touching(self._parts.positions(), self._parts.axes())
         for pair in self._now:
             if pair not in self._frames:
-                log.warning(
+                _log.warning(
                     "at %.3f s the %s meets the %s, and nothing pushes back there: the device "
                     "would stop. Move the stroke, or what is in its way",
                     self._arm.time,

@@ -10,7 +10,7 @@ from tissue import BladeSegment, FloatArray
 
 HAND = "hand"
 """Name of the body that shows where the hand wants the middle of the edge, and of its site."""
-EDGE = "edge"
+_EDGE = "edge"
 """Name of the site in the middle of the edge, where the hand holds the blade."""
 ACTUATORS = ("hand_x", "hand_y", "hand_z", "hand_turn")
 
@@ -72,7 +72,7 @@ def add_hand(
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
     edge = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     spec.site(tip).parent.add_site(
-        name=EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=_orientation(edge, np.array([0.0, 0, -1.0]))
+        name=_EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=_orientation(edge, np.array([0.0, 0, -1.0]))
     )
     hand = spec.worldbody.add_body(name=HAND, mocap=True)
     hand.add_site(name=HAND)
@@ -118,7 +118,7 @@ class Hand:
         self._quaternion = data.mocap_quat[mocap]
         self._control = data.ctrl[controls : controls + 6]
         self._output = data.actuator_force[outputs : outputs + 6]
-        self._edge = data.site_xpos[model.site(EDGE).id]
+        self._edge = data.site_xpos[model.site(_EDGE).id]
         self._lead = model.actuator_biasprm[first, 2] / model.actuator_biasprm[first, 1]
         turn = model.actuator(ACTUATORS[3]).id
         self._turning_lead = model.actuator_biasprm[turn, 2] / model.actuator_biasprm[turn, 1]
@@ -175,7 +175,9 @@ class Hand:
 
 def _actuator(spec: mujoco.MjSpec, name: str) -> "mujoco.MjsActuator":
     """Add an actuator that acts on the middle of the edge as seen from the hand."""
-    return spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=EDGE, refsite=HAND)
+    return spec.add_actuator(
+        name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=_EDGE, refsite=HAND
+    )
 
 
 def _orientation(edge: FloatArray, forward: FloatArray) -> FloatArray:

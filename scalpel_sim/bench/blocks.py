@@ -8,7 +8,7 @@ import numpy as np
 from scalpel_sim.errors import UsageError
 from tissue import BoolArray, FloatArray, IntArray, TetrahedralMesh, block
 
-Cells = tuple[int, int, int]
+_Cells = tuple[int, int, int]
 
 CELL = 0.01
 """Side of a cell [m]."""
@@ -17,7 +17,7 @@ JITTER = 0.1
 SEED = 1998
 """Of the jitter: the same blocks for everybody."""
 
-BLOCKS: dict[int, Cells] = {
+BLOCKS: dict[int, _Cells] = {
     576: (4, 4, 6),
     5_400: (9, 10, 10),
     6_000: (10, 10, 10),
@@ -52,7 +52,7 @@ def on_sides(positions: FloatArray, axes: tuple[int, ...]) -> BoolArray:
     return np.asarray(np.any(low | high, axis=1))
 
 
-class Edges(NamedTuple):
+class _Edges(NamedTuple):
     """The edges of a mesh, and what springs along them and masses at their ends follow from."""
 
     nodes: IntArray
@@ -65,14 +65,14 @@ class Edges(NamedTuple):
     """A quarter of each tetrahedron around a node [m3], shape (n_nodes,)."""
 
 
-def edges_of(mesh: TetrahedralMesh) -> Edges:
+def edges_of(mesh: TetrahedralMesh) -> _Edges:
     """Return the edges of a mesh."""
     corners = mesh.positions[mesh.tetrahedra]
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
     pairs = [mesh.tetrahedra[:, list(pair)] for pair in combinations(range(4), 2)]
     nodes, edge = np.unique(np.sort(np.vstack(pairs), axis=1), axis=0, return_inverse=True)
     ends = mesh.positions[nodes]
-    return Edges(
+    return _Edges(
         nodes,
         np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1),
         np.bincount(edge.ravel(), np.tile(volumes, len(pairs))).astype(np.float64),

@@ -22,27 +22,27 @@ from tissue import BladeSegment, BladeSweep, FloatArray, Material, Tissue, block
 if TYPE_CHECKING:
     from rich.console import Console
 
-Cells = tuple[int, int, int]
+_Cells = tuple[int, int, int]
 
-CELLS: tuple[Cells, ...] = ((5, 6, 6), (11, 12, 13), (25, 26, 26))
+CELLS: tuple[_Cells, ...] = ((5, 6, 6), (11, 12, 13), (25, 26, 26))
 """Of the blocks along x, y and z: 1,080, 10,296 and 101,400 tetrahedra."""
-CELL = 5e-3
+_CELL = 5e-3
 """Side of a cell [m]."""
 SLIT = 3.5
 """Length of the slit [cells]."""
-DEPTH, ABOVE = 3.37, 2.0
+_DEPTH, _ABOVE = 3.37, 2.0
 """How far the edge reaches below the upper side, and above [cells]."""
-ASIDE = 0.37
+_ASIDE = 0.37
 """Distance of the slit from the grid's planes [cells]: none of it runs along faces that are
 there."""
-STEP = 2.5e-4
+_STEP = 2.5e-4
 """Way of the blade in a step [m]: 0.25 m/s at 1 kHz, fast for a hand."""
-DT = 1e-3
+_DT = 1e-3
 """[s]."""
-SHARP = Material(toughness=1.0)
+_SHARP = Material(toughness=1.0)
 """The blade hardly drags: it cuts where it passes."""
 
-US_PER_S = 1e6
+_US_PER_S = 1e6
 
 
 class Slit(NamedTuple):
@@ -77,14 +77,14 @@ class CutCost(NamedTuple):
     """Time of the steps that split, for each split tetrahedron [s]."""
 
 
-def measure(n_rounds: int, blocks: Sequence[Cells] = CELLS, watch: Watch = SILENT) -> Findings:
+def measure(n_rounds: int, blocks: Sequence[_Cells] = CELLS, watch: Watch = SILENT) -> Findings:
     """Return the cost for each block, over so many rounds, in which blocks take turns."""
     slits = slits_of(n_rounds, blocks, watch)
     return Findings(_figures(slits), [], partial(print_costs, list(map(cost_of, slits))))
 
 
 def slits_of(
-    n_rounds: int, blocks: Sequence[Cells] = CELLS, watch: Watch = SILENT
+    n_rounds: int, blocks: Sequence[_Cells] = CELLS, watch: Watch = SILENT
 ) -> list[list[Slit]]:
     """Return what each round cost, for each block."""
     _run(blocks[0])  # the kernels are loaded, and the processor is awake
@@ -119,7 +119,7 @@ def _figures(blocks: Sequence[Sequence[Slit]]) -> list[Figure]:
             figures.append(
                 of_times(
                     "cut", case, slits[0].n_tetrahedra, "time", "µs", samples,
-                    clock=WALL.name, convert=lambda s: US_PER_S * s,
+                    clock=WALL.name, convert=lambda s: _US_PER_S * s,
                 )
             )  # fmt: skip
     return figures
@@ -137,15 +137,15 @@ def print_costs(costs: Sequence[CutCost], console: "Console") -> None:
             f"{cost.n_tetrahedra:,}",
             f"{cost.n_split:,}",
             f"{cost.n_steps}",
-            f"{US_PER_S * cost.step_mean:.0f}",
+            f"{_US_PER_S * cost.step_mean:.0f}",
             f"{cost.step_mean / costs[0].step_mean:.2f}",
-            f"{US_PER_S * cost.per_split:.1f}",
-            f"{US_PER_S * cost.idle_median:.0f}",
+            f"{_US_PER_S * cost.per_split:.1f}",
+            f"{_US_PER_S * cost.idle_median:.0f}",
         )
     console.print(table)
     console.print(
-        f"The same slit in each block: {SLIT:g} x {DEPTH:g} cells of {CELL * 1e3:g} mm, "
-        f"{STEP * 1e3:g} mm a step. A cut step splits tetrahedra; its time is CD + GC, search, "
+        f"The same slit in each block: {SLIT:g} x {_DEPTH:g} cells of {_CELL * 1e3:g} mm, "
+        f"{_STEP * 1e3:g} mm a step. A cut step splits tetrahedra; its time is CD + GC, search, "
         "splitting, un-gluing, masses and springs, without relaxation; the share is that of the "
         "smallest block. A split leaves one tetrahedron more. In an idle step the blade moves on "
         "in the tissue, and nothing is split.",
@@ -153,25 +153,25 @@ def print_costs(costs: Sequence[CutCost], console: "Console") -> None:
     )
 
 
-def _turn(cells: Cells, watch: Watch) -> Slit:
+def _turn(cells: _Cells, watch: Watch) -> Slit:
     """Cut one fresh block, and say so."""
     slit = _run(cells)
     watch.tick(f"cut in {slit.n_tetrahedra:,} tetrahedra")
     return slit
 
 
-def _run(cells: Cells) -> Slit:
+def _run(cells: _Cells) -> Slit:
     """Cut one fresh block."""
-    mesh = block(cells, [CELL * n for n in cells])
+    mesh = block(cells, [_CELL * n for n in cells])
     held = np.ones(len(mesh.positions), dtype=bool)
-    tissue = Tissue(mesh, SHARP, fixed=held, gravity=(0.0, 0.0, 0.0))
+    tissue = Tissue(mesh, _SHARP, fixed=held, gravity=(0.0, 0.0, 0.0))
     before = _edge(cells, 0.0)
     taken: list[float] = []
     sizes = [tissue.n_tetrahedra]
     with no_garbage_collection():
-        for i in range(1, round(SLIT * CELL / STEP) + 1):
-            after = _edge(cells, i * STEP)
-            result = tissue.step(BladeSweep(before, after), DT)
+        for i in range(1, round(SLIT * _CELL / _STEP) + 1):
+            after = _edge(cells, i * _STEP)
+            result = tissue.step(BladeSweep(before, after), _DT)
             taken.append(result.profile.collision + result.profile.topology)
             sizes.append(result.n_tetrahedra)
             before = after
@@ -179,13 +179,13 @@ def _run(cells: Cells) -> Slit:
     return Slit(sizes[0], seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
 
 
-def _edge(cells: Cells, way: float) -> BladeSegment:
+def _edge(cells: _Cells, way: float) -> BladeSegment:
     """Return the upright edge, so far [m] along the slit, which is in the middle of the block."""
-    x = CELL * (cells[0] // 2 + ASIDE)
-    y = CELL * (cells[1] // 2 - SLIT / 2) + way
-    top = CELL * cells[2]
+    x = _CELL * (cells[0] // 2 + _ASIDE)
+    y = _CELL * (cells[1] // 2 - SLIT / 2) + way
+    top = _CELL * cells[2]
     return BladeSegment(
-        np.array([x, y, top - DEPTH * CELL]),
-        np.array([x, y, top + ABOVE * CELL]),
+        np.array([x, y, top - _DEPTH * _CELL]),
+        np.array([x, y, top + _ABOVE * _CELL]),
         np.array([0.0, 1.0, 0.0]),
     )

@@ -26,7 +26,7 @@ POISSON_RATIO: dict[Law, float] = {"springs": 0.25, "neo_hookean": 0.3}
 """What springs have without a volume term; what peers are given under their law of tetrahedra."""
 DENSITY = 1e3
 """[kg/m3]."""
-TOUGHNESS = 5.0
+_TOUGHNESS = 5.0
 """[J/m2]: for an engine that warns of tissue too tough for its mesh. Nothing is cut here."""
 LAWS: tuple[Law, ...] = ("springs", "neo_hookean")
 """Each is measured."""
@@ -37,7 +37,7 @@ def material(law: Law, *, is_damped: bool = True) -> Material:
     made = Material(
         young_modulus=STIFFNESS,
         density=DENSITY,
-        toughness=TOUGHNESS,
+        toughness=_TOUGHNESS,
         law=law,
         poisson_ratio=POISSON_RATIO[law],
     )

@@ -11,18 +11,18 @@ from scalpel_sim.bench.tables import print_figures
 from scalpel_sim.bench.timing import CPU, Case, interleaved
 from scalpel_sim.bench.watch import SILENT, Watch
 
-SIZES = (576, 5_400, 20_250, 60_000)
+_SIZES = (576, 5_400, 20_250, 60_000)
 """Of the blocks [tetrahedra]."""
 TOUCHING = 5_400
 """Of each of the two blocks that touch."""
-NS_PER_S, US_PER_S = 1e9, 1e6
+_NS_PER_S, _US_PER_S = 1e9, 1e6
 
 NAMES = {"springs": "springs", "neo_hookean": "neo-Hookean"}
 
 
 def measure(n_rounds: int, largest: int | None = None, watch: Watch = SILENT) -> Findings:
     """Time every loop, at each size up to the largest."""
-    sizes = up_to(SIZES, largest)
+    sizes = up_to(_SIZES, largest)
     cases: list[Case] = []
     figures: list[Callable[[list], Figure]] = []
     for size in sizes:
@@ -65,11 +65,11 @@ def measure(n_rounds: int, largest: int | None = None, watch: Watch = SILENT) ->
 def _per_tetrahedron(case: str, size: int, rounds: list) -> Figure:
     return of_times(
         "kernels", case, size, "time", "ns/tet", rounds,
-        clock=CPU.name, convert=lambda s: NS_PER_S * s / size,
+        clock=CPU.name, convert=lambda s: _NS_PER_S * s / size,
     )  # fmt: skip
 
 
 def _whole(case: str, size: int, rounds: list) -> Figure:
     return of_times(
-        "kernels", case, size, "time", "µs", rounds, clock=CPU.name, convert=lambda s: US_PER_S * s
+        "kernels", case, size, "time", "µs", rounds, clock=CPU.name, convert=lambda s: _US_PER_S * s
     )

@@ -36,20 +36,20 @@ from tissue.integrators.options import Relaxing
 if TYPE_CHECKING:
     from rich.console import Console
 
-SIZES = (6_000, 60_000, 1_000_188)
+_SIZES = (6_000, 60_000, 1_000_188)
 """Of the blocks [tetrahedra]."""
-DEPTH, ABOVE = 1.4, 2.0
+_DEPTH, _ABOVE = 1.4, 2.0
 """How far the edge reaches below the upper side, and above [cells]."""
-ASIDE = 0.37
+_ASIDE = 0.37
 """Distance of the slit from the grid's planes [cells]: none of it runs along faces that are
 there."""
-STEP = 7e-4
+_STEP = 7e-4
 """Way of the blade in a frame [m]: a frame that splits any splits a dozen tetrahedra."""
 N_FRAMES = 40
 """With the blade."""
 N_AT_REST = 80
 """Frames before it comes: the far nodes of a body at rest fall asleep."""
-SHARP = 1.0
+_SHARP = 1.0
 """Toughness [J/m2]: the blade hardly drags; it cuts where it passes."""
 ENTRY = 3
 """First frames, left out: the edge comes into the body."""
@@ -62,9 +62,9 @@ WAYS: dict[str, tuple[Law, Relaxing]] = {
     "local, springs": ("springs", LocalTimeStepping()),
     "local, neo-Hookean": ("neo_hookean", LocalTimeStepping()),
 }
-US_PER_S = 1e6
+_US_PER_S = 1e6
 
-ABOUT = (
+_ABOUT = (
     "Whole frames of 1 ms: search, cut, relaxation, the force on the blade, and what Python does. "
     "Cut: frames that split tetrahedra, as many as `splits` on average. Else: the blade moves on "
     "and splits nothing. Share: of the smallest body. CPU time of the thread. Hierarchical is the "
@@ -98,19 +98,19 @@ def measure(
     n_rounds: int,
     largest: int | None = None,
     watch: Watch = SILENT,
-    sizes: Sequence[int] = SIZES,
+    sizes: Sequence[int] = _SIZES,
 ) -> Findings:
     """Cut a slit into each body up to the largest, with each way to relax, in turns."""
     sizes, skipped = that_fit(up_to(tuple(sizes), largest), memory(), "local frame")
     cases = [(size, way) for way in WAYS for size in sizes]
     for law, relaxing in WAYS.values():
-        slit(sizes[0], law, relaxing)  # the kernels are loaded
+        _slit(sizes[0], law, relaxing)  # the kernels are loaded
     watch.begin(n_rounds * len(cases))
     rounds: list[list[Frames]] = []
     for _ in range(n_rounds):
         rounds.append([])
         for size, way in cases:
-            rounds[-1].append(slit(size, *WAYS[way]))
+            rounds[-1].append(_slit(size, *WAYS[way]))
             watch.tick(f"{way}, {size:,}")
     found = [
         _local(way, size, frames)
@@ -120,10 +120,10 @@ def measure(
     return Findings(figures, skipped, partial(_print, found, skipped))
 
 
-def slit(n_tetrahedra: int, law: Law, relaxing: Relaxing) -> Frames:
+def _slit(n_tetrahedra: int, law: Law, relaxing: Relaxing) -> Frames:
     """Cut the slit into a fresh body at rest."""
     mesh = block_mesh(n_tetrahedra)
-    sharp = replace(material(law), toughness=SHARP)
+    sharp = replace(material(law), toughness=_SHARP)
     tissue = Tissue(mesh, sharp, fixed=held(mesh), gravity=(0.0, 0.0, 0.0), relaxation=relaxing)
     for _ in range(N_AT_REST):
         tissue.step(None, DT)
@@ -145,12 +145,12 @@ def slit(n_tetrahedra: int, law: Law, relaxing: Relaxing) -> Frames:
 def _edge(n_tetrahedra: int, frame: int) -> BladeSegment:
     """Return the upright edge in a frame; the slit is in the middle of the body."""
     cells = BLOCKS[n_tetrahedra]
-    x = CELL * (cells[0] // 2 + ASIDE)
-    y = 0.5 * (CELL * cells[1] - STEP * N_FRAMES) + STEP * frame
+    x = CELL * (cells[0] // 2 + _ASIDE)
+    y = 0.5 * (CELL * cells[1] - _STEP * N_FRAMES) + _STEP * frame
     top = CELL * cells[2]
     return BladeSegment(
-        np.array([x, y, top - DEPTH * CELL]),
-        np.array([x, y, top + ABOVE * CELL]),
+        np.array([x, y, top - _DEPTH * CELL]),
+        np.array([x, y, top + _ABOVE * CELL]),
         np.array([0.0, 1.0, 0.0]),
     )
 
@@ -162,7 +162,7 @@ def _local(way: str, size: int, rounds: Sequence[Frames]) -> Local:
     def figure(case: str, samples: Sequence[FloatArray], note: str) -> Figure:
         return of_times(
             "local frame", f"{way}: {case}", size, "time", "µs", samples,
-            clock=CPU.name, convert=lambda s: US_PER_S * s, note=note,
+            clock=CPU.name, convert=lambda s: _US_PER_S * s, note=note,
         )  # fmt: skip
 
     return Local(
@@ -193,4 +193,4 @@ def _print(found: Sequence[Local], skipped: Sequence[Skipped], console: "Console
         )
     console.print(table)
     print_skipped(skipped, console)
-    console.print(ABOUT, style="dim")
+    console.print(_ABOUT, style="dim")

@@ -34,16 +34,16 @@ from scalpel_sim.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
-SIZES = (5_400, 20_250, 60_000)
+_SIZES = (5_400, 20_250, 60_000)
 """Of the blocks [tetrahedra]."""
-TURN = 0.25
+_TURN = 0.25
 """How long a case steps in each round [s of CPU time]."""
 NOT_FINITE = "its positions are no longer finite: what it computed is not a motion"
-MS_PER_S = 1e3
+_MS_PER_S = 1e3
 CLOCK = "CPU of the process"
 
 
-class Entry(NamedTuple):
+class _Entry(NamedTuple):
     """A case of ours or of a peer."""
 
     engine: str
@@ -62,38 +62,38 @@ class Entry(NamedTuple):
 
 OURS_SPRINGS, OURS_SOLID = "springs, Runge-Kutta", "plain neo-Hookean, 1 evaluation"
 """What others are compared with: damped with damped, undamped with undamped."""
-UNDAMPED = ", undamped"
+_UNDAMPED = ", undamped"
 """End of the name of a case without dampers."""
 
 _RKN, _EULER = "Runge-Kutta-Nystroem", "symplectic Euler"
 _AVERAGED = "f64; averaged dilatation"
 
 OURS = {
-    OURS_SPRINGS: Entry(
+    OURS_SPRINGS: _Entry(
         "ours", "ours.py", "springs:runge_kutta:damped", f"springs, damped; {_RKN}", "3",
         "f64; dampers four times a step",
     ),
-    OURS_SPRINGS + UNDAMPED: Entry(
+    OURS_SPRINGS + _UNDAMPED: _Entry(
         "ours", "ours.py", "springs:runge_kutta:undamped", f"springs, no damping; {_RKN}", "3",
         "f64",
     ),
-    "springs, 1 evaluation": Entry(
+    "springs, 1 evaluation": _Entry(
         "ours", "ours.py", "springs:euler:damped", f"springs, damped; {_EULER}", "1",
         "f64; for comparison only",
     ),
-    OURS_SOLID: Entry(
+    OURS_SOLID: _Entry(
         "ours", "ours.py", "neo_hookean:euler:damped:plain", f"neo-Hookean, damped; {_EULER}", "1",
         "f64; for comparison only",
     ),
-    OURS_SOLID + UNDAMPED: Entry(
+    OURS_SOLID + _UNDAMPED: _Entry(
         "ours", "ours.py", "neo_hookean:euler:undamped:plain",
         f"neo-Hookean, no damping; {_EULER}", "1", "f64; for comparison only",
     ),
-    "neo-Hookean, 1 evaluation": Entry(
+    "neo-Hookean, 1 evaluation": _Entry(
         "ours", "ours.py", "neo_hookean:euler:damped", f"neo-Hookean, damped; {_EULER}", "1",
         f"{_AVERAGED}; for comparison only",
     ),
-    "neo-Hookean, Runge-Kutta": Entry(
+    "neo-Hookean, Runge-Kutta": _Entry(
         "ours", "ours.py", "neo_hookean:runge_kutta:damped", f"neo-Hookean, damped; {_RKN}", "3",
         f"{_AVERAGED}; dampers four times a step",
     ),
@@ -103,43 +103,43 @@ _MUJOCO, _NEWTON, _RAPIER = (f"pip install {name}" for name in ("mujoco", "newto
 _KIRCHHOFF = "St. Venant-Kirchhoff"
 
 PEERS = {
-    "MuJoCo flex, Euler": Entry(
+    "MuJoCo flex, Euler": _Entry(
         "MuJoCo", "mujoco_flex.py", "Euler:damped", f"{_KIRCHHOFF}, damped; Euler", "1",
         "f64; the whole of mj_step, contact off", _MUJOCO,
     ),
-    "MuJoCo flex, Euler" + UNDAMPED: Entry(
+    "MuJoCo flex, Euler" + _UNDAMPED: _Entry(
         "MuJoCo", "mujoco_flex.py", "Euler:undamped", f"{_KIRCHHOFF}, no damping; Euler", "1",
         "f64; the whole of mj_step, contact off", _MUJOCO,
     ),
-    "MuJoCo flex, RK4": Entry(
+    "MuJoCo flex, RK4": _Entry(
         "MuJoCo", "mujoco_flex.py", "RK4:damped", f"{_KIRCHHOFF}, damped; Runge-Kutta 4", "4",
         "f64; the whole of mj_step, contact off", _MUJOCO,
     ),
-    "MuJoCo flex, discrete": Entry(
+    "MuJoCo flex, discrete": _Entry(
         "MuJoCo", "mujoco_flex.py", "discrete:damped", f"{_KIRCHHOFF}, damped; implicit", "-",
         "f64; could take longer steps; contact off", _MUJOCO,
     ),
-    "Newton springs": Entry(
+    "Newton springs": _Entry(
         "Newton", "newton_semi_implicit.py", "springs:damped", f"springs, damped; {_EULER}", "1",
         "f32; contact and particle grid off", _NEWTON,
     ),
-    "Newton springs" + UNDAMPED: Entry(
+    "Newton springs" + _UNDAMPED: _Entry(
         "Newton", "newton_semi_implicit.py", "springs:undamped", f"springs, no damping; {_EULER}",
         "1", "f32; contact and particle grid off", _NEWTON,
     ),
-    "Newton neo-Hookean": Entry(
+    "Newton neo-Hookean": _Entry(
         "Newton", "newton_semi_implicit.py", "neo_hookean:damped",
         f"neo-Hookean, damped; {_EULER}", "1", "f32; contact and particle grid off", _NEWTON,
     ),
-    "Rapier springs": Entry(
+    "Rapier springs": _Entry(
         "Rapier", "rapier_soft.py", "springs", "distance constraints; 1 iteration", "-",
         "f32; its softness; 1 iteration: its default is 4; collision off", _RAPIER,
     ),
-    "Rapier constraints": Entry(
+    "Rapier constraints": _Entry(
         "Rapier", "rapier_soft.py", "constraints", "neo-Hookean; 1 iteration", "-",
         "f32; could take longer steps; 1 iteration: its default is 4; collision off", _RAPIER,
     ),
-    "Rapier finite elements": Entry(
+    "Rapier finite elements": _Entry(
         "Rapier", "rapier_soft.py", "fem", "neo-Hookean; conjugate gradient", "-",
         "f32; could take longer steps; 1 substep: its default is 4; collision off", _RAPIER,
     ),
@@ -153,7 +153,7 @@ class Ran(NamedTuple):
     """A case in one body: its turns, in the order of the rounds."""
 
     name: str
-    entry: Entry
+    entry: _Entry
     version: str
     tetrahedra: int
     turns: list[Turn]
@@ -169,7 +169,7 @@ def measure(
     largest: int | None = None,
     python: Path | None = None,
     watch: Watch = SILENT,
-    sizes: Sequence[int] = SIZES,
+    sizes: Sequence[int] = _SIZES,
 ) -> Findings:
     """Let all cases step in turns, in each body up to the largest.
 
@@ -282,7 +282,7 @@ def _in_one_body(
         for _ in range(n_rounds):
             for process, ran in list(running):
                 try:
-                    turn = process.turn(TURN)
+                    turn = process.turn(_TURN)
                     failure = "" if np.isfinite(turn.moved) else NOT_FINITE
                 except Failed as error:
                     failure = str(error)
@@ -304,10 +304,10 @@ def _figures(ran: Ran, all_of_them: Sequence[Ran]) -> list[Figure]:
     figures = [
         of_times(
             "peers", ran.name, ran.tetrahedra, "time", "ms", [t.seconds for t in ran.turns],
-            clock=CLOCK, convert=lambda s: MS_PER_S * s, note=note,
+            clock=CLOCK, convert=lambda s: _MS_PER_S * s, note=note,
         )
     ]  # fmt: skip
-    damping = UNDAMPED if ran.name.endswith(UNDAMPED) else ""
+    damping = _UNDAMPED if ran.name.endswith(_UNDAMPED) else ""
     for name in (OURS_SPRINGS, OURS_SOLID):
         for ours in all_of_them:
             if (ours.name, ours.tetrahedra) != (name + damping, ran.tetrahedra):

@@ -23,7 +23,7 @@ from scalpel_sim.bench.traffic import Traffic
 from scalpel_sim.bench.watch import SILENT, Watch
 from tissue import FloatArray
 
-SIZES = (6_000, 60_000, 600_000)
+_SIZES = (6_000, 60_000, 600_000)
 """Of the blocks [tetrahedra]: in a core's own cache, in the shared one, in memory."""
 SMALLEST = 576
 """Measured where nothing larger is wanted."""
@@ -61,7 +61,7 @@ def limit(
 
 def measure(n_rounds: int, largest: int | None = None, watch: Watch = SILENT) -> Findings:
     """Time the limits and a Runge-Kutta step of springs, in each body up to the largest."""
-    sizes = up_to((SMALLEST, *SIZES), largest)
+    sizes = up_to((SMALLEST, *_SIZES), largest)
     sizes = tuple(n for n in sizes if n != SMALLEST) or sizes
     machine = caches()
     levels = triads(machine)

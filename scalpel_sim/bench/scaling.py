@@ -18,11 +18,11 @@ from scalpel_sim.bench.timing import CPU, Case, interleaved
 from scalpel_sim.bench.watch import SILENT, Watch
 from tissue import FloatArray
 
-SIZES = (576, 6_000, 60_000, 199_800, 600_000, 1_000_188)
+_SIZES = (576, 6_000, 60_000, 199_800, 600_000, 1_000_188)
 """Of the blocks [tetrahedra]."""
-NS_PER_S, MS_PER_S = 1e9, 1e3
+_NS_PER_S, _MS_PER_S = 1e9, 1e3
 
-ABOUT = (
+_ABOUT = (
     "Blocks of jittered cells of 10 mm, held on four sides; one thread; sizes take turns. CPU: "
     "what the processor spent on it. A step of the whole body costs the same per tetrahedron until "
     "the body outgrows a cache."
@@ -33,7 +33,7 @@ def measure(
     n_rounds: int,
     largest: int | None = None,
     watch: Watch = SILENT,
-    sizes: Sequence[int] = SIZES,
+    sizes: Sequence[int] = _SIZES,
 ) -> Findings:
     """Time a Runge-Kutta step of each size up to the largest, under each law."""
     sizes, skipped = that_fit(up_to(tuple(sizes), largest), memory(), "scaling", len(LAWS))
@@ -49,7 +49,7 @@ def measure(
         figures += _figures(name, size, rounds)
     figures.sort(key=lambda figure: (figure.case, figure.unit, figure.tetrahedra))
     return Findings(
-        figures, skipped, partial(print_figures, "scaling", figures, skipped, about=ABOUT)
+        figures, skipped, partial(print_figures, "scaling", figures, skipped, about=_ABOUT)
     )
 
 
@@ -58,10 +58,10 @@ def _figures(name: str, size: int, rounds: Sequence[FloatArray]) -> list[Figure]
     return [
         of_times(
             "scaling", name, size, "time per tetrahedron", "ns/tet", rounds,
-            clock=CPU.name, convert=lambda s: NS_PER_S * s / size,
+            clock=CPU.name, convert=lambda s: _NS_PER_S * s / size,
         ),
         of_times(
             "scaling", name, size, "time", "ms", rounds,
-            clock=CPU.name, convert=lambda s: MS_PER_S * s,
+            clock=CPU.name, convert=lambda s: _MS_PER_S * s,
         ),
     ]  # fmt: skip

@@ -15,9 +15,9 @@ from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES, scene_called
 from scalpel_sim.simulation import Simulation
 
-MS_PER_S = 1e3
+_MS_PER_S = 1e3
 
-ABOUT = (
+_ABOUT = (
     "Each scene's whole stroke; no pictures, no files. A frame is 1 ms of life: arm, bridge, "
     "search (CD), cut (GC), relaxation (RX). In the tissue: frames with the blade in it. Late: "
     "frames that took longer than the time that they stand for. Wall time: other work on the "
@@ -48,7 +48,7 @@ def measure(
             runs[name].append(simulation.recording)
             watch.tick(name)
     figures = [f for name in names for f in _figures(name, sizes[name], runs[name])]
-    return Findings(figures, [], partial(print_figures, "scenes", figures, [], about=ABOUT))
+    return Findings(figures, [], partial(print_figures, "scenes", figures, [], about=_ABOUT))
 
 
 def _run(name: str, seconds: float | None) -> tuple[Simulation, int]:
@@ -65,7 +65,7 @@ def _figures(name: str, size: int, runs: Sequence[Recording]) -> list[Figure]:
     def of_frames(case: str, rounds: list[np.ndarray]) -> Figure:
         return of_times(
             "scenes", f"{name}: {case}", size, "time", "ms", rounds,
-            clock=WALL.name, convert=lambda s: MS_PER_S * s,
+            clock=WALL.name, convert=lambda s: _MS_PER_S * s,
         )  # fmt: skip
 
     frames = [run.column("frame_s") for run in runs]

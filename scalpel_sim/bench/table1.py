@@ -38,11 +38,11 @@ from tissue import block
 if TYPE_CHECKING:
     from rich.console import Console
 
-Cells = tuple[int, int, int]
+_Cells = tuple[int, int, int]
 
-CELL = 0.01
+_CELL = 0.01
 """Side of a cell [m]; the paper has no lengths."""
-WAY = np.array([[0.38, -0.4], [0.38, 1.6]])
+_WAY = np.array([[0.38, -0.4], [0.38, 1.6]])
 """Straight through, off the planes of each grid, and on behind the body: the blade drags tissue."""
 DEPTHS = {(2, 2, 2): 0.58, (2, 4, 3): 0.58, (4, 6, 4): 0.7}
 """How far the blade goes down, as a share of the height: part of the way, so that the paper's
@@ -52,7 +52,7 @@ scheme splits 18, 48 and 108 tetrahedra. The paper's counts tell of 18, 48 and 1
 class Row(NamedTuple):
     """One grid, cut by one scheme on this machine; medians over runs."""
 
-    cells: Cells
+    cells: _Cells
     scheme: str
     tetrahedra_initial: int
     tetrahedra_final: int
@@ -77,7 +77,7 @@ def measure(n_rounds: int, schemes: Sequence[str] = SCHEMES, watch: Watch = SILE
     return Findings(figures, [], partial(print_rows, [_median(each) for each in runs]))
 
 
-def _turn(case: tuple[Cells, str], watch: Watch) -> Row:
+def _turn(case: tuple[_Cells, str], watch: Watch) -> Row:
     """Do one cut, and say so."""
     row = _run(*case)
     watch.tick(f"{'x'.join(map(str, row.cells))} cells, {row.scheme}")
@@ -159,13 +159,13 @@ def print_rows(rows: Sequence[Row], console: "Console") -> None:
     )
 
 
-def _run(cells: Cells, scheme: str) -> Row:
+def _run(cells: _Cells, scheme: str) -> Row:
     """Do one cut."""
-    size = [CELL * n for n in cells]
+    size = [_CELL * n for n in cells]
     scene = Scene("table1", "a grid of the paper", lambda: block(cells, size), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
-    simulation = prepare_cut(Cut(scene, WAY, DEPTHS[cells]), tissue)
+    simulation = prepare_cut(Cut(scene, _WAY, DEPTHS[cells]), tissue)
     spent_on: list[float] = []
     simulation.pictures.append(_into_nothing(simulation, spent_on))
     simulation.run(simulation.stroke.duration)

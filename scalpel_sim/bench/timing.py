@@ -10,7 +10,7 @@ from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
 from tissue import FloatArray
 
-TURN = 0.1
+_TURN = 0.1
 """How long a case runs in each round [s]: long against a time slice of the system, short against
 what changes on a shared machine."""
 LEAST_SAMPLES = 3
@@ -48,7 +48,7 @@ def interleaved(
     n_rounds: int,
     *,
     clock: Clock = CPU,
-    turn: float = TURN,
+    turn: float = _TURN,
     watch: Watch = SILENT,
 ) -> list[list[FloatArray]]:
     """Return the seconds that each sample took a call: for each case, an array for each round.

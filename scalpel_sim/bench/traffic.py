@@ -41,7 +41,7 @@ DAMPED = (
     Sweep(ELASTIC_SLOT, 32, *_LAST),
 )
 """Forces and dampers at three positions, and dampers once more at the second of them."""
-UNDAMPED = (
+_UNDAMPED = (
     Sweep(ELASTIC_SLOT, 18, *_FIRST),
     Sweep(ELASTIC_SLOT, 18, 3 + 3 + 4, 70),
     Sweep(ELASTIC_SLOT, 18, *_LAST),
@@ -70,7 +70,7 @@ def traffic(row_lengths: list[int], *, is_damped: bool) -> Traffic:
     """Return the traffic of a step of nodes with so many springs each."""
     n_nodes = len(row_lengths)
     n_slots = sum(-(-length // WIDTH) * WIDTH for length in row_lengths)
-    sweeps = DAMPED if is_damped else UNDAMPED
+    sweeps = DAMPED if is_damped else _UNDAMPED
     return Traffic(
         n_springs=sum(row_lengths) // 2,
         n_slots=n_slots,

@@ -10,10 +10,10 @@ from rich.table import Table
 from scalpel_sim.errors import unknown
 from tissue import DAMPING_BAND, MATERIALS, Figure, Preset
 
-KPA_PER_PA = 1e-3
-MM_PER_M = 1e3
+_KPA_PER_PA = 1e-3
+_MM_PER_M = 1e3
 
-NOT_CONFIRMED = "*"
+_NOT_CONFIRMED = "*"
 """Marks a figure that could not be traced to a measurement."""
 
 HEADINGS = ("name", "E, kPa", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
@@ -56,18 +56,18 @@ def print_presets(presets: Sequence[Preset]) -> None:
     for preset in presets:
         table.add_row(
             preset.name,
-            _marked(preset.young_modulus, KPA_PER_PA),
+            _marked(preset.young_modulus, _KPA_PER_PA),
             _marked(preset.poisson_ratio),
             _marked(preset.density),
             _marked(preset.toughness),
             _marked(preset.damping_ratio),
             _marked(preset.blade_friction),
-            f"{preset.toughness.value / preset.young_modulus.value * MM_PER_M:.1f}",
+            f"{preset.toughness.value / preset.young_modulus.value * _MM_PER_M:.1f}",
         )
     console.print(table)
     low, high = DAMPING_BAND
     console.print(
-        f"{NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
+        f"{_NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
         "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
         f"stretching at {low:g} and {high:g} Hz, less between. friction: on the faces of "
         "a blade. J / E: how far a blade drags the tissue along before it parts.",
@@ -86,12 +86,12 @@ def print_presets(presets: Sequence[Preset]) -> None:
 
 def _marked(figure: Figure, scale: float = 1.0) -> str:
     """Return the number, with a mark if nobody was found to have measured it."""
-    return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else NOT_CONFIRMED}"
+    return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else _NOT_CONFIRMED}"
 
 
 def _line(name: str, figure: Figure) -> str:
     """Return what is known of a figure, in a line."""
-    mark = "" if figure.is_confirmed else NOT_CONFIRMED
+    mark = "" if figure.is_confirmed else _NOT_CONFIRMED
     source = f" [{figure.source}]" if figure.source else ""
     return f"  {name}{mark}: {figure.measured}{source}"
 

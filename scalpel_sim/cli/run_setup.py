@@ -30,7 +30,7 @@ from scalpel_sim.scenes import (
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.warm_up import kernels_are_compiled, warm_up
 
-log = logging.getLogger("scalpel_sim")
+_log = logging.getLogger("scalpel_sim")
 
 LONGEST_RUN = 3600.0
 """[s] of simulated time: more is a slip of the keyboard."""
@@ -84,7 +84,7 @@ def _tissue_here(
     check_folder(_folder(motion, scene))
     scene, springs = springs_as_asked(scene, body)
     load_kernels(talk)
-    log.info("settling %s", scene.about)
+    _log.info("settling %s", scene.about)
     return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs
 
 

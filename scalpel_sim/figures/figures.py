@@ -25,17 +25,17 @@ TOWARDS_EYE = np.array([0.9, -2.0, 1.9])
 """Where the eye stands, in diagonals of the body: one looks along the cut, and into it."""
 LAMP = np.array([-0.6, -0.5, 1.2])
 """From behind the viewer's left shoulder, so that the light falls into the cut."""
-STEEL = (0.80, 0.82, 0.85)
+_STEEL = (0.80, 0.82, 0.85)
 RELIEF = 0.02
-WIDTH, HEIGHT = 640, 520
+_WIDTH, HEIGHT = 640, 520
 """Of each panel [pixels]."""
 WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
-GAP = 12
+_GAP = 12
 """Between panels [pixels]."""
 LINE = 26
 """Height of a line of text [pixels]."""
-DOTS_PER_INCH = 150
+_DOTS_PER_INCH = 150
 
 
 class Drawn(NamedTuple):
@@ -98,7 +98,7 @@ def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Dra
 def _view(seen: Sequence[Moment], margins: Margins) -> View:
     """Return the view that holds the body at all moments."""
     points = np.concatenate([moment.surface.positions for moment in seen])
-    return framing(points, _diagonal(seen[0]) * TOWARDS_EYE, WIDTH, HEIGHT, margins)
+    return framing(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
 
 
 def _diagonal(moment: Moment) -> float:
@@ -120,7 +120,7 @@ def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
             )
         )
     for mesh, shape in moment.tool if with_tool else ():
-        red, green, blue = STEEL if shape.is_blade else shape.colour[:3].tolist()
+        red, green, blue = _STEEL if shape.is_blade else shape.colour[:3].tolist()
         gloss = 1.2 if shape.is_blade else 0.4
         things.append(Thing(mesh, (red, green, blue), gloss=gloss, shininess=80.0, is_slender=True))
     bounds = np.stack([surface.positions.min(axis=0), surface.positions.max(axis=0)])
@@ -131,17 +131,17 @@ def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
 def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path) -> None:
     """Write panels, two in a row, each with its letter and label below, and the title last."""
     n_rows = math.ceil(len(panels) / 2)
-    width = 2 * WIDTH + 3 * GAP
-    height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
-    figure = Figure(figsize=(width / DOTS_PER_INCH, height / DOTS_PER_INCH), facecolor="white")
+    width = 2 * _WIDTH + 3 * _GAP
+    height = n_rows * (HEIGHT + LINE + _GAP) + 2 * LINE + 2 * _GAP
+    figure = Figure(figsize=(width / _DOTS_PER_INCH, height / _DOTS_PER_INCH), facecolor="white")
     for i, (panel, label) in enumerate(zip(panels, labels, strict=True)):
-        left = GAP + (i % 2) * (WIDTH + GAP)
-        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + GAP) + LINE
-        axes = figure.add_axes((left / width, bottom / height, WIDTH / width, HEIGHT / height))
+        left = _GAP + (i % 2) * (_WIDTH + _GAP)
+        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + _GAP) + LINE
+        axes = figure.add_axes((left / width, bottom / height, _WIDTH / width, HEIGHT / height))
         axes.imshow(panel, interpolation="none", aspect="auto")
         axes.set_axis_off()
         figure.text(
-            (left + WIDTH / 2) / width,
+            (left + _WIDTH / 2) / width,
             (bottom - LINE / 2) / height,
             f"{'abcd'[i]})  {label}",
             ha="center",
@@ -150,7 +150,7 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         )
     figure.text(
         0.5,
-        (GAP + LINE) / height,
+        (_GAP + LINE) / height,
         f"{title}\n(after Bielser, Maiwald, Gross 1998)",
         ha="center",
         va="center",
@@ -158,7 +158,7 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         style="italic",
     )
     try:
-        FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH, format="png")
+        FigureCanvasAgg(figure).print_figure(path, dpi=_DOTS_PER_INCH, format="png")
     except OSError as error:
         raise RunError(
             f"{path}: cannot be written ({error.strerror or error}); choose another --output"

@@ -21,7 +21,7 @@ MAP_PIXELS = 320
 BIAS = 2.5
 """How far a point must lie behind what the light sees to be in its shadow, in pixels of the map.
 Less, and surfaces that the light grazes have stripes; more, and shadows come off their bodies."""
-LIFT = 2.0
+_LIFT = 2.0
 """How far off its surface a point is looked up, in pixels of the map, for the same reason."""
 FAINTEST = 1e-3
 """Share of a light in a highlight below which none is seen, and none is computed."""
@@ -129,7 +129,7 @@ def _light_on(
             facing = normals[i, 0] * lx + normals[i, 1] * ly + normals[i, 2] * lz
             if facing <= 0.0 or flat[i, 0] * lx + flat[i, 1] * ly + flat[i, 2] * lz <= 0.0:
                 continue
-            lift = LIFT / scales[k]
+            lift = _LIFT / scales[k]
             x = points[i, 0] + lift * flat[i, 0] - eyes[k, 0]
             y = points[i, 1] + lift * flat[i, 1] - eyes[k, 1]
             z = points[i, 2] + lift * flat[i, 2] - eyes[k, 2]

@@ -8,7 +8,7 @@ import numpy as np
 from tissue import FloatArray, IntArray
 from tissue.core.jit import kernel
 
-FLAT = 1e-12
+_FLAT = 1e-12
 """Twice the area [pixels squared] up to which a triangle is seen edge-on, and shows nothing."""
 
 
@@ -51,7 +51,7 @@ def _rasterise(
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
         twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if not abs(twice_area) > FLAT:
+        if not abs(twice_area) > _FLAT:
             continue
         x_low = max(0, math.ceil(min(ax, min(bx, cx)) - 0.5))
         x_high = min(width - 1, math.floor(max(ax, max(bx, cx)) - 0.5))
@@ -99,7 +99,7 @@ def draw_segments(
     for i in range(len(ends)):
         ax, ay, az = ends[i, 0, 0], ends[i, 0, 1], ends[i, 0, 2]
         dx, dy, dz = ends[i, 1, 0] - ax, ends[i, 1, 1] - ay, ends[i, 1, 2] - az
-        squared = max(dx * dx + dy * dy, FLAT)
+        squared = max(dx * dx + dy * dy, _FLAT)
         x_low = max(0, math.ceil(min(ax, ax + dx) - half - 0.5))
         x_high = min(width - 1, math.floor(max(ax, ax + dx) + half - 0.5))
         y_low = max(0, math.ceil(min(ay, ay + dy) - half - 0.5))

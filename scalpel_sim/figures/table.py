@@ -5,7 +5,7 @@ import numpy as np
 from scalpel_sim.viewer.draping import TriangleMesh
 from tissue import FloatArray
 
-REACH = 6.0
+_REACH = 6.0
 """Half width, in diagonals of the body: as far as its shadow can be seen."""
 N_SQUARES = 48
 """Along each side. Those that reach behind the eye are left out, so they must be small."""
@@ -14,7 +14,7 @@ N_SQUARES = 48
 def table_below(bounds: FloatArray) -> TriangleMesh:
     """Return a level square under the middle of a body with these bounds [m], shape (2, 3)."""
     centre = bounds.mean(axis=0)
-    reach = REACH * float(np.linalg.norm(bounds[1] - bounds[0]))
+    reach = _REACH * float(np.linalg.norm(bounds[1] - bounds[0]))
     line = np.linspace(-reach, reach, N_SQUARES + 1)
     x, y = np.meshgrid(centre[0] + line, centre[1] + line, indexing="ij")
     positions = np.stack([x, y, np.full_like(x, bounds[0, 2])], axis=-1).reshape(-1, 3)

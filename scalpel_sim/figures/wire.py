@@ -6,14 +6,14 @@ from scalpel_sim.figures.camera import View
 from scalpel_sim.figures.rasterise import draw_segments, rasterise
 from tissue import FloatArray, IntArray, Snapshot, Surface
 
-PAPER = (1.0, 1.0, 1.0)
+_PAPER = (1.0, 1.0, 1.0)
 SKIN_FACE, CUT_FACE = (0.955, 0.96, 0.97), (1.0, 0.86, 0.84)
 SKIN_LINE, CUT_LINE = (0.13, 0.16, 0.22), (0.75, 0.10, 0.10)
 HIDDEN = 0.13
 """Opacity of lines behind faces: they tell how deep the mesh goes, and do not confuse."""
-THICKNESS = 1.1
+_THICKNESS = 1.1
 """Of the lines [pixels]."""
-SLACK = 2e-3
+_SLACK = 2e-3
 """How much nearer, as a fraction, a face must be to hide a line: lines lie on faces, and faces that
 are this thin beside their distance hide nothing that one would miss."""
 
@@ -33,7 +33,7 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
     corners = fine.project(surface.positions)[surface.triangles]
     raster = rasterise(corners, fine.width, fine.height)
     image = np.empty((fine.height, fine.width, 3))
-    image[:] = PAPER
+    image[:] = _PAPER
     seen = raster.triangle >= 0
     is_cut = np.zeros_like(seen)
     is_cut[seen] = surface.is_cut[raster.triangle[seen]]
@@ -49,7 +49,7 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
     for edges, positions, colour, is_surface in groups:
         visible, hidden = np.zeros(seen.shape), np.zeros(seen.shape)
         ends = np.ascontiguousarray(fine.project(positions)[edges])
-        draw_segments(ends, raster.nearness, samples * THICKNESS, SLACK, visible, hidden)
+        draw_segments(ends, raster.nearness, samples * _THICKNESS, _SLACK, visible, hidden)
         drawn = visible if is_surface else HIDDEN * np.maximum(visible, hidden)
         image += drawn[:, :, None] * (np.array(colour) - image)
     return image.reshape(view.height, samples, view.width, samples, 3).mean(axis=(1, 3))

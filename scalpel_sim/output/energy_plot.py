@@ -11,7 +11,7 @@ from scalpel_sim.output.energy_terms import TERMS, Term
 from scalpel_sim.output.force_plot import DOTS_PER_INCH, MAGNITUDE, legend, plain
 from scalpel_sim.output.recording import Recording
 
-MJ_PER_J = 1e3
+_MJ_PER_J = 1e3
 PERCENT = 100.0
 
 SMALLEST_SHOWN = 0.003
@@ -21,7 +21,7 @@ could be seen. The table has it."""
 OPACITY = 0.85
 """So that the grid is seen through what is stacked."""
 
-MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
+_MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
 """Fixed: see `scalpel_sim.output.force_plot`."""
 
 
@@ -30,11 +30,13 @@ def plot_energies(recording: Recording, title: str, path: Path) -> None:
     time = recording.column("time_s")
     work = recording.column("work_of_blade_j")
     figure = Figure(figsize=(8.0, 5.8))
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0), gridspec_kw=MARGINS)
+    above, below = figure.subplots(
+        2, 1, sharex=True, height_ratios=(3.2, 1.0), gridspec_kw=_MARGINS
+    )
     figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
     for sign in (1.0, -1.0):
         _stack(above, time, recording, sign)
-    above.plot(time, MJ_PER_J * work, color=MAGNITUDE, lw=1.6, label="work of the blade")
+    above.plot(time, _MJ_PER_J * work, color=MAGNITUDE, lw=1.6, label="work of the blade")
     above.axhline(0.0, color=MAGNITUDE, lw=0.6)
     above.set_ylabel("energy [mJ]")
     legend(above, 4)
@@ -53,19 +55,19 @@ def plot_energies(recording: Recording, title: str, path: Path) -> None:
 def _stack(axes: Axes, time: np.ndarray, recording: Recording, sign: float) -> None:
     """Draw what took energy upwards from zero, or with the other sign what gave it downwards."""
     base = np.zeros_like(time)
-    for term in shown(recording):
+    for term in _shown(recording):
         height = np.clip(sign * _of(recording, term), 0.0, None)
         if height.any():
             is_first = sign > 0.0 or not (_of(recording, term) > 0.0).any()
             label = term.label if is_first else None
-            low, high = sign * MJ_PER_J * base, sign * MJ_PER_J * (base + height)
+            low, high = sign * _MJ_PER_J * base, sign * _MJ_PER_J * (base + height)
             axes.fill_between(
                 time, low, high, color=term.colour, lw=0.0, alpha=OPACITY, label=label
             )
             base = base + height
 
 
-def shown(recording: Recording) -> list[Term]:
+def _shown(recording: Recording) -> list[Term]:
     """Return the terms that are large enough to be seen."""
     sizes = [float(np.abs(_of(recording, term)).max(initial=0.0)) for term in TERMS]
     return [

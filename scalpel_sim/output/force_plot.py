@@ -20,14 +20,14 @@ PARTS = (
     ("friction_force", "faces, friction", "#e69f00"),
 )
 MAGNITUDE = "#222222"
-AREA = "#aa3377"
+_AREA = "#aa3377"
 LIMITED = "#d55e00"
 DOTS_PER_INCH = 150
-MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.065, "top": 0.91, "hspace": 0.16}
+_MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.065, "top": 0.91, "hspace": 0.16}
 """Fixed: to let matplotlib find them by itself would draw everything twice."""
-MM2_PER_M2 = 1e6
+_MM2_PER_M2 = 1e6
 
-SAME = 1e-9
+_SAME = 1e-9
 """Relative difference between what the tissue did and what the arm felt that is only rounding."""
 
 
@@ -36,7 +36,7 @@ def plot_forces(recording: Recording, title: str, path: Path) -> None:
     time = recording.column("time_s")
     figure = Figure(figsize=(8.0, 7.2))
     above, middle, below = figure.subplots(
-        3, 1, sharex=True, height_ratios=(1.6, 1.2, 0.8), gridspec_kw=MARGINS
+        3, 1, sharex=True, height_ratios=(1.6, 1.2, 0.8), gridspec_kw=_MARGINS
     )
     figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
     _plot_felt(above, time, recording)
@@ -75,7 +75,7 @@ def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
     """Draw what the arm feels; where the device is at its limit, what the tissue did instead."""
     force, raw = recording.vector("force"), recording.vector("tissue_force")
     size, wanted = (np.linalg.norm(vectors, axis=1) for vectors in (force, raw))
-    is_limited = np.abs(force - raw).max(axis=1, initial=0.0) > SAME * wanted
+    is_limited = np.abs(force - raw).max(axis=1, initial=0.0) > _SAME * wanted
     axes.plot(time, size, color=MAGNITUDE, lw=1.6, label="magnitude")
     for i, (axis, colour) in enumerate(COMPONENTS):
         axes.plot(time, force[:, i], color=colour, lw=1.0, label=f"${axis}$")
@@ -100,8 +100,8 @@ def _plot_parts(axes: Axes, time: np.ndarray, recording: Recording) -> None:
 
 
 def _plot_area(axes: Axes, time: np.ndarray, recording: Recording) -> None:
-    area = recording.column("cut_area_m2") * MM2_PER_M2
-    axes.fill_between(time, area, color=AREA, alpha=0.15, lw=0.0)
-    axes.plot(time, area, color=AREA, lw=1.6)
+    area = recording.column("cut_area_m2") * _MM2_PER_M2
+    axes.fill_between(time, area, color=_AREA, alpha=0.15, lw=0.0)
+    axes.plot(time, area, color=_AREA, lw=1.6)
     axes.set_ylabel("cut area [mm²]")
     axes.set_ylim(bottom=0.0)

@@ -13,6 +13,11 @@ SLOWEST = 60.0
 """How long a plot may take [s]: a second, or ten when matplotlib first looks for fonts."""
 
 
+_PROGRAM = (
+    "from scalpel_sim.output.plot_process import draw_requested_plots; draw_requested_plots()"
+)
+
+
 class Plotter:
     """A process that draws on request. It ends when it is closed, or when this process ends.
 
@@ -22,7 +27,7 @@ class Plotter:
     def __init__(self) -> None:
         # A session of its own: the Ctrl-C that ends a run must not end the drawing of it.
         self._process = subprocess.Popen(
-            [sys.executable, "-c", "from scalpel_sim.output.plot_process import main; main()"],
+            [sys.executable, "-c", _PROGRAM],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -68,7 +73,7 @@ class Plotter:
             cast(IO[str], pipe).close()
 
 
-def main() -> None:
+def draw_requested_plots() -> None:
     """Load what is needed, and draw what the standard input then asks for."""
     from scalpel_sim.output.energy_plot import plot_energies
     from scalpel_sim.output.force_plot import plot_forces

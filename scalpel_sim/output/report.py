@@ -18,21 +18,21 @@ MOST_PIECES = 8
 """Pieces that the table has rows for, the largest; `summary.json` has them all."""
 
 G_PER_KG = 1e3
-KPA_PER_PA = 1e-3
+_KPA_PER_PA = 1e-3
 CM3_PER_M3 = 1e6
-MM_PER_M = 1e3
-MM2_PER_M2 = 1e6
-MJ_PER_J = 1e3
+_MM_PER_M = 1e3
+_MM2_PER_M2 = 1e6
+_MJ_PER_J = 1e3
 
 
-PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
+_PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
 """By scene. The paper has no such figures for the other bodies."""
 
 
 def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> None:
     """Add how far the cut is off the blade's path, and what following it costs."""
     mean, largest, altitude, before = (
-        f"{quality[name] * MM_PER_M:.3g}"
+        f"{quality[name] * _MM_PER_M:.3g}"
         for name in (
             "path_error_mean_m",
             "path_error_largest_m",
@@ -54,7 +54,7 @@ def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> 
 def _add_springs(row: Callable[[str, str], None], springs: dict[str, float]) -> None:
     """Add what the springs are like on this mesh, beside what they stand for."""
     mean, softest, stiffest = (
-        springs[f"young_modulus_{which}pa"] * KPA_PER_PA for which in ("", "softest_", "stiffest_")
+        springs[f"young_modulus_{which}pa"] * _KPA_PER_PA for which in ("", "softest_", "stiffest_")
     )
     error = springs["young_modulus_error"]
     row("springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}")
@@ -80,13 +80,13 @@ def _add_counters(row: Callable[[str, str], None], counters: dict[str, Any]) -> 
             row(label, f"{counters[name]:,} frames")
     passivity = counters.get("passivity", {})
     if passivity.get("frames"):
-        away = passivity["injected_away"] * MJ_PER_J
+        away = passivity["injected_away"] * _MJ_PER_J
         row("damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ")
 
 
 def print_table(summary: Summary, console: Console) -> None:
     """Print the figures of a run as a table."""
-    paper = PAPER.get(summary.scene)
+    paper = _PAPER.get(summary.scene)
     table = Table(
         title=f"{summary.scene}: {summary.settings['stroke']} stroke",
         title_justify="left",
@@ -123,12 +123,12 @@ def print_table(summary: Summary, console: Console) -> None:
         _add_quality(row, summary.quality)
     if "springs" in summary.settings:
         _add_springs(row, summary.settings["springs"])
-    row("cut area", f"{summary.cut_area_m2 * MM2_PER_M2:,.0f} mm²")
+    row("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
     row("peak force", f"{summary.force_peak_n:.3f} N")
     row("mean force", f"{summary.force_mean_n:.3f} N")
     for pair, frames in summary.touched.items():
         row(f"met: {pair}", f"{frames:,} frames")
-    row("work of the blade", f"{summary.work_of_blade_j * MJ_PER_J:.2f} mJ")
+    row("work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ")
     _add_counters(row, summary.counters)
     row(
         "frames/s, median",
@@ -159,7 +159,7 @@ def _account(energies: dict[str, float], residual_of_work: float | None) -> Tabl
 
     def row(label: str, energy: float, share: float | None) -> None:
         shown = "" if share is None else f"{share:.2%}"
-        table.add_row(label, f"{energy * MJ_PER_J:.4f} mJ", shown)
+        table.add_row(label, f"{energy * _MJ_PER_J:.4f} mJ", shown)
 
     row("work of the blade", work, 1.0 if work else None)
     table.add_section()

@@ -12,11 +12,11 @@ from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray, Tissue
 
-SPEED = 0.06
+_SPEED = 0.06
 """Of the blade [m/s]."""
 POSE_EVERY = 1e-3
 """Between two poses of a stroke [m]."""
-ABOVE = 0.35
+_ABOVE = 0.35
 """How far the edge reaches above the body, as a share of its height."""
 
 
@@ -52,12 +52,14 @@ def _stroke(cut: Cut, bounds: FloatArray) -> Stroke:
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     height = float(high[2] - low[2])
     up = np.array([np.sin(cut.lean), 0.0, np.cos(cut.lean)])
-    below, above = cut.depth * height, ABOVE * height
+    below, above = cut.depth * height, _ABOVE * height
     segments = []
     for (x, y), forward in zip(way, ahead, strict=True):
         at = np.array([x, y, high[2]])
         segments.append(BladeSegment(at - below * up, at + above * up, np.array([*forward, 0.0])))
-    times = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]) / SPEED
+    times = (
+        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]) / _SPEED
+    )
     return Stroke(times, segments, cut.scene.name)
 
 

@@ -43,18 +43,18 @@ SHIFTS = (0.0, 0.04, -0.04, 0.08, -0.08, 0.12, -0.12, 0.16, -0.16, 0.2, -0.2)
 branched body falls into more than two parts at the middle, the nearest place is taken where it
 does not."""
 
-HELD = 0.06
+_HELD = 0.06
 """Fraction of the body's width at each end that a sheet must leave whole: the held sides are there
 (5 % of the width on a body without flat sides)."""
 
 ABOUT_EQUAL = 0.8
 """The blade lies level, and moves down, where the section is this much thinner than it is high."""
 
-BLADE_MARGIN, BLADE_MARGIN_SHARE = 5e-3, 0.3
+_BLADE_MARGIN, BLADE_MARGIN_SHARE = 5e-3, 0.3
 """By how much the blade is longer than the section, at both ends: [m], plus a share of the section.
 Tissue sags, stretches, and is dragged along; a blade that it slips off leaves a bridge."""
 
-GAP, GAP_SHARE = 5e-3, 0.1
+_GAP, GAP_SHARE = 5e-3, 0.1
 """How far before the body the blade starts: [m], plus a share of the section's length."""
 
 OVERSHOOT, OVERSHOOT_SHARE = 15e-3, 0.4
@@ -83,17 +83,17 @@ DEEPEST_PRESS = 0.1
 PRESS_DWELL = 0.5
 """How long the blade rests at the end of a press [s]: the tissue comes to rest under it."""
 
-RAMP = 0.1
+_RAMP = 0.1
 """Time in which the blade gathers its speed, and loses it [s]: the arm has inertia."""
 
 SAMPLE = 5e-3
 """Time between the poses of a planned stroke [s]. 20 of them make a ramp."""
 
-MOST_SAMPLES = 2000
+_MOST_SAMPLES = 2000
 """Between the ramps: what a stroke of 10 s takes. On a longer one they lie farther apart, so that a
 mesh in millimetres that is read as metres is soon refused for its size."""
 
-log = logging.getLogger("scalpel_sim")
+_log = logging.getLogger("scalpel_sim")
 
 
 def plan(
@@ -131,7 +131,7 @@ def plan(
     travels, depths = sheet.travel(cut), sheet.depth(cut)
     first, last = float(travels.min()), float(travels.max())
     length = last - first
-    start = first - max(GAP + GAP_SHARE * length, 0.5 * speed * RAMP)
+    start = first - max(_GAP + GAP_SHARE * length, 0.5 * speed * _RAMP)
     thickness = float(np.ptp(depths))
     give = _give(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
     end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + give
@@ -143,7 +143,7 @@ def plan(
             depth = min(harmless, DEEPEST_PRESS * length)
         _check_positive("depth", depth, "m")
         end = first + depth
-    margin = BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * give
+    margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * give
     times, travels = _timed(sheet, start, end, speed)
     segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
     if name == "press":
@@ -181,7 +181,7 @@ def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Sheet:
         first = first or sheet
     if first is None:
         raise StrokeError("the body has no section across its middle; is it in two pieces?")
-    log.warning("no %s stroke near the middle of the body parts it in exactly two", name)
+    _log.warning("no %s stroke near the middle of the body parts it in exactly two", name)
     return first
 
 
@@ -238,7 +238,7 @@ def _divides(sheet: Sheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) 
     whole = edges[above[edges[:, 0]] == above[edges[:, 1]]]
     parts, _ = components(len(mesh.positions), whole)
     x = mesh.positions[:, 0]
-    margin = HELD * np.ptp(x)
+    margin = _HELD * np.ptp(x)
     left, right = above[x <= x.min() + margin], above[x >= x.max() - margin]
     return parts == pieces + 1 and not left.any() and bool(right.all())
 
@@ -265,17 +265,17 @@ def _give(width: float, length: float, thickness: float, material: Material) -> 
 def _timed(sheet: Sheet, start: float, end: float, speed: float) -> tuple[FloatArray, FloatArray]:
     """Return times [s] and travels [m] along the motion, at an even speed along the sheet's bend.
 
-    The speed rises and falls as half a cosine over `RAMP`; a way too short for that is taken more
+    The speed rises and falls as half a cosine over `_RAMP`; a way too short for that is taken more
     slowly.
     """
     fine = np.linspace(start, end, 1001)  # a bend of 11 % is followed to 1e-6 of its length
     pieces = np.hypot(np.diff(fine), np.diff(sheet.bulge(fine)[0]))
     ways = np.concatenate([[0.0], np.cumsum(pieces)])
-    speed = min(speed, ways[-1] / RAMP)
-    duration = ways[-1] / speed + RAMP
-    ramp = np.linspace(0.0, RAMP, math.ceil(RAMP / SAMPLE) + 1)
-    n_even = min(math.ceil((duration - 2.0 * RAMP) / SAMPLE), MOST_SAMPLES)
-    even = np.linspace(RAMP, duration - RAMP, n_even + 1)
+    speed = min(speed, ways[-1] / _RAMP)
+    duration = ways[-1] / speed + _RAMP
+    ramp = np.linspace(0.0, _RAMP, math.ceil(_RAMP / SAMPLE) + 1)
+    n_even = min(math.ceil((duration - 2.0 * _RAMP) / SAMPLE), _MOST_SAMPLES)
+    even = np.linspace(_RAMP, duration - _RAMP, n_even + 1)
     # Rounded to a nanosecond, so that the ends of the parts are one and the same.
     times = np.unique(np.concatenate([ramp, even, duration - ramp]).round(9))
     duration = float(times[-1])
@@ -289,8 +289,8 @@ def _timed(sheet: Sheet, start: float, end: float, speed: float) -> tuple[FloatA
 
 def _ramped(times: FloatArray, speed: float) -> FloatArray:
     """Return the way covered since a start from rest [m]."""
-    ramp = np.minimum(times, RAMP)
-    gathering = 0.5 * speed * (ramp - RAMP / math.pi * np.sin(math.pi * ramp / RAMP))
+    ramp = np.minimum(times, _RAMP)
+    gathering = 0.5 * speed * (ramp - _RAMP / math.pi * np.sin(math.pi * ramp / _RAMP))
     return gathering + speed * (times - ramp)
 
 

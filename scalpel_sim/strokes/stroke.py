@@ -12,13 +12,13 @@ import numpy as np
 from scalpel_sim.errors import UsageError
 from tissue import BladeSegment, FloatArray
 
-SAME_LENGTH = 0.01
+_SAME_LENGTH = 0.01
 """By which fraction the blade's length may vary along a stroke: what rounding in a file leaves."""
 
 FASTEST = 2.0
 """[m/s]. No hand cuts faster; times in milliseconds or positions in millimetres do."""
 
-COLUMNS = ("t", "tip_x", "tip_y", "tip_z", "heel_x", "heel_y", "heel_z")
+_COLUMNS = ("t", "tip_x", "tip_y", "tip_z", "heel_x", "heel_y", "heel_z")
 FORWARD_COLUMNS = ("forward_x", "forward_y", "forward_z")
 
 
@@ -115,13 +115,13 @@ def from_csv(path: str | Path) -> Stroke:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
-        raise StrokeError(f"{path} is empty; its first line is {','.join(COLUMNS)}")
+        raise StrokeError(f"{path} is empty; its first line is {','.join(_COLUMNS)}")
     columns = _columns(path, *numbered[0])
     table = np.array([_row(path, number, cells, columns) for number, cells in numbered[1:]])
     if len(table) < 2:
         raise StrokeError(f"{path} has {len(table)} poses; a stroke needs at least two")
     times, tips, heels = table[:, 0], table[:, 1:4], table[:, 4:7]
-    if len(columns) > len(COLUMNS):
+    if len(columns) > len(_COLUMNS):
         forwards = table[:, 7:10]
     else:
         forwards = _forwards_of_motion(path, tips, heels)
@@ -154,7 +154,7 @@ def _check(times: FloatArray, tips: FloatArray, heels: FloatArray, forwards: Flo
     lengths = np.linalg.norm(edges, axis=1)
     if (lengths == 0.0).any():
         raise _PoseError(int(np.argmin(lengths)), "tip and heel coincide: the blade has no length")
-    off = np.abs(lengths - lengths[0]) > SAME_LENGTH * lengths[0]
+    off = np.abs(lengths - lengths[0]) > _SAME_LENGTH * lengths[0]
     if off.any():
         i = int(np.argmax(off))
         raise _PoseError(
@@ -205,11 +205,11 @@ def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
 def _columns(path: Path, number: int, header: list[str]) -> list[int]:
     """Return where each of the columns is, in the order in which they are used."""
     names = [name.lower() for name in header]
-    wanted = COLUMNS + (FORWARD_COLUMNS if set(FORWARD_COLUMNS) & set(names) else ())
+    wanted = _COLUMNS + (FORWARD_COLUMNS if set(FORWARD_COLUMNS) & set(names) else ())
     if sorted(names) != sorted(wanted):
         raise StrokeError(
             f"{path}, line {number}: the columns are '{','.join(header)[:200]}'; wanted "
-            f"{','.join(COLUMNS)} and, if the blade does not cut the way it moves, "
+            f"{','.join(_COLUMNS)} and, if the blade does not cut the way it moves, "
             f"{','.join(FORWARD_COLUMNS)}"
         )
     return [names.index(name) for name in wanted]

@@ -22,15 +22,15 @@ from tissue import BladeSegment, BladeShape, Energies, FloatArray
 
 LARGEST_RESIDUAL = 0.005
 """Of the blade's work: the issue's bound."""
-SPEED = 0.05
+_SPEED = 0.05
 """[m/s]."""
-FRICTION = 0.3
+_FRICTION = 0.3
 SHOWN = ("work_of_blade", "cutting", "friction", "elastic", "damping")
 """What the plots show of the account."""
-MJ_PER_J = 1e3
+_MJ_PER_J = 1e3
 
 
-class Stroke(NamedTuple):
+class _Stroke(NamedTuple):
     """A way of the blade, and what it meets."""
 
     places: list[BladeSegment]
@@ -40,22 +40,22 @@ class Stroke(NamedTuple):
     """Toughness of the skin [J/m2]."""
 
 
-def press() -> list[BladeSegment]:
+def _press() -> list[BladeSegment]:
     """Push the edge 2 mm into the side of the block, and let go."""
-    y = np.arange(-0.003, 0.002, SPEED * DT)
+    y = np.arange(-0.003, 0.002, _SPEED * DT)
     return [edge((MIDDLE, at, -0.005)) for at in np.concatenate((y, y[::-1]))]
 
 
 def slanted() -> list[BladeSegment]:
     """A blade that leans to the side and drifts there by a tenth of its way: side load."""
-    y = np.arange(-0.003, LENGTH, SPEED * DT)
+    y = np.arange(-0.003, LENGTH, _SPEED * DT)
     return [edge((0.014 + 0.1 * at, at, -0.005), along=(0.3, 0.0, 1.0)) for at in y]
 
 
 def curved() -> list[BladeSegment]:
     """An arc of 40 mm radius; the blade faces along it."""
     radius = 0.04
-    angle = np.arange(-0.6, 0.6, SPEED * DT / radius)
+    angle = np.arange(-0.6, 0.6, _SPEED * DT / radius)
     return [
         edge(
             (MIDDLE - radius * (1.0 - np.cos(a)), 0.5 * LENGTH + radius * np.sin(a), -0.005),
@@ -65,16 +65,16 @@ def curved() -> list[BladeSegment]:
     ]
 
 
-def strokes(quick: bool) -> dict[str, Stroke]:
+def strokes(quick: bool) -> dict[str, _Stroke]:
     """Return the strokes by name."""
     deep = 0.6 * THICKNESS
     chosen = {
-        "press": Stroke(press(), toughness=40.0),
-        "puncture": Stroke(in_and_out(0.01, deep, SPEED), skin=60.0),
-        "straight": Stroke(through(SPEED, end=1.15 * LENGTH)),
-        "slanted": Stroke(slanted()),
-        "curved": Stroke(curved()),
-        "slicing": Stroke(through(SPEED, ratio=1.0)),
+        "press": _Stroke(_press(), toughness=40.0),
+        "puncture": _Stroke(in_and_out(0.01, deep, _SPEED), skin=60.0),
+        "straight": _Stroke(through(_SPEED, end=1.15 * LENGTH)),
+        "slanted": _Stroke(slanted()),
+        "curved": _Stroke(curved()),
+        "slicing": _Stroke(through(_SPEED, ratio=1.0)),
     }
     return {name: chosen[name] for name in ("press", "puncture")} if quick else chosen
 
@@ -91,10 +91,10 @@ def measure(quick: bool) -> Findings:
     for name, stroke in strokes(quick).items():
         for blade in (None, BladeShape()):
             material = rubber(
-                toughness=stroke.toughness, skin_toughness=stroke.skin, blade_friction=FRICTION
+                toughness=stroke.toughness, skin_toughness=stroke.skin, blade_friction=_FRICTION
             )
             record = lead(block_tissue(material, blade=blade, audit=True), stroke.places)
-            kind = "line" if blade is None else f"scalpel, friction {FRICTION:g}"
+            kind = "line" if blade is None else f"scalpel, friction {_FRICTION:g}"
             lines.append(judge(f"{name}, {kind}", record.energies))
             if blade and name in ("puncture", "slanted"):
                 plots.append(_plot(f"Energy of a stroke: {name}, {kind}", record))
@@ -108,7 +108,7 @@ def _plot(title: str, record: Record) -> Plot:
         Curve(
             name.replace("_", " "),
             time,
-            record.accounts[:, Energies._fields.index(name)] * MJ_PER_J,
+            record.accounts[:, Energies._fields.index(name)] * _MJ_PER_J,
         )
         for name in SHOWN
     ]

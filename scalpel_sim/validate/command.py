@@ -46,7 +46,7 @@ def validate(
     check_folder(out)
     with talking(talk):
         load_kernels(talk)
-        done = run(scenes, quick=quick, talk=talk)
+        done = _run(scenes, quick=quick, talk=talk)
         text = as_json(done, quick=quick, versions=versions())
         write(out, done, text, quick=quick)
     if talk.json:
@@ -63,7 +63,7 @@ def validate(
         raise RunError(f"{failed} lines are out of their bounds; {out / PAGE} says which")
 
 
-def run(scenes: Sequence["Scene"], *, quick: bool, talk: Talk) -> list["Done"]:
+def _run(scenes: Sequence["Scene"], *, quick: bool, talk: Talk) -> list["Done"]:
     """Run the scenes one after the other, and say which one is on."""
     from scalpel_sim.validate.results import Done
 

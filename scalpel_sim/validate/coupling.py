@@ -24,7 +24,7 @@ PRESS = changed(SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, arm="
 UJ_PER_J = 1e6
 
 
-def press(hand: str, every: int) -> tuple[Simulation, FloatArray]:
+def _press(hand: str, every: int) -> tuple[Simulation, FloatArray]:
     """Press on tissue that answers every `every` ms, and then do what the hand does.
 
     Returns:
@@ -73,7 +73,7 @@ def measure(quick: bool) -> Findings:
     lines, curves, notes = [], [], []
     for hand in ("lets go",) if quick else HANDS:
         for every in (1, 33) if quick else (1, 5, 10, 33):
-            simulation, energy = press(hand, every)
+            simulation, energy = _press(hand, every)
             counters = simulation.bridge.counters.passivity
             lines.append(judge(hand, every, counters.least_energy))
             force = np.linalg.norm(simulation.recording.vector("force"), axis=1).max()

@@ -18,13 +18,13 @@ from scalpel_sim.validate.block import (
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
 from tissue import MATERIALS, BladeShape, FloatArray, Material
 
-SLOW_TOUGHNESS = 1.1
+_SLOW_TOUGHNESS = 1.1
 """Of gelatine of 10 % by weight, cut slowly [J/m2]."""
-SLOW = 10e-3 / 60.0
+_SLOW = 10e-3 / 60.0
 """Speed up to which that holds [m/s]: 10 mm/min."""
 SLOPE = 0.5
 """Of toughness by speed above it, both as logarithms."""
-NEAR = 0.20
+_NEAR = 0.20
 """How far force / depth may be off: the specification's bound for gels."""
 
 LEAST_10 = 0.52 / 160.0
@@ -41,16 +41,16 @@ PHANTOM_STIFFNESS = 100e3
 
 def published(speed: float) -> float:
     """Toughness of gelatine by speed [J/m2], as Forte et al. measured it with wires."""
-    return SLOW_TOUGHNESS * max(speed / SLOW, 1.0) ** SLOPE
+    return _SLOW_TOUGHNESS * max(speed / _SLOW, 1.0) ** SLOPE
 
 
 def gelatine() -> Material:
     """Return the gelatine of the presets, with the law of toughness of the paper."""
     return replace(
         MATERIALS["gelatin"].material,
-        toughness=SLOW_TOUGHNESS,
+        toughness=_SLOW_TOUGHNESS,
         toughness_exponent=SLOPE,
-        toughness_speed=SLOW,
+        toughness_speed=_SLOW,
     )
 
 
@@ -61,7 +61,7 @@ def force_per_depth(speed: float) -> float:
     return float(record.of_steady(record.resistance).mean() / THICKNESS)
 
 
-def slit(depth: float) -> float:
+def _slit(depth: float) -> float:
     """Draw the point of a scalpel through the top of a phantom; return force / depth [N/m]."""
     material = rubber(young_modulus=PHANTOM_STIFFNESS, toughness=APPARENT)
     y = np.arange(-0.003, 0.75 * LENGTH, 0.1 * DT)
@@ -76,12 +76,12 @@ def measure(quick: bool) -> Findings:
     forces = np.array([force_per_depth(v) for v in speeds])
     lines = [
         Line(f"gelatine, {v * 60e3:,.0f} mm/min: force / depth over published toughness",
-             f / published(v), *within(NEAR))
+             f / published(v), *within(_NEAR))
         for v, f in zip(speeds, forces, strict=True)
     ]  # fmt: skip
     deep = FORCE_12 / PER_DEPTH[1]
     for name, depth in (("10", LEAST_10), ("12", deep))[: 1 if quick else 2]:
-        figure = slit(depth)
+        figure = _slit(depth)
         lines.append(
             Line(f"phantom, blade {name}, {depth * 1e3:.2f} mm deep: force / depth",
                  figure, PER_DEPTH[0] * 0.95, PER_DEPTH[1], "N/m")
@@ -90,7 +90,7 @@ def measure(quick: bool) -> Findings:
 
 
 def _plot(speeds: FloatArray, forces: FloatArray) -> Plot:
-    finely = np.geomspace(SLOW / 10.0, speeds[-1], 100)
+    finely = np.geomspace(_SLOW / 10.0, speeds[-1], 100)
     x = np.log10(finely * 60e3)
     curves = [
         Curve("measured in the simulation", np.log10(speeds * 60e3), np.log10(forces)),

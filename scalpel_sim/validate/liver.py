@@ -17,15 +17,15 @@ from scalpel_sim.validate.findings import (
 from scalpel_sim.validate.puncturing import into
 from tissue import MATERIALS, BladeShape, Material, block
 
-SIZE, CELLS = (0.1, 0.08, 0.05), (10, 8, 5)
+_SIZE, _CELLS = (0.1, 0.08, 0.05), (10, 8, 5)
 """A piece of liver [m]."""
-EDGE = 0.02
+_EDGE = 0.02
 """Length of edge [m]."""
-DEEP, SPEED = 0.035, 0.05
+_DEEP, _SPEED = 0.035, 0.05
 """[m], [m/s]."""
-BESIDE = 3e-3
+_BESIDE = 3e-3
 """How far beside a plane of the mesh it is cut [m]: a third of a cell."""
-STIFFNESS = 15e3
+_STIFFNESS = 15e3
 """Young's modulus [Pa] of liver where it is pressed hard. That of the preset, 4.7 kPa, was measured
 with waves of small strain: with it the blade would dent the tissue by J / E = 35 mm, more than a
 liver is thick, before it cuts. The steady force does not depend on it."""
@@ -44,7 +44,7 @@ GIVES = Known(
     "tissue that is dragged along by J / E = 11 mm, 1.5 nodes of this mesh, gives way by itself in "
     "places, and a few percent of the work go into its motion",
 )
-LOWER = Known(
+_LOWER = Known(
     148.0,
     187.0,
     "the toughness here is that of needles in bovine liver; what was measured with blades in pig "
@@ -68,16 +68,16 @@ class Insertions(NamedTuple):
 def liver(friction: float) -> Material:
     """Return the liver of the presets, as stiff as where it is pressed hard."""
     material = MATERIALS["liver"].material
-    return replace(material, young_modulus=STIFFNESS, blade_friction=friction)
+    return replace(material, young_modulus=_STIFFNESS, blade_friction=friction)
 
 
 def insert_twice(material: Material) -> Insertions:
     """Push a blade in, draw it out, and push it in again: what cutting took is the difference."""
-    mesh = block(CELLS, SIZE)
+    mesh = block(_CELLS, _SIZE)
     blade = BladeShape(height=8e-3)
     tissue = block_tissue(material, mesh=mesh, held="left,right,bottom", blade=blade, audit=True)
-    middle = (0.5 * SIZE[0] + BESIDE, 0.5 * SIZE[1])
-    down = into(EDGE, DEEP, SPEED, middle=middle, top=SIZE[2])
+    middle = (0.5 * _SIZE[0] + _BESIDE, 0.5 * _SIZE[1])
+    down = into(_EDGE, _DEEP, _SPEED, middle=middle, top=_SIZE[2])
     first, _, second = (lead(tissue, way) for way in (down, down[::-1], down))
     n = len(first.work)
     steady = slice(round(BETWEEN[0] * n), round(BETWEEN[1] * n))
@@ -85,12 +85,12 @@ def insert_twice(material: Material) -> Insertions:
     return Insertions(
         first,
         second,
-        force=float(first.force[steady, 2].mean() / EDGE),
-        toughness=float(less.mean() / EDGE),
+        force=float(first.force[steady, 2].mean() / _EDGE),
+        toughness=float(less.mean() / _EDGE),
     )
 
 
-def judge(friction: float, found: Insertions) -> list[Line]:
+def _judge(friction: float, found: Insertions) -> list[Line]:
     """Return the lines of two insertions."""
     name = f"friction {friction:g}"
     return [
@@ -99,7 +99,7 @@ def judge(friction: float, found: Insertions) -> list[Line]:
         Line(f"{name}: toughness by first less second insertion, against the same of pigs",
              found.toughness, *TWICE, unit="J/m²"),
         Line(f"{name}: steady force / edge against that of blades, pig", found.force, *BLADE,
-             unit="N/m", known=LOWER),
+             unit="N/m", known=_LOWER),
     ]  # fmt: skip
 
 
@@ -108,10 +108,10 @@ def measure(quick: bool) -> Findings:
     lines, curves = [], []
     for friction in (0.0,) if quick else (0.0, 0.2):
         found = insert_twice(liver(friction))
-        lines += judge(friction, found)
+        lines += _judge(friction, found)
         for which, record in (("first", found.first), ("second", found.second)):
-            depth = (SIZE[2] - record.tip[:, 2]) * 1e3
-            force = record.force[:, 2] / EDGE
+            depth = (_SIZE[2] - record.tip[:, 2]) * 1e3
+            force = record.force[:, 2] / _EDGE
             curves.append(Curve(f"{which} time, friction {friction:g}", depth, force))
     bands = [
         Band("blade, pig: 187 to 225", *BLADE),

@@ -10,10 +10,10 @@ from scalpel_sim.validate.findings import Plot
 # Okabe and Ito's palette: told apart by those who see fewer colours too.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#222222")
 BANDS = ("#999999", "#e69f00", "#56b4e9")
-DOTS_PER_INCH = 100
+_DOTS_PER_INCH = 100
 MARKED = 12
 """Curves of no more points than this are drawn as points."""
-BESIDE = 5
+_BESIDE = 5
 """A legend of more entries than this stands beside the plot."""
 
 
@@ -39,8 +39,8 @@ def draw(plot: Plot, path: Path) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", lw=0.6)
     axes.set_axisbelow(True)
-    if len(axes.get_legend_handles_labels()[0]) > BESIDE:
+    if len(axes.get_legend_handles_labels()[0]) > _BESIDE:
         figure.legend(frameon=False, fontsize=8, loc="outside right upper")
     else:
         axes.legend(frameon=False, fontsize=8, loc="best")
-    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH, format="png")
+    FigureCanvasAgg(figure).print_figure(path, dpi=_DOTS_PER_INCH, format="png")

@@ -28,12 +28,12 @@ NARROW = 0.001
 """Length of an edge all of which breaks in at once [m]: less than an element's."""
 WIDE = 0.02
 """Length of an edge whose faces rub on what it has cut [m]."""
-DEEP, SPEED = 0.012, 0.05
+_DEEP, _SPEED = 0.012, 0.05
 """[m], [m/s]."""
-TOUGHNESS = 20.0
+_TOUGHNESS = 20.0
 """[J/m2]."""
-FRICTION = 0.2
-NEAR = 0.10
+_FRICTION = 0.2
+_NEAR = 0.10
 """How far the peak may be off: the specification's bound."""
 DROPS = 0.7
 """How much of the peak the force has 10 ms later at most, where skin is three times as tough as
@@ -80,9 +80,11 @@ def stroke(length: float, skin: float, cells: tuple[int, int, int] = FINE) -> Re
         skin: Toughness of the skin over that of the rest.
         cells: Of the block.
     """
-    material = rubber(toughness=TOUGHNESS, skin_toughness=skin * TOUGHNESS, blade_friction=FRICTION)
+    material = rubber(
+        toughness=_TOUGHNESS, skin_toughness=skin * _TOUGHNESS, blade_friction=_FRICTION
+    )
     tissue = block_tissue(material, cells, held="left,right,bottom", blade=BladeShape(), audit=True)
-    return lead(tissue, in_and_out(length, DEEP, SPEED))
+    return lead(tissue, in_and_out(length, _DEEP, _SPEED))
 
 
 def way_in(record: Record) -> Puncture:
@@ -96,7 +98,7 @@ def way_in(record: Record) -> Puncture:
         peak=float(force[peak]),
         plateau=float(force[n // 2 : n].mean()),
         after_peak=float(force[peak + 10]),
-        area_before=float(cutting / TOUGHNESS),
+        area_before=float(cutting / _TOUGHNESS),
     )
 
 
@@ -116,7 +118,7 @@ def way_out(record: Record) -> Withdrawal:
 def judge_in(name: str, found: Puncture, asked: float, known: Known | None = None) -> list[Line]:
     """Return the lines of the way in, where the peak should be `asked` [N]."""
     lines = [
-        Line(f"{name}: peak / (toughness of the skin × edge)", found.peak / asked, *within(NEAR),
+        Line(f"{name}: peak / (toughness of the skin × edge)", found.peak / asked, *within(_NEAR),
              known=known)
     ]  # fmt: skip
     if known is None:
@@ -143,7 +145,7 @@ def measure(quick: bool) -> Findings:
     for skin in (3.0,) if quick else (1.5, 2.0, 3.0):
         name = f"edge of {NARROW * 1e3:g} mm, skin × {skin:g}"
         found = way_in(stroke(NARROW, skin))
-        lines += judge_in(name, found, skin * TOUGHNESS * NARROW)
+        lines += judge_in(name, found, skin * _TOUGHNESS * NARROW)
         if skin == 3.0:
             drop = found.after_peak / found.peak
             lines.append(Line(f"{name}: force 10 ms after the peak / peak", drop, 0.0, DROPS))
@@ -152,7 +154,7 @@ def measure(quick: bool) -> Findings:
     record = stroke(WIDE, 1.5, COARSE if quick else FINE)
     found = way_in(record)
     if not quick:
-        lines += judge_in(name, found, 1.5 * TOUGHNESS * WIDE, known=UNZIPS)
+        lines += judge_in(name, found, 1.5 * _TOUGHNESS * WIDE, known=UNZIPS)
     lines += judge_out(name, way_out(record), found.plateau)
     curves.append(_curve(name, record, WIDE))
     plot = Plot(
@@ -166,7 +168,7 @@ def measure(quick: bool) -> Findings:
 
 def _curve(name: str, record: Record, length: float) -> Curve:
     depth = (THICKNESS - record.tip[:, 2]) * 1e3
-    return Curve(name, depth, record.force[:, 2] / (TOUGHNESS * length))
+    return Curve(name, depth, record.force[:, 2] / (_TOUGHNESS * length))
 
 
 SCENE = Scene(

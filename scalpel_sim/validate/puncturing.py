@@ -5,7 +5,7 @@ import numpy as np
 from scalpel_sim.validate.block import DT, LENGTH, MIDDLE, THICKNESS, edge
 from tissue import BladeSegment, FloatArray
 
-ABOVE = 0.5e-3
+_ABOVE = 0.5e-3
 """How far above the block the edge begins [m]."""
 
 
@@ -26,8 +26,8 @@ def into(
         middle: Where the middle of the edge is, across and along [m].
         top: Of the body [m].
     """
-    n = round((deep + ABOVE) / speed / DT)
-    heights: FloatArray = top + ABOVE - np.linspace(0.0, deep + ABOVE, n + 1)
+    n = round((deep + _ABOVE) / speed / DT)
+    heights: FloatArray = top + _ABOVE - np.linspace(0.0, deep + _ABOVE, n + 1)
     x, y = middle[0], middle[1] - 0.5 * length
     return [
         edge((x, y, z), along=(0.0, 1.0, 0.0), forward=(0.0, 0.0, -1.0), length=length)

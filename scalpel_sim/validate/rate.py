@@ -6,25 +6,25 @@ from scalpel_sim.validate.block import THICKNESS, block_tissue, lead, rubber, th
 from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
 from tissue import BladeShape
 
-SLOW_TOUGHNESS, TWICE_AT, EXPONENT = 10.0, 0.1, 0.5
+_SLOW_TOUGHNESS, TWICE_AT, EXPONENT = 10.0, 0.1, 0.5
 """[J/m2], [m/s]."""
-STIFFNESS = 30e3
+_STIFFNESS = 30e3
 """Young's modulus [Pa]."""
 RUPTURE = 1e5
 """Work to rupture [J/m3]."""
-NEAR = 0.05
+_NEAR = 0.05
 
 
 def toughness(speed: float) -> float:
     """Theory [J/m2]: J0 (1 + (v / v0)^n)."""
-    return SLOW_TOUGHNESS * (1.0 + (speed / TWICE_AT) ** EXPONENT)
+    return _SLOW_TOUGHNESS * (1.0 + (speed / TWICE_AT) ** EXPONENT)
 
 
 def force_at(speed: float) -> float:
     """Cut through at that speed [m/s], and return the mean force [N]."""
     material = rubber(
-        young_modulus=STIFFNESS,
-        toughness=SLOW_TOUGHNESS,
+        young_modulus=_STIFFNESS,
+        toughness=_SLOW_TOUGHNESS,
         toughness_exponent=EXPONENT,
         toughness_speed=TWICE_AT,
     )
@@ -34,7 +34,7 @@ def force_at(speed: float) -> float:
 
 def force_of(radius: float) -> float:
     """Cut through with an edge of that radius [m], and return the mean force [N]."""
-    material = rubber(young_modulus=STIFFNESS, toughness=SLOW_TOUGHNESS, work_to_rupture=RUPTURE)
+    material = rubber(young_modulus=_STIFFNESS, toughness=_SLOW_TOUGHNESS, work_to_rupture=RUPTURE)
     thin = BladeShape(thickness=1e-5, edge_radius=radius)  # its faces push nothing apart
     record = lead(block_tissue(material, blade=thin), through(TWICE_AT))
     return float(record.of_steady(record.resistance).mean())
@@ -47,13 +47,13 @@ def measure(quick: bool) -> Findings:
     fast = np.array([force_at(v) for v in speeds]) / THICKNESS
     lines = [
         Line(f"{v * 1e3:g} mm/s: force / (toughness at that speed × depth)",
-             f / toughness(v), *within(NEAR))
+             f / toughness(v), *within(_NEAR))
         for v, f in zip(speeds, fast, strict=True)
     ]  # fmt: skip
     for radius in radii:
-        theory = (SLOW_TOUGHNESS + 2.0 * radius * RUPTURE) * THICKNESS
+        theory = (_SLOW_TOUGHNESS + 2.0 * radius * RUPTURE) * THICKNESS
         name = f"edge of {radius * 1e6:g} µm: force / ((toughness + 2 r W) × depth)"
-        lines.append(Line(name, force_of(radius) / theory, *within(NEAR)))
+        lines.append(Line(name, force_of(radius) / theory, *within(_NEAR)))
     finely = np.linspace(0.0, speeds[-1], 100)
     curves = [
         Curve("measured", speeds * 1e3, fast),

@@ -10,11 +10,11 @@ from scalpel_sim.validate.block import MIDDLE, block_tissue, edge, rubber
 from scalpel_sim.validate.findings import Findings, Known, Line, Scene
 from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray, Law, Tissue
 
-LARGEST = 1e-9
+_LARGEST = 1e-9
 """[N] and [N m]: the issue's bound."""
-DT = 1e-4
+_DT = 1e-4
 """Time step [s]: short, since the motion itself keeps moments only as well as it is stepped."""
-SPEED = 0.3
+_SPEED = 0.3
 """[m/s]."""
 HEAVY = 4000.0
 """Density [kg/m3]: a free block of water would be pushed away and not cut."""
@@ -46,7 +46,7 @@ class Balance(NamedTuple):
 
 def wavy(n: int) -> list[BladeSegment]:
     """Return a way through the block that swings from side to side: side load."""
-    y = -0.003 + SPEED * DT * np.arange(n)
+    y = -0.003 + _SPEED * _DT * np.arange(n)
     return [edge((MIDDLE + 0.003 * np.sin(75.0 * at), at, -0.005)) for at in y]
 
 
@@ -64,7 +64,7 @@ def balance(tissue: Tissue, places: list[BladeSegment]) -> Balance:
     momentum, moment = _momenta(tissue)
     size = (tissue.n_nodes, tissue.n_tetrahedra, 0.0)
     for t0, t1 in itertools.pairwise(places):
-        result = tissue.step(BladeSweep(t0, t1), DT)
+        result = tissue.step(BladeSweep(t0, t1), _DT)
         wrench, contacts = result.wrench, result.contacts
         torque = wrench.torque + np.cross(wrench.point, wrench.force)
         before, (momentum, moment) = (momentum, moment), _momenta(tissue)
@@ -74,8 +74,8 @@ def balance(tissue: Tissue, places: list[BladeSegment]) -> Balance:
         rows.append(
             (
                 np.abs(wrench.force + result.force_on_tissue).max(),
-                np.abs(wrench.force + (momentum - before[0]) / DT).max(),
-                np.abs(torque + (moment - before[1]) / DT).max(),
+                np.abs(wrench.force + (momentum - before[0]) / _DT).max(),
+                np.abs(torque + (moment - before[1]) / _DT).max(),
                 np.abs(turns + result.wrench_t1.torque).max(),
                 size != size_before,
             )
@@ -100,13 +100,13 @@ def judge(law: str, found: Balance) -> list[Line]:
     in_steady = float(found.moment[~changed].max())
     in_changed = float(found.moment[changed].max(initial=0.0))
     return [
-        Line(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, LARGEST, "N"),
+        Line(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, _LARGEST, "N"),
         Line(f"{law}: force on blade + change of momentum", float(found.momentum.max()), 0.0,
-             LARGEST, "N"),
-        Line(f"{law}: torque + change of angular momentum", in_steady, 0.0, LARGEST, "N m"),
-        Line(f"{law}: the same where the mesh changes", in_changed, 0.0, LARGEST, "N m",
+             _LARGEST, "N"),
+        Line(f"{law}: torque + change of angular momentum", in_steady, 0.0, _LARGEST, "N m"),
+        Line(f"{law}: the same where the mesh changes", in_changed, 0.0, _LARGEST, "N m",
              known=MESH_TURNS),
-        Line(f"{law}: torque of contacts + wrench", float(found.contacts.max()), 0.0, LARGEST,
+        Line(f"{law}: torque of contacts + wrench", float(found.contacts.max()), 0.0, _LARGEST,
              "N m"),
     ]  # fmt: skip
 

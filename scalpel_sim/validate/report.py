@@ -10,7 +10,7 @@ from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Line, Source
 from scalpel_sim.validate.results import Counts, Done, counts
 
 STYLES = {PASS: "green", KNOWN: "yellow", FAIL: "bold red"}
-NOT_CONFIRMED = "(not looked up: take it for an estimate)"
+_NOT_CONFIRMED = "(not looked up: take it for an estimate)"
 
 
 def print_table(done: Sequence[Done], console: Console) -> None:
@@ -105,7 +105,7 @@ def _section(done: Done, pictures: Sequence[str]) -> list[str]:
 
 
 def _source(source: Source) -> str:
-    mark = "" if source.is_confirmed else f" {NOT_CONFIRMED}"
+    mark = "" if source.is_confirmed else f" {_NOT_CONFIRMED}"
     return f"- {source.citation}: {source.says}{mark}"
 
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Findings, Line, Scene
 
-FORMAT = "scalpel-sim validation 1"
+_FORMAT = "scalpel-sim validation 1"
 """First entry of the file; the number changes where readers of older files would stumble."""
 
 
@@ -37,7 +37,7 @@ def counts(done: Sequence[Done]) -> Counts:
 def as_json(done: Sequence[Done], *, quick: bool, versions: dict[str, str]) -> str:
     """Return what was found as JSON text."""
     content = {
-        "format": FORMAT,
+        "format": _FORMAT,
         "quick": quick,
         "versions": versions,
         "passed": counts(done).failed == 0,

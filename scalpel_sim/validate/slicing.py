@@ -7,13 +7,13 @@ from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Sc
 
 TOUGHNESS = 20.0
 """[J/m2]."""
-STIFFNESS = 30e3
+_STIFFNESS = 30e3
 """Young's modulus [Pa]."""
-HELD = "left,right,bottom"
+_HELD = "left,right,bottom"
 """So that the block is not drawn down with the edge."""
-NEAR = 0.10
+_NEAR = 0.10
 """How far the normal force may be off: the issue's bound for 45 degrees."""
-SLOW, FAST = 0.02, 0.05
+_SLOW, FAST = 0.02, 0.05
 """[m/s]."""
 STICKS = Known(
     0.9,
@@ -31,8 +31,8 @@ def normal_force(toughness: float, ratio: float) -> float:
 
 def cut(ratio: float, speed: float) -> Record:
     """Cut through the block while the edge is drawn down by `ratio` of its way."""
-    material = rubber(young_modulus=STIFFNESS, toughness=TOUGHNESS)
-    return lead(block_tissue(material, held=HELD), through(speed, ratio=ratio))
+    material = rubber(young_modulus=_STIFFNESS, toughness=TOUGHNESS)
+    return lead(block_tissue(material, held=_HELD), through(speed, ratio=ratio))
 
 
 def judge(ratio: float, speed: float, record: Record, toughness: float) -> list[Line]:
@@ -42,10 +42,12 @@ def judge(ratio: float, speed: float, record: Record, toughness: float) -> list[
     along = float(record.of_steady(record.force[:, 2]).mean())
     name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s"
     known = STICKS if ratio > 1.0 and speed < FAST else None
-    lines = [Line(f"{name}: normal force over theory", across / theory, *within(NEAR), known=known)]
+    lines = [
+        Line(f"{name}: normal force over theory", across / theory, *within(_NEAR), known=known)
+    ]
     if ratio > 0.0:
         share = along / (ratio * theory)
-        lines.append(Line(f"{name}: force along the edge over theory", share, *within(NEAR)))
+        lines.append(Line(f"{name}: force along the edge over theory", share, *within(_NEAR)))
     return lines
 
 
@@ -64,7 +66,7 @@ def measure(quick: bool) -> Findings:
             )
         )
     if not quick:
-        lines += judge(2.0, SLOW, cut(2.0, SLOW), TOUGHNESS)
+        lines += judge(2.0, _SLOW, cut(2.0, _SLOW), TOUGHNESS)
     return Findings(lines, [_plot(np.array(ratios), np.array(measured))])
 
 

@@ -24,7 +24,7 @@ STIFF_ENOUGH = 30e3
 """Young's modulus [Pa] at which tetrahedra bear all three toughnesses on both meshes
 (`tissue.material_warnings.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4
 mm. Springs bear the least of them."""
-NEAR = 0.05
+_NEAR = 0.05
 """How far the force may be off: the issue's bound."""
 RIPPLE = 0.10
 """How much it may swing, as its standard deviation over its mean."""
@@ -81,7 +81,7 @@ def judge(name: str, measured: Sequence[Steady], law: Law, toughness: float) -> 
     force_known = SPRINGS_GIVE if law == "springs" else TOUGH if toughness > 20.0 else None
     ripple_known = SPRINGS_SWING if law == "springs" else None
     return [
-        Line(f"{name}: force / (toughness × depth)", worst, *within(NEAR), known=force_known),
+        Line(f"{name}: force / (toughness × depth)", worst, *within(_NEAR), known=force_known),
         Line(f"{name}: ripple", ripple, 0.0, RIPPLE, known=ripple_known),
     ]
 

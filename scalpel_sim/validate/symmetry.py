@@ -6,9 +6,9 @@ from scalpel_sim.validate.block import COARSE, FINE, SIZE, block_tissue, lead, r
 from scalpel_sim.validate.findings import Findings, Known, Line, Scene
 from tissue import BladeShape, Law, TetrahedralMesh, block
 
-LARGEST = 0.05
+_LARGEST = 0.05
 """Lateral force over cutting force: the specification's bound."""
-STIFFNESS = 30e3
+_STIFFNESS = 30e3
 """Young's modulus [Pa]. Below 10 kPa, where the edge drags the tissue along by more than 2 mm, the
 lips buckle to one side, as a symmetric body may."""
 DRIFTS = Known(
@@ -18,7 +18,7 @@ DRIFTS = Known(
     "holds sideways does not slip: it adds up along the cut. Without friction, and under law "
     "neo_hookean, it does not",
 )
-NEAR = 1e-9
+_NEAR = 1e-9
 """Nodes that lie closer together are one [m]; cells are millimetres."""
 
 
@@ -26,7 +26,7 @@ def mirrored(cells: tuple[int, int, int]) -> TetrahedralMesh:
     """Return the block as two halves that are mirror images across x."""
     half = block((cells[0] // 2, *cells[1:]), (0.5 * SIZE[0], *SIZE[1:]))
     other = half.positions * (-1.0, 1.0, 1.0) + (SIZE[0], 0.0, 0.0)
-    rounded = np.round(np.concatenate((half.positions, other)) / NEAR) * NEAR
+    rounded = np.round(np.concatenate((half.positions, other)) / _NEAR) * _NEAR
     points, place = np.unique(rounded, axis=0, return_inverse=True)
     turned = half.tetrahedra[:, [1, 0, 2, 3]] + len(half.positions)  # else inside out
     return TetrahedralMesh(points, place.ravel()[np.concatenate((half.tetrahedra, turned))])
@@ -34,7 +34,7 @@ def mirrored(cells: tuple[int, int, int]) -> TetrahedralMesh:
 
 def lateral_share(law: Law, cells: tuple[int, int, int], blade: BladeShape | None) -> float:
     """Cut through the middle, and return the mean lateral force over the cutting force."""
-    material = rubber(law, young_modulus=STIFFNESS, blade_friction=0.3)
+    material = rubber(law, young_modulus=_STIFFNESS, blade_friction=0.3)
     tissue = block_tissue(material, mesh=mirrored(cells), blade=blade)
     record = lead(tissue, through(0.1, x=0.5 * SIZE[0]))
     lateral = np.abs(record.of_steady(record.force[:, 0])).mean()
@@ -53,7 +53,7 @@ def measure(quick: bool) -> Findings:
                 share = lateral_share(law, cells, blade)
                 known = DRIFTS if law == "springs" and blade else None
                 name += ": |lateral force| / cutting force"
-                lines.append(Line(name, share, 0.0, LARGEST, known=known))
+                lines.append(Line(name, share, 0.0, _LARGEST, known=known))
     return Findings(lines)
 
 

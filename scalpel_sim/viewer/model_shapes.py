@@ -9,7 +9,7 @@ import numpy as np
 from scalpel_sim.viewer.draping import TriangleMesh
 from tissue import FloatArray
 
-N_AROUND = 32
+_N_AROUND = 32
 """Segments around a round shape: at this count its outline looks round on a screen."""
 
 BEVEL = 0.12
@@ -111,13 +111,13 @@ def _revolve(radii: FloatArray, heights: FloatArray, normals: FloatArray) -> Tri
         heights: Height of each ring [m].
         normals: Outward and upward component of each ring's normal, shape (n_rings, 2).
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, N_AROUND + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, _N_AROUND + 1)
     around = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     up = np.array([0.0, 0.0, 1.0])
     positions = radii[:, None, None] * around + heights[:, None, None] * up
     directions = normals[:, :1, None] * around + normals[:, 1:, None] * up
     return TriangleMesh(
-        positions.reshape(-1, 3), _grid(len(radii), N_AROUND + 1), directions.reshape(-1, 3)
+        positions.reshape(-1, 3), _grid(len(radii), _N_AROUND + 1), directions.reshape(-1, 3)
     )
 
 
@@ -137,7 +137,7 @@ def _half_circle(steps: int, start: float, end: float) -> FloatArray:
 
 
 def _ellipsoid(radii: FloatArray) -> TriangleMesh:
-    circle = _half_circle(N_AROUND // 2 + 1, -np.pi / 2.0, np.pi / 2.0)
+    circle = _half_circle(_N_AROUND // 2 + 1, -np.pi / 2.0, np.pi / 2.0)
     ball = _revolve(circle[:, 0], circle[:, 1], circle)
     normals = ball.normals / radii
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -145,8 +145,8 @@ def _ellipsoid(radii: FloatArray) -> TriangleMesh:
 
 
 def _capsule(radius: float, half_length: float) -> TriangleMesh:
-    lower = _half_circle(N_AROUND // 4 + 1, -np.pi / 2.0, 0.0)
-    upper = _half_circle(N_AROUND // 4 + 1, 0.0, np.pi / 2.0)
+    lower = _half_circle(_N_AROUND // 4 + 1, -np.pi / 2.0, 0.0)
+    upper = _half_circle(_N_AROUND // 4 + 1, 0.0, np.pi / 2.0)
     normals = np.concatenate([lower, upper])
     shift = np.repeat([-half_length, half_length], len(lower))
     return _revolve(radius * normals[:, 0], radius * normals[:, 1] + shift, normals)
@@ -224,7 +224,7 @@ def _height_field(model: mujoco.MjModel, field: int) -> TriangleMesh:
     return _faceted(positions, _grid(rows, columns))
 
 
-BLADE_MARGIN = 0.1
+_BLADE_MARGIN = 0.1
 """How far heel and tip may lie outside the box that stands for the blade, as a fraction of its
 length. Boxes that they do not fit are other parts of the same body."""
 
@@ -241,7 +241,7 @@ def _edge_in_geom(model: mujoco.MjModel, geom: int) -> tuple[FloatArray, FloatAr
         ends.append((model.site_pos[site] - model.geom_pos[geom]) @ matrix.reshape(3, 3))
     heel, tip = ends
     size = model.geom_size[geom]
-    fits = (np.abs([heel, tip]) <= size + BLADE_MARGIN * size.max()).all()
+    fits = (np.abs([heel, tip]) <= size + _BLADE_MARGIN * size.max()).all()
     is_in_sheet = np.abs(tip - heel).argmax() != size.argmin() and not np.array_equal(heel, tip)
     return (heel, tip) if fits and is_in_sheet else None
 

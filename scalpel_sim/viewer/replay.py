@@ -26,7 +26,7 @@ BYTES_PER_TRIANGLE = 55
 """What a triangle takes in the file: measured 38 to 50 on cut blocks and organs, compressed and
 in base64. Only the number of frames that are kept hangs on it."""
 
-CAPTION = (
+_CAPTION = (
     "Skin: red-brown, with vessels. Bright red: what the blade has laid open. Arrow: the force "
     "that the blade feels; blue lines: of each contact, thirty times as long. Drag "
     "to turn, scroll to zoom."
@@ -115,7 +115,7 @@ class ReplayWriter:
         if not frames:
             raise ValueError("the replay has no frames: add at least one before writing it")
         path.write_text(
-            replay_page(self._title, CAPTION, "\n".join(self._elements(frames))), encoding="utf-8"
+            replay_page(self._title, _CAPTION, "\n".join(self._elements(frames))), encoding="utf-8"
         )
 
     def _elements(self, frames: list[_Frame]) -> Iterator[str]:

@@ -34,7 +34,7 @@ LAST_PORT = 7099
 FAREWELL = 1.0
 """How long the last picture may take to reach the pages [s] before the process ends."""
 
-CAPTION = (
+_CAPTION = (
     "Bright red: what the blade has laid open. Blue: the force of each contact. Drag to turn, "
     "scroll to zoom."
 )
@@ -156,7 +156,7 @@ async def serve(setting: Setting, inbox: Inbox) -> None:
     """Serve pictures until the inbox has ended. Prints the greeting first."""
     audience = Audience(Stage(setting.shapes, setting.frame, wireframe=setting.wireframe))
     application = tornado.web.Application()
-    document = live_page(setting.title, CAPTION)
+    document = live_page(setting.title, _CAPTION)
     application.add_handlers(
         OWN_NAMES,
         [(r"/", Page, {"document": document}), (r"/frames", FrameSocket, {"audience": audience})],
@@ -188,7 +188,7 @@ def _listen(application: tornado.web.Application, port: int | None) -> Greeting:
     return Greeting(error=f"port {port} is in use; choose another one, or none to get a free one")
 
 
-def main() -> None:
+def serve_page() -> None:
     """Be the process that `viewer.Viewer` starts."""
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
     setting = pickle.load(sys.stdin.buffer)

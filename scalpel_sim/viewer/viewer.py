@@ -167,7 +167,7 @@ def _start_process() -> subprocess.Popen[bytes]:
     pages get the last picture. It ends when the pipe does, however the run came to its end.
     """
     return subprocess.Popen(
-        [sys.executable, "-c", "from scalpel_sim.viewer.server import main; main()"],
+        [sys.executable, "-c", "from scalpel_sim.viewer.server import serve_page; serve_page()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,

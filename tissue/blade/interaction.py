@@ -56,7 +56,7 @@ NEAR_BLADE = 0.5
 """How near to the blade's faces the tissue's are looked at, per mean node size: twice as far as the
 blade goes between two looks."""
 
-SAME_LENGTH = 1e-3
+_SAME_LENGTH = 1e-3
 """Relative change in length below which it is the same blade. Poses in single precision, or between
 two places of a turning blade, differ by less; another blade would begin another incision."""
 
@@ -100,7 +100,7 @@ class Grip:
 
     def is_another(self, length: float) -> bool:
         """Whether an edge of that length [m] is another one; 0 is none."""
-        return abs(length - self._edge_length) > SAME_LENGTH * length
+        return abs(length - self._edge_length) > _SAME_LENGTH * length
 
     def take(self, length: float, body: Body, edge: Edge, when: float) -> None:
         """Let go of the tissue with the edge as it was, and take one of that length [m]."""

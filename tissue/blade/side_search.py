@@ -29,10 +29,10 @@ from tissue.mesh.nonconforming import is_open
 from tissue.mesh.point_location import TetrahedronGrid, cell_along
 from tissue.mesh.star import Visits
 
-N_AROUND, CELLS, COUNTS = 0, 1, 7
+_N_AROUND, _CELLS, COUNTS = 0, 1, 7
 """Places in `Flanks.searched`."""
 
-SIDE, AREA, ENERGY = 0, 1, 2
+_SIDE, _AREA, ENERGY = 0, 1, 2
 """Places in `Flanks.faces_before`."""
 
 LEAST_COSINE = 0.5
@@ -93,12 +93,12 @@ def find_faces(
     """
     low, high = blade_box(flanks, edge, when, margin)
     if _are_other_cells(flanks.searched, grid, low, high):
-        flanks.searched[N_AROUND] = _open_faces(flanks, body, visits, grid)
-    if flanks.searched[N_AROUND] < 0:
+        flanks.searched[_N_AROUND] = _open_faces(flanks, body, visits, grid)
+    if flanks.searched[_N_AROUND] < 0:
         return False
     frame = blade_frame(edge, when)
     n = 0
-    for i in range(flanks.searched[N_AROUND]):
+    for i in range(flanks.searched[_N_AROUND]):
         face = flanks.around[i]
         if _is_near(flanks, body, frame, face // 4, face % 4, margin):
             flanks.found[n] = face
@@ -110,7 +110,7 @@ def find_faces(
 @kernel
 def forget_cells(flanks: Flanks) -> None:
     """Let the faces around the blade be looked for anew: the mesh or the grid is another."""
-    flanks.searched[N_AROUND] = -1
+    flanks.searched[_N_AROUND] = -1
 
 
 @kernel
@@ -119,11 +119,11 @@ def _are_other_cells(searched: IntArray, grid: TetrahedronGrid, low: Vec3, high:
 
     Or whether they list others now. A blade goes for many steps through the same cells.
     """
-    are_others = searched[N_AROUND] < 0
+    are_others = searched[_N_AROUND] < 0
     for c in range(3):
         first, last = cell_along(grid, low[c], c), cell_along(grid, high[c], c)
-        are_others = are_others or searched[CELLS + c] != first or searched[CELLS + 3 + c] != last
-        searched[CELLS + c], searched[CELLS + 3 + c] = first, last
+        are_others = are_others or searched[_CELLS + c] != first or searched[_CELLS + 3 + c] != last
+        searched[_CELLS + c], searched[_CELLS + 3 + c] = first, last
     for k in range(len(grid.counts)):
         are_others = are_others or searched[COUNTS + k] != grid.counts[k]
         searched[COUNTS + k] = grid.counts[k]
@@ -136,9 +136,9 @@ def _open_faces(flanks: Flanks, body: Body, visits: Visits, grid: TetrahedronGri
     visits.epoch[0] += 1
     epoch, cells = visits.epoch[0], flanks.searched
     n = 0
-    for i in range(cells[CELLS], cells[CELLS + 3] + 1):
-        for j in range(cells[CELLS + 1], cells[CELLS + 4] + 1):
-            for k in range(cells[CELLS + 2], cells[CELLS + 5] + 1):
+    for i in range(cells[_CELLS], cells[_CELLS + 3] + 1):
+        for j in range(cells[_CELLS + 1], cells[_CELLS + 4] + 1):
+            for k in range(cells[_CELLS + 2], cells[_CELLS + 5] + 1):
                 entry = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
                 while entry >= 0:
                     t = grid.entry[entry]
@@ -196,8 +196,8 @@ def _take_over(
         for c in range(4):
             flanks.before[i, c] = flanks.state[i, c]
     for i in range(flanks.count[0]):
-        flanks.faces_before[i, SIDE] = flanks.side[i]
-        flanks.faces_before[i, AREA] = flanks.area[i]
+        flanks.faces_before[i, _SIDE] = flanks.side[i]
+        flanks.faces_before[i, _AREA] = flanks.area[i]
         flanks.faces_before[i, ENERGY] = flanks.energy[i]
     for i in range(n):
         flanks.known_as[i] = flanks.place[flanks.found[i]]
@@ -210,11 +210,11 @@ def _take_over(
         # What is pressed keeps its side and area: to measure a lip that trembles anew in each step
         # gave it energy, a tenth of what the blade did in an organ.
         if old >= 0 and flanks.faces_before[old, ENERGY] > 0.0:
-            flanks.side[row] = flanks.faces_before[old, SIDE]
-            flanks.area[row] = flanks.faces_before[old, AREA]
+            flanks.side[row] = flanks.faces_before[old, _SIDE]
+            flanks.area[row] = flanks.faces_before[old, _AREA]
         elif not _measure(flanks, body, frame, row):
             continue
-        is_known = old >= 0 and flanks.faces_before[old, SIDE] == flanks.side[row]
+        is_known = old >= 0 and flanks.faces_before[old, _SIDE] == flanks.side[row]
         flanks.face[row] = face
         flanks.place[face] = row
         flanks.count[0] = row + 1

@@ -7,7 +7,7 @@ from tissue.cutting.blade_path import Path, nearest_on_edge
 from tissue.geometry.tetrahedron import nearest_on_segment, nearest_on_triangle, normalised
 from tissue.mesh.body import CUT, Body
 
-BESIDE = 0.7
+_BESIDE = 0.7
 """Cosine of the angle between the flat's normal and the way to the nearest cut face, from which the
 point is beside that face, in the slit. Below, it is ahead of the rim, or under the bottom."""
 
@@ -77,7 +77,7 @@ def _is_beside(body: Body, t: int, p: Vec3, flat: Vec3, reach: float) -> bool:
             ),
         )
         distance = norm(d)
-        if distance <= reach and abs(dot(d, flat)) >= BESIDE * distance:
+        if distance <= reach and abs(dot(d, flat)) >= _BESIDE * distance:
             return True
     return False
 

@@ -13,7 +13,7 @@ END = 1e-3
 """Share of an edge at each end that is left to the node there, which meets triangles."""
 
 
-SAME_WAY = 0.5
+_SAME_WAY = 0.5
 """Cosine between the normals of two edges above which they cannot face each other. Contact needs
 a direction within a right angle of one normal and of the other's opposite: between edges of one lip
 that is one along the lip."""
@@ -87,10 +87,10 @@ def do_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
 
 @kernel
 def face_the_same_way(outward: Vec3, other_outward: Vec3) -> bool:
-    """Whether two edges cannot face each other; see `SAME_WAY`."""
+    """Whether two edges cannot face each other; see `_SAME_WAY`."""
     same = dot(outward, other_outward)
     squares = dot(outward, outward) * dot(other_outward, other_outward)
-    return same > 0.0 and same * same > SAME_WAY * SAME_WAY * squares
+    return same > 0.0 and same * same > _SAME_WAY * _SAME_WAY * squares
 
 
 @kernel

@@ -16,7 +16,7 @@ from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
 from tissue.mesh.body import Body
 from tissue.mesh.nonconforming import is_open
 
-FLAT = 0.05
+_FLAT = 0.05
 """Sine of the angle up to which an edge counts as flat. Two such, crossed at their middles, overlap
 by a hundredth of their length before their ends meet faces."""
 
@@ -62,6 +62,6 @@ def is_ridge(body: Body, t: int, f: int, k: int, outward: IntArray) -> bool:
     here = axpy(-dot(ac, ab) / square, ab, ac)
     there = axpy(-dot(ad, ab) / square, ab, ad)
     area = cross(ab, ac)
-    flat = FLAT * math.sqrt(dot(there, there))
+    flat = _FLAT * math.sqrt(dot(there, there))
     height = dot(area, there) / norm(area)
     return height < (flat if dot(here, there) > 0.0 else -flat)

@@ -16,7 +16,7 @@ from tissue.core.structs import Arrays
 from tissue.core.vec3 import dot, store, sub, vec3
 from tissue.mesh.body import Body, grown
 
-WAY, MOVE, LITTLE = 0, 1, 2
+_WAY, MOVE, _LITTLE = 0, 1, 2
 """Places in `Motion.whole`."""
 
 STEP, N_NEW = 0, 1
@@ -27,7 +27,7 @@ STEPS_TO_REST = 64
 trembles is slow at each turn, and whenever a node becomes restless all pairs are gone through."""
 
 
-NEAR = 8.0
+_NEAR = 8.0
 """Distance of a near pair, as a share of what a restless node moves. Larger: more pairs are looked
 at always, at a few nanoseconds each; smaller: more are asked one by one, at ten times that."""
 
@@ -129,14 +129,14 @@ def measure_motion(
         move = math.sqrt(dot(d, d))
         largest_move = move if not move <= largest_move else largest_move
         motion.reach[node] = move
-        if not move <= whole[LITTLE]:
+        if not move <= whole[_LITTLE]:
             if not is_restless(motion, node):
                 number[N_NEW] += 1
             motion.restless_until[node] = number[STEP] + STEPS_TO_REST
         if not is_restless(motion, node):
             largest_way = max(largest_way, way)
             largest_reach = max(largest_reach, move)
-    whole[WAY] += largest_way
+    whole[_WAY] += largest_way
     whole[MOVE] = largest_reach
     return largest_move
 
@@ -168,13 +168,13 @@ def horizon(motion: Motion, slack: float) -> float:
     What went through is no deeper than both sides moved in this step, and were before it: `slack`
     at most [m].
     """
-    return CLOSING * motion.whole[WAY] + 2.0 * motion.whole[MOVE] + slack
+    return CLOSING * motion.whole[_WAY] + 2.0 * motion.whole[MOVE] + slack
 
 
 @kernel
 def is_near(motion: Motion, distance: float) -> bool:
     """Whether a pair so far apart [m] would be looked at again in the next step or two anyway."""
-    return distance <= NEAR * motion.whole[LITTLE]
+    return distance <= _NEAR * motion.whole[_LITTLE]
 
 
 @kernel
@@ -209,4 +209,4 @@ def _sleep(motion: Motion, pairs: Pairs, k: int, distance: float) -> None:
     if has_restless(motion, nodes_of_pair(pairs, k)):
         pairs.wake[k] = -np.inf
     else:
-        pairs.wake[k] = distance + CLOSING * motion.whole[WAY]
+        pairs.wake[k] = distance + CLOSING * motion.whole[_WAY]

@@ -67,7 +67,7 @@ from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
 from tissue.geometry.tetrahedron import Weights
 from tissue.mesh.body import NODES, Body
 
-POINTS, EDGES = 0, 1
+_POINTS, _EDGES = 0, 1
 """Kinds of pairs."""
 
 
@@ -116,11 +116,11 @@ def find_contacts(contact: ContactState, body: Body) -> None:
     contact.looked[0] = contact.contacts.clock[0]
     points, edges = candidates.point_triangle, candidates.edge_edge
     look_at_points(points, x, contact.signs)
-    _find(contact, x, POINTS, points, contact.point_hits, last)
+    _find(contact, x, _POINTS, points, contact.point_hits, last)
     look_at_edges(edges, x, contact.normal, contact.signs)
-    _find(contact, x, EDGES, edges, contact.edge_hits, last)
-    _add_hits(contact, body, POINTS, contact.point_hits)
-    _add_hits(contact, body, EDGES, contact.edge_hits)
+    _find(contact, x, _EDGES, edges, contact.edge_hits, last)
+    _add_hits(contact, body, _POINTS, contact.point_hits)
+    _add_hits(contact, body, _EDGES, contact.edge_hits)
     if contact.floor > -np.inf:
         _find_on_floor(contact, body)
 
@@ -155,7 +155,7 @@ def _find(
     slack = contact.slack + 2.0 * touch
     hits.count[0] = 0
     for k in range(pairs.counts[N_NEAR]):
-        if may_be_under(signs, k, touch) if kind == POINTS else may_be_crossed(signs, k):
+        if may_be_under(signs, k, touch) if kind == _POINTS else may_be_crossed(signs, k):
             _look_at(contact, x, kind, pairs, k, hits, last)
     _let_sleep(contact, x, kind, pairs)
     k = pairs.counts[N_NEAR]
@@ -197,7 +197,7 @@ def _look_at(
         return
     if _meeting(contact, x, kind, nodes).is_one:
         first, second = pairs.item[k, 0], pairs.item[k, 1]
-        if kind == POINTS:
+        if kind == _POINTS:
             add_hit(hits, nodes, second, second)
         else:
             add_hit(hits, nodes, first // 3, second // 3)
@@ -212,7 +212,7 @@ def _is_due(contact: ContactState, nodes: Nodes, last: int) -> bool:
 @kernel
 def _is_dead(candidates: Candidates, kind: int, k: int) -> bool:
     """Whether pair `k` of that kind is out of date."""
-    return is_dead_point(candidates, k) if kind == POINTS else is_dead_edge(candidates, k)
+    return is_dead_point(candidates, k) if kind == _POINTS else is_dead_edge(candidates, k)
 
 
 @kernel
@@ -252,7 +252,7 @@ def _add_hits(contact: ContactState, body: Body, kind: int, hits: Hits) -> None:
 @kernel
 def _apart(x: FloatArray, kind: int, nodes: Nodes) -> float:
     """How far a node is from where it would meet a triangle, or an edge from another [m]."""
-    if kind == EDGES:
+    if kind == _EDGES:
         return distance_of_edges(_edges(x, nodes))
     at = _corners(x, nodes)
     return distance_to_triangle(at) - rim_of(at.a, at.b, at.c)
@@ -261,7 +261,7 @@ def _apart(x: FloatArray, kind: int, nodes: Nodes) -> float:
 @kernel
 def _meeting(contact: ContactState, x: FloatArray, kind: int, nodes: Nodes) -> Meeting:
     """Whether one side went through the other in this step."""
-    if kind == POINTS:
+    if kind == _POINTS:
         under = _point_triangle(contact, _corners(x, nodes), nodes)
         weights = Weights(1.0, under.b + under.c - 1.0, -under.b, -under.c)
         return Meeting(under.is_through, weights, under.normal)

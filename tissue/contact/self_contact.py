@@ -60,7 +60,7 @@ micrometre in an organ. Smaller: where lips of one cut lie node on node, each no
 triangles around the other, which say the same, and all sweeps are always done; at 1e-6 a body with
 3,000 contacts had 5,000, for less than shows. Larger: nodes that are pressed tremble."""
 
-SLACK = 0.01
+_SLACK = 0.01
 """How deep a node may be left in what it touches, and be found again by the triangle beside as it
 slides there, per mean node size. Larger: what was always so is taken for contact, where lips are
 thin; smaller: a node that is pinched between two faces is lost."""
@@ -120,7 +120,7 @@ class SelfContact:
             friction=float(friction),
             floor=-np.inf if floor is None else float(floor),
             margin=float(MARGIN * node_size),
-            slack=float(SLACK * node_size),
+            slack=float(_SLACK * node_size),
             touch=float(TOUCH * node_size),
         )
         self.arrays.state[IS_AWAKE] = floor is not None

@@ -15,11 +15,11 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3
 
-MOST_CELLS = 8
+_MOST_CELLS = 8
 """Cells along an axis that a box is put into at most. A larger one is looked at by every search:
 an element that is stretched so far is rare, and one of 100 cells would fill a million of them."""
 
-N_ENTRIES, FREE = 0, 1
+N_ENTRIES, _FREE = 0, 1
 """Places in `Grid.state`."""
 
 
@@ -45,7 +45,7 @@ class Box(NamedTuple):
     high: Vec3
 
 
-class Cells(NamedTuple):
+class _Cells(NamedTuple):
     """The cells from one to another."""
 
     i: int
@@ -73,13 +73,13 @@ def clear_grid(grid: Grid) -> None:
     for bucket in range(len(grid.first)):
         grid.first[bucket] = -1
     grid.state[N_ENTRIES] = 0
-    grid.state[FREE] = -1
+    grid.state[_FREE] = -1
 
 
 @kernel
-def _cells_of(grid: Grid, box: Box) -> Cells:
+def _cells_of(grid: Grid, box: Box) -> _Cells:
     per_metre = 1.0 / grid.size
-    return Cells(
+    return _Cells(
         math.floor(box.low.x * per_metre),
         math.floor(box.low.y * per_metre),
         math.floor(box.low.z * per_metre),
@@ -90,11 +90,11 @@ def _cells_of(grid: Grid, box: Box) -> Cells:
 
 
 @kernel
-def _is_large(cells: Cells) -> bool:
+def _is_large(cells: _Cells) -> bool:
     return (
-        cells.i_last - cells.i >= MOST_CELLS
-        or cells.j_last - cells.j >= MOST_CELLS
-        or cells.k_last - cells.k >= MOST_CELLS
+        cells.i_last - cells.i >= _MOST_CELLS
+        or cells.j_last - cells.j >= _MOST_CELLS
+        or cells.k_last - cells.k >= _MOST_CELLS
     )
 
 
@@ -119,9 +119,9 @@ def put(grid: Grid, item: int, box: Box) -> bool:
 
 @kernel
 def _put(grid: Grid, item: int, bucket: int) -> bool:
-    entry = grid.state[FREE]
+    entry = grid.state[_FREE]
     if entry >= 0:
-        grid.state[FREE] = grid.next[entry]
+        grid.state[_FREE] = grid.next[entry]
     else:
         entry = grid.state[N_ENTRIES]
         if entry == len(grid.item):
@@ -160,8 +160,8 @@ def _take(grid: Grid, item: int, bucket: int) -> None:
         grid.first[bucket] = grid.next[entry]
     else:
         grid.next[before] = grid.next[entry]
-    grid.next[entry] = grid.state[FREE]
-    grid.state[FREE] = entry
+    grid.next[entry] = grid.state[_FREE]
+    grid.state[_FREE] = entry
 
 
 class Search(Arrays):

@@ -8,7 +8,7 @@ from tissue.mesh.changes import Change
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
-SCHEMES = ("stellar", "paper")
+_SCHEMES = ("stellar", "paper")
 """Names of the schemes: ours, and that of Bielser, Maiwald and Gross."""
 
 
@@ -18,8 +18,8 @@ def checked_scheme(name: str) -> str:
     Raises:
         ValueError: there is no such scheme.
     """
-    if name not in SCHEMES:
-        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(SCHEMES)}")
+    if name not in _SCHEMES:
+        raise ValueError(f"there is no scheme {name!r} of cutting. Schemes: {', '.join(_SCHEMES)}")
     return name
 
 

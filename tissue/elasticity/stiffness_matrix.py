@@ -23,7 +23,7 @@ from tissue.types import TetrahedralMesh
 if TYPE_CHECKING:  # imported where it is used: half a second that no cut has to wait for
     from scipy.sparse import csr_array
 
-EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 """Local nodes of a tetrahedron's edges."""
 
 LOCAL_DILATATION = 5.0 / 6.0
@@ -62,9 +62,9 @@ def gradients(mesh: TetrahedralMesh) -> Gradients:
 def edge_springs(mesh: TetrahedralMesh, modulus: float) -> EdgeSprings:
     """Return the springs of van Gelder's formula, k = E V / l^2; `modulus` is E [Pa]."""
     volume = gradients(mesh).volume
-    ends = np.sort(mesh.tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
+    ends = np.sort(mesh.tetrahedra[:, _EDGES].reshape(-1, 2), axis=1)
     unique, which = np.unique(ends, axis=0, return_inverse=True)
-    around = np.bincount(which.ravel(), weights=np.repeat(volume, len(EDGES)))
+    around = np.bincount(which.ravel(), weights=np.repeat(volume, len(_EDGES)))
     span = mesh.positions[unique[:, 1]] - mesh.positions[unique[:, 0]]
     return EdgeSprings(unique, modulus * around / np.sum(span**2, axis=1))
 

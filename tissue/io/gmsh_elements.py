@@ -8,9 +8,9 @@ from tissue.io.source import Source
 from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
-TETRAHEDRON = 4
+_TETRAHEDRON = 4
 
-KINDS = {
+_KINDS = {
     1: Kind("lines", 1, 2),
     2: Kind("triangles", 2, 3),
     3: Kind("quadrangles", 2, 4),
@@ -58,7 +58,7 @@ class Elements:
         """Take elements of one kind, with the tags of their nodes, shape (n_elements, n_nodes)."""
         if len(node_tags):
             self._counts[number] = self._counts.get(number, 0) + len(node_tags)
-        if number == TETRAHEDRON:
+        if number == _TETRAHEDRON:
             self._tetrahedra.append(node_tags)
 
     def mesh(self, tags: IntArray, positions: FloatArray) -> TetrahedralMesh:
@@ -67,7 +67,7 @@ class Elements:
         Raises:
             MeshError: There are no tetrahedra, a tag is there twice, or none has it.
         """
-        expect_tetrahedra(self._counts, KINDS, TETRAHEDRON)
+        expect_tetrahedra(self._counts, _KINDS, _TETRAHEDRON)
         wanted = np.concatenate(self._tetrahedra)
         order = np.argsort(tags, kind="stable")
         in_order = tags[order]
@@ -87,6 +87,6 @@ class Elements:
 
 def kind_of(source: Source, number: int, at: int | None = None) -> Kind:
     """Return a kind of element by its number, or fail."""
-    if number not in KINDS:
+    if number not in _KINDS:
         source.fail(f"expected a type of element that Gmsh knows, found {number}", at)
-    return KINDS[number]
+    return _KINDS[number]

@@ -6,9 +6,9 @@ from tissue.core.array_types import IntArray
 from tissue.io.cells import Kind, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 
-TETRAHEDRON = 10
+_TETRAHEDRON = 10
 
-KINDS = {
+_KINDS = {
     0: Kind("empty cells", 0, 0),
     1: Kind("points", 0, 1),
     2: Kind("groups of points", 0, 0),
@@ -56,7 +56,9 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
         MeshError: There are no tetrahedra, there are other volumes, or a cell is not within `flat`.
     """
     numbers, counts = np.unique(types, return_counts=True)
-    expect_tetrahedra(dict(zip(numbers.tolist(), counts.tolist(), strict=True)), KINDS, TETRAHEDRON)
+    expect_tetrahedra(
+        dict(zip(numbers.tolist(), counts.tolist(), strict=True)), _KINDS, _TETRAHEDRON
+    )
     outside = np.flatnonzero((starts < 0) | (sizes < 0) | (sizes > len(flat) - starts))
     if outside.size:
         cell = outside[0]
@@ -64,7 +66,7 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
             f"cell {cell} has {sizes[cell]} nodes from entry {starts[cell]} on, but there are "
             f"{len(flat)} entries"
         )
-    is_tetrahedron = types == TETRAHEDRON
+    is_tetrahedron = types == _TETRAHEDRON
     wrong = np.flatnonzero(is_tetrahedron & (sizes != 4))
     if wrong.size:
         raise MeshError(f"cell {wrong[0]} is a tetrahedron with {sizes[wrong[0]]} nodes, not 4")

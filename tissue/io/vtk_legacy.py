@@ -10,7 +10,7 @@ from tissue.io.source import Source, as_floats, as_ints, count_in, shown
 from tissue.io.vtk_cells import tetrahedra_of
 from tissue.types import TetrahedralMesh
 
-DTYPES = {
+_DTYPES = {
     "char": ">i1",
     "signed_char": ">i1",
     "unsigned_char": ">u1",
@@ -194,6 +194,6 @@ class _Reader:
 
     def _dtype(self, words: list[str], k: int, at: int) -> str:
         name = words[k].lower() if k < len(words) else ""
-        if name not in DTYPES:
+        if name not in _DTYPES:
             self._source.fail(f"expected a type of numbers, found {shown(name)}", at)
-        return DTYPES[name]
+        return _DTYPES[name]

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from tissue.io.source import Source, shown
 from tissue.mesh.validation import MeshError
 
-DTYPES = {
+_DTYPES = {
     "Int8": "i1",
     "Int16": "i2",
     "Int32": "i4",
@@ -55,7 +55,7 @@ def decoded(
     Raises:
         MeshError: They are not there.
     """
-    dtype = DTYPES.get(element.get("type", ""))
+    dtype = _DTYPES.get(element.get("type", ""))
     if dtype is None:
         raise MeshError(f"{name}: expected a type, found {shown(element.get('type', ''))}")
     form = element.get("format", "ascii")

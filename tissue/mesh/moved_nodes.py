@@ -7,7 +7,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.mesh.body import grown
 
-N_MOVED, EPOCH = 0, 1
+N_MOVED, _EPOCH = 0, 1
 """Places in `Moved.state`."""
 
 
@@ -37,8 +37,8 @@ def grown_moved(moved: Moved, n_nodes: int) -> Moved:
 def note_moved(moved: Moved, nodes: IntArray, n: int) -> None:
     """Note the first `n` of `nodes`."""
     for i in range(n):
-        if moved.seen[nodes[i]] != moved.state[EPOCH]:
-            moved.seen[nodes[i]] = moved.state[EPOCH]
+        if moved.seen[nodes[i]] != moved.state[_EPOCH]:
+            moved.seen[nodes[i]] = moved.state[_EPOCH]
             moved.nodes[moved.state[N_MOVED]] = nodes[i]
             moved.state[N_MOVED] += 1
 
@@ -47,4 +47,4 @@ def note_moved(moved: Moved, nodes: IntArray, n: int) -> None:
 def forget_moved(moved: Moved) -> None:
     """Empty the list: the question was answered."""
     moved.state[N_MOVED] = 0
-    moved.state[EPOCH] += 1
+    moved.state[_EPOCH] += 1

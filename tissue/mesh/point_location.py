@@ -20,7 +20,7 @@ TETRAHEDRA_PER_CELL = 4.0
 """Cells are so large that the body fills this many tetrahedra a cell on average. Fewer make long
 lists of cells, more make long lists in each."""
 
-MOST_CELLS = 1 << 20
+_MOST_CELLS = 1 << 20
 """Cells at most, for a body that fills little of its box."""
 
 ENTRIES_PER_TETRAHEDRON = 16
@@ -77,7 +77,7 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
     n_nodes, n_tetrahedra = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
     low = positions[:n_nodes].min(axis=0) - margin
     size = positions[:n_nodes].max(axis=0) + margin - low
-    n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), MOST_CELLS)
+    n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), _MOST_CELLS)
     spacing = float(max(np.cbrt(size.prod() / n_cells), size.max() / n_cells))
     shape = np.floor(size / spacing).astype(np.int64) + 1
     room = max(ENTRIES_PER_TETRAHEDRON * n_tetrahedra, LEAST_ENTRIES)

@@ -11,7 +11,7 @@ from tissue.geometry.connected_components import components
 from tissue.mesh.faces import FACES, SortedFaces, sorted_faces
 from tissue.types import TetrahedralMesh
 
-logger = logging.getLogger("tissue")
+_logger = logging.getLogger("tissue")
 
 MAX_EXTENT = 1e3
 """A body larger than this [m] is in other units than metres."""
@@ -74,7 +74,7 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     except MeshError as error:
         raise MeshError(f"{name}: {error}") from None
     for warning in result.warnings:
-        logger.warning("%s: %s", name, warning)
+        _logger.warning("%s: %s", name, warning)
     return result
 
 

@@ -10,9 +10,9 @@ from tissue import BladeSegment, BladeSweep
 
 LARGEST_COORDINATE = 1e3
 """[m]. No body is larger; a blade farther away is a broken message."""
-LONGEST_STEP = 1.0
+_LONGEST_STEP = 1.0
 """[s]. A frame is a millisecond; a step of hours would keep the tissue busy for days."""
-UNIT_TOLERANCE = 1e-6
+_UNIT_TOLERANCE = 1e-6
 """How far the length of `forward` may be from 1: what single precision leaves."""
 
 _NO_BLADE = struct.Struct("<d")
@@ -50,11 +50,11 @@ def _check_segment(numbers: list[float]) -> None:
     for x in numbers[:6]:
         if not -LARGEST_COORDINATE <= x <= LARGEST_COORDINATE:
             raise MessageError(f"the blade is not within {LARGEST_COORDINATE:g} m: {numbers[:6]}")
-    if not abs(math.hypot(*numbers[6:]) - 1.0) <= UNIT_TOLERANCE:
+    if not abs(math.hypot(*numbers[6:]) - 1.0) <= _UNIT_TOLERANCE:
         raise MessageError(f"forward is not a unit vector: {numbers[6:]}")
 
 
 def _checked_step(dt: float) -> float:
-    if not 0.0 < dt <= LONGEST_STEP:
-        raise MessageError(f"a step of {dt} s; wanted more than 0 and at most {LONGEST_STEP:g}")
+    if not 0.0 < dt <= _LONGEST_STEP:
+        raise MessageError(f"a step of {dt} s; wanted more than 0 and at most {_LONGEST_STEP:g}")
     return dt

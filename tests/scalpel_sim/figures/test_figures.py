@@ -15,7 +15,7 @@ from scalpel_sim.figures.wire import edges_of
 @pytest.fixture
 def small(monkeypatch, tmp_path):
     """Draw small panels, in a folder of its own."""
-    monkeypatch.setattr(figures, "WIDTH", 150)
+    monkeypatch.setattr(figures, "_WIDTH", 150)
     monkeypatch.setattr(figures, "HEIGHT", 120)
     monkeypatch.chdir(tmp_path)
 

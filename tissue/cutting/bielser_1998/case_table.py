@@ -67,7 +67,7 @@ class Action(NamedTuple):
         return f"{self.operator}({', '.join(self.operands)})"
 
 
-class Entry(NamedTuple):
+class _Entry(NamedTuple):
     """A line of the lookup table."""
 
     code: int
@@ -110,8 +110,8 @@ def _turned(action: Action, split_faces: set[str], onto: dict[str, str]) -> Acti
     return Action(action.operator, tuple(operands))
 
 
-def _table() -> dict[int, Entry]:
-    table: dict[int, Entry] = {}
+def _table() -> dict[int, _Entry]:
+    table: dict[int, _Entry] = {}
     for case, text in REPRESENTATIVES.items():
         actions = _read(text)
         split_faces = {a.operands[0][:-1] for a in actions if a.operator == "splitFace"}
@@ -119,7 +119,7 @@ def _table() -> dict[int, Entry]:
             onto = dict(zip(CORNERS, turned, strict=True))
             entry = tuple(_turned(action, split_faces, onto) for action in actions)
             code = code_of(*(a.operands[0] for a in entry if a.operator == "splitEdge"))
-            table.setdefault(code, Entry(code, case, entry))
+            table.setdefault(code, _Entry(code, case, entry))
     return table
 
 

@@ -31,7 +31,7 @@ from tissue.mesh.changes import FULL, clear_changes, new_change
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
-REACH = 0.25
+_REACH = 0.25
 """How far from its box the blade must be to have left a tetrahedron, in mean node sizes. A blade in
 soft tissue trembles; without it, tetrahedra that it comes back into were split too early, by codes
 of fewer edges (10 of 154 in a slanted stroke through the paper's block, and it stayed in one
@@ -53,7 +53,7 @@ class PaperScheme:
     def __init__(self, body: Body, density: float, node_size: float) -> None:
         self.change = new_change()
         self._density = density
-        self._reach = REACH * node_size
+        self._reach = _REACH * node_size
         self._records = records_of(body)
         self._table = table()
         n = len(self._records.tetrahedra)

@@ -15,7 +15,7 @@ from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.node_rings import N_FOUND, Rings
 
-N_VOLUMES, N_PRESSURES, N_FORCES, EPOCH = 0, 1, 2, 3
+N_VOLUMES, N_PRESSURES, N_FORCES, _EPOCH = 0, 1, 2, 3
 """Places in `Patch.state`."""
 
 
@@ -87,7 +87,7 @@ def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, feelin
 @kernel
 def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out: IntArray) -> int:
     """Write the blocks of the tetrahedra around nodes up to that ring to `out`; return how many."""
-    patch.state[EPOCH] += 1
+    patch.state[_EPOCH] += 1
     n = 0
     for k in range(rings.state[N_FOUND]):
         node = rings.order[k]
@@ -96,8 +96,8 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
         first = solid.first[node]
         for slot in range(first, first + solid.count[node]):
             block = tetrahedron_at(solid, slot) // WIDTH
-            if patch.seen[block] != patch.state[EPOCH]:
-                patch.seen[block] = patch.state[EPOCH]
+            if patch.seen[block] != patch.state[_EPOCH]:
+                patch.seen[block] = patch.state[_EPOCH]
                 out[n] = block
                 n += 1
     return n
