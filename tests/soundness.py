@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from tissue import FloatArray, IntArray, Snapshot
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.body import Body
 
 OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 
@@ -139,7 +139,7 @@ def faults(
 def link_faults(body: Body) -> list[str]:
     """Return what is wrong with the links of a body, and with what names tetrahedra and twins."""
     found = []
-    n_nodes, n = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    n_nodes, n = body.n_nodes, body.n_tetrahedra
     tetrahedra, links = body.tetrahedra[:n], body.links[:n].ravel()
     nodes = np.sort(tetrahedra[:, OUTWARD].reshape(-1, 3), axis=1)
     (here,) = np.nonzero(links >= 0)

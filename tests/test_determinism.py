@@ -51,10 +51,11 @@ def test_arrays_that_grow_change_nothing():
     _, expected = run(mesh, stroke)
     roomy = Tissue(mesh, fixed=bodies.sides(mesh))
     for _ in range(3):  # each call doubles arrays that look nearly full
-        counts = roomy._body.counts.copy()
-        roomy._body.counts[:] = len(roomy._body.rest), len(roomy._body.tetrahedra)
+        n_nodes, n_tetrahedra = roomy._body.n_nodes, roomy._body.n_tetrahedra
+        roomy._body.n_nodes = len(roomy._body.rest)
+        roomy._body.n_tetrahedra = len(roomy._body.tetrahedra)
         roomy._grow()
-        roomy._body.counts[:] = counts
+        roomy._body.n_nodes, roomy._body.n_tetrahedra = n_nodes, n_tetrahedra
     assert len(roomy._body.rest) > 4 * len(Tissue(mesh)._body.rest)
     assert fingerprint(roomy, strokes.make(roomy, stroke)) == expected
 

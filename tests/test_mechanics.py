@@ -26,7 +26,6 @@ from tissue.elasticity.finite_elements import (
 )
 from tissue.elasticity.neo_hookean import solid_energy
 from tissue.elasticity.stiffness_matrix import stiffness_matrix
-from tissue.mesh.body import NODES, TETRAHEDRA
 from tissue.mesh.changes import clear_changes
 from tissue.mesh.faces import sorted_faces
 from tissue.mesh.star import LARGEST_STAR, no_visits
@@ -208,9 +207,7 @@ def after_random_splits(mesh, positions, n, seed=26):
     yield cut.body
     random = np.random.default_rng(seed)
     for _ in range(n):
-        a, b = random.choice(
-            cut.body.tetrahedra[random.integers(cut.body.counts[TETRAHEDRA])], 2, False
-        )
+        a, b = random.choice(cut.body.tetrahedra[random.integers(cut.body.n_tetrahedra)], 2, False)
         clear_changes(cut.change)
         split_edge(cut, int(a), int(b), float(random.uniform(0.3, 0.7)))
     yield cut.body
@@ -218,7 +215,7 @@ def after_random_splits(mesh, positions, n, seed=26):
 
 def energy_of(body, material, averaged):
     """Elastic energy of tetrahedra [J]."""
-    n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    n_nodes, n_tets = body.n_nodes, body.n_tetrahedra
     rooms = (len(body.rest), len(body.tetrahedra))
     law = neo_hookean(material.mu, material.lam, averaged=averaged)
     solid = no_solid(law, *rooms, room_for_stars(*rooms))
@@ -245,7 +242,7 @@ def test_26_splits_without_a_cut_hardly_change_how_a_body_gives_way(averaged):
     mesh = bodies.jittered(6, seed=4)
 
     def compliance(body):
-        n_nodes, n_tets = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+        n_nodes, n_tets = body.n_nodes, body.n_tetrahedra
         now = TetrahedralMesh(body.rest[:n_nodes].copy(), body.tetrahedra[:n_tets].copy())
         return give(now, dead_load(now, mesh), SOLID, averaged=averaged)
 

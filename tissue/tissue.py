@@ -51,9 +51,9 @@ from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Motion
 from tissue.material import Material
 from tissue.material_warnings import warn_of_ratio, warn_of_toughness
-from tissue.mesh.body import NODES, TETRAHEDRA, Body, build_body, grown_body
+from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.bounding_boxes import Survey, survey, survey_of
-from tissue.mesh.changes import FULL, touched_nodes
+from tissue.mesh.changes import touched_nodes
 from tissue.mesh.chunks import ChunkNodes, chunk_nodes, chunks_of
 from tissue.mesh.cut_error import lowest_altitude, path_error
 from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
@@ -214,12 +214,12 @@ class Tissue:
     @property
     def n_nodes(self) -> int:
         """Number of nodes."""
-        return int(self._body.counts[NODES])
+        return self._body.n_nodes
 
     @property
     def n_tetrahedra(self) -> int:
         """Number of tetrahedra."""
-        return int(self._body.counts[TETRAHEDRA])
+        return self._body.n_tetrahedra
 
     @property
     def bounds(self) -> FloatArray:
@@ -295,7 +295,7 @@ class Tissue:
         """
         rows, ways = checked_edges(edges, forward)
         self._end_incision()
-        before = float(self._scheme.change.area[0])
+        before = self._scheme.change.area
         spacing = self.node_size / SAMPLES_PER_NODE_SIZE
         rows = resampled(rows, spacing, MOST_SAMPLES)
         blade, self._path = self._path, new_path(rows.shape[1])
@@ -315,7 +315,7 @@ class Tissue:
                     self._cut(self._scheme.cut)
         self._end_incision()
         self._path = blade
-        return float(self._scheme.change.area[0]) - before
+        return self._scheme.change.area - before
 
     def settle(self) -> int:
         """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
@@ -489,7 +489,7 @@ class Tissue:
                 self._grip.mesh_changed(self._body, self._visits, change)
                 self._contact.mesh_changed(self._body, change)
                 self._relaxation.mesh_changed(self._body, self._elasticity, self._nodes, n)
-            full = bool(change.counts[FULL])
+            full = bool(change.is_full)
             self._grow()
             if not full:
                 return
@@ -557,7 +557,7 @@ class Tissue:
             n_active=self._scheme.n_active,
             active_point_tetrahedron=int(self._path.seed[0]) if sweep is not None else -1,
             anchored_length=anchored_length(grip.tool.anchors),
-            cut_area=float(self._scheme.change.area[0]),
+            cut_area=self._scheme.change.area,
             work_of_blade=float(totals[WORK_OF_BLADE]),
             work_of_cutting=float(totals[WORK_OF_CUTTING]),
             n_substeps=n_substeps,

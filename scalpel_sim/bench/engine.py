@@ -13,7 +13,7 @@ from tissue.core.jit import kernel
 from tissue.elasticity.finite_elements import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 from tissue.tissue import NOWHERE
 
 DT = 1e-3
@@ -162,7 +162,7 @@ class Touching:
 
 @kernel
 def _kick_and_drift(body: Body, accelerations: FloatArray, dt: float) -> None:
-    for i in range(body.counts[NODES]):
+    for i in range(body.n_nodes):
         for c in range(3):
             body.velocities[i, c] += dt * accelerations[i, c]
             body.positions[i, c] += dt * body.velocities[i, c]

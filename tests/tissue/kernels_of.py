@@ -23,7 +23,7 @@ from tissue.elasticity.springs import (
     no_springs,
 )
 from tissue.integrators.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
-from tissue.mesh.body import NODES, Body, build_body, grown_body
+from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.star import LARGEST_STAR, no_visits
 from tissue.tissue import NOWHERE
@@ -47,7 +47,7 @@ def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
 
 def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
     """Write every mass of the body; return the rows of its springs."""
-    n = int(body.counts[NODES])
+    n = body.n_nodes
     capacity = len(body.rest)
     springs = no_springs(capacity, 40 * capacity + POOL_MARGIN)
     written = build_rows(
@@ -77,7 +77,7 @@ def row(springs: Springs, node: int) -> dict[int, tuple[float, float]]:
 
 def dense_modes(body: Body, springs: Springs) -> FloatArray:
     """Return M^-1/2 K M^-1/2 of the nodes that can move, of a body at rest [1/s2]."""
-    n = int(body.counts[NODES])
+    n = body.n_nodes
     stiffness = np.zeros((n, 3, n, 3))
     for i in range(n):
         for j, (k, _) in row(springs, i).items():

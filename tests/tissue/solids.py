@@ -22,7 +22,7 @@ from tissue.elasticity.finite_elements import (
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
-from tissue.mesh.body import NODES, TETRAHEDRA, Body, build_body
+from tissue.mesh.body import Body, build_body
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
 YOUNG_MODULUS = 10e3
@@ -56,14 +56,14 @@ class SolidBody(NamedTuple):
 
     def forces(self, positions: FloatArray) -> FloatArray:
         """Return the forces on the nodes when they are at `positions` [N]."""
-        n, n_tetrahedra = self.body.counts
+        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
         out = np.zeros((n, 3))
         evaluate(self.solid, self.placed(positions), n_tetrahedra, n, out)
         return out
 
     def energy(self, positions: FloatArray) -> float:
         """Return the elastic energy when they are at `positions`, less that at rest [J]."""
-        n, n_tetrahedra = self.body.counts
+        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
         return solid_energy(self.solid, self.placed(positions), n_tetrahedra, n)
 
     def placed(self, positions: FloatArray) -> FloatArray:
@@ -73,7 +73,7 @@ class SolidBody(NamedTuple):
 
     def frequency(self) -> float:
         """Return the bound on the angular frequencies [1/s]."""
-        return float(np.sqrt(self.solid.frequency_squared[: self.body.counts[NODES]].max()))
+        return float(np.sqrt(self.solid.frequency_squared[: self.body.n_nodes].max()))
 
     def relaxed(
         self, positions: FloatArray, seconds: float, drag: float, pull: FloatArray | None = None
@@ -82,7 +82,7 @@ class SolidBody(NamedTuple):
 
         The step is a sixth of the stable one at rest: crushed tetrahedra are stiffer.
         """
-        n, n_tetrahedra = self.body.counts
+        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
         x = self.placed(positions).copy()
         h = 2.0 / self.frequency() / 6.0
         load = np.zeros((n, 3)) if pull is None else pull
@@ -100,7 +100,7 @@ def solid_of(mesh: TetrahedralMesh, law: Law, fixed: BoolArray | None = None) ->
 
 def built(body: Body, law: Law) -> SolidBody:
     """Return the solid of a body that has its masses."""
-    n, n_tetrahedra = (int(body.counts[i]) for i in (NODES, TETRAHEDRA))
+    n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))
     solid = no_solid(law, *room, room_for_stars(*room))
     visits = no_visits(*room)
@@ -125,7 +125,7 @@ def j_of(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
 
 def fastest(solid: SolidBody, positions: FloatArray | None = None) -> float:
     """Return the largest angular frequency at rest or elsewhere [1/s], by differences of forces."""
-    here = solid.body.rest[: solid.body.counts[NODES]].copy() if positions is None else positions
+    here = solid.body.rest[: solid.body.n_nodes].copy() if positions is None else positions
     free = np.repeat(~solid.body.fixed[: len(here)], 3)
     roots = np.sqrt(np.repeat(solid.body.masses[: len(here)], 3))
     step = 1e-6 * np.ptp(here)
@@ -167,7 +167,7 @@ def swing(
 ) -> None:
     """Take steps of the simplest kind (symplectic Euler): a test of forces needs no better."""
     v, f = scratch[0], scratch[1]
-    n = body.counts[NODES]
+    n = body.n_nodes
     for _ in range(n_steps):
         evaluate(solid, x, n_tetrahedra, n, f)
         for i in range(n):

@@ -31,10 +31,10 @@ from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray
 from tissue.cutting.blade_path import Path
 from tissue.material import Material
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 from tissue.mesh.bounding_boxes import Survey, boxes_meet
-from tissue.mesh.changes import N_DIRTY, Change
-from tissue.mesh.moved_nodes import N_MOVED, Moved, forget_moved
+from tissue.mesh.changes import Change
+from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.point_location import build_grid, list_appended, list_moved, no_grid
 from tissue.mesh.star import LARGEST_STAR, Visits
 from tissue.types import BladeContacts, Wrench
@@ -120,7 +120,7 @@ class Grip:
         """Find what the edge holds, in the mesh after a pass of a cut."""
         relocate(self.tool.anchors, body, visits, self._queue)
         if self._has_flanks:
-            forget_changed_faces(self.tool.flanks, change.dirty, change.counts[N_DIRTY])
+            forget_changed_faces(self.tool.flanks, change.dirty, change.n_dirty)
 
     def feel(
         self,
@@ -204,9 +204,9 @@ class Grip:
         """Let the grid list where the tetrahedra are now."""
         if len(self._all_nodes) != len(body.positions):
             self._all_nodes = np.arange(len(body.positions))
-        nodes, n = self._all_nodes, int(body.counts[NODES])
+        nodes, n = self._all_nodes, body.n_nodes
         if moved is not None:
-            nodes, n = moved.nodes, int(moved.state[N_MOVED])
+            nodes, n = moved.nodes, int(moved.n_nodes)
         has_room = (
             len(self._grid.listed_at) == len(body.positions)
             and list_moved(body, visits, self._grid, nodes, n, self._queue)

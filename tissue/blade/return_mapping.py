@@ -63,8 +63,8 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
     at = walk(body, p, start)
     if at.inside or at.link == OUTER:
         return Place(at.tetrahedron, at.inside, not at.inside)
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     queue[0] = at.tetrahedron
     visits.tetrahedra[at.tetrahedron] = epoch
     n = 1

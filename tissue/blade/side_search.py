@@ -133,8 +133,8 @@ def _are_other_cells(searched: IntArray, grid: TetrahedronGrid, low: Vec3, high:
 @kernel
 def _open_faces(flanks: Flanks, body: Body, visits: Visits, grid: TetrahedronGrid) -> int:
     """Write the open faces in those cells to `flanks.around`; return how many, -1 without room."""
-    visits.epoch[0] += 1
-    epoch, cells = visits.epoch[0], flanks.searched
+    visits.epoch += 1
+    epoch, cells = visits.epoch, flanks.searched
     n = 0
     for i in range(cells[_CELLS], cells[_CELLS + 3] + 1):
         for j in range(cells[_CELLS + 1], cells[_CELLS + 4] + 1):

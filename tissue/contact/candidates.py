@@ -39,7 +39,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
-from tissue.mesh.body import NODES, Body, grown
+from tissue.mesh.body import Body, grown
 from tissue.mesh.surface import OUTWARD
 
 N_NODES, N_DIRTY, N_UPDATES = 0, 1, 2
@@ -187,7 +187,7 @@ def clear(candidates: Candidates) -> None:
 @kernel
 def moves_as_tissue_does(body: Body, start: FloatArray) -> bool:
     """Whether no node at all has moved by more than `FARTHEST`, or to nowhere, since `start`."""
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         d = sub(vec3(body.positions, node), vec3(start, node))
         if not dot(d, d) <= FARTHEST * FARTHEST:
             return False

@@ -8,8 +8,8 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
-from tissue.mesh.body import CUT, OUTER, TETRAHEDRA, Body, grown
-from tissue.mesh.changes import N_DIRTY, Change
+from tissue.mesh.body import CUT, OUTER, Body, grown
+from tissue.mesh.changes import Change
 
 ROOM_FOR_FACES = 1 << 14
 """Faces that there is room for at first: those of several cuts, so that few steps must grow it."""
@@ -77,7 +77,7 @@ def with_room(faces: Faces, n_more: int) -> Faces:
 @kernel
 def renew_faces(faces: Faces, body: Body, change: Change) -> None:
     """Take in and leave out faces of the tetrahedra that changed. Room: 4 for each of them."""
-    for i in range(change.counts[N_DIRTY]):
+    for i in range(change.n_dirty):
         _renew(faces, body, change.dirty[i])
 
 
@@ -85,7 +85,7 @@ def renew_faces(faces: Faces, body: Body, change: Change) -> None:
 def count_faces(body: Body, with_skin: bool) -> int:
     """Return how many faces there are to collect."""
     n = 0
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         for f in range(4):
             link = body.links[t, f]
             if link == CUT or (with_skin and link == OUTER):
@@ -96,7 +96,7 @@ def count_faces(body: Body, with_skin: bool) -> int:
 @kernel
 def collect_faces(faces: Faces, body: Body) -> None:
     """Look at every tetrahedron of the body."""
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         _renew(faces, body, t)
 
 

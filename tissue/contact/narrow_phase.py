@@ -65,7 +65,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
 from tissue.geometry.tetrahedron import Weights
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 
 _POINTS, _EDGES = 0, 1
 """Kinds of pairs."""
@@ -307,7 +307,7 @@ def _edge_edge(contact: ContactState, now: Edges, nodes: Nodes) -> EdgeEdge:
 
 @kernel
 def _find_on_floor(contact: ContactState, body: Body) -> None:
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         if body.positions[node, 2] < contact.floor - contact.touch:
             nodes, weights = (node, node, node, node), Weights(1.0, 0.0, 0.0, 0.0)
             up = Vec3(0.0, 0.0, 1.0)

@@ -37,7 +37,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, scale, store, vec3
 from tissue.geometry.tetrahedron import Weights
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 
 MANY = 1.0 / 16.0
 """Share of new contacts from which on all is looked at once more: a correction can push a node into
@@ -48,7 +48,7 @@ the next step."""
 @kernel
 def prepare(contact: ContactState, body: Body) -> None:
     """Before a Runge-Kutta step: note where the nodes are."""
-    for i in range(body.counts[NODES]):
+    for i in range(body.n_nodes):
         store(contact.start, i, vec3(body.positions, i))
 
 

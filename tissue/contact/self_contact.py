@@ -41,8 +41,8 @@ from tissue.contact.state import (
     ContactState,
 )
 from tissue.core.simd import aligned, room_for_points
-from tissue.mesh.body import TETRAHEDRA, Body, grown
-from tissue.mesh.changes import N_DIRTY, Change
+from tissue.mesh.body import Body, grown
+from tissue.mesh.changes import Change
 from tissue.mesh.pieces import label_pieces
 from tissue.types import BodyContacts
 
@@ -152,7 +152,7 @@ class SelfContact:
         The lips of the first incision do not touch before it ends: the blade is between them.
         """
         state, faces = self.arrays.state, self.arrays.faces
-        faces = with_room(faces, 4 * int(change.counts[N_DIRTY]))
+        faces = with_room(faces, 4 * int(change.n_dirty))
         renew_faces(faces, body, change)
         if faces is not self.arrays.faces:
             self.arrays = self.arrays.replaced(faces=faces)
@@ -166,7 +166,7 @@ class SelfContact:
     def look_for_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; its skin may touch then, too."""
         faces = self.arrays.faces
-        n_tetrahedra = int(body.counts[TETRAHEDRA])
+        n_tetrahedra = body.n_tetrahedra
         piece, queue = np.empty((2, n_tetrahedra), np.int64)
         n_pieces = label_pieces(body, piece, queue)
         if n_pieces == 1:

@@ -12,7 +12,6 @@ from tissue.cutting.blade_path import Path, Plane, nearest_on_edge, plane_at
 from tissue.cutting.cut_surface import on_sheet, see_side, side_of
 from tissue.cutting.snapping import insert_crossing, snap_distance
 from tissue.cutting.workspace import Cut, flag
-from tissue.mesh.changes import FULL, N_DIRTY
 
 
 @kernel
@@ -22,8 +21,8 @@ def resolve_bridges(cut: Cut) -> None:
     These stay in `work.previous`, for a last look at their faces.
     """
     work, visits = cut.work, cut.visits
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     for i in range(work.n_active[0]):
         visits.tetrahedra[work.active[i]] = epoch
     # `visits` is overwritten by the searches below, so the list is thinned out first.
@@ -35,7 +34,7 @@ def resolve_bridges(cut: Cut) -> None:
     work.n_previous[0] = n
     for i in range(n):
         _resolve(cut, work.previous[i])
-        if cut.change.counts[FULL] != 0:
+        if cut.change.is_full != 0:
             return
 
 
@@ -48,7 +47,7 @@ def remember_active(cut: Cut) -> None:
         if n < len(work.previous):
             work.previous[n] = work.active[i]
             n += 1
-    for i in range(change.counts[N_DIRTY]):
+    for i in range(change.n_dirty):
         if n < len(work.previous):
             work.previous[n] = change.dirty[i]
             n += 1

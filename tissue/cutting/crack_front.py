@@ -15,7 +15,6 @@ from tissue.cutting.snapping import insert_in_face
 from tissue.cutting.workspace import Cut
 from tissue.geometry.exact_predicates import Point, pierces, point
 from tissue.mesh.body import local_index
-from tissue.mesh.changes import FULL, N_DIRTY
 from tissue.mesh.star import star
 
 MOST_EVENTS = 32
@@ -102,7 +101,7 @@ def bring_front_to_blade(cut: Cut) -> None:
             sub(vec3(path.t1, k + 1), origin),
         )
         node = _lay_front(cut, way, node)
-        if cut.change.counts[FULL] != 0:
+        if cut.change.is_full != 0:
             return
     if node >= 0 and path.member[last] and front[1] >= 0:
         _join(cut, node, front[1])
@@ -126,7 +125,7 @@ def _lay_front(cut: Cut, way: Way, before: int) -> int:
         if before >= 0 and not (event.outer and not event.leaving):
             _join(cut, before, node)
         before = -1 if event.outer and event.leaving else node
-        if cut.change.counts[FULL] != 0:
+        if cut.change.is_full != 0:
             return before
     return before
 
@@ -138,7 +137,7 @@ def next_event(cut: Cut, way: Way, after: float) -> Event:
     best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), -1, False, False)
     for i in range(work.n_active[0]):
         best = _earlier_event(cut, work.active[i], way, after, best)
-    for i in range(change.counts[N_DIRTY]):
+    for i in range(change.n_dirty):
         best = _earlier_event(cut, change.dirty[i], way, after, best)
     return best
 

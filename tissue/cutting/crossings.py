@@ -22,8 +22,8 @@ def find_active_tetrahedra(cut: Cut) -> None:
     changed in the step before, and from one lip of an earlier cut to the other.
     """
     body, path, work, visits = cut.body, cut.path, cut.work, cut.visits
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     work.n_active[0] = 0
     for k in range(len(path.seed)):
         if path.seed[k] >= 0:
@@ -136,8 +136,8 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
 def find_crossings(cut: Cut) -> None:
     """Find the edges of active tetrahedra that the swept edge crosses, each asked once."""
     body, work, visits = cut.body, cut.work, cut.visits
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     mask = len(work.hash_keys) - 1
     work.n_crossings[0] = 0
     for i in range(work.n_active[0]):

@@ -27,7 +27,7 @@ class Scheme(Protocol):
     """A way to cut a mesh. It owns the arrays of the current incision, not those of the body.
 
     A cut step is `detect`, then passes of `cut`, each after `grow` and another `detect`, until one
-    no longer ends for want of room (`change.counts[FULL]`).
+    no longer ends for want of room (`change.is_full`).
     """
 
     change: Change

@@ -17,8 +17,8 @@ from tissue.cutting.cut_surface import (
 )
 from tissue.cutting.workspace import Cut
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
-from tissue.mesh.body import CUT, NODES, Body, local_index
-from tissue.mesh.changes import FULL, N_DIRTY, N_FACES, N_FLAGGED, note_dirty
+from tissue.mesh.body import CUT, Body, local_index
+from tissue.mesh.changes import note_dirty
 from tissue.mesh.star import star
 
 CRUMB_TETRAHEDRA = 16
@@ -31,13 +31,13 @@ def open_sheet(cut: Cut) -> None:
     _mark(cut)
     _keep_crumbs(cut)
     change = cut.change
-    for i in range(change.counts[N_FACES]):
+    for i in range(change.n_faces):
         if change.faces[i, 1] >= 0:
-            change.area[0] += face_area(
+            change.area += face_area(
                 cut.body.rest, cut.body.tetrahedra, change.faces[i, 0], change.faces[i, 1]
             )
             _unglue_face(cut, i)
-    for i in range(change.counts[N_FLAGGED]):
+    for i in range(change.n_flagged):
         _unglue_fans(cut, change.flagged[i])
 
 
@@ -66,7 +66,7 @@ def _mark(cut: Cut) -> None:
         _mark_around(cut, work.active[i])
     for i in range(work.n_previous[0]):  # by now the sides of all their nodes have been seen
         _mark_around(cut, work.previous[i])
-    for i in range(change.counts[N_FLAGGED]):
+    for i in range(change.n_flagged):
         _mark_star(cut, change.flagged[i])
 
 
@@ -92,13 +92,13 @@ def _mark_around(cut: Cut, t: int) -> None:
             continue
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
             continue  # the last link of a tetrahedron holds: it would be a crumb
-        if change.counts[N_FACES] == len(change.faces):
-            change.counts[FULL] = 1
+        if change.n_faces == len(change.faces):
+            change.is_full = 1
             return
         decide_side(sheet, t, side)
         decide_side(sheet, other, other_side)
-        row = change.counts[N_FACES]
-        change.counts[N_FACES] += 1
+        row = change.n_faces
+        change.n_faces += 1
         change.faces[row, 0] = t
         change.faces[row, 1] = f
         change.faces[row, 2] = other
@@ -178,8 +178,8 @@ def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
 def _keep_crumbs(cut: Cut) -> None:
     """Link small closed pieces that this step made back to the side of larger contact."""
     change, body, work, visits = cut.change, cut.body, cut.work, cut.visits
-    n_faces = change.counts[N_FACES]
-    first = visits.epoch[0] + 1
+    n_faces = change.n_faces
+    first = visits.epoch + 1
     for i in range(n_faces):
         for j in range(0, 4, 2):
             start = change.faces[i, j]
@@ -204,8 +204,8 @@ def _small_piece(cut: Cut, start: int, first: int) -> int:
     What a search since visit `first` has seen belongs to a piece that is not small.
     """
     body, visits, piece = cut.body, cut.visits, cut.work.around
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     if visits.tetrahedra[start] >= first:
         return 0
     visits.tetrahedra[start] = epoch
@@ -232,10 +232,10 @@ def _relink(cut: Cut, n: int) -> None:
     The piece was just collected, so its tetrahedra bear the current visit.
     """
     change, body, sheet = cut.change, cut.body, cut.sheet
-    epoch = cut.visits.epoch[0]
+    epoch = cut.visits.epoch
     area_plus = 0.0
     area_minus = 0.0
-    for row in range(change.counts[N_FACES]):
+    for row in range(change.n_faces):
         outside = _outside_of_piece(cut, row, epoch)
         if outside >= 0:
             area = face_area(body.rest, body.tetrahedra, change.faces[row, 0], change.faces[row, 1])
@@ -246,7 +246,7 @@ def _relink(cut: Cut, n: int) -> None:
     if area_plus == 0.0 and area_minus == 0.0:
         return
     side = 1 if area_plus >= area_minus else -1
-    for row in range(change.counts[N_FACES]):
+    for row in range(change.n_faces):
         outside = _outside_of_piece(cut, row, epoch)
         if outside >= 0 and decided_side(sheet, outside) == side:
             t = change.faces[row, 0]
@@ -292,7 +292,7 @@ def _unglue_face(cut: Cut, row: int) -> None:
 def _unglue_fans(cut: Cut, node: int) -> None:
     """Double a node put into the rim of an old cut, if the tetrahedra around it are apart."""
     body, change = cut.body, cut.change
-    for i in range(change.counts[N_DIRTY]):
+    for i in range(change.n_dirty):
         t = change.dirty[i]
         if local_index(body, t, node) >= 0:
             _unglue(cut, node, t)
@@ -303,7 +303,7 @@ def _unglue(cut: Cut, node: int, t: int) -> None:
     """Give the part of the star of `node` that holds `t` a copy of it, if it is apart."""
     body, work, change, visits = cut.body, cut.work, cut.change, cut.visits
     star(body, visits, node, body.node_tetrahedron[node], work.around)
-    if visits.tetrahedra[t] == visits.epoch[0]:
+    if visits.tetrahedra[t] == visits.epoch:
         return
     n = star(body, visits, node, t, work.around)
     copy = _copy_node(cut, node)
@@ -316,8 +316,8 @@ def _unglue(cut: Cut, node: int, t: int) -> None:
 @kernel
 def _copy_node(cut: Cut, node: int) -> int:
     body, sheet = cut.body, cut.sheet
-    copy = body.counts[NODES]
-    body.counts[NODES] += 1
+    copy = body.n_nodes
+    body.n_nodes += 1
     for x in range(3):
         body.rest[copy, x] = body.rest[node, x]
         body.positions[copy, x] = body.positions[node, x]

@@ -19,7 +19,6 @@ from tissue.cutting.stellar_subdivision import (
 from tissue.cutting.workspace import Cut, flag
 from tissue.geometry.tetrahedron import normalised
 from tissue.mesh.body import CUT
-from tissue.mesh.changes import FULL
 from tissue.mesh.star import node_size, star
 
 EXPLAINED = 1.5
@@ -107,7 +106,7 @@ def insert_crossings(cut: Cut) -> None:
             work.crossing[row, 2],
             work.crossing_at[row, 0],
         )
-        if cut.change.counts[FULL] != 0:
+        if cut.change.is_full != 0:
             return
 
 

@@ -12,8 +12,8 @@ from tissue.cutting.cut_surface import decide_side, decided_side, touch
 from tissue.cutting.workspace import PASS_NODES, SPARE_NODES, Cut
 from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude
-from tissue.mesh.body import NODES, TETRAHEDRA, local_index
-from tissue.mesh.changes import FULL, N_FLAGGED, note_dirty
+from tissue.mesh.body import local_index
+from tissue.mesh.changes import note_dirty
 from tissue.mesh.star import edge_star
 
 NO_ROOM = -1
@@ -103,11 +103,11 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
     n_appended = n * (n_ends - 1)
     if (
         n == 0
-        or body.counts[NODES] + SPARE_NODES > len(body.rest)
-        or body.counts[TETRAHEDRA] + n_appended > len(body.tetrahedra)
-        or change.counts[N_FLAGGED] > PASS_NODES
+        or body.n_nodes + SPARE_NODES > len(body.rest)
+        or body.n_tetrahedra + n_appended > len(body.tetrahedra)
+        or change.n_flagged > PASS_NODES
     ):
-        change.counts[FULL] = 1
+        change.is_full = 1
         return NO_ROOM
     node = _new_node(cut, a, b, c, w)
     for i in range(n):
@@ -115,8 +115,8 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
         work.place[t] = i
         work.children[i, 0] = t
         for e in range(1, n_ends):
-            work.children[i, e] = body.counts[TETRAHEDRA]
-            body.counts[TETRAHEDRA] += 1
+            work.children[i, e] = body.n_tetrahedra
+            body.n_tetrahedra += 1
         for f in range(4):
             work.parent_links[i, f] = body.links[t, f]
     for i in range(n):
@@ -131,8 +131,8 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
 def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     """Append a node; position and velocity are linear, which keeps momentum and strain."""
     body = cut.body
-    node = body.counts[NODES]
-    body.counts[NODES] += 1
+    node = body.n_nodes
+    body.n_nodes += 1
     for x in range(3):
         body.rest[node, x] = _mix(body.rest, a, b, c, w, x)
         body.positions[node, x] = _mix(body.positions, a, b, c, w, x)

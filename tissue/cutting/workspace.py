@@ -9,7 +9,7 @@ from tissue.core.vec3 import dot, sub, vec3
 from tissue.cutting.blade_path import Path, plane_near
 from tissue.cutting.cut_surface import Sheet, on_sheet, put_on_sheet
 from tissue.mesh.body import Body
-from tissue.mesh.changes import CHANGES, N_FLAGGED, Change
+from tissue.mesh.changes import CHANGES, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 PASS_NODES = 256
@@ -128,6 +128,6 @@ def flag(cut: Cut, node: int) -> None:
         put_on_sheet(sheet, node, offset)
         cut.body.off_path[node] = max(cut.body.off_path[node], offset)
     change = cut.change
-    if change.counts[N_FLAGGED] < len(change.flagged):
-        change.flagged[change.counts[N_FLAGGED]] = node
-        change.counts[N_FLAGGED] += 1
+    if change.n_flagged < len(change.flagged):
+        change.flagged[change.n_flagged] = node
+        change.n_flagged += 1

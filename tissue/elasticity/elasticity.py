@@ -20,8 +20,8 @@ from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.strained_frequency import strained_frequency
 from tissue.material import Material
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
-from tissue.mesh.changes import N_DIRTY, Change, largest_frequency
+from tissue.mesh.body import Body
+from tissue.mesh.changes import Change, largest_frequency
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 ROOM_FOR_SPRINGS = 1 << 16
@@ -62,14 +62,14 @@ class Elasticity:
         """Bound on the square of every angular frequency so far [1/s2]."""
         self.damper_frequency_squared = 0.0
         """The same of springs alone, whose stiffness the dampers have, whatever the law [1/s2]."""
-        n_nodes, n_tetrahedra = (int(body.counts[i]) for i in (NODES, TETRAHEDRA))
+        n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
     ) -> None:
         """Write anew what the tetrahedra that changed, and their `n` nodes, enter into."""
-        self._write(body, visits, change.dirty[: change.counts[N_DIRTY]], nodes[:n])
+        self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
 
     @property
     def follows_strain(self) -> bool:
@@ -84,7 +84,7 @@ class Elasticity:
         """
         if not self._has_solid:
             return 0.0
-        blocks = n_blocks(int(body.counts[TETRAHEDRA]))
+        blocks = n_blocks(body.n_tetrahedra)
         return strained_frequency(self.arrays, body.positions, self.arrays.solid.every, 0, blocks)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:

@@ -5,14 +5,14 @@ from tissue.core.jit import kernel
 from tissue.core.simd import store_point
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.internal_forces import Elastic, Surroundings, elastic_energy, viscous_force
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 
 
 @kernel
 def kinetic_energy(body: Body) -> float:
     """Of all nodes [J]."""
     energy = 0.0
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         v = vec3(body.velocities, node)
         energy += 0.5 * body.masses[node] * dot(v, v)
     return energy
@@ -22,7 +22,7 @@ def kinetic_energy(body: Body) -> float:
 def potential_energy(body: Body, gravity: Vec3) -> float:
     """Of all nodes in gravity [J]."""
     energy = 0.0
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         energy -= body.masses[node] * dot(gravity, vec3(body.positions, node))
     return energy
 
@@ -46,7 +46,7 @@ def dissipated_power(
     """What viscosity and drag take at that motion [W]; `scratch` has the shape of positions."""
     time = surroundings.retardation_time
     power = 0.0
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         if body.fixed[node]:
             continue
         v = vec3(velocities, node)

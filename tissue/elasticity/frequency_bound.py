@@ -113,17 +113,17 @@ def with_neighbours(solid: Solid, visits: Visits, listed: IntArray, n: int) -> i
 
 @kernel
 def _mark_listed(visits: Visits, listed: IntArray, n: int) -> None:
-    visits.epoch[0] += 1
+    visits.epoch += 1
     for i in range(n):
-        visits.nodes[listed[i]] = visits.epoch[0]
+        visits.nodes[listed[i]] = visits.epoch
 
 
 @kernel
 def _list(visits: Visits, listed: IntArray, n: int, node: int) -> int:
     """Add a node to a list of `n` unless it is marked; return how many it has."""
-    if visits.nodes[node] == visits.epoch[0]:
+    if visits.nodes[node] == visits.epoch:
         return n
-    visits.nodes[node] = visits.epoch[0]
+    visits.nodes[node] = visits.epoch
     listed[n] = node
     return n + 1
 
@@ -135,7 +135,7 @@ def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> 
     The averaged volume V_a J changes by the sum of C_b . u_b, C_b = sum of V grad N_b / 4 over the
     tetrahedra around node a. Its energy is lam / (2 V_a) times the square of that.
     """
-    visits.epoch[0] += 1
+    visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t = tetrahedron_at(solid, slot)
@@ -154,8 +154,8 @@ def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> 
 def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
     """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
     node = solid.nodes[node_place(t, k)]
-    if visits.nodes[node] != visits.epoch[0]:
-        visits.nodes[node] = visits.epoch[0]
+    if visits.nodes[node] != visits.epoch:
+        visits.nodes[node] = visits.epoch
         visits.place[node] = n
         solid.ring_nodes[n] = node
         store(solid.ring, n, Vec3(0.0, 0.0, 0.0))
@@ -176,7 +176,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     lam = max(solid.law.lam_of_tetrahedra - 5.0 / 6.0 * mu, -2.0 / 3.0 * mu)
     averaged = solid.law.lam_of_nodes != 0.0
     isotropic, stiffness = 0.0, nothing_symmetric()
-    visits.epoch[0] += 1
+    visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t = tetrahedron_at(solid, slot)

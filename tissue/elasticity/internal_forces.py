@@ -15,7 +15,7 @@ from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
 from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
 from tissue.elasticity.springs import Springs, spring_energy
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.body import Body
 
 SPRINGS, TETRAHEDRA_TOO = 0, 1
 """Places in `Elastic.has`."""
@@ -48,7 +48,7 @@ def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
     """Evaluate all tetrahedra at `positions` [m], for `internal_force`."""
     if elastic.has[TETRAHEDRA_TOO]:
         solid = elastic.solid
-        blocks, nodes = n_blocks(body.counts[TETRAHEDRA]), body.counts[NODES]
+        blocks, nodes = n_blocks(body.n_tetrahedra), body.n_nodes
         solid_forces(solid, positions, solid.every, blocks, solid.every, nodes)
 
 
@@ -107,6 +107,6 @@ def elastic_energy(elastic: Elastic, body: Body) -> float:
     if elastic.has[SPRINGS]:
         energy += spring_energy(elastic.springs, body)
     if elastic.has[TETRAHEDRA_TOO]:
-        n_nodes, n_tetrahedra = body.counts[NODES], body.counts[TETRAHEDRA]
+        n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         energy += solid_energy(elastic.solid, body.positions, n_tetrahedra, n_nodes)
     return energy

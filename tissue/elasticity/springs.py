@@ -23,7 +23,7 @@ from tissue.geometry.tetrahedron import (
     nothing_symmetric,
     tetrahedron_volume,
 )
-from tissue.mesh.body import NODES, TETRAHEDRA, Body, grown
+from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
 POOL_MARGIN = LARGEST_STAR + WIDTH
@@ -113,8 +113,8 @@ def _build_row(
     # Both ends of an edge must add the same volumes in the same order, or the two ends of a spring
     # would differ in the last bit and action would not quite be reaction: hence sorted.
     n_around = sorted_star(body, visits, node, around)
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     n = 0
     for i in range(n_around):
         for k in range(4):
@@ -193,7 +193,7 @@ def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> 
 def spring_energy(springs: Springs, body: Body) -> float:
     """Energy stored in the springs [J]: sum of k (l - l0)^2 / 2, each spring once."""
     energy = 0.0
-    for i in range(body.counts[NODES]):
+    for i in range(body.n_nodes):
         here = vec3(body.positions, i)
         for slot in range(springs.first[i], springs.first[i] + springs.count[i]):
             j = springs.neighbour[slot]
@@ -208,6 +208,6 @@ def spring_energy(springs: Springs, body: Body) -> float:
 def total_volume(body: Body) -> float:
     """Volume of the body at rest [m3]."""
     volume = 0.0
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         volume += tetrahedron_volume(body.rest, body.tetrahedra, t)
     return volume

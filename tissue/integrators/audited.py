@@ -8,7 +8,6 @@ from tissue.core.array_types import FloatArray
 from tissue.elasticity.energy import body_energy, dissipated_power
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
 from tissue.integrators.step_context import Motion, give_way_after, set_right
-from tissue.mesh.body import NODES
 
 
 class Audited:
@@ -45,7 +44,7 @@ class Audited:
 
     def _step(self, motion: Motion, at: float, share: float) -> None:
         body, stages, elastic = motion.body, motion.stages, motion.elasticity.arrays
-        n, h = int(body.counts[NODES]), share * motion.dt
+        n, h = body.n_nodes, share * motion.dt
         self._positions[:n], self._velocities[:n] = body.positions[:n], body.velocities[:n]
         before = self._power_now
         blade = (motion.tool, motion.edge, stages)

@@ -11,7 +11,6 @@ from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Motion
-from tissue.mesh.body import NODES
 
 SETTLED = 1e-3
 """Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
@@ -29,7 +28,7 @@ def settle(all_together: GlobalStepper, motion: Motion) -> int:
         motion: What takes part; its time step is not used.
     """
     body, elasticity = motion.body, motion.elasticity
-    n, energy = int(body.counts[NODES]), 0.0
+    n, energy = body.n_nodes, 0.0
     velocities, masses = body.velocities[:n], body.masses[:n, None]
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         strained = elasticity.strained_frequency_squared(body)

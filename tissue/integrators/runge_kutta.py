@@ -29,7 +29,7 @@ from tissue.elasticity.internal_forces import (
     internal_force,
     viscous_force,
 )
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 
@@ -126,7 +126,7 @@ def runge_kutta_nystroem(
 ) -> None:
     """Advance positions and velocities from fraction `at` of the time step by `share` of it."""
     h = share * dt
-    n = body.counts[NODES]
+    n = body.n_nodes
     external = stages.external
     half, end = at + 0.5 * share, at + share
     act(tool, body, edge, body.positions, at, share / 6.0, dt, external)
@@ -272,5 +272,5 @@ def accelerations(
     """Write the acceleration of every node as it is and moves now to `out` [m/s2]."""
     x, v = body.positions, body.velocities
     deform(elastic, body, x)
-    for i in range(body.counts[NODES]):
+    for i in range(body.n_nodes):
         store_point(out, i, acceleration(body, elastic, i, x, v, external, surroundings))

@@ -18,7 +18,7 @@ from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
 from tissue.integrators.step_context import Motion, end_step
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.body import Body
 
 
 class Threads:
@@ -46,7 +46,7 @@ class Threads:
     def _step(self, motion: Motion, at: float, share: float) -> None:
         """One step of Nystroem's form (see `runge_kutta_nystroem`)."""
         body, elastic, stages = motion.body, motion.elasticity.arrays, motion.stages
-        n = int(body.counts[NODES])
+        n = body.n_nodes
         arguments = (body, elastic, stages, motion.surroundings, share * motion.dt)
         self._act(motion, body.positions, at, share / 6.0)
         self._deform(body, elastic, body.positions)
@@ -71,10 +71,10 @@ class Threads:
         if not elastic.has[TETRAHEDRA_TOO]:
             return
         solid = elastic.solid
-        blocks = n_blocks(int(body.counts[TETRAHEDRA]))
+        blocks = n_blocks(body.n_tetrahedra)
         if has_averaged_volumes(solid):
             self._share(blocks, volumes, solid, positions, solid.every)
-            self._share(int(body.counts[NODES]), pressures, solid, solid.every)
+            self._share(body.n_nodes, pressures, solid, solid.every)
         self._share(blocks, corner_forces, solid, positions, solid.every)
 
     def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:

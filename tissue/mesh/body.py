@@ -13,7 +13,7 @@ import numpy as np
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import room_for_points
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import Lattice, lattice_around
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
@@ -38,12 +38,9 @@ INSIDE_TOLERANCE = 1e-9
 LONGEST_WALK = 128
 """Tetrahedra that `walk` passes through at most. A step of the edge passes through two or three."""
 
-NODES, TETRAHEDRA = 0, 1
-"""Places in `Body.counts`."""
-
 
 class Body(Arrays):
-    """Every node and tetrahedron. Rows beyond `counts` are room to grow."""
+    """Every node and tetrahedron. Rows beyond their numbers are room to grow."""
 
     rest: FloatArray
     """Rest positions [m], shape (capacity, 3)."""
@@ -68,8 +65,10 @@ class Body(Arrays):
     """Node indices, shape (capacity, 4)."""
     links: IntArray
     """What is behind each face, shape (capacity, 4)."""
-    counts: IntArray
-    """Number of nodes and of tetrahedra, shape (2,)."""
+    n_nodes: IntCell
+    """Number of nodes."""
+    n_tetrahedra: IntCell
+    """Number of tetrahedra."""
     lattice: Lattice
     hanging: Hanging
 
@@ -118,7 +117,8 @@ def build_body(
         twin=np.arange(n),
         tetrahedra=tetrahedra.copy(),
         links=build_links(tetrahedra),
-        counts=np.array([n, len(tetrahedra)], dtype=np.int64),
+        n_nodes=n,
+        n_tetrahedra=len(tetrahedra),
         lattice=lattice,
         hanging=nothing_hanging(),
     )
@@ -138,7 +138,13 @@ def grown(array: np.ndarray, capacity: int, fill: float = 0) -> np.ndarray:
 def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
     """Return the body with room for that many nodes and tetrahedra."""
     of_tetrahedra = ("tetrahedra", "links")
-    of_nodes = set(Body.__annotations__) - {*of_tetrahedra, "counts", "lattice", "hanging"}
+    of_nodes = set(Body.__annotations__) - {
+        *of_tetrahedra,
+        "n_nodes",
+        "n_tetrahedra",
+        "lattice",
+        "hanging",
+    }
     larger = {name: grown(getattr(body, name), n_nodes) for name in of_nodes}
     larger |= {name: grown(getattr(body, name), n_tetrahedra) for name in of_tetrahedra}
     hanging = grown_hanging(body.hanging, n_nodes, n_tetrahedra)

@@ -8,7 +8,7 @@ import numpy as np
 from tissue.core.array_types import IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, vec3
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 
 
 class Survey(NamedTuple):
@@ -27,7 +27,7 @@ def survey(body: Body) -> Survey:
     """Look at all nodes."""
     box = Survey(Vec3(np.inf, np.inf, np.inf), Vec3(-np.inf, -np.inf, -np.inf), True)
     x = body.positions
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         box = _with(box, vec3(x, node))
     return box
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
@@ -21,14 +21,16 @@ class Change(Arrays):
     """Tetrahedra that were split or got another node, shape (CHANGES,); may repeat."""
     faces: IntArray
     """Faces cut: tetrahedron, face, tetrahedron, face; shape (CHANGES, 4)."""
-    counts: IntArray
-    """How many of each, and whether there was too little room; shape (4,)."""
-    area: FloatArray
-    """Area of the faces cut, at rest, since the body was made [m2]; shape (1,)."""
-
-
-N_FLAGGED, N_DIRTY, N_FACES, FULL = 0, 1, 2, 3
-"""Places in `Change.counts`."""
+    n_flagged: IntCell
+    """Number of entries in `flagged`."""
+    n_dirty: IntCell
+    """Number of entries in `dirty`."""
+    n_faces: IntCell
+    """Number of entries in `faces`."""
+    is_full: IntCell
+    """1 if the pass stopped for want of room, else 0."""
+    area: FloatCell
+    """Area of the faces cut, at rest, one side of each, since the body was made [m2]."""
 
 
 def new_change() -> Change:
@@ -37,33 +39,38 @@ def new_change() -> Change:
         flagged=np.zeros(CHANGES, np.int64),
         dirty=np.zeros(CHANGES, np.int64),
         faces=np.zeros((CHANGES, 4), np.int64),
-        counts=np.zeros(4, np.int64),
-        area=np.zeros(1),
+        n_flagged=0,
+        n_dirty=0,
+        n_faces=0,
+        is_full=0,
+        area=0.0,
     )
 
 
 @kernel
 def clear_changes(change: Change) -> None:
     """Forget what the last pass did."""
-    for i in range(len(change.counts)):
-        change.counts[i] = 0
+    change.n_flagged = 0
+    change.n_dirty = 0
+    change.n_faces = 0
+    change.is_full = 0
 
 
 @kernel
 def note_dirty(change: Change, t: int) -> None:
     """Note that tetrahedron `t` was changed."""
-    if change.counts[N_DIRTY] < len(change.dirty):
-        change.dirty[change.counts[N_DIRTY]] = t
-        change.counts[N_DIRTY] += 1
+    if change.n_dirty < len(change.dirty):
+        change.dirty[change.n_dirty] = t
+        change.n_dirty += 1
 
 
 @kernel
 def touched_nodes(body: Body, change: Change, visits: Visits, out: IntArray) -> int:
     """Write the nodes of the changed tetrahedra to `out`, each once; return how many."""
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     n = 0
-    for i in range(change.counts[N_DIRTY]):
+    for i in range(change.n_dirty):
         for k in range(4):
             node = body.tetrahedra[change.dirty[i], k]
             if visits.nodes[node] != epoch:

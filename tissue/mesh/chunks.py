@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.body import Body
 from tissue.types import Chunks
 
 TETRAHEDRA_EACH = 64
@@ -32,8 +32,8 @@ def chunk_nodes(body: Body) -> ChunkNodes:
 
     The tetrahedra whose first node is in a cell are a chunk.
     """
-    tetrahedra = body.tetrahedra[: body.counts[TETRAHEDRA]]
-    n_nodes = int(body.counts[NODES])
+    tetrahedra = body.tetrahedra[: body.n_tetrahedra]
+    n_nodes = body.n_nodes
     rest = body.rest[:n_nodes]
     low, extent = rest.min(axis=0), np.ptp(rest, axis=0)
     n = min(max(len(tetrahedra) // TETRAHEDRA_EACH, 1), MOST_CHUNKS)
@@ -66,6 +66,6 @@ def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
                 low, high = min(low, here), max(high, here)
             boxes[chunk, 0, axis], boxes[chunk, 1, axis] = low, high
     largest = 0.0
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         largest = max(largest, v[node, 0] ** 2 + v[node, 1] ** 2 + v[node, 2] ** 2)
     return np.sqrt(largest)

@@ -8,7 +8,7 @@ from tissue.core.array_types import BoolArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import vec3
 from tissue.geometry.tetrahedron import smallest_altitude
-from tissue.mesh.body import CUT, NODES, TETRAHEDRA, Body
+from tissue.mesh.body import CUT, Body
 
 
 class PathError(NamedTuple):
@@ -23,7 +23,7 @@ class PathError(NamedTuple):
 
 def path_error(body: Body) -> PathError:
     """Return the path error of every cut in the body, in O(its tetrahedra)."""
-    return PathError(*_path_error(body, np.zeros(int(body.counts[NODES]), dtype=np.bool_)))
+    return PathError(*_path_error(body, np.zeros(body.n_nodes, dtype=np.bool_)))
 
 
 @kernel
@@ -32,7 +32,7 @@ def _path_error(body: Body, seen: BoolArray) -> tuple[int, float, float]:
     n = 0
     total = 0.0
     largest = 0.0
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         for f in range(4):
             if body.links[t, f] != CUT:
                 continue
@@ -51,7 +51,7 @@ def _path_error(body: Body, seen: BoolArray) -> tuple[int, float, float]:
 def lowest_altitude(body: Body) -> float:
     """Smallest altitude of all tetrahedra at rest [m]."""
     lowest = np.inf
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         lowest = min(
             lowest,
             smallest_altitude(

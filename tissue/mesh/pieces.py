@@ -5,7 +5,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.geometry.connected_components import components
-from tissue.mesh.body import TETRAHEDRA, Body
+from tissue.mesh.body import Body
 from tissue.mesh.nonconforming import behind, n_behind
 from tissue.types import Piece, Snapshot
 
@@ -16,7 +16,7 @@ def label_pieces(body: Body, piece: IntArray, queue: IntArray) -> int:
 
     `piece` and `queue` have a place for each tetrahedron.
     """
-    n_tetrahedra = body.counts[TETRAHEDRA]
+    n_tetrahedra = body.n_tetrahedra
     for t in range(n_tetrahedra):
         piece[t] = -1
     n_pieces = 0

@@ -13,7 +13,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
-from tissue.mesh.body import NODES, TETRAHEDRA, Body
+from tissue.mesh.body import Body
 from tissue.mesh.star import Visits, star
 
 TETRAHEDRA_PER_CELL = 4.0
@@ -74,7 +74,7 @@ def no_grid() -> TetrahedronGrid:
 
 def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronGrid:
     """Return the grid of all tetrahedra at `positions` [m], widened by `margin` [m]."""
-    n_nodes, n_tetrahedra = int(body.counts[NODES]), int(body.counts[TETRAHEDRA])
+    n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     low = positions[:n_nodes].min(axis=0) - margin
     size = positions[:n_nodes].max(axis=0) + margin - low
     n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), _MOST_CELLS)
@@ -101,7 +101,7 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
 @kernel
 def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> bool:
     """List the tetrahedra that were appended since the last call; return whether there was room."""
-    while grid.counts[LISTED] < body.counts[TETRAHEDRA]:
+    while grid.counts[LISTED] < body.n_tetrahedra:
         t = grid.counts[LISTED]
         for k in range(4):
             node = body.tetrahedra[t, k]

@@ -4,9 +4,9 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.geometry.tetrahedron import node_altitude
-from tissue.mesh.body import NODES, Body, local_index
+from tissue.mesh.body import Body, local_index
 from tissue.mesh.nonconforming import END
 
 LARGEST_STAR = 4096
@@ -16,8 +16,8 @@ LARGEST_STAR = 4096
 class Visits(Arrays):
     """Which tetrahedra and nodes a search has seen. A new epoch forgets all, without clearing."""
 
-    epoch: IntArray
-    """Number of the current search, shape (1,)."""
+    epoch: IntCell
+    """Number of the current search."""
     tetrahedra: IntArray
     """Search that saw each tetrahedron last, shape (capacity,)."""
     nodes: IntArray
@@ -29,7 +29,7 @@ class Visits(Arrays):
 def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
     """Return visits for that many nodes and tetrahedra."""
     return Visits(
-        epoch=np.zeros(1, np.int64),
+        epoch=0,
         tetrahedra=np.zeros(n_tetrahedra, np.int64),
         nodes=np.zeros(n_nodes, np.int64),
         place=np.zeros(n_nodes, np.int64),
@@ -43,8 +43,8 @@ def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> in
     They come in breadth-first order, `start` first. Where nodes may hang they are those of the list
     of `node`.
     """
-    visits.epoch[0] += 1
-    epoch = visits.epoch[0]
+    visits.epoch += 1
+    epoch = visits.epoch
     if len(body.hanging.first) > 0:
         return _listed(body, visits, node, out)
     visits.tetrahedra[start] = epoch
@@ -74,7 +74,7 @@ def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
     corner = body.hanging.first[node]
     while corner != END and n < LARGEST_STAR:
         out[n] = corner // 4
-        visits.tetrahedra[out[n]] = visits.epoch[0]
+        visits.tetrahedra[out[n]] = visits.epoch
         n += 1
         corner = body.hanging.next[corner]
     return n
@@ -113,9 +113,9 @@ def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
 def mean_node_size(body: Body, visits: Visits, out: IntArray) -> float:
     """Mean over all nodes of `node_size` [m]."""
     total = 0.0
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         total += node_size(body, visits, node, out)
-    return total / body.counts[NODES]
+    return total / body.n_nodes
 
 
 @kernel

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, IntArray
 from tissue.core.jit import kernel
-from tissue.mesh.body import CUT, NODES, TETRAHEDRA, Body
+from tissue.mesh.body import CUT, Body
 from tissue.mesh.nonconforming import is_open
 from tissue.types import Surface
 
@@ -18,7 +18,7 @@ def boundary_triangles(
 ) -> int:
     """Write the triangles without a neighbour; return how many. Room: 4 a tetrahedron."""
     n = 0
-    for t in range(body.counts[TETRAHEDRA]):
+    for t in range(body.n_tetrahedra):
         for f in range(4):
             if is_open(body.links[t, f]):
                 for k in range(3):
@@ -30,12 +30,12 @@ def boundary_triangles(
 
 def boundary_surface(body: Body) -> Surface:
     """Return the boundary with its own vertices: only nodes that some triangle uses."""
-    room = 4 * int(body.counts[TETRAHEDRA])
+    room = 4 * body.n_tetrahedra
     triangles = np.empty((room, 3), dtype=np.int64)
     is_cut = np.empty(room, dtype=np.bool_)
     n = boundary_triangles(body, triangles, is_cut, OUTWARD)
     triangles = triangles[:n]
-    used = np.zeros(int(body.counts[NODES]), dtype=np.bool_)
+    used = np.zeros(body.n_nodes, dtype=np.bool_)
     used[triangles] = True
     nodes = np.flatnonzero(used)
     vertex = np.cumsum(used) - 1

@@ -7,7 +7,6 @@ from tissue import Tissue, block
 from tissue.blade.slit import behind_edge, in_slit
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
-from tissue.mesh.body import TETRAHEDRA
 from tissue.mesh.point_location import build_grid, tetrahedron_at
 
 EDGE = 0.04
@@ -29,7 +28,7 @@ def slit_body():
 def is_in_slit(body, x, y, z, along=UP, forward=AHEAD) -> bool:
     p = Vec3(x, y, z)
     t = tetrahedron_at(body, build_grid(body, body.rest, 0.0), body.rest, p)
-    assert 0 <= t < body.counts[TETRAHEDRA]
+    assert 0 <= t < body.n_tetrahedra
     return in_slit(body, t, p, along, forward, REACH)
 
 

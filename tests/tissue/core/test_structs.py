@@ -5,7 +5,8 @@ import pytest
 
 from tissue import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, FloatCell, IntCell, Vectors
+from tissue.core.vec3 import Vec3
 
 pytestmark = pytest.mark.kernel
 
@@ -91,3 +92,57 @@ def test_a_field_of_another_type_than_before_is_refused():
     example()
     with pytest.raises(TypeError, match="other types"):
         Inner(values=np.zeros(3, dtype=np.int64), weight=1.0)
+
+
+class Counter(Arrays):
+    values: FloatArray
+    n: IntCell
+    total: FloatCell
+
+
+class Holder(Arrays):
+    counter: Counter
+
+
+class Frame(Vectors):
+    origin: Vec3
+    axis: Vec3
+
+
+@kernel
+def count_up(holder, by):
+    for i in range(len(holder.counter.values)):
+        holder.counter.n += 1
+        holder.counter.total += by * holder.counter.values[i]
+    return holder.counter.n
+
+
+@kernel
+def along(frame, distance):
+    return frame.origin.x + distance * frame.axis.z
+
+
+def test_kernels_and_python_see_the_same_cells():
+    counter = Counter(values=np.array([1.0, 2.0]), n=5, total=0.5)
+    holder = Holder(counter=counter)
+    assert count_up(holder, 2.0) == 7
+    assert (counter.n, counter.total) == (7, 6.5)
+    counter.n, counter.total = 0, -1.0
+    assert count_up(holder, 1.0) == 2
+    assert (counter.n, counter.total) == (2, 2.0)
+
+
+def test_a_replaced_struct_has_cells_of_its_own():
+    first = Counter(values=np.ones(1), n=1, total=0.0)
+    second = first.replaced(values=np.ones(3))
+    second.n = 9
+    assert (first.n, second.n) == (1, 9)
+
+
+def test_a_kernel_reads_a_struct_of_vectors():
+    assert along(Frame(Vec3(1.0, 0.0, 0.0), Vec3(0.0, 0.0, 3.0)), 2.0) == 7.0
+
+
+def test_a_struct_of_vectors_needs_them_all():
+    with pytest.raises(ValueError, match="argument"):
+        Frame(Vec3(1.0, 0.0, 0.0))

@@ -8,7 +8,6 @@ from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.cut_surface import on_sheet, see_side, side_of
-from tissue.mesh.body import NODES
 from tissue.mesh.changes import note_dirty
 
 pytestmark = pytest.mark.kernel
@@ -37,7 +36,7 @@ def test_an_edge_between_both_sides_is_cut_where_the_sheet_passes():
     see_side(cut.sheet, 0, -1, True)
     see_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
-    assert cut.body.counts[NODES] == 5
+    assert cut.body.n_nodes == 5
     np.testing.assert_allclose(cut.body.rest[4], [0.5, 0.0, 0.0])
     assert on_sheet(cut.sheet, 4)
 
@@ -47,7 +46,7 @@ def test_a_node_that_was_seen_on_the_wrong_side_from_afar_is_put_right():
     see_side(cut.sheet, 0, -1, True)
     see_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
     assert side_of(cut.sheet, 0) == 1
 
 
@@ -56,7 +55,7 @@ def test_a_node_seen_on_the_wrong_side_that_is_near_the_sheet_lies_on_it():
     see_side(cut.sheet, 0, -1, True)
     see_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
     assert on_sheet(cut.sheet, 0)
 
 
@@ -65,7 +64,7 @@ def test_a_tetrahedron_beyond_the_tip_is_no_bridge():
     see_side(cut.sheet, 0, -1, True)
     see_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
 
 
 def test_a_tetrahedron_that_is_still_active_waits():
@@ -74,7 +73,7 @@ def test_a_tetrahedron_that_is_still_active_waits():
     see_side(cut.sheet, 1, 1, True)
     cut.work.n_active[0] = 1
     resolve_bridges(cut)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
 
 
 def test_changed_tetrahedra_are_remembered_beside_the_active_ones():

@@ -11,7 +11,6 @@ from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
 from tissue.cutting.crossings import find_active_tetrahedra
 from tissue.cutting.cut_surface import on_sheet
-from tissue.mesh.body import NODES, TETRAHEDRA
 
 pytestmark = [
     pytest.mark.kernel,
@@ -34,7 +33,7 @@ def swept(y0: float, y1: float, low: float = DEPTH):
     path.sideways[:] = [1.0, 0.0, 0.0]
     path.member[:] = True
     path.linked[:-1] = True
-    centres = cut.body.rest[cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]]].mean(axis=1)
+    centres = cut.body.rest[cut.body.tetrahedra[: cut.body.n_tetrahedra]].mean(axis=1)
     for k in range(5):
         path.seed[k] = np.linalg.norm(centres - path.t1[k], axis=1).argmin()
     put_on_lattice(path, cut.body.lattice)
@@ -43,16 +42,16 @@ def swept(y0: float, y1: float, low: float = DEPTH):
 
 
 def on_it(cut) -> list[int]:
-    return [n for n in range(int(cut.body.counts[NODES])) if on_sheet(cut.sheet, n)]
+    return [n for n in range(cut.body.n_nodes) if on_sheet(cut.sheet, n)]
 
 
 def edges_of(cut) -> set[tuple[int, int]]:
-    tetrahedra = cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]].tolist()
+    tetrahedra = cut.body.tetrahedra[: cut.body.n_tetrahedra].tolist()
     return {pair for t in tetrahedra for pair in itertools.combinations(sorted(t), 2)}
 
 
 def expect_sound(cut) -> None:
-    n_tetrahedra, n = int(cut.body.counts[TETRAHEDRA]), int(cut.body.counts[NODES])
+    n_tetrahedra, n = cut.body.n_tetrahedra, cut.body.n_nodes
     volumes = soundness.volumes(cut.body.rest[:n], cut.body.tetrahedra[:n_tetrahedra])
     assert volumes.min() > 0.0
     assert volumes.sum() == pytest.approx(1.0, rel=1e-13)

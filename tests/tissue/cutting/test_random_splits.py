@@ -11,7 +11,6 @@ from tissue.core.vec3 import Vec3
 from tissue.cutting.stellar_subdivision import split_edge, split_face
 from tissue.cutting.workspace import Cut
 from tissue.geometry.tetrahedron import tetrahedron_volume
-from tissue.mesh.body import TETRAHEDRA
 from tissue.mesh.changes import clear_changes
 from tissue.mesh.star import edge_star
 
@@ -42,7 +41,7 @@ def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: Floa
     least = np.inf
     for i in range(len(which)):
         clear_changes(cut.change)
-        t = int(which[i, 0] * body.counts[TETRAHEDRA])
+        t = int(which[i, 0] * body.n_tetrahedra)
         k = int(which[i, 1] * 4)
         a = body.tetrahedra[t, k]
         b = body.tetrahedra[t, (k + 1) % 4]

@@ -10,8 +10,6 @@ from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.cut_surface import begin_sheet, on_sheet, side_of
 from tissue.cutting.snapping import insert_crossing, insert_in_face, snap_distance, sort_crossings
 from tissue.cutting.workspace import flag
-from tissue.mesh.body import NODES
-from tissue.mesh.changes import N_FLAGGED
 
 pytestmark = pytest.mark.kernel
 
@@ -36,7 +34,7 @@ def corner(x: float, **quality):
 def test_an_edge_crossed_in_its_middle_gets_a_node_there():
     cut = corner(0.5)
     insert_crossing(cut, 0, 1, 0, 0.5)
-    assert cut.body.counts[NODES] == 5
+    assert cut.body.n_nodes == 5
     np.testing.assert_allclose(cut.body.rest[4], [0.5, 0.0, 0.0])
     assert on_sheet(cut.sheet, 4)
 
@@ -52,21 +50,21 @@ def test_a_crossing_nearer_than_a_share_of_the_node_s_size_uses_the_node(share, 
     x = share * SIZE
     cut = corner(x, snap=0.3)
     insert_crossing(cut, 0, 1, 0, x)
-    assert (cut.body.counts[NODES] == 5) == splits
+    assert (cut.body.n_nodes == 5) == splits
     assert on_sheet(cut.sheet, 0) != splits
 
 
 def test_a_crossing_nearer_than_the_floor_uses_the_node():
     cut = corner(0.25, snap=0.0, floor=0.3)
     insert_crossing(cut, 0, 1, 0, 0.25)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
     assert on_sheet(cut.sheet, 0)
 
 
 def test_a_split_that_would_break_the_guard_uses_the_nearest_node():
     cut = corner(0.3, snap=0.01, guard=0.5)
     insert_crossing(cut, 0, 1, 0, 0.3)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
     assert on_sheet(cut.sheet, 0)
 
 
@@ -80,8 +78,8 @@ def test_a_crossing_beside_a_node_on_the_sheet_is_explained_by_it():
     cut = corner(0.1)
     insert_crossing(cut, 0, 1, 0, 0.1)
     insert_crossing(cut, 0, 2, 0, 0.1)
-    assert cut.body.counts[NODES] == 4
-    assert cut.change.counts[N_FLAGGED] == 1
+    assert cut.body.n_nodes == 4
+    assert cut.change.n_flagged == 1
 
 
 def test_an_edge_with_both_ends_on_the_sheet_is_left_alone():
@@ -89,7 +87,7 @@ def test_an_edge_with_both_ends_on_the_sheet_is_left_alone():
     flag(cut, 0)
     flag(cut, 1)
     insert_crossing(cut, 0, 1, 0, 0.5)
-    assert cut.body.counts[NODES] == 4
+    assert cut.body.n_nodes == 4
 
 
 def test_a_node_of_an_earlier_sheet_draws_the_same_cut_again_from_as_far():

@@ -18,7 +18,6 @@ from tissue.cutting.stellar_subdivision import (
     split_edge,
     split_face,
 )
-from tissue.mesh.body import NODES, TETRAHEDRA
 
 pytestmark = pytest.mark.kernel
 
@@ -33,7 +32,7 @@ def split_all(cut, splits):
     """Split an edge or a face of a tetrahedron for each entry."""
     edges = list(itertools.combinations(range(4), 2))
     for which, face, s, t in splits:
-        n = int(cut.body.counts[TETRAHEDRA])
+        n = cut.body.n_tetrahedra
         nodes = cut.body.tetrahedra[which % n].tolist()
         if face:
             a, b, c = (nodes[(which + k) % 4] for k in range(3))
@@ -41,19 +40,19 @@ def split_all(cut, splits):
         else:
             p, q = edges[which % 6]
             node = split_edge(cut, nodes[p], nodes[q], s)
-        assert node == cut.body.counts[NODES] - 1
+        assert node == cut.body.n_nodes - 1
 
 
 def mesh_of(cut):
     """Return rest positions and tetrahedra that are in use."""
     body = cut.body
-    return body.rest[: body.counts[NODES]], body.tetrahedra[: body.counts[TETRAHEDRA]]
+    return body.rest[: body.n_nodes], body.tetrahedra[: body.n_tetrahedra]
 
 
 def moving(cut, seed=0):
     """Let every node of the body be elsewhere and move."""
     random = np.random.default_rng(seed)
-    n = int(cut.body.counts[NODES])
+    n = cut.body.n_nodes
     cut.body.positions[:n] += 0.1 * random.normal(size=(n, 3))
     cut.body.velocities[:n] = random.normal(size=(n, 3))
 
@@ -109,7 +108,7 @@ def test_mass_and_momentum_are_kept(mesh, splits):
 def test_each_node_names_a_tetrahedron_that_holds_it(mesh, splits):
     cut = cut_of(mesh)
     split_all(cut, splits)
-    for node in range(int(cut.body.counts[NODES])):
+    for node in range(cut.body.n_nodes):
         assert node in cut.body.tetrahedra[cut.body.node_tetrahedron[node]]
 
 
@@ -118,13 +117,13 @@ def test_an_edge_split_doubles_the_tetrahedra_around_the_edge():
     around = naive.star(MESHES[0].tetrahedra, 0) & naive.star(MESHES[0].tetrahedra, 7)
     assert len(around) == 6  # the diagonal of a cell
     split_edge(cut, 0, 7, 0.5)
-    assert cut.body.counts[TETRAHEDRA] == 12
+    assert cut.body.n_tetrahedra == 12
 
 
 def test_a_face_split_makes_three_of_each_tetrahedron_at_the_face():
     cut = cut_of(bodies.two_tetrahedra())
     node = split_face(cut, 1, 2, 3, Vec3(0.2, 0.3, 0.5))
-    assert cut.body.counts[TETRAHEDRA] == 6
+    assert cut.body.n_tetrahedra == 6
     np.testing.assert_allclose(cut.body.rest[node], [0.2, 0.3, 0.5])
 
 
@@ -154,6 +153,6 @@ def test_a_split_that_would_leave_a_flat_tetrahedron_is_not_good():
 
 def test_without_room_nothing_is_split():
     cut = cut_of(bodies.unit_tetrahedron())
-    cut.body.counts[NODES] = len(cut.body.rest) - 1
+    cut.body.n_nodes = len(cut.body.rest) - 1
     assert split_edge(cut, 0, 1, 0.5) == NO_ROOM
-    assert cut.body.counts[TETRAHEDRA] == 1
+    assert cut.body.n_tetrahedra == 1

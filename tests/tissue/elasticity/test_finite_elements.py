@@ -24,8 +24,7 @@ from tissue.elasticity.finite_elements import (
     volume_term,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
-from tissue.mesh.body import NODES, TETRAHEDRA
-from tissue.mesh.changes import N_DIRTY, clear_changes, touched_nodes
+from tissue.mesh.changes import clear_changes, touched_nodes
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
 pytestmark = pytest.mark.kernel
@@ -89,13 +88,13 @@ def test_rows_renewed_where_a_cut_touched_are_those_built_from_scratch(law):
         split_all(cut, [(int(random.integers(1000)), bool(random.integers(2)), 0.4, 0.5)])
         springs_of(cut.body)
         n = touched_nodes(cut.body, cut.change, visits, nodes)
-        build_tetrahedra(renewed.solid, cut.body, cut.change.dirty, cut.change.counts[N_DIRTY])
+        build_tetrahedra(renewed.solid, cut.body, cut.change.dirty, cut.change.n_dirty)
         assert build_stars(renewed.solid, cut.body, visits, nodes, n, around) == n
         assert bound_solid_frequencies(renewed.solid, cut.body, visits, nodes, n) > n
     afresh = built(cut.body, law)
-    for node in range(int(cut.body.counts[NODES])):
+    for node in range(cut.body.n_nodes):
         assert corners(renewed.solid, node) == corners(afresh.solid, node)
-    x = cut.body.rest[: cut.body.counts[NODES]]
+    x = cut.body.rest[: cut.body.n_nodes]
     x = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
     np.testing.assert_array_equal(renewed.forces(x), afresh.forces(x))
     assert renewed.energy(x) == afresh.energy(x)
@@ -104,8 +103,8 @@ def test_rows_renewed_where_a_cut_touched_are_those_built_from_scratch(law):
 
 def test_no_room_for_a_row_is_said_and_nothing_is_lost():
     whole = solid_of(MESHES["grid"], law_of(0.45))
-    body, n = whole.body, int(whole.body.counts[NODES])
-    room = (n, int(body.counts[TETRAHEDRA]))
+    body, n = whole.body, whole.body.n_nodes
+    room = (n, body.n_tetrahedra)
     visits, around = no_visits(*room), np.zeros(LARGEST_STAR, dtype=np.int64)
     tight = no_solid(law_of(0.45), *room, POOL_MARGIN + 40)
     build_tetrahedra(tight, body, tight.every, room[1])

@@ -7,7 +7,6 @@ from tests import bodies
 from tests.tissue.solids import LAWS, fastest, law_of, solid_of
 from tissue import block
 from tissue.elasticity.frequency_refinement import tighten
-from tissue.mesh.body import NODES
 from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel
@@ -28,7 +27,7 @@ def with_a_sliver():
 
 def tightened(solid, allowed=0.0):
     """Weigh the nodes anew; return those whose bound may have changed."""
-    n = int(solid.body.counts[NODES])
+    n = solid.body.n_nodes
     solid.solid.listed[:n] = np.arange(n)
     visits = no_visits(len(solid.body.rest), len(solid.body.tetrahedra))
     n = tighten(solid.solid, solid.body, visits, n, allowed)

@@ -19,7 +19,6 @@ from tests.tissue.solids import (
 )
 from tissue import TetrahedralMesh, block
 from tissue.core.jit import is_compiling
-from tissue.mesh.body import NODES, TETRAHEDRA
 
 pytestmark = pytest.mark.kernel
 
@@ -179,8 +178,8 @@ def subdivided(mesh: TetrahedralMesh, x):
     cut = cut_of(mesh)
     cut.body.positions[: len(x)] = x
     split_all(cut, SPLITS)
-    n = int(cut.body.counts[NODES])
-    tetrahedra = cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]]
+    n = cut.body.n_nodes
+    tetrahedra = cut.body.tetrahedra[: cut.body.n_tetrahedra]
     return TetrahedralMesh(cut.body.rest[:n], tetrahedra), cut.body.positions[:n].copy()
 
 
@@ -216,8 +215,8 @@ def test_20_forces_after_splits_are_those_of_the_mesh_built_from_scratch():
     cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
     split_all(cut, SPLITS[:20])
     springs_of(cut.body)
-    n = int(cut.body.counts[NODES])
-    mesh = TetrahedralMesh(cut.body.rest[:n], cut.body.tetrahedra[: cut.body.counts[TETRAHEDRA]])
+    n = cut.body.n_nodes
+    mesh = TetrahedralMesh(cut.body.rest[:n], cut.body.tetrahedra[: cut.body.n_tetrahedra])
     x = moved(mesh, 0.02)
     for law in LAWS.values():
         expected = solid_of(mesh, law).forces(x)

@@ -38,7 +38,7 @@ def elastic_of(solid):
 
 
 def bound(solid, positions):
-    blocks = n_blocks(int(solid.body.counts[1]))
+    blocks = n_blocks(solid.body.n_tetrahedra)
     elastic = elastic_of(solid)
     return float(np.sqrt(strained_frequency(elastic, positions, solid.solid.every, 0, blocks)))
 

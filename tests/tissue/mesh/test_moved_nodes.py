@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from tissue.mesh.moved_nodes import N_MOVED, forget_moved, none_moved, note_moved
+from tissue.mesh.moved_nodes import forget_moved, none_moved, note_moved
 
 pytestmark = pytest.mark.kernel
 
 
 def nodes(moved):
-    return moved.nodes[: moved.state[N_MOVED]].tolist()
+    return moved.nodes[: moved.n_nodes].tolist()
 
 
 def test_each_node_is_listed_once_in_the_order_in_which_it_came():

@@ -8,7 +8,6 @@ from tests.tissue.kernels_of import cut_of
 from tissue.core.vec3 import Vec3
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
-from tissue.mesh.body import NODES, TETRAHEDRA
 from tissue.mesh.bounding_boxes import survey
 from tissue.mesh.point_location import (
     build_grid,
@@ -32,7 +31,7 @@ def cut():
 
 def first_that_holds(body, p: Vec3) -> int:
     """Ask every tetrahedron."""
-    for t in range(int(body.counts[TETRAHEDRA])):
+    for t in range(body.n_tetrahedra):
         if smallest_weight(barycentric_in(p, body.positions, body.tetrahedra, t)) >= 0.0:
             return t
     return -1
@@ -61,14 +60,14 @@ def test_a_grid_that_lists_nothing_finds_nothing(cut):
 
 def test_points_are_found_while_nodes_go_less_far_than_the_margin(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
-    n = int(cut.body.counts[NODES])
+    n = cut.body.n_nodes
     cut.body.positions[:n] += np.random.default_rng(1).uniform(-0.02, 0.02, (n, 3))
     expect_found(cut.body, cells, seed=1)
 
 
 def test_points_are_found_when_nodes_that_went_far_are_listed_again(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
-    n = int(cut.body.counts[NODES])
+    n = cut.body.n_nodes
     cut.body.positions[:n] += [0.3, -0.2, 0.1]
     assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.work.around)
     expect_found(cut.body, cells, seed=2)

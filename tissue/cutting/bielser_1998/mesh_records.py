@@ -84,7 +84,7 @@ class Table(Arrays):
 
 def with_room_to_hang(body: Body) -> Body:
     """Return a whole body whose faces and nodes may come to hang."""
-    n_nodes, n_tetrahedra = (int(n) for n in body.counts)
+    n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     tetrahedra = body.tetrahedra[:n_tetrahedra]
     n_faces = len(sorted_faces(tetrahedra).starts)
     return body.replaced(hanging=may_hang(n_faces, n_nodes, tetrahedra))
@@ -92,7 +92,7 @@ def with_room_to_hang(body: Body) -> Body:
 
 def records_of(body: Body) -> Records:
     """Return the records of a body that is whole."""
-    n_nodes, n_tetrahedra = (int(n) for n in body.counts)
+    n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     tetrahedra = body.tetrahedra[:n_tetrahedra].copy()
     ends = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
     edges, edges_of = np.unique(ends, axis=0, return_inverse=True)

@@ -27,7 +27,7 @@ from tissue.cutting.crossings import find_active_tetrahedra, find_crossings
 from tissue.cutting.cut_surface import grown_sheet, new_sheet
 from tissue.cutting.workspace import Cut, Quality, new_work
 from tissue.mesh.body import Body
-from tissue.mesh.changes import FULL, clear_changes, new_change
+from tissue.mesh.changes import clear_changes, new_change
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
@@ -85,7 +85,7 @@ class PaperScheme:
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """See `Scheme`."""
         cut = self._arrays(body, visits, path)
-        is_first_pass = self.change.counts[FULL] == 0
+        is_first_pass = self.change.is_full == 0
         clear_changes(self.change)
         if is_first_pass:
             self._n_ignored += record_crossings(cut, self._records)

@@ -13,7 +13,7 @@ from tissue.cutting.bielser_1998.mesh_records import NO_NODE, reference_at_edge,
 from tissue.cutting.bielser_1998.template_1_to_17 import CENTRE, EDGE_NODE, FACE_NODE
 from tissue.cutting.bielser_1998.workspace import Split
 from tissue.geometry.exact_predicates import nearest
-from tissue.mesh.body import NODES, Body
+from tissue.mesh.body import Body
 
 
 @kernel
@@ -132,8 +132,8 @@ def _copy_node(body: Body, node: int) -> int:
 
 @kernel
 def _append_node(body: Body) -> int:
-    node = body.counts[NODES]
-    body.counts[NODES] += 1
+    node = body.n_nodes
+    body.n_nodes += 1
     body.masses[node] = 0.0
     body.twin[node] = node
     return node

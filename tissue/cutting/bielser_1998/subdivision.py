@@ -7,8 +7,8 @@ from tissue.cutting.bielser_1998.split_operators import refer_to_nodes
 from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN
 from tissue.cutting.bielser_1998.workspace import N_GUARDED, N_OF_CASE, N_OWN, Split
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
-from tissue.mesh.body import CUT, NODES, OUTER, TETRAHEDRA
-from tissue.mesh.changes import FULL, note_dirty
+from tissue.mesh.body import CUT, OUTER
+from tissue.mesh.changes import note_dirty
 from tissue.mesh.nonconforming import HANGING, join_list, leave_list
 
 MOST_NEW_NODES = 20
@@ -19,10 +19,10 @@ MOST_NEW_NODES = 20
 def split_tetrahedron(s: Split, t: int, code: int) -> bool:
     """Split the initial tetrahedron `t` by its code; whether there was room."""
     body, records, change = s.body, s.records, s.change
-    if body.counts[NODES] + MOST_NEW_NODES > len(body.rest) or body.counts[
-        TETRAHEDRA
-    ] + N_CHILDREN - 1 > len(body.tetrahedra):
-        change.counts[FULL] = 1
+    if body.n_nodes + MOST_NEW_NODES > len(body.rest) or body.n_tetrahedra + N_CHILDREN - 1 > len(
+        body.tetrahedra
+    ):
+        change.is_full = 1
         return False
     if place_nodes(records, s.table, s.placing, t, code):
         s.tally[N_GUARDED] += 1
@@ -35,8 +35,8 @@ def split_tetrahedron(s: Split, t: int, code: int) -> bool:
         corner = records.tetrahedra[t, i]
         leave_list(body.hanging, corner, t)
         body.masses[corner] -= 0.25 * s.density * volume
-    records.first_child[t] = body.counts[TETRAHEDRA]
-    body.counts[TETRAHEDRA] += N_CHILDREN - 1
+    records.first_child[t] = body.n_tetrahedra
+    body.n_tetrahedra += N_CHILDREN - 1
     for c in range(N_CHILDREN):
         _make_child(s, t, c)
         _link_inside(s, t, c, code)
@@ -91,7 +91,7 @@ def _link_inside(s: Split, t: int, c: int, code: int) -> None:
         if triangle >= 0 and (table.opened[code] >> triangle) & 1 == 1:
             body.links[child, f] = CUT
             if link // 4 > c:
-                s.change.area[0] += face_area(body.rest, body.tetrahedra, child, f)
+                s.change.area += face_area(body.rest, body.tetrahedra, child, f)
         else:
             body.links[child, f] = 4 * child_of(s.records, t, link // 4) + link % 4
 

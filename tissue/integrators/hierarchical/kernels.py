@@ -44,7 +44,7 @@ from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.spring_forces import NO_LENGTH
 from tissue.elasticity.springs import Springs
 from tissue.integrators.node_rings import N_FOUND, Rings, ring_of
-from tissue.mesh.body import NODES, Body, grown
+from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR
 
 FRAME, N_KNOWN = 0, 1
@@ -146,7 +146,7 @@ def hierarchical_frame(
                 break
             _move(body, springs, trails, external, surroundings, node, t1)
         if j % n_far == 0 and not is_far_frozen:
-            for node in range(body.counts[NODES]):
+            for node in range(body.n_nodes):
                 if not 0 <= ring_of(rings, node) <= last_ring:
                     _move(body, springs, trails, external, surroundings, node, t1)
     clear_tool(tool, body, external)
@@ -168,10 +168,10 @@ def _lay_trails(
                 trails.frames[node] = counts[FRAME] + 1
             _lay_trail(body, trails, node, 0.0)
     else:
-        for node in range(body.counts[NODES]):
+        for node in range(body.n_nodes):
             _lay_trail(body, trails, node, 0.0)
     counts[FRAME] += 1
-    counts[N_KNOWN] = body.counts[NODES]
+    counts[N_KNOWN] = body.n_nodes
 
 
 @inlined
@@ -323,6 +323,6 @@ def ring_frequencies(
             out[ring] = max(out[ring], frequency_squared[node])
     if is_far_frozen:
         return
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         if not (0 <= ring_of(rings, node) <= last_ring or body.fixed[node]):
             out[last_ring + 1] = max(out[last_ring + 1], frequency_squared[node])

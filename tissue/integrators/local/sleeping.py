@@ -18,7 +18,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.springs import Springs
-from tissue.mesh.body import NODES, Body, grown
+from tissue.mesh.body import Body, grown
 
 ASLEEP, WATCHED, AWAKE = 0, 1, 2
 """State of a node."""
@@ -100,7 +100,7 @@ def wake_each(activity: Activity, body: Body, springs: Springs, nodes: IntArray,
 @kernel
 def wake_all(activity: Activity, body: Body, springs: Springs) -> None:
     """Wake every node: gravity or what holds the body has changed."""
-    for node in range(body.counts[NODES]):
+    for node in range(body.n_nodes):
         wake(activity, body, springs, node)
 
 

@@ -33,7 +33,7 @@ from tissue.integrators.node_rings import new_rings
 from tissue.integrators.options import LocalTimeStepping
 from tissue.integrators.step_context import Motion, end_step
 from tissue.mesh.body import Body
-from tissue.mesh.moved_nodes import N_MOVED, Moved, grown_moved, none_moved, note_moved
+from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
 class LocalStepper:
@@ -179,7 +179,7 @@ class LocalStepper:
             note_positions(contact.arrays, body, activity.listed, self.n_awake)
             if self._has_new_nodes:  # fixed ones among them are never listed
                 moved = self._moved
-                note_positions(contact.arrays, body, moved.nodes, int(moved.state[N_MOVED]))
+                note_positions(contact.arrays, body, moved.nodes, int(moved.n_nodes))
         else:
             prepare(contact.arrays, body)
             self._is_prepared = True

@@ -9,7 +9,7 @@ from tissue import FloatArray, IntArray, TetrahedralMesh
 from tissue.cutting.bielser_1998.mesh_records import cut_edge_code, edge_between, with_room_to_hang
 from tissue.cutting.bielser_1998.scheme import PaperScheme
 from tissue.cutting.bielser_1998.subdivision import split_tetrahedron
-from tissue.mesh.body import NODES, TETRAHEDRA, Body, build_body, grown_body
+from tissue.mesh.body import Body, build_body, grown_body
 
 
 class Splits(NamedTuple):
@@ -32,23 +32,23 @@ class Splits(NamedTuple):
 
     @property
     def tetrahedra(self) -> IntArray:
-        return self.body.tetrahedra[: self.body.counts[TETRAHEDRA]]
+        return self.body.tetrahedra[: self.body.n_tetrahedra]
 
     @property
     def rest(self) -> FloatArray:
-        return self.body.rest[: self.body.counts[NODES]]
+        return self.body.rest[: self.body.n_nodes]
 
     @property
     def momentum(self) -> FloatArray:
         """[kg m/s]."""
-        n = int(self.body.counts[NODES])
+        n = self.body.n_nodes
         return self.body.masses[:n] @ self.body.velocities[:n]
 
 
 def splits_of(mesh: TetrahedralMesh) -> Splits:
     """Return a whole body, each node with its mass."""
     body = with_room_to_hang(build_body(mesh, None, None))
-    n_nodes, n_tetrahedra = (int(n) for n in body.counts)
+    n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     body = grown_body(body, n_nodes + 512, 32 * n_tetrahedra + 512)
     corners = mesh.positions[mesh.tetrahedra]
     volume = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0

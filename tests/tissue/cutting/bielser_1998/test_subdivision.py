@@ -11,8 +11,7 @@ from tissue.core.vec3 import Vec3
 from tissue.cutting.bielser_1998.case_table import TABLE
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, is_cut
 from tissue.cutting.bielser_1998.subdivision import split_tetrahedron
-from tissue.mesh.body import NODES, OUTER, TETRAHEDRA
-from tissue.mesh.changes import FULL
+from tissue.mesh.body import OUTER
 from tissue.mesh.nonconforming import HANGING, behind, n_behind
 from tissue.mesh.pieces import label_pieces
 from tissue.mesh.star import no_visits
@@ -41,7 +40,7 @@ def split_one(code, mesh=None, at=0.4):
 def drifting(splits, seed=0):
     """Let every node go its own way."""
     random = np.random.default_rng(seed)
-    n = int(splits.body.counts[NODES])
+    n = splits.body.n_nodes
     splits.body.velocities[:n] = random.normal(size=(n, 3))
 
 
@@ -166,7 +165,7 @@ def test_fixed_nodes_have_fixed_nodes_between_them():
 def test_without_room_nothing_is_split():
     splits = splits_of(bodies.unit_tetrahedron())
     splits.cross(0, 1)
-    splits.body.counts[TETRAHEDRA] = len(splits.body.tetrahedra) - 15
+    splits.body.n_tetrahedra = len(splits.body.tetrahedra) - 15
     assert not split_tetrahedron(splits.scheme._split(splits.body), 0, 0b100000)
-    assert splits.scheme.change.counts[FULL] == 1
-    assert splits.body.counts[NODES] == 4
+    assert splits.scheme.change.is_full == 1
+    assert splits.body.n_nodes == 4
