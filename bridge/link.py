@@ -113,7 +113,7 @@ class InProcessLink:
 
     def quality(self) -> CutReport:
         """See `TissueLink.quality`."""
-        return self._tissue.quality()
+        return self._tissue.cut_report()
 
     def close(self) -> None:
         """See `TissueLink.close`."""

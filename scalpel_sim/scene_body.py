@@ -6,7 +6,7 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
-from tissue import FloatArray, Tissue, fixed_nodes
+from tissue import FloatArray, SolverSettings, Tissue, fixed_nodes
 from tissue.blade.toughness import resistance_of
 
 _log = logging.getLogger("scalpel_sim")
@@ -34,12 +34,14 @@ def make_tissue(scene: Scene) -> Tissue:
         positions=pulled_apart(mesh.positions, scene.fixed, scene.stretch),
         gravity=(0.0, 0.0, -scene.gravity),
         floor=scene.floor,
-        quality=scene.quality,
-        scheme=scene.scheme,
-        relaxation=scene.relaxation,
-        threads=scene.threads,
         blade=scene.blade,
-        audit=scene.audit,
+        solver=SolverSettings(
+            cut=scene.quality,
+            scheme=scene.scheme,
+            relaxation=scene.relaxation,
+            threads=scene.threads,
+            audit=scene.audit,
+        ),
     )
     if fixed.any():
         tissue.settle()

@@ -7,7 +7,16 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from tissue import BladeSegment, BladeShape, BladeSweep, TetrahedralMesh, Tissue, block, fixed_nodes
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+    fixed_nodes,
+)
 from tissue.core.jit import cache_directory
 
 _SIDE = 0.02
@@ -32,7 +41,12 @@ def warm_up() -> None:
         with _motion_compiled_beside():
             places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
             Tissue(mesh, blade=BladeShape()).incise(places, _edge(0.0).forward)
-    tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"), blade=BladeShape(), audit=True)
+    tissue = Tissue(
+        mesh,
+        fixed=fixed_nodes(mesh, "left,right"),
+        blade=BladeShape(),
+        solver=SolverSettings(audit=True),
+    )
     tissue.settle()
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 0.6, N_STEPS):
@@ -43,7 +57,7 @@ def warm_up() -> None:
     tissue.surface()
     tissue.snapshot()
     tissue.n_pieces()
-    tissue.quality()
+    tissue.cut_report()
     move_two_pieces()
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests import bodies, strokes
 from tests.tissue.kernels_of import row, springs_of
-from tissue import Material, Tissue, block
+from tissue import Material, SolverSettings, Tissue, block
 from tissue.elasticity.internal_forces import elastic_energy
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -54,7 +54,7 @@ def test_a_free_undamped_body_keeps_its_energy():
     def energy():
         body = tissue.snapshot()
         kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-        return kinetic + elastic_energy(tissue._elasticity.arrays, tissue._body)
+        return kinetic + elastic_energy(tissue._system.elasticity.arrays, tissue._body)
 
     before = energy()
     for _ in range(500):
@@ -166,7 +166,7 @@ def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02, relaxation="globa
         Material(toughness=toughness, **law),
         fixed=bodies.sides(mesh),
         gravity=NO_GRAVITY,
-        relaxation=relaxation,
+        solver=SolverSettings(relaxation=relaxation),
     )
     low = -0.005 if depth == SLAB[2] else SLAB[2] - depth
     stroke = strokes.upright(0.0213, -0.004, 0.06, low, 0.025, speed * dt / strokes.DT)
@@ -243,7 +243,7 @@ def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
     tissue, _, results = steady((6, 12, 3), toughness, 0.1)
     body = tissue.snapshot()
     stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
-    stored += elastic_energy(tissue._elasticity.arrays, tissue._body)
+    stored += elastic_energy(tissue._system.elasticity.arrays, tissue._body)
     last = results[-1]
     assert last.work_of_cutting > 0.0
     assert last.work_of_cutting <= last.work_of_blade
@@ -268,7 +268,7 @@ def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
     strokes.make(tissue, strokes.slanted(mesh))
     strokes.make(tissue, strokes.straight(mesh, 0.3))
     body, n = tissue._body, tissue.n_nodes
-    kept = [row(tissue._elasticity.arrays.springs, i) for i in range(n)]
+    kept = [row(tissue._system.elasticity.arrays.springs, i) for i in range(n)]
     masses = body.masses[:n].copy()
     from_scratch = springs_of(body, tissue.material.young_modulus)
     assert kept == [row(from_scratch, i) for i in range(n)]

@@ -194,11 +194,11 @@ def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
 def test_before_the_first_cut_contact_has_nothing_to_look_at():
     mesh = block((4, 4, 4), (0.04,) * 3)
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
-    assert not tissue._contact.is_awake
+    assert not tissue._system.contact.is_awake
     tissue.step(None, strokes.DT)
-    assert not tissue._contact.arrays.start.any()
+    assert not tissue._system.contact.arrays.start.any()
     strokes.make(tissue, strokes.straight(mesh))
-    assert tissue._contact.is_awake
+    assert tissue._system.contact.is_awake
 
 
 def falling(height=0.02, material=None, gravity=(0.0, 0.0, -9.81), **options):
@@ -238,7 +238,7 @@ def energy(tissue: Tissue, gravity: float = 0.0) -> float:
     body = tissue.snapshot()
     kinetic = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
     weight = gravity * float(body.masses @ body.positions[:, 2])
-    return kinetic + elastic_energy(tissue._elasticity.arrays, tissue._body) + weight
+    return kinetic + elastic_energy(tissue._system.elasticity.arrays, tissue._body) + weight
 
 
 @pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])
@@ -355,7 +355,7 @@ def lying(n_steps=300):
 def test_before_a_step_contact_gives_nothing_to_what_it_presses():
     """What it gave along the normals of the step before fed corners of lips that turn with them."""
     tissue = lying()
-    contact, body = tissue._contact.arrays, tissue._body
+    contact, body = tissue._system.contact.arrays, tissue._body
     assert (contact.contacts.impulse[: contact.contacts.count[0]] > 0.0).sum() > 5
     before = tissue.snapshot()
     prepare(contact, body)
@@ -365,7 +365,7 @@ def test_before_a_step_contact_gives_nothing_to_what_it_presses():
 
 def test_contacts_of_faces_that_changed_are_sought_anew_and_the_others_last():
     tissue = lying()
-    contact = tissue._contact.arrays
+    contact = tissue._system.contact.arrays
     contacts, faces = contact.contacts, contact.faces
     of = {tuple(contacts.node[k]): contacts.face[k].tolist() for k in range(contacts.count[0])}
     changed = {face for sides in list(of.values())[:4] for face in sides}

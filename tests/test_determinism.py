@@ -54,7 +54,7 @@ def test_arrays_that_grow_change_nothing():
         n_nodes, n_tetrahedra = roomy._body.n_nodes, roomy._body.n_tetrahedra
         roomy._body.n_nodes = len(roomy._body.rest)
         roomy._body.n_tetrahedra = len(roomy._body.tetrahedra)
-        roomy._grow()
+        roomy._make_room()
         roomy._body.n_nodes, roomy._body.n_tetrahedra = n_nodes, n_tetrahedra
     assert len(roomy._body.rest) > 4 * len(Tissue(mesh)._body.rest)
     assert fingerprint(roomy, strokes.make(roomy, stroke)) == expected

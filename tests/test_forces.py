@@ -9,7 +9,16 @@ import numpy as np
 import pytest
 
 from tests.bodies import sides
-from tissue import BladeSegment, BladeShape, BladeSweep, Material, TetrahedralMesh, Tissue, block
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+)
 
 SIZE = np.array([0.04, 0.04, 0.02])
 DT = 1e-3
@@ -51,7 +60,11 @@ class Run:
         mesh = mesh or block(cells, SIZE)
         of_tissue = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
         self.tissue = Tissue(
-            mesh, Material(**SOFT | material), blade=blade, audit=True, **of_tissue
+            mesh,
+            Material(**SOFT | material),
+            blade=blade,
+            **of_tissue,
+            solver=SolverSettings(audit=True),
         )
         self.poses = poses
         self.results = [
@@ -248,7 +261,7 @@ def test_the_faces_of_the_blade_do_not_press_the_skin_that_it_goes_through():
 
 def test_an_audit_of_another_relaxation_is_refused():
     with pytest.raises(ValueError, match="audit"):
-        Tissue(block((2, 2, 2), SIZE), audit=True, relaxation="local")
+        Tissue(block((2, 2, 2), SIZE), solver=SolverSettings(audit=True, relaxation="local"))
 
 
 def test_an_audit_changes_nothing():

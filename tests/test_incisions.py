@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from tests import bodies, incisions, judged, soundness
 from tests.incisions import Incision
-from tissue import TetrahedralMesh, Tissue
-from tissue.tissue import CutSettings
+from tissue import CutSettings, SolverSettings, TetrahedralMesh, Tissue
 
 EXACT = CutSettings(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
 """Every crossing gets its own node: what is cut can be counted."""
@@ -28,7 +27,9 @@ GOOD = ("jittered grid", "Delaunay, 10 degrees")
 
 
 def at_rest(mesh: TetrahedralMesh, quality: CutSettings | None = None) -> Tissue:
-    return Tissue(mesh, gravity=(0.0, 0.0, 0.0), quality=quality)
+    return Tissue(
+        mesh, gravity=(0.0, 0.0, 0.0), solver=SolverSettings(cut=quality or CutSettings())
+    )
 
 
 def cut_along(mesh: TetrahedralMesh, *cuts: Incision, quality: CutSettings | None = None) -> Tissue:
@@ -258,13 +259,13 @@ def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in
     for seed in range(20):
         mesh = MADE[made](seed)
         tissue = at_rest(mesh)
-        before = tissue._elasticity.frequency_squared
+        before = tissue._system.elasticity.frequency_squared
         for i in range(5):
             tissue.incise(*incisions.incision(mesh, list(incisions.KINDS)[i], 10 * seed + i))
         after = tissue.snapshot()
         altitude = soundness.smallest_altitude(after.rest_positions, after.tetrahedra)
         assert altitude >= (1.0 - 1e-9) * CutSettings().guard * tissue.node_size
-        growth.append(np.sqrt(tissue._elasticity.frequency_squared / before))
+        growth.append(np.sqrt(tissue._system.elasticity.frequency_squared / before))
     assert np.median(growth) <= 6.0
     assert max(growth) <= 8.0
 

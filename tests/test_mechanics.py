@@ -15,7 +15,7 @@ from scipy.sparse.linalg import cg
 from benchmarks.mesh_study import MODES, Bar, Model
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
-from tissue import Material, TetrahedralMesh, Tissue, block
+from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -188,7 +188,7 @@ def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(mesh, fra
         replace(SOLID, viscous_damping=20.0, retardation_time=2e-4),
         positions=np.random.default_rng(25).uniform(0.0, size, mesh.positions.shape),
         gravity=NO_GRAVITY,
-        relaxation=relaxation,
+        solver=SolverSettings(relaxation=relaxation),
     )
     for _ in range(round(2.0 / frame)):
         tissue.step(None, frame)

@@ -189,7 +189,9 @@ def test_the_cut_opens_up_to_a_blade_that_rests(mesh):
     arrives = along_y(-0.01, 0.0262)
     moving = strokes.make(tissue, arrives)[-1].cut_area
     rested = strokes.make(tissue, [arrives[-1]] * 400)[-1].cut_area
-    in_tissue = tissue._path.t1[tissue._path.member]  # which gave way: it is behind the blade
+    in_tissue = tissue._incision.path.t1[
+        tissue._incision.path.member
+    ]  # which gave way: it is behind the blade
     swept = float(np.trapezoid(in_tissue[:, 1].clip(0.0), in_tissue[:, 2].clip(0.0, EDGE)))
     assert moving < 0.9 * swept
     assert rested == pytest.approx(swept, rel=0.1)

@@ -6,7 +6,7 @@ import pytest
 from tests import bodies, strokes
 from tests.test_conservation import NO_GRAVITY, SLAB, momentum
 from tests.test_determinism import fingerprint
-from tissue import Hierarchical, LocalTimeStepping, Material, Tissue, block
+from tissue import Hierarchical, LocalTimeStepping, Material, SolverSettings, Tissue, block
 from tissue.integrators.local.sleeping import WAKE_ACCELERATION
 
 LOCAL, HIERARCHICAL = LocalTimeStepping(), Hierarchical(updates=16, rings=3)
@@ -22,7 +22,9 @@ LAWS = {
 
 def waited(mesh, material, relaxation, seconds=1.0):
     """Return a body held at two sides that has sagged for that long."""
-    tissue = Tissue(mesh, material, fixed=bodies.sides(mesh), relaxation=relaxation)
+    tissue = Tissue(
+        mesh, material, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
+    )
     for _ in range(round(seconds / strokes.DT)):
         tissue.step(None, strokes.DT)
     return tissue
@@ -83,19 +85,29 @@ def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
 
 def test_far_from_a_small_poke_a_large_body_sleeps_on():
     mesh = block((20, 6, 6), (0.4, 0.12, 0.12))
-    tissue = Tissue(mesh, Material(viscous_damping=100.0), gravity=NO_GRAVITY, relaxation=LOCAL)
+    tissue = Tissue(
+        mesh,
+        Material(viscous_damping=100.0),
+        gravity=NO_GRAVITY,
+        solver=SolverSettings(relaxation=LOCAL),
+    )
     for _ in range(100):
         tissue.step(None, strokes.DT)
-    assert tissue._relaxation.n_awake == 0
+    assert tissue._integrator.n_awake == 0
     press = strokes.upright(0.2, -0.001, 0.0002, low=0.05, high=0.15, speed=0.02)
     strokes.make(tissue, press)
-    assert 0 < tissue._relaxation.n_awake < 0.5 * tissue.n_nodes
+    assert 0 < tissue._integrator.n_awake < 0.5 * tissue.n_nodes
 
 
 @pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
 def test_the_cutting_force_is_toughness_times_length(relaxation):
     mesh = block((6, 12, 3), SLAB)
-    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, relaxation=relaxation)
+    tissue = Tissue(
+        mesh,
+        fixed=bodies.sides(mesh),
+        gravity=NO_GRAVITY,
+        solver=SolverSettings(relaxation=relaxation),
+    )
     stroke = strokes.upright(0.0213, -0.004, 0.06, -0.005, 0.025, 0.1)
     results = strokes.make(tissue, stroke)
     middle = [r for r, at in zip(results, stroke[1:], strict=True) if 0.035 < at.tip[1] < 0.055]
@@ -114,7 +126,9 @@ def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(l
     mesh = bodies.jittered(4, 0)
     material = Material(law=law, poisson_ratio=0.3, viscous_damping=0.0, toughness=5.0)
     relaxation = LocalTimeStepping(rings=rings)
-    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, relaxation=relaxation)
+    tissue = Tissue(
+        mesh, material, gravity=NO_GRAVITY, solver=SolverSettings(relaxation=relaxation)
+    )
     scale = float(tissue.snapshot().masses.sum())
     n_cut = 0
     for sweep in strokes.sweeps(strokes.slanted(mesh)):
@@ -131,7 +145,9 @@ def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
     mesh = bodies.jittered(4, 0)
     prints = []
     for _ in range(2):
-        tissue = Tissue(mesh, fixed=bodies.sides(mesh), relaxation=relaxation)
+        tissue = Tissue(
+            mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
+        )
         results = strokes.make(tissue, strokes.slanted(mesh))
         assert results[-1].cut_area > 0.0
         prints.append(fingerprint(tissue, results))
@@ -144,12 +160,14 @@ def test_arrays_that_grow_change_nothing(relaxation):
     mesh = bodies.jittered(4, 0)
     prints = []
     for n_doubled in (0, 2):
-        tissue = Tissue(mesh, fixed=bodies.sides(mesh), relaxation=relaxation)
+        tissue = Tissue(
+            mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
+        )
         for _ in range(n_doubled):
             n_nodes, n_tetrahedra = tissue._body.n_nodes, tissue._body.n_tetrahedra
             tissue._body.n_nodes = len(tissue._body.rest)
             tissue._body.n_tetrahedra = len(tissue._body.tetrahedra)
-            tissue._grow()
+            tissue._make_room()
             tissue._body.n_nodes, tissue._body.n_tetrahedra = n_nodes, n_tetrahedra
         prints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
     assert prints[0] == prints[1]
@@ -160,7 +178,9 @@ def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
     mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
     held = mesh.positions[:, 0] < 1e-6
     material = Material(viscous_damping=20.0, toughness=2.0)
-    tissue = Tissue(mesh, material, fixed=held, floor=-0.004, relaxation=LOCAL)
+    tissue = Tissue(
+        mesh, material, fixed=held, floor=-0.004, solver=SolverSettings(relaxation=LOCAL)
+    )
     strokes.make(tissue, strokes.straight(mesh, 0.6))
     assert tissue.n_pieces() == 2
     for _ in range(800):
@@ -181,7 +201,9 @@ def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
     mesh = mesh._replace(positions=mesh.positions + 0.1)
     held = mesh.positions[:, 2] < 0.115
     material = Material(viscous_damping=20.0, toughness=2.0)
-    tissue = Tissue(mesh, material, fixed=held, gravity=NO_GRAVITY, relaxation=LOCAL)
+    tissue = Tissue(
+        mesh, material, fixed=held, gravity=NO_GRAVITY, solver=SolverSettings(relaxation=LOCAL)
+    )
     strokes.make(tissue, strokes.straight(mesh, 0.3))  # from now on lips may touch
     results = strokes.make(tissue, strokes.straight(mesh, 0.7))
     made = tissue.snapshot().fixed[len(mesh.positions) :]

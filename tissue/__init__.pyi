@@ -19,6 +19,7 @@ from .material_presets import Preset as Preset
 from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
+from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
 from .tissue import TissueError as TissueError
 from .types import BladeContacts as BladeContacts
@@ -62,6 +63,7 @@ __all__ = [
     "Preset",
     "SchemeStatistics",
     "Snapshot",
+    "SolverSettings",
     "StageTimes",
     "StepResult",
     "Surface",

@@ -1,7 +1,6 @@
-"""Where the work of the blade goes: `Audit` keeps the account of a body."""
+"""`Audit`: the account of energy of a body, from the work of the blade to where it went."""
 
 from tissue.blade.anchors import Edge, anchors_energy
-from tissue.blade.forces import Tool
 from tissue.blade.impulse_totals import (
     RELEASED,
     WORK_OF_BLADE,
@@ -12,9 +11,9 @@ from tissue.blade.impulse_totals import (
 from tissue.blade.side_contact import flanks_energy
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.energy import body_energy, kinetic_energy, potential_energy
-from tissue.elasticity.internal_forces import Elastic, elastic_energy
+from tissue.elasticity.internal_forces import elastic_energy
 from tissue.integrators.audited import Audited
-from tissue.mesh.body import Body
+from tissue.integrators.system import System
 from tissue.types import Energies
 
 
@@ -24,32 +23,34 @@ class Audit:
     def __init__(self, gravity: Vec3) -> None:
         self._gravity = gravity
         self.audited = Audited()
-        """Steps the body, and counts what damping and contact take."""
+        """Takes the steps of the body, and counts the losses in damping and contact."""
         self._topology = 0.0
         self._at_first = (0.0, 0.0, 0.0)
 
-    def begin(self, body: Body, elastic: Elastic) -> None:
-        """Begin the account with the body as it is."""
+    def begin(self, system: System) -> None:
+        """Begin the account with the body as it is; work and losses so far are forgotten."""
         self.audited.damping = self.audited.contact = self._topology = 0.0
-        self._at_first = self._stored(body, elastic)
+        system.interaction.tool.anchors.totals[WORK_OF_BLADE:] = 0.0
+        self._at_first = self._stored(system)
 
-    def before_cut(self, body: Body, elastic: Elastic, tool: Tool, edge: Edge, when: float) -> None:
-        """Take note of the energy before the mesh changes."""
-        self._topology += self._all(body, elastic, tool, edge, when)
+    def before_cut(self, system: System, edge: Edge, when: float) -> None:
+        """Note the energy before the mesh changes."""
+        self._topology += self._all(system, edge, when)
 
-    def after_cut(self, body: Body, elastic: Elastic, tool: Tool, edge: Edge, when: float) -> None:
-        """Count what the change took."""
-        self._topology -= self._all(body, elastic, tool, edge, when)
+    def after_cut(self, system: System, edge: Edge, when: float) -> None:
+        """Count the energy that the change of the mesh took."""
+        self._topology -= self._all(system, edge, when)
 
-    def energies(self, body: Body, elastic: Elastic, tool: Tool, edge: Edge) -> Energies:
+    def energies(self, system: System, edge: Edge) -> Energies:
         """Return the account at the end of a step."""
+        tool = system.interaction.tool
         totals = tool.anchors.totals
-        elastic_now, kinetic, potential = self._stored(body, elastic)
+        elastic, kinetic, potential = self._stored(system)
         elastic_first, kinetic_first, potential_first = self._at_first
-        held = anchors_energy(tool.anchors, body, edge, 1.0, tool.resistance)
+        held = anchors_energy(tool.anchors, system.body, edge, 1.0, tool.resistance)
         return Energies(
             work_of_blade=float(totals[WORK_OF_BLADE]),
-            elastic=elastic_now - elastic_first,
+            elastic=elastic - elastic_first,
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,
             held=held + flanks_energy(tool.flanks),
@@ -62,10 +63,13 @@ class Audit:
             released=float(totals[RELEASED]),
         )
 
-    def _stored(self, body: Body, elastic: Elastic) -> tuple[float, float, float]:
-        potential = potential_energy(body, self._gravity)
-        return elastic_energy(elastic, body), kinetic_energy(body), potential
+    def _stored(self, system: System) -> tuple[float, float, float]:
+        """Return the elastic, kinetic and potential energy [J]."""
+        body, potential = system.body, potential_energy(system.body, self._gravity)
+        return elastic_energy(system.elasticity.arrays, body), kinetic_energy(body), potential
 
-    def _all(self, body: Body, elastic: Elastic, tool: Tool, edge: Edge, when: float) -> float:
-        stored = body_energy(body, elastic, self._gravity)
+    def _all(self, system: System, edge: Edge, when: float) -> float:
+        """Return the energy of the body and of the anchors [J]."""
+        body, tool = system.body, system.interaction.tool
+        stored = body_energy(body, system.elasticity.arrays, self._gravity)
         return stored + anchors_energy(tool.anchors, body, edge, when, tool.resistance)

@@ -6,13 +6,14 @@ import numpy as np
 
 from scalpel_sim.bench.blocks import block_mesh, held
 from scalpel_sim.bench.traffic import Traffic, traffic
-from tissue import FloatArray, Law, Material, TetrahedralMesh, Tissue
+from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
 from tissue.contact.resolve import prepare, resolve
 from tissue.contact.state import ANEW, IS_STALE, N_TOUCHING
 from tissue.core.jit import kernel
 from tissue.elasticity.finite_elements import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
+from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
 from tissue.tissue import NOWHERE
 
@@ -67,22 +68,24 @@ class Loops:
     ) -> None:
         mesh = block_mesh(n_tetrahedra)
         self._is_damped = is_damped
-        self._all_together = GlobalStepper()
+        self._stepper = GlobalStepper()
         self._tissue = Tissue(
-            mesh, material(law, is_damped=is_damped), fixed=held(mesh), relaxation="global"
+            mesh,
+            material(law, is_damped=is_damped),
+            fixed=held(mesh),
+            solver=SolverSettings(relaxation="global"),
         )
         if not is_averaged:
-            made, elasticity = material(law), self._tissue._elasticity
+            made, elasticity = material(law), self._tissue._system.elasticity
             plain = neo_hookean(made.mu, made.lam, averaged=False)
             arrays = elasticity.arrays
             elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
 
     def forces(self, n: int) -> None:
         """Evaluate the forces on all nodes, and what they accelerate them by."""
-        tissue = self._tissue
-        elastic, external = tissue._elasticity.arrays, tissue._stages.external
+        system = self._tissue._system
         for _ in range(n):
-            accelerations(tissue._body, elastic, external, tissue._surroundings, tissue._stages.a1)
+            accelerations(system.context, system.stages.a1)
 
     def euler_steps(self, n: int) -> None:
         """Take steps of the symplectic Euler method: one evaluation of the forces each.
@@ -92,12 +95,12 @@ class Loops:
         body = self._tissue._body
         for _ in range(n):
             self.forces(1)
-            _kick_and_drift(body, self._tissue._stages.a1, DT)
+            _kick_and_drift(body, self._tissue._system.stages.a1, DT)
 
     def runge_kutta_steps(self, n: int) -> None:
         """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
-        tissue = self._tissue
-        self._all_together.relax_by(tissue._motion(NOWHERE, n * DT, 0.0, 1.0), n)
+        increment = Increment(NOWHERE, n * DT, 0.0, 1.0)
+        self._stepper.take_steps(self._tissue._system, increment, n)
 
     def frames(self, n: int) -> None:
         """Let the body live through time steps, all included but a blade."""
@@ -112,7 +115,7 @@ class Loops:
     @property
     def traffic(self) -> Traffic:
         """What a Runge-Kutta step of the springs must move and compute."""
-        lengths = self._tissue._elasticity.arrays.springs.count[: self._tissue.n_nodes]
+        lengths = self._tissue._system.elasticity.arrays.springs.count[: self._tissue.n_nodes]
         return traffic(lengths.tolist(), is_damped=self._is_damped)
 
     @property
@@ -144,17 +147,17 @@ class Touching:
     @property
     def n_contacts(self) -> int:
         """Contacts that press."""
-        return int(self._tissue._contact.arrays.totals[N_TOUCHING])
+        return int(self._tissue._system.contact.arrays.totals[N_TOUCHING])
 
     def searches(self, n: int) -> None:
         """Look for all pairs that may touch, as where faces have moved by the margin."""
         for _ in range(n):
-            self._tissue._contact.arrays.state[IS_STALE] = ANEW
+            self._tissue._system.contact.arrays.state[IS_STALE] = ANEW
             self.checks(1)
 
     def checks(self, n: int) -> None:
         """Look at the pairs that were found, and keep them apart, as in every Runge-Kutta step."""
-        contact, body = self._tissue._contact.arrays, self._tissue._body
+        contact, body = self._tissue._system.contact.arrays, self._tissue._body
         for _ in range(n):
             prepare(contact, body)
             resolve(contact, body, DT)

@@ -29,9 +29,10 @@ from tissue import (
     Hierarchical,
     Law,
     LocalTimeStepping,
+    SolverSettings,
     Tissue,
 )
-from tissue.integrators.options import Relaxing
+from tissue.integrators.options import IntegratorOptions
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -54,7 +55,7 @@ _SHARP = 1.0
 ENTRY = 3
 """First frames, left out: the edge comes into the body."""
 
-WAYS: dict[str, tuple[Law, Relaxing]] = {
+WAYS: dict[str, tuple[Law, IntegratorOptions]] = {
     "hierarchical (I 64, s_max 6)": (
         "springs",
         Hierarchical(updates=64, rings=6, far="frozen"),
@@ -120,11 +121,17 @@ def measure(
     return Findings(figures, skipped, partial(_print, found, skipped))
 
 
-def _slit(n_tetrahedra: int, law: Law, relaxing: Relaxing) -> Frames:
+def _slit(n_tetrahedra: int, law: Law, relaxing: IntegratorOptions) -> Frames:
     """Cut the slit into a fresh body at rest."""
     mesh = block_mesh(n_tetrahedra)
     sharp = replace(material(law), toughness=_SHARP)
-    tissue = Tissue(mesh, sharp, fixed=held(mesh), gravity=(0.0, 0.0, 0.0), relaxation=relaxing)
+    tissue = Tissue(
+        mesh,
+        sharp,
+        fixed=held(mesh),
+        gravity=(0.0, 0.0, 0.0),
+        solver=SolverSettings(relaxation=relaxing),
+    )
     for _ in range(N_AT_REST):
         tissue.step(None, DT)
     seconds, sizes = np.zeros(N_FRAMES), np.full(N_FRAMES + 1, n_tetrahedra)

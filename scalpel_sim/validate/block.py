@@ -15,6 +15,7 @@ from tissue import (
     FloatArray,
     Law,
     Material,
+    SolverSettings,
     StepResult,
     TetrahedralMesh,
     Tissue,
@@ -88,7 +89,7 @@ def block_tissue(
         fixed=fixed_nodes(mesh, held) if held else None,
         gravity=(0.0, 0.0, 0.0),
         blade=blade,
-        audit=audit,
+        solver=SolverSettings(audit=audit),
     )
 
 

@@ -22,7 +22,7 @@ from tissue import Law, Material
 
 STIFF_ENOUGH = 30e3
 """Young's modulus [Pa] at which tetrahedra bear all three toughnesses on both meshes
-(`tissue.material_warnings.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4
+(`tissue.input_checks.TOUGHEST`): 60 J/m2 are 2 mm of it, and a node of the finer mesh is 2.4
 mm. Springs bear the least of them."""
 _NEAR = 0.05
 """How far the force may be off: the issue's bound."""

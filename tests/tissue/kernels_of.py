@@ -9,10 +9,11 @@ from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.forces import Tool
 from tissue.blade.side_contact import new_flanks
 from tissue.blade.toughness import resistance_of
+from tissue.contact.self_contact import SelfContact
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
-from tissue.cutting.workspace import SPARE_NODES, Cut, Quality, new_work
+from tissue.cutting.workspace import Cut, Quality, new_work
 from tissue.elasticity.finite_elements import no_solid, room_for_stars, volume_term
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.springs import (
@@ -22,10 +23,13 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
-from tissue.integrators.runge_kutta import Stages, accelerations, new_stages, runge_kutta_nystroem
+from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
+from tissue.integrators.stages import Stages, new_stages
+from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.star import LARGEST_STAR, no_visits
+from tissue.mesh.workspace import SPARE_NODES
 from tissue.tissue import NOWHERE
 
 DENSITY, YOUNG_MODULUS = 1000.0, 10e3
@@ -115,20 +119,33 @@ class Network(NamedTuple):
     stages: Stages
     surroundings: Surroundings
 
+    @property
+    def context(self) -> StepContext:
+        """All that takes part in a step."""
+        n_nodes, n_tetrahedra = len(self.body.rest), len(self.body.tetrahedra)
+        return StepContext(
+            body=self.body,
+            elastic=elastic_of(self.springs),
+            tool=self.tool,
+            contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
+            surroundings=self.surroundings,
+            stages=self.stages,
+            visits=no_visits(n_nodes, n_tetrahedra),
+            queue=np.zeros(LARGEST_STAR, dtype=np.int64),
+            reach=1.0,
+        )
+
     def forces(self) -> FloatArray:
         """Return the forces on the nodes as they are and move now [N]."""
         out = np.zeros_like(self.body.positions)
-        elastic = elastic_of(self.springs)
-        accelerations(self.body, elastic, self.stages.external, self.surroundings, out)
+        accelerations(self.context, out)
         return out * self.body.masses[:, None]
 
     def advance(self, h: float, n: int = 1) -> None:
         """Take `n` Runge-Kutta steps of `h` [s]."""
-        elastic = elastic_of(self.springs)
-        blade = (self.tool, NOWHERE)
-        rest = (self.stages, self.surroundings, h, 0.0, 1.0)
+        context = self.context
         for _ in range(n):
-            runge_kutta_nystroem(self.body, elastic, *blade, *rest)
+            runge_kutta_nystroem(context, NOWHERE, h, 0.0, 1.0)
 
 
 def network_of(
@@ -142,7 +159,9 @@ def network_of(
     springs = springs_of(body)
     stages = new_stages(len(mesh.positions))
     tool = tool_with(new_anchors(2, 1.0, YOUNG_MODULUS))
-    surroundings = Surroundings(Vec3(0.0, 0.0, 0.0), viscous_damping, retardation_time)
+    surroundings = Surroundings(
+        gravity=Vec3(0.0, 0.0, 0.0), drag=viscous_damping, retardation_time=retardation_time
+    )
     return Network(body, springs, tool, stages, surroundings)
 
 

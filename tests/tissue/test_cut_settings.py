@@ -7,7 +7,7 @@ import pytest
 
 from tests import soundness
 from tests.strokes import curved, make, upright
-from tissue import CutReport, CutSettings, Material, Tissue, block, fixed_nodes
+from tissue import CutReport, CutSettings, Material, SolverSettings, Tissue, block, fixed_nodes
 
 SIZE = 0.04
 CELLS = 4
@@ -22,22 +22,26 @@ DRAG = 0.02
 
 def cut_at(x: float, quality: CutSettings | None = None) -> Tissue:
     """Return a block that an upright blade has cut in two at `x` [m]."""
-    tissue = Tissue(MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, quality=quality)
+    tissue = Tissue(
+        MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, solver=SolverSettings(cut=quality)
+    )
     make(tissue, upright(x, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
     return tissue
 
 
 def curved_with(snap: float, guard: float) -> CutReport:
     quality = CutSettings(snap=snap, floor=snap, guard=guard)
-    tissue = Tissue(MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, quality=quality)
+    tissue = Tissue(
+        MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, solver=SolverSettings(cut=quality)
+    )
     make(tissue, curved(MESH))
-    return tissue.quality()
+    return tissue.cut_report()
 
 
 def test_the_path_error_is_how_far_the_cut_faces_are_from_where_the_blade_passed():
     x = 0.0185
     tissue = cut_at(x)
-    surface, found = tissue.surface(), tissue.quality()
+    surface, found = tissue.surface(), tissue.cut_report()
     nodes = np.unique(surface.triangles[surface.is_cut])
     off = np.abs(surface.rest_positions[nodes, 0] - x)
     assert found.n_cut_nodes == len(nodes)
@@ -55,9 +59,9 @@ def test_a_cut_along_the_faces_of_the_mesh_has_no_path_error_and_no_price():
 
 def test_a_later_cut_does_not_forget_the_path_error_of_the_first():
     tissue = cut_at(0.0185)
-    first = tissue.quality()
+    first = tissue.cut_report()
     make(tissue, upright(0.0324, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
-    both = tissue.quality()
+    both = tissue.cut_report()
     assert both.n_cut_nodes > first.n_cut_nodes
     assert both.path_error_largest >= first.path_error_largest
 
@@ -71,7 +75,7 @@ def test_less_snapping_follows_the_blade_more_closely_and_costs_time_step():
 
 def test_the_smallest_altitude_is_that_of_the_thinnest_tetrahedron_and_not_below_the_guard():
     tissue = cut_at(0.0176)
-    body, found = tissue.snapshot(), tissue.quality()
+    body, found = tissue.snapshot(), tissue.cut_report()
     lowest = soundness.smallest_altitude(body.rest_positions, body.tetrahedra)
     assert found.now.altitude == pytest.approx(lowest, rel=1e-9)
     assert found.guard <= found.now.altitude < found.initial.altitude

@@ -36,6 +36,10 @@ FloatCell = Annotated[float, "cell"]
 """A number in a struct that kernels and Python may change. A plain `float` does not change."""
 
 
+_VECTOR = types.NamedUniTuple(types.float64, 3, Vec3)
+"""Numba's type of a vector."""
+
+
 class ArraysType(types.Type):
     """Numba's type of a subclass of `Arrays`: the names and types of its fields, in order.
 
@@ -87,7 +91,7 @@ class _Cell:
 
 
 class Arrays:
-    """Base of structs of C-contiguous arrays, numbers, and other such structs.
+    """Base of structs of C-contiguous arrays, numbers, vectors, and other such structs.
 
     A subclass annotates its fields in order and is made from keywords. Only the elements of arrays
     and the fields annotated as `IntCell` or `FloatCell` change. All objects of a subclass have
@@ -130,6 +134,9 @@ class Arrays:
             elif isinstance(value, float):
                 words.append(_word(value))
                 kinds.append((name, types.float64))
+            elif isinstance(value, Vec3):
+                words += [_word(number) for number in value]
+                kinds.append((name, _VECTOR))
             else:
                 if not value.flags.c_contiguous:
                     raise TypeError(f"{type(self).__name__}.{name} is not C-contiguous")
@@ -160,15 +167,13 @@ def _word(number: float) -> int:
 class Vectors(Arrays):
     """Base of structs of vectors alone, made from one vector a field, in order.
 
-    For what is made anew in every step: it takes a third of the time of an `Arrays`, and a kernel
+    For what is made in every step: it takes a third of the time of an `Arrays`, and a kernel
     that got a tuple of tuples instead took 3 us more.
     """
 
     def __init_subclass__(cls) -> None:
-        vector = types.NamedUniTuple(types.float64, 3, Vec3)
-        cls._numba_type_ = ArraysType(
-            cls.__name__, tuple((name, vector) for name in cls.__annotations__)
-        )
+        fields = tuple((name, _VECTOR) for name in cls.__annotations__)
+        cls._numba_type_ = ArraysType(cls.__name__, fields)
 
     def __init__(self, *vectors: Vec3) -> None:
         for name, vector in zip(type(self).__annotations__, vectors, strict=True):
@@ -243,7 +248,7 @@ def _getattr(context: Any, builder: Any, struct: ArraysType, table: Any, attribu
         return builder.inttoptr(word(0), ir.IntType(64).as_pointer())
     if field == types.float64:
         return builder.bitcast(word(0), ir.DoubleType())
-    if isinstance(field, types.NamedUniTuple):  # of floats: see `Vectors`
+    if isinstance(field, types.NamedUniTuple):
         numbers = [builder.bitcast(word(i), ir.DoubleType()) for i in range(len(field))]
         return context.make_tuple(builder, field, numbers)
     itemsize = context.get_abi_sizeof(context.get_data_type(field.dtype))

@@ -9,12 +9,13 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, vec3
 from tissue.cutting.cut_surface import decide_side, decided_side, touch
-from tissue.cutting.workspace import PASS_NODES, SPARE_NODES, Cut
+from tissue.cutting.workspace import Cut
 from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude
 from tissue.mesh.body import local_index
 from tissue.mesh.changes import note_dirty
 from tissue.mesh.star import edge_star
+from tissue.mesh.workspace import PASS_NODES, SPARE_NODES
 
 NO_ROOM = -1
 """In place of a node: the arrays must grow first."""

@@ -12,13 +12,6 @@ from tissue.mesh.body import Body
 from tissue.mesh.changes import CHANGES, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
-PASS_NODES = 256
-"""Nodes that one pass of a cut step puts on the sheet at most; a step that needs more is done in
-several passes. Un-gluing them notes some 50 tetrahedra each, which must fit into CHANGES."""
-
-SPARE_NODES = 4 * PASS_NODES
-"""Room for nodes that a pass leaves for un-gluing: no node falls into more than a few copies."""
-
 CROSSINGS = 1 << 12
 """Edges that one pass can cross."""
 

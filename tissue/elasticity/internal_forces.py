@@ -4,8 +4,6 @@ Springs along the edges, tetrahedra as elements of a solid, or both: the law of 
 which. Dampers lie along the edges under either law.
 """
 
-from typing import NamedTuple
-
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
@@ -32,15 +30,15 @@ class Elastic(Arrays):
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
 
 
-class Surroundings(NamedTuple):
-    """What slows and pulls every node besides its neighbours."""
+class Surroundings(Arrays):
+    """Gravity, and the damping of the motion."""
 
     gravity: Vec3
-    """[m/s2]."""
+    """Acceleration of free fall [m/s2]."""
     drag: float
     """Rate at which free motion dies away [1/s]."""
     retardation_time: float
-    """Damping along each edge, per its stiffness [s]."""
+    """Damping along each edge, per stiffness of the edge [s]."""
 
 
 @kernel

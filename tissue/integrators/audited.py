@@ -1,4 +1,4 @@
-"""Runge-Kutta steps that are watched: what damping takes, and what contact does to the energy."""
+"""Runge-Kutta steps with an account of energy: the losses in damping and in contact."""
 
 import numpy as np
 
@@ -7,74 +7,78 @@ from tissue.contact.resolve import prepare
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.energy import body_energy, dissipated_power
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
-from tissue.integrators.step_context import Motion, give_way_after, set_right
+from tissue.integrators.step_context import Increment
+from tissue.integrators.step_end import resolve_contact, slip_blade
+from tissue.integrators.system import System
 
 
 class Audited:
-    """All nodes together, as `tissue.integrators.runge_kutta.relax` moves them, with an account.
+    """All nodes together, as `runge_kutta_steps` moves them, with an account of energy.
 
-    What damping takes is integrated by Simpson's rule over each step, from the motion at its
+    The loss in damping is integrated by Simpson's rule over each step, from the motion at its
     begin, middle and end: one order below the motion itself.
     """
 
     def __init__(self) -> None:
         self.damping = 0.0
-        """What viscosity and drag took so far [J]."""
+        """Energy lost in viscosity and drag so far [J]."""
         self.contact = 0.0
-        """What contact took so far [J]."""
+        """Energy lost in contact so far [J]."""
         self._positions, self._velocities, self._scratch = np.zeros((3, 0, 3))
         self._power_now = 0.0
 
-    def relax_by(self, motion: Motion, n: int) -> None:
-        """Advance the motion by `n` Runge-Kutta steps."""
-        if len(self._positions) != len(motion.body.positions):
+    def take_steps(self, system: System, increment: Increment, n: int) -> None:
+        """Advance the motion by an increment in `n` Runge-Kutta steps."""
+        body, contact = system.body, system.contact
+        if len(self._positions) != len(body.positions):
             self._positions, self._velocities, self._scratch = (
-                np.zeros_like(motion.body.positions) for _ in range(3)
+                np.zeros_like(body.positions) for _ in range(3)
             )
-        share = (motion.end - motion.begin) / n
+        share = (increment.end - increment.begin) / n
         for i in range(n):
-            at = motion.begin + i * share
-            if motion.contact.is_awake:
-                prepare(motion.contact.arrays, motion.body)
-            if i == 0 or motion.contact.is_awake:
-                self._power_now = self._power_of(motion, motion.body.velocities)
-            self._step(motion, at, share)
-            self._set_right(motion, share * motion.dt, at + share)
-            give_way_after(motion, share * motion.dt, at + share)
+            at = increment.begin + i * share
+            if contact.is_awake:
+                prepare(contact.arrays, body)
+            if i == 0 or contact.is_awake:
+                self._power_now = self._power_of(system, body.velocities)
+            self._step(system, increment, at, share)
+            self._resolve_contact(system, increment, share * increment.dt, at + share)
+            slip_blade(system, increment, share * increment.dt, at + share)
 
-    def _step(self, motion: Motion, at: float, share: float) -> None:
-        body, stages, elastic = motion.body, motion.stages, motion.elasticity.arrays
-        n, h = body.n_nodes, share * motion.dt
+    def _step(self, system: System, increment: Increment, at: float, share: float) -> None:
+        body, stages = system.body, system.stages
+        n, h = body.n_nodes, share * increment.dt
         self._positions[:n], self._velocities[:n] = body.positions[:n], body.velocities[:n]
         before = self._power_now
-        blade = (motion.tool, motion.edge, stages)
-        runge_kutta_nystroem(body, elastic, *blade, motion.surroundings, motion.dt, at, share)
-        after = self._power_of(motion, body.velocities)
-        # Simpson's rule for the way gives the velocity half-way, of 4th order as the rest.
-        way = body.positions[:n] - self._positions[:n]
+        runge_kutta_nystroem(system.context, increment.edge, increment.dt, at, share)
+        after = self._power_of(system, body.velocities)
+        # Simpson's rule for the displacement gives the velocity half-way, of 4th order as the rest.
+        displacement = body.positions[:n] - self._positions[:n]
         ends = self._velocities[:n] + body.velocities[:n]
-        self._velocities[:n] = 1.5 / h * way - 0.25 * ends
-        middle = self._power_of(motion, self._velocities, stages.positions)
+        self._velocities[:n] = 1.5 / h * displacement - 0.25 * ends
+        middle = self._power_of(system, self._velocities, stages.positions)
         self.damping += h / 6.0 * (before + 4.0 * middle + after)
         self._power_now = after
 
     def _power_of(
-        self, motion: Motion, velocities: FloatArray, positions: FloatArray | None = None
+        self, system: System, velocities: FloatArray, positions: FloatArray | None = None
     ) -> float:
-        """What damping takes at these velocities, where the nodes are or at `positions` [W]."""
-        body, elastic = motion.body, motion.elasticity.arrays
+        """Return the power lost in damping [W] at these velocities and at `positions`, or here."""
+        body, elastic = system.body, system.elasticity.arrays
         at = body.positions if positions is None else positions
-        return dissipated_power(body, elastic, motion.surroundings, at, velocities, self._scratch)
+        return dissipated_power(body, elastic, system.surroundings, at, velocities, self._scratch)
 
-    def _set_right(self, motion: Motion, seconds: float, when: float) -> None:
-        if motion.contact.is_awake:
-            before = self._energy(motion, when)
-            set_right(motion, seconds)
-            self.contact += before - self._energy(motion, when)
+    def _resolve_contact(
+        self, system: System, increment: Increment, seconds: float, when: float
+    ) -> None:
+        if system.contact.is_awake:
+            before = self._energy(system, increment, when)
+            resolve_contact(system, seconds)
+            self.contact += before - self._energy(system, increment, when)
 
     @staticmethod
-    def _energy(motion: Motion, when: float) -> float:
-        """Of the body, and of what the edge holds [J]."""
-        body, tool = motion.body, motion.tool
-        stored = body_energy(body, motion.elasticity.arrays, motion.surroundings.gravity)
-        return stored + anchors_energy(tool.anchors, body, motion.edge, when, tool.resistance)
+    def _energy(system: System, increment: Increment, when: float) -> float:
+        """Return the energy of the body and of the anchors [J]."""
+        body, tool = system.body, system.interaction.tool
+        stored = body_energy(body, system.elasticity.arrays, system.surroundings.gravity)
+        return stored + anchors_energy(tool.anchors, body, increment.edge, when, tool.resistance)

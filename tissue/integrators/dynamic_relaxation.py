@@ -7,41 +7,44 @@ Khan (1994) for kinetic damping.
 
 import numpy as np
 
+from tissue.blade.anchors import Edge
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
-from tissue.integrators.step_context import Motion
+from tissue.integrators.step_context import Increment
+from tissue.integrators.system import System
 
 SETTLED = 1e-3
 """Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
 LONGEST_SETTLING = 20_000
 """Runge-Kutta steps after which to give up waiting."""
 STEPS_BETWEEN_PEAKS = 4
-"""Runge-Kutta steps between two looks at the kinetic energy."""
+"""Runge-Kutta steps between two evaluations of the kinetic energy."""
 
 
-def settle(all_together: GlobalStepper, motion: Motion) -> int:
+def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
     """Relax to equilibrium; return the steps that it took.
 
     Args:
-        all_together: Moves all nodes.
-        motion: What takes part; its time step is not used.
+        stepper: Moves all nodes.
+        system: Body, forces and contact.
+        edge: The edge of no blade.
     """
-    body, elasticity = motion.body, motion.elasticity
+    body, elasticity = system.body, system.elasticity
     n, energy = body.n_nodes, 0.0
     velocities, masses = body.velocities[:n], body.masses[:n, None]
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         strained = elasticity.strained_frequency_squared(body)
         highest = max(elasticity.frequency_squared, strained)
-        dt = STEPS_BETWEEN_PEAKS * stable_step(elasticity, highest, motion.surroundings)
+        dt = STEPS_BETWEEN_PEAKS * stable_step(elasticity, highest, system.surroundings)
         velocities_t0 = velocities.copy()
-        all_together.relax_by(motion._replace(dt=dt, begin=0.0, end=1.0), STEPS_BETWEEN_PEAKS)
-        if motion.contact.is_awake:  # what holds a body on the floor is not in its forces
+        stepper.take_steps(system, Increment(edge, dt, 0.0, 1.0), STEPS_BETWEEN_PEAKS)
+        if system.contact.is_awake:  # what holds a body on the floor is not in its forces
             largest = np.abs(velocities - velocities_t0).max() / dt
         else:
-            stages, arrays = motion.stages, elasticity.arrays
-            accelerations(body, arrays, stages.external, motion.surroundings, stages.a1)
-            largest = np.abs(stages.a1[:n]).max()
+            a = system.stages.a1
+            accelerations(system.context, a)
+            largest = np.abs(a[:n]).max()
         before, energy = energy, float((masses * velocities**2).sum())
         if energy < before:
             velocities[:] = 0.0

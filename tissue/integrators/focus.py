@@ -5,7 +5,7 @@ from tissue.blade.forces import Tool
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.elasticity.springs import Springs
-from tissue.integrators.node_rings import EPOCH, N_FOUND, Rings, add_focus, begin_search, search
+from tissue.integrators.node_rings import Rings, add_focus, append_node, begin_search, search
 from tissue.mesh.body import Body
 
 N_CORNERS = 4
@@ -16,7 +16,7 @@ N_CORNERS = 4
 def find_held(held: Rings, body: Body, tool: Tool) -> bool:
     """Make the nodes that the blade acts on ring 0 of `held`; return whether there are any.
 
-    Those of the anchor nearest to the tip come first. Where there are none, `held` stays as it was.
+    The nodes of the anchor nearest to the tip come first. Without any, `held` stays as it was.
     """
     anchors, flanks = tool.anchors, tool.flanks
     n = 0
@@ -47,41 +47,33 @@ def find_rings(
 
     Args:
         rings: Written.
-        held: Of `find_held`.
-        springs: The rows.
-        last_ring: Where the search ends.
+        held: The nodes that `find_held` found.
+        springs: The rows of neighbours.
+        last_ring: Last ring of the search.
         scratch: Shape (capacity,).
     """
     begin_search(rings)
-    for k in range(min(N_CORNERS, held.state[N_FOUND])):
+    for k in range(min(N_CORNERS, held.n_found)):
         add_focus(rings, held.order[k])
     search(rings, springs, last_ring)
-    n = rings.state[N_FOUND]
+    n = rings.n_found
     for k in range(n):
         scratch[k] = rings.order[k]
-    rings.state[N_FOUND] = 0
-    for k in range(held.state[N_FOUND]):
-        _append(rings, held.order[k], 0)
+    rings.n_found = 0
+    for k in range(held.n_found):
+        append_node(rings, held.order[k], 0)
     for k in range(n):
         if rings.ring[scratch[k]] > 0:
-            _append(rings, scratch[k], rings.ring[scratch[k]])
-    _see_neighbours(rings, held, springs, last_ring)
+            append_node(rings, scratch[k], rings.ring[scratch[k]])
+    _append_neighbours(rings, held, springs, last_ring)
 
 
 @kernel
-def _see_neighbours(rings: Rings, held: Rings, springs: Springs, last_ring: int) -> None:
-    """Find the neighbours of held nodes that were beyond the last ring: they are seen too."""
-    for k in range(held.state[N_FOUND]):
+def _append_neighbours(rings: Rings, held: Rings, springs: Springs, last_ring: int) -> None:
+    """Append the neighbours of held nodes that were beyond the last ring."""
+    for k in range(held.n_found):
         first = springs.first[held.order[k]]
         for slot in range(first, first + springs.count[held.order[k]]):
             other = springs.neighbour[slot]
-            if rings.seen[other] != rings.state[EPOCH]:
-                _append(rings, other, last_ring)
-
-
-@kernel
-def _append(rings: Rings, node: int, ring: int) -> None:
-    rings.seen[node] = rings.state[EPOCH]
-    rings.ring[node] = ring
-    rings.order[rings.state[N_FOUND]] = node
-    rings.state[N_FOUND] += 1
+            if rings.seen[other] != rings.epoch:
+                append_node(rings, other, last_ring)

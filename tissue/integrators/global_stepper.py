@@ -1,4 +1,4 @@
-"""All nodes together: the two-level Runge-Kutta method, in as many steps as stability needs."""
+"""The default integrator: all nodes together, in as many Runge-Kutta steps as stability needs."""
 
 import math
 
@@ -6,19 +6,20 @@ from tissue.blade.forces import frequency_with_tool
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.audited import Audited
-from tissue.integrators.runge_kutta import relax
+from tissue.integrators.runge_kutta import runge_kutta_steps
 from tissue.integrators.stability import SAFETY, stable_step
-from tissue.integrators.step_context import Motion
+from tissue.integrators.step_context import Increment
+from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
 from tissue.mesh.body import Body
 
-STEPS_BETWEEN_LOOKS = 2
-"""Runge-Kutta steps between two looks at how far tetrahedra are strained. A lip that snaps back, or
-is pinched, is as much shorter within a frame of eight steps as an element is long."""
+STEPS_BETWEEN_STRAIN_BOUNDS = 2
+"""Runge-Kutta steps between two bounds on the frequencies of the strained body. A lip that snaps
+back, or is pinched, is as much shorter within a frame of eight steps as an element is long."""
 
 
 class GlobalStepper:
-    """See `tissue.integrators.step_context.Relaxation`; it remembers nothing.
+    """All nodes together, by the two-level Runge-Kutta method. An `Integrator` without memory.
 
     Args:
         threads: How many threads share the loops over the body.
@@ -33,60 +34,44 @@ class GlobalStepper:
         if audited is None and threads > 1:
             self._stepper = Threads(threads)
 
-    def relax(self, motion: Motion) -> int:
-        """Advance the motion; return the Runge-Kutta steps taken."""
-        elasticity = motion.elasticity
+    def advance(self, system: System, increment: Increment) -> int:
+        """Advance the motion by an increment; return the Runge-Kutta steps taken."""
+        elasticity, tool = system.elasticity, system.interaction.tool
         by_node = elasticity.arrays.frequency_squared
-        near = frequency_with_tool(motion.tool, motion.body, by_node, motion.stages.external)
+        near = frequency_with_tool(tool, system.body, by_node, system.stages.external)
         done = 0
         while True:
             # The bound of the strained body is so wide of the truth that it needs no safety on top.
-            strained = SAFETY**2 * elasticity.strained_frequency_squared(motion.body)
+            strained = SAFETY**2 * elasticity.strained_frequency_squared(system.body)
             highest = max(elasticity.frequency_squared, near, strained)
-            step = stable_step(elasticity, highest, motion.surroundings)
-            n = max(1, math.ceil(motion.span / step))
-            if not elasticity.follows_strain or n <= STEPS_BETWEEN_LOOKS:
-                self.relax_by(motion, n)
+            step = stable_step(elasticity, highest, system.surroundings)
+            n = max(1, math.ceil(increment.span / step))
+            if not elasticity.follows_strain or n <= STEPS_BETWEEN_STRAIN_BOUNDS:
+                self.take_steps(system, increment, n)
                 return done + n
-            share = STEPS_BETWEEN_LOOKS / n
-            end = motion.begin + share * (motion.end - motion.begin)
-            self.relax_by(motion._replace(end=end), STEPS_BETWEEN_LOOKS)
-            motion = motion._replace(begin=end)
-            done += STEPS_BETWEEN_LOOKS
+            share = STEPS_BETWEEN_STRAIN_BOUNDS / n
+            end = increment.begin + share * (increment.end - increment.begin)
+            self.take_steps(system, increment._replace(end=end), STEPS_BETWEEN_STRAIN_BOUNDS)
+            increment = increment._replace(begin=end)
+            done += STEPS_BETWEEN_STRAIN_BOUNDS
 
-    def relax_by(self, motion: Motion, n: int) -> None:
-        """Advance the motion by `n` Runge-Kutta steps."""
+    def take_steps(self, system: System, increment: Increment, n: int) -> None:
+        """Advance the motion by an increment in `n` Runge-Kutta steps."""
         if self._stepper is not None:
-            self._stepper.relax_by(motion, n)
+            self._stepper.take_steps(system, increment, n)
             return
         done = 0
         while True:
-            done = relax(
-                motion.body,
-                motion.elasticity.arrays,
-                motion.tool,
-                motion.edge,
-                motion.visits,
-                motion.stages,
-                motion.contact.arrays,
-                motion.queue,
-                motion.surroundings,
-                motion.reach,
-                motion.dt,
-                motion.begin,
-                motion.end,
-                done,
-                n,
-            )
+            done = runge_kutta_steps(system.context, *increment, done, n)
             if done == n:
                 return
-            motion.contact.make_room()
+            system.contact.make_room()
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
-        """Nothing is remembered."""
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+        """Do nothing: no step depends on the one before."""
 
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
-        """Nothing is remembered."""
+        """Do nothing: no step depends on the one before."""
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Nothing is remembered."""
+        """Do nothing: there are no arrays."""

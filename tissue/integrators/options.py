@@ -73,9 +73,9 @@ class LocalTimeStepping:
             )
 
 
-Relaxing = Global | Hierarchical | LocalTimeStepping
+IntegratorOptions = Global | Hierarchical | LocalTimeStepping
 
-BY_NAME: dict[str, Relaxing] = {
+BY_NAME: dict[str, IntegratorOptions] = {
     "global": Global(),
     "hierarchical": Hierarchical(),
     "local": LocalTimeStepping(),
@@ -83,7 +83,7 @@ BY_NAME: dict[str, Relaxing] = {
 """With the default settings."""
 
 
-def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
+def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> IntegratorOptions:
     """Return the settings that a name stands for, or those given, for a body of that material.
 
     Raises:
@@ -93,7 +93,7 @@ def checked_relaxation(choice: str | Relaxing, material: Material) -> Relaxing:
         if choice not in BY_NAME:
             raise ValueError(f"no relaxation is called {choice!r}. Known: {', '.join(BY_NAME)}")
         choice = BY_NAME[choice]
-    if not isinstance(choice, Relaxing):
+    if not isinstance(choice, IntegratorOptions):
         raise ValueError(
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
             "or LocalTimeStepping with settings"

@@ -1,98 +1,54 @@
-"""What advancing the motion needs, whichever way it is done, and what is done around each step."""
+"""What a step works on: one struct for kernels, and the part of a time step to advance by."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from tissue.blade.anchors import Edge
-from tissue.blade.forces import Tool, give_way
-from tissue.contact.resolve import resolve
-from tissue.contact.self_contact import SelfContact
+from tissue.blade.forces import Tool
+from tissue.contact.state import ContactState
 from tissue.core.array_types import IntArray
-from tissue.elasticity.elasticity import Elasticity
-from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.runge_kutta import Stages
+from tissue.core.structs import Arrays
+from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.integrators.stages import Stages
 from tissue.mesh.body import Body
-from tissue.mesh.moved_nodes import Moved
 from tissue.mesh.star import Visits
 
 
-class Motion(NamedTuple):
-    """A part of a time step, and all that takes part."""
+class StepContext(Arrays):
+    """Everything that the kernels of an integrator read and write."""
 
     body: Body
-    elasticity: Elasticity
-    contact: SelfContact
+    """Positions and velocities are written."""
+    elastic: Elastic
+    """What the forces inside the body follow from."""
     tool: Tool
-    edge: Edge
-    visits: Visits
+    """The blade: it acts in every stage, and slips after every step."""
+    contact: ContactState
+    """What may touch; positions and velocities are corrected after every step."""
+    surroundings: Surroundings
+    """Gravity and damping."""
     stages: Stages
+    """Scratch of a step, and the forces of the blade."""
+    visits: Visits
+    """Scratch for searches."""
     queue: IntArray
     """Scratch for searches, shape (LARGEST_STAR,)."""
-    surroundings: Surroundings
     reach: float
     """See `slip` [m]."""
+
+
+class Increment(NamedTuple):
+    """A part of a time step, over which the edge moves little."""
+
+    edge: Edge
+    """The cutting edge over the whole time step."""
     dt: float
-    """Length of the whole time step [s], which the edge's motion is over."""
+    """Length of the whole time step [s]."""
     begin: float
-    """Fraction of the time step at which to begin."""
+    """Fraction of the time step at which the increment begins."""
     end: float
-    """Fraction at which to end."""
+    """Fraction of the time step at which it ends."""
 
     @property
     def span(self) -> float:
-        """What is to be advanced [s]."""
+        """Length of the increment [s]."""
         return self.dt * (self.end - self.begin)
-
-
-class Relaxation(Protocol):
-    """A way to advance the motion. It owns what it remembers from step to step."""
-
-    @property
-    def moved(self) -> Moved | None:
-        """Nodes that moved since it was emptied; None where all do."""
-        ...
-
-    @property
-    def moving(self) -> tuple[IntArray, int] | None:
-        """Nodes that may have moved in the last call of `relax`, and how many; None where all."""
-        ...
-
-    def relax(self, motion: Motion) -> int:
-        """Advance the motion; return how many steps the finest nodes took."""
-        ...
-
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
-        """Take note that the mesh around the first `n` of `nodes` changed."""
-        ...
-
-    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
-        """Take note that every node moved by other means, and is at rest."""
-        ...
-
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Make room for that many nodes and tetrahedra."""
-        ...
-
-
-def end_step(motion: Motion, seconds: float, when: float) -> None:
-    """After a step: set right what went through what, and let give way what does not hold.
-
-    Args:
-        motion: What takes part.
-        seconds: Length of the step [s].
-        when: Its end, as a fraction of the time step.
-    """
-    if motion.contact.is_awake:
-        set_right(motion, seconds)
-    give_way_after(motion, seconds, when)
-
-
-def set_right(motion: Motion, seconds: float) -> None:
-    """Set right what went through what in a step of that length [s]."""
-    while not resolve(motion.contact.arrays, motion.body, seconds):
-        motion.contact.make_room()
-
-
-def give_way_after(motion: Motion, seconds: float, when: float) -> None:
-    """Let give way what the blade does not hold: see `end_step`."""
-    body, edge, external, reach = motion.body, motion.edge, motion.stages.external, motion.reach
-    give_way(motion.tool, body, motion.visits, edge, external, when, seconds, reach, motion.queue)

@@ -17,7 +17,9 @@ from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
-from tissue.integrators.step_context import Motion, end_step
+from tissue.integrators.step_context import Increment, StepContext
+from tissue.integrators.step_end import end_step
+from tissue.integrators.system import System
 from tissue.mesh.body import Body
 
 
@@ -32,39 +34,33 @@ class Threads:
         self._n = n
         self._pool = ThreadPoolExecutor(n - 1, thread_name_prefix="tissue")
 
-    def relax_by(self, motion: Motion, n: int) -> None:
-        """Advance the motion by `n` Runge-Kutta steps (see
-        `tissue.integrators.runge_kutta.relax`)."""
-        share = (motion.end - motion.begin) / n
+    def take_steps(self, system: System, increment: Increment, n: int) -> None:
+        """Advance the motion by an increment in `n` Runge-Kutta steps, as `runge_kutta_steps`."""
+        share = (increment.end - increment.begin) / n
         for i in range(n):
-            at = motion.begin + i * share
-            if motion.contact.is_awake:
-                prepare(motion.contact.arrays, motion.body)
-            self._step(motion, at, share)
-            end_step(motion, share * motion.dt, at + share)
+            at = increment.begin + i * share
+            if system.contact.is_awake:
+                prepare(system.contact.arrays, system.body)
+            self._step(system.context, increment, at, share)
+            end_step(system, increment, share * increment.dt, at + share)
 
-    def _step(self, motion: Motion, at: float, share: float) -> None:
-        """One step of Nystroem's form (see `runge_kutta_nystroem`)."""
-        body, elastic, stages = motion.body, motion.elasticity.arrays, motion.stages
-        n = body.n_nodes
-        arguments = (body, elastic, stages, motion.surroundings, share * motion.dt)
-        self._act(motion, body.positions, at, share / 6.0)
+    def _step(self, context: StepContext, increment: Increment, at: float, share: float) -> None:
+        """Take one step of Nystroem's form, as `runge_kutta_nystroem`."""
+        body, elastic, tool, stages = context.body, context.elastic, context.tool, context.stages
+        edge, dt, external = increment.edge, increment.dt, stages.external
+        n, h = body.n_nodes, share * dt
+        half, end = at + 0.5 * share, at + share
+        act(tool, body, edge, body.positions, at, share / 6.0, dt, external)
         self._deform(body, elastic, body.positions)
-        self._share(n, first_stage, *arguments)
-        self._act(motion, stages.positions, at + 0.5 * share, share * 2.0 / 3.0)
+        self._share(n, first_stage, context, h)
+        act(tool, body, edge, stages.positions, half, share * 2.0 / 3.0, dt, external)
         self._deform(body, elastic, stages.positions)
-        self._share(n, second_stage, *arguments)
-        if motion.surroundings.retardation_time > 0.0:
-            self._share(n, third_stage, *arguments)
-        self._act(motion, stages.positions_4, at + share, share / 6.0)
+        self._share(n, second_stage, context, h)
+        if context.surroundings.retardation_time > 0.0:
+            self._share(n, third_stage, context, h)
+        act(tool, body, edge, stages.positions_4, end, share / 6.0, dt, external)
         self._deform(body, elastic, stages.positions_4)
-        self._share(n, fourth_stage, *arguments)
-
-    @staticmethod
-    def _act(motion: Motion, positions: FloatArray, when: float, share: float) -> None:
-        """Let the blade act on the nodes at `positions` [m]."""
-        edge, dt, external = motion.edge, motion.dt, motion.stages.external
-        act(motion.tool, motion.body, edge, positions, when, share, dt, external)
+        self._share(n, fourth_stage, context, h)
 
     def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
         """Evaluate all tetrahedra (see `tissue.elasticity.internal_forces.deform`)."""

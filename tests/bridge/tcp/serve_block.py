@@ -10,7 +10,7 @@ import numpy as np
 from bridge import Bridge, InProcessLink, serve
 from bridge.tcp import peer
 from bridge.tcp.keys import chosen_key
-from tissue import BladeSegment, BladeShape, Material, Tissue, block
+from tissue import BladeSegment, BladeShape, Material, SolverSettings, Tissue, block
 
 SIDE = 0.02
 
@@ -22,7 +22,13 @@ def block_tissue() -> Tissue:
     """
     mesh = block((3, 2, 2), (SIDE, SIDE, SIDE))
     fixed = (mesh.positions[:, 0] == 0.0) | (mesh.positions[:, 0] == SIDE)
-    return Tissue(mesh, Material(toughness=5.0), fixed=fixed, blade=BladeShape(), audit=True)
+    return Tissue(
+        mesh,
+        Material(toughness=5.0),
+        fixed=fixed,
+        blade=BladeShape(),
+        solver=SolverSettings(audit=True),
+    )
 
 
 def compile_kernels() -> None:
@@ -35,7 +41,7 @@ def compile_kernels() -> None:
     tissue.surface()
     tissue.chunks()
     tissue.n_pieces()
-    tissue.quality()
+    tissue.cut_report()
 
 
 if __name__ == "__main__":

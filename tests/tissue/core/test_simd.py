@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tissue import Tissue, block
+from tissue import SolverSettings, Tissue, block
 from tissue.core import simd
 from tissue.core.jit import kernel
 from tissue.core.simd import (
@@ -75,8 +75,10 @@ def test_eight_points_are_gathered_and_summed_up():
 
 
 def test_all_arrays_whose_rows_are_gathered_have_room_behind_the_last():
-    tissue = Tissue(block((1, 1, 1), (0.01, 0.01, 0.01)), relaxation="hierarchical")
-    body, stages = tissue._body, tissue._stages
+    tissue = Tissue(
+        block((1, 1, 1), (0.01, 0.01, 0.01)), solver=SolverSettings(relaxation="hierarchical")
+    )
+    body, stages = tissue._body, tissue._system.stages
     arrays = [body.rest, body.positions, body.velocities, new_trails(5).origins]
     arrays += [getattr(stages, name) for name in Stages.__annotations__]
     arrays += [room_for_points(7), grown(room_for_points(7), 9)]

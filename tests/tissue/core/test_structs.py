@@ -16,6 +16,11 @@ class Inner(Arrays):
     weight: float
 
 
+class Field(Arrays):
+    values: FloatArray
+    direction: Vec3
+
+
 class Outer(Arrays):
     numbers: IntArray
     inner: Inner
@@ -146,3 +151,13 @@ def test_a_kernel_reads_a_struct_of_vectors():
 def test_a_struct_of_vectors_needs_them_all():
     with pytest.raises(ValueError, match="argument"):
         Frame(Vec3(1.0, 0.0, 0.0))
+
+
+@kernel
+def along_field(field, i):
+    return field.values[i] * field.direction.y
+
+
+def test_a_kernel_reads_a_vector_beside_arrays():
+    field = Field(values=np.array([1.0, 2.0]), direction=Vec3(0.0, 3.0, 0.0))
+    assert along_field(field, 1) == 6.0

@@ -25,7 +25,7 @@ def test_no_motion_grows_in_a_step_however_much_dampers_brake(retardation_time, 
     c *= retardation_time
     body = build_body(MESH, None, None)
     elasticity = Elasticity(material, body, no_visits(len(body.rest), len(body.tetrahedra)))
-    around = Surroundings(Vec3(0.0, 0.0, 0.0), 0.0, retardation_time)
+    around = Surroundings(gravity=Vec3(0.0, 0.0, 0.0), drag=0.0, retardation_time=retardation_time)
     h = stable_step(elasticity, elasticity.frequency_squared, around) / SAFETY
     one, zero = np.eye(len(k)), np.zeros_like(k)
     x, v = np.hstack([one, zero]), np.hstack([zero, one])  # of the state (x, v)

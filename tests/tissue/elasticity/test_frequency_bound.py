@@ -7,7 +7,7 @@ import pytest
 
 from tests import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, fastest, lame, law_of, moved, solid_of
-from tissue import Material, TetrahedralMesh, Tissue, block
+from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.finite_elements import volume_term
 
@@ -26,7 +26,7 @@ def cut_tissue(seed: int, relaxation: str = "global") -> Tissue:
     """Return a small body of averaged neo-Hookean tetrahedra after two incisions at random."""
     whole = block((4, 3, 3), (0.04, 0.03, 0.03)) if seed % 2 else bodies.jittered(3, seed)
     material = Material(law="neo_hookean", poisson_ratio=0.45)
-    tissue = Tissue(whole, material, relaxation=relaxation)
+    tissue = Tissue(whole, material, solver=SolverSettings(relaxation=relaxation))
     for i in range(2):
         tissue.incise(*incisions.incision(whole, KINDS[(seed + 3 * i) % len(KINDS)], seed + i))
     return tissue
@@ -40,7 +40,7 @@ def cut_mesh(seed: int) -> TetrahedralMesh:
 
 def solid_that_followed(tissue: Tissue) -> SolidBody:
     """Return the solid that was renewed where the cuts touched."""
-    return SolidBody(tissue._body, tissue._elasticity.arrays.solid)
+    return SolidBody(tissue._body, tissue._system.elasticity.arrays.solid)
 
 
 @needs_speed
@@ -49,7 +49,7 @@ def test_8_the_bound_that_followed_cuts_is_above_the_fastest_mode_by_little(seed
     tissue = cut_tissue(seed)
     solid = solid_that_followed(tissue)
     assert 1.0 <= solid.frequency() / fastest(solid) <= LOOSEST_BOUND
-    assert solid.frequency() <= np.sqrt(tissue._elasticity.frequency_squared)
+    assert solid.frequency() <= np.sqrt(tissue._system.elasticity.frequency_squared)
 
 
 @needs_speed
@@ -60,7 +60,7 @@ def test_8_with_local_time_stepping_it_is_nearer_and_still_above(seed):
     truth = fastest(solid)
     assert truth == pytest.approx(fastest(loose), rel=1e-6)
     assert truth <= solid.frequency() < loose.frequency()
-    assert solid.frequency() <= np.sqrt(tissue._elasticity.frequency_squared)
+    assert solid.frequency() <= np.sqrt(tissue._system.elasticity.frequency_squared)
 
 
 @needs_speed

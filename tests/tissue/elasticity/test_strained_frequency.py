@@ -5,7 +5,7 @@ import pytest
 
 from tests import bodies
 from tests.tissue.solids import fastest, law_of, solid_of
-from tissue import Material, Tissue, block
+from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
@@ -100,7 +100,7 @@ def test_tissue_that_is_drawn_out_and_let_go_stays_whole_without_a_time_step_giv
         Material(law="neo_hookean", poisson_ratio=poisson_ratio, young_modulus=5e3),
         fixed=frame,
         positions=x * [1.5, 1.5, 1.0],
-        relaxation=relaxation,
+        solver=SolverSettings(relaxation=relaxation),
     )
     substeps = [tissue.step(None, 1e-3).n_substeps for _ in range(50)]
     assert max(substeps) > 1

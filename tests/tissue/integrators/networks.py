@@ -7,15 +7,14 @@ from tests.tissue.kernels_of import Network, elastic_of, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.hierarchical.kernels import Trails, hierarchical_frame, new_trails
+from tissue.integrators.hierarchical.kernels import Frame, Trails, hierarchical_frame, new_trails
 from tissue.integrators.hierarchical.stepper import ring_steps
 from tissue.integrators.local.chebyshev import STABILISATION, chebyshev
 from tissue.integrators.local.element_subsets import find_patch, new_patch, reach_of
-from tissue.integrators.local.kernels import macro_step, new_zone
+from tissue.integrators.local.kernels import LocalState, MacroStep, macro_step, new_zone
 from tissue.integrators.local.sleeping import all_asleep, wake_all
 from tissue.integrators.local.step_selection import find_listed_patch
 from tissue.integrators.node_rings import (
-    N_FOUND,
     Rings,
     add_focus,
     begin_search,
@@ -38,7 +37,9 @@ def block(
     """Return a box of n x n x n jittered cells, held at two sides or free."""
     mesh = bodies.jittered_grid(n, 0)
     network = network_of(mesh, bodies.sides(mesh) if held else None)
-    return network._replace(surroundings=Surroundings(gravity, drag, retardation_time))
+    return network._replace(
+        surroundings=Surroundings(gravity=gravity, drag=drag, retardation_time=retardation_time)
+    )
 
 
 def nearest(network: Network, point: FloatArray) -> int:
@@ -57,7 +58,7 @@ def rings_around(network: Network, node: int, last_ring: int) -> Rings:
 
 def found(rings: Rings) -> list[int]:
     """Return the nodes that were found, in order."""
-    return rings.order[: rings.state[N_FOUND]].tolist()
+    return rings.order[: rings.n_found].tolist()
 
 
 def frames(
@@ -74,21 +75,11 @@ def frames(
     n_nodes = len(network.body.rest)
     rings = rings_around(network, focus, last_ring + 1)
     trails = trails or new_trails(n_nodes)
-    external = np.zeros((n_nodes, 3))
     n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
-    settings = (span, 0.0, 1.0, n_micro, every, last_ring, frozen)
+    frame = Frame(span, 0.0, 1.0, n_micro, last_ring, frozen)
+    context = network.context
     for _ in range(n):
-        hierarchical_frame(
-            network.body,
-            network.springs,
-            network.tool,
-            NOWHERE,
-            rings,
-            trails,
-            external,
-            network.surroundings,
-            *settings,
-        )
+        hierarchical_frame(context, NOWHERE, rings, trails, every, frame)
 
 
 def leaps(
@@ -112,23 +103,12 @@ def leaps(
     search(zone.rings, network.springs, reach_of(elastic))
     find_patch(zone.patch, elastic, zone.rings, 0, reach_of(elastic) - 1)
     find_listed_patch(listed, elastic, activity, new_rings(n_nodes))
+    context = network.context
+    state = LocalState(activity=activity, listed=listed, zone=zone)
     for i in range(n):
-        macro_step(
-            body,
-            elastic,
-            network.tool,
-            NOWHERE,
-            activity,
-            listed,
-            zone,
-            chebyshev(n_substeps, stabilisation),
-            np.zeros((n_nodes, 3)),
-            network.surroundings,
-            span,
-            0.0,
-            1.0,
-            0.5 if i == 0 else 1.0,
-        )
+        step = MacroStep(span, 0.0, 1.0, 0.5 if i == 0 else 1.0)
+        coefficients = chebyshev(n_substeps, stabilisation)
+        macro_step(context, NOWHERE, state, coefficients, step, 0.0)
 
 
 def highest_frequency(network: Network) -> float:

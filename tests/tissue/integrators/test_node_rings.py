@@ -5,7 +5,6 @@ import pytest
 
 from tests.tissue.integrators.networks import block, found, rings_around
 from tissue.integrators.node_rings import (
-    N_FOUND,
     UNREACHED,
     add_focus,
     begin_search,
@@ -68,4 +67,4 @@ def test_a_search_without_a_focus_finds_nothing():
     rings = new_rings(N_NODES)
     begin_search(rings)
     search(rings, NETWORK.springs, 5)
-    assert rings.state[N_FOUND] == 0
+    assert rings.n_found == 0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tissue import Material, Tissue
+from tissue import Material, SolverSettings, Tissue
 
 pytestmark = pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core")
 
@@ -21,7 +21,13 @@ LAWS = {
 
 def state_after(threads, material, n_steps):
     """Return a digest of a body, cut through and then swinging, after that many steps of 1 ms."""
-    tissue = Tissue(MESH, material, fixed=bodies.sides(MESH), floor=-0.03, threads=threads)
+    tissue = Tissue(
+        MESH,
+        material,
+        fixed=bodies.sides(MESH),
+        floor=-0.03,
+        solver=SolverSettings(threads=threads),
+    )
     n_cut = len(strokes.make(tissue, strokes.slanted(MESH)))
     for _ in range(n_steps - n_cut):
         tissue.step(None, 1e-3)
@@ -41,4 +47,4 @@ def test_two_threads_end_with_the_bits_of_one(law, n_steps):
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True, 10_000])
 def test_a_number_of_threads_that_no_machine_has_is_refused(threads):
     with pytest.raises(ValueError, match="whole number from 1 to"):
-        Tissue(MESH, threads=threads)
+        Tissue(MESH, solver=SolverSettings(threads=threads))

@@ -15,10 +15,12 @@ momentum drifts by parts in a thousand, the order is 2 without damping along spr
 At rest all that is gone: the equilibrium is that of all nodes moved together.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tissue.blade.anchors import Edge
-from tissue.blade.forces import Tool, act, clear_tool
+from tissue.blade.forces import act, clear_tool
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import (
@@ -39,17 +41,13 @@ from tissue.core.simd import (
     summed,
     times,
 )
-from tissue.core.structs import Arrays
-from tissue.elasticity.internal_forces import Surroundings
+from tissue.core.structs import Arrays, IntCell
 from tissue.elasticity.spring_forces import NO_LENGTH
 from tissue.elasticity.springs import Springs
-from tissue.integrators.node_rings import N_FOUND, Rings, ring_of
+from tissue.integrators.node_rings import Rings, ring_of
+from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR
-
-FRAME, N_KNOWN = 0, 1
-"""Places in `Trails.counts`."""
-
 
 N_SEEN = 10
 """Numbers in `Trails.seen` for each neighbour."""
@@ -63,8 +61,8 @@ class Trails(Arrays):
     """How a neighbour sees each node: on a straight line since the node was moved last."""
 
     origins: FloatArray
-    """Position that the line has at the begin of the frame [m], shape (capacity, 3). Its direction
-    is the velocity of the node."""
+    """Position on the line at the begin of the frame [m], shape (capacity, 3). Its direction is
+    the velocity of the node."""
     clocks: FloatArray
     """When the node was moved last, since the begin of the frame [s]; shape (capacity,)."""
     frames: IntArray
@@ -72,8 +70,10 @@ class Trails(Arrays):
     seen: FloatArray
     """What the node that is being moved sees of its neighbours, eight after eight: origins and
     velocities of their trails, ways to them [m], and stiffness by squared length [N/m3]."""
-    counts: IntArray
-    """Number of the last frame, and of the nodes that there were; shape (2,)."""
+    frame: IntCell
+    """Number of the last frame."""
+    n_known: IntCell
+    """Number of nodes that there were in it."""
 
 
 def new_trails(n_nodes: int) -> Trails:
@@ -83,7 +83,8 @@ def new_trails(n_nodes: int) -> Trails:
         clocks=np.zeros(n_nodes),
         frames=np.zeros(n_nodes, np.int64),
         seen=aligned(N_SEEN * LARGEST_ROW),
-        counts=np.zeros(2, np.int64),
+        frame=0,
+        n_known=0,
     )
 
 
@@ -93,62 +94,60 @@ def grown_trails(trails: Trails, n_nodes: int) -> Trails:
     return trails.replaced(**{name: grown(getattr(trails, name), n_nodes) for name in of_nodes})
 
 
+class Frame(NamedTuple):
+    """A frame of the hierarchical relaxation."""
+
+    dt: float
+    """Length of the time step [s]."""
+    begin: float
+    """Fraction of the time step at which the frame begins."""
+    end: float
+    """Fraction of the time step at which it ends."""
+    n: int
+    """Micro steps."""
+    last_ring: int
+    """s_max: nodes further out are beyond the rings."""
+    is_far_frozen: bool
+    """Whether nodes beyond the last ring stay where they are (the paper's rule)."""
+
+
 @kernel
 def hierarchical_frame(
-    body: Body,
-    springs: Springs,
-    tool: Tool,
-    edge: Edge,
-    rings: Rings,
-    trails: Trails,
-    external: FloatArray,
-    surroundings: Surroundings,
-    dt: float,
-    at: float,
-    share: float,
-    n: int,
-    every: IntArray,
-    last_ring: int,
-    is_far_frozen: bool,
+    context: StepContext, edge: Edge, rings: Rings, trails: Trails, every: IntArray, frame: Frame
 ) -> None:
-    """Advance the body by one frame, from fraction `at` of the time step by `share` of it.
+    """Advance the body by one frame.
 
     Args:
-        body: Positions and velocities are written.
-        springs: The rows.
-        tool: Acts in every micro step; all nodes that it acts on should be in ring 0.
-        edge: The cutting edge over the whole time step of length `dt` [s].
+        context: What takes part. The blade acts in every micro step; all nodes that it acts on
+            should be in ring 0.
+        edge: The cutting edge over the time step.
         rings: Searched up to `last_ring + 1`: the ring beyond the last is seen, but not moved.
         trails: Scratch.
-        external: Scratch for the forces of the blade [N], shape (capacity, 3).
-        surroundings: Gravity and damping.
-        dt: Length of the time step [s].
-        at: Where in the time step the frame begins.
-        share: Which share of it the frame is.
-        n: Micro steps.
         every: Micro steps between two moves of a node of each ring, and last of those beyond; each
             divides the next. The nodes of ring 0 are moved in each micro step.
-        last_ring: s_max.
-        is_far_frozen: Whether nodes beyond the last ring stay where they are (the paper's rule).
+        frame: Times, and how far out nodes are moved.
     """
+    body, tool, external = context.body, context.tool, context.stages.external
+    last_ring, is_far_frozen, n = frame.last_ring, frame.is_far_frozen, frame.n
     _lay_trails(body, rings, trails, last_ring, is_far_frozen)
-    span = share * dt
+    share = frame.end - frame.begin
+    span = share * frame.dt
     n_far = every[last_ring + 1]
     for j in range(1, n + 1):
-        begin = at + share * (j - 1) / n
-        act(tool, body, edge, body.positions, begin, share / n, dt, external)
+        begin = frame.begin + share * (j - 1) / n
+        act(tool, body, edge, body.positions, begin, share / n, frame.dt, external)
         t1 = span * j / n
-        for k in range(rings.state[N_FOUND]):
+        for k in range(rings.n_found):
             node = rings.order[k]
             ring = rings.ring[node]
             # The rings come in order, so that none further out is due either.
             if ring > last_ring or j % every[ring] != 0:
                 break
-            _move(body, springs, trails, external, surroundings, node, t1)
+            _move(context, trails, node, t1)
         if j % n_far == 0 and not is_far_frozen:
             for node in range(body.n_nodes):
                 if not 0 <= ring_of(rings, node) <= last_ring:
-                    _move(body, springs, trails, external, surroundings, node, t1)
+                    _move(context, trails, node, t1)
     clear_tool(tool, body, external)
 
 
@@ -157,21 +156,20 @@ def _lay_trails(
     body: Body, rings: Rings, trails: Trails, last_ring: int, is_far_frozen: bool
 ) -> None:
     """Give every node that takes part, or is seen by one that does, the clock of the frame."""
-    counts = trails.counts
     if is_far_frozen:
-        for k in range(rings.state[N_FOUND]):
+        for k in range(rings.n_found):
             node = rings.order[k]
-            was_frozen = node < counts[N_KNOWN] and trails.frames[node] != counts[FRAME]
+            was_frozen = node < trails.n_known and trails.frames[node] != trails.frame
             if was_frozen or rings.ring[node] > last_ring:
                 store_point(body.velocities, node, point_of(0.0, 0.0, 0.0))
             if rings.ring[node] <= last_ring:
-                trails.frames[node] = counts[FRAME] + 1
+                trails.frames[node] = trails.frame + 1
             _lay_trail(body, trails, node, 0.0)
     else:
         for node in range(body.n_nodes):
             _lay_trail(body, trails, node, 0.0)
-    counts[FRAME] += 1
-    counts[N_KNOWN] = body.n_nodes
+    trails.frame += 1
+    trails.n_known = body.n_nodes
 
 
 @inlined
@@ -182,16 +180,9 @@ def _lay_trail(body: Body, trails: Trails, node: int, clock: float) -> None:
 
 
 @kernel
-def _move(
-    body: Body,
-    springs: Springs,
-    trails: Trails,
-    external: FloatArray,
-    surroundings: Surroundings,
-    node: int,
-    t1: float,
-) -> None:
+def _move(context: StepContext, trails: Trails, node: int, t1: float) -> None:
     """Move one node alone, from its own clock to `t1` [s] since the begin of the frame."""
+    body, springs, surroundings = context.body, context.elastic.springs, context.surroundings
     if body.fixed[node]:
         return
     t0 = trails.clocks[node]
@@ -199,7 +190,8 @@ def _move(
     x, v = point(body.positions, node), point(body.velocities, node)
     time, drag = surroundings.retardation_time, surroundings.drag
     per_mass = 1.0 / body.masses[node]
-    constant = point_of(*surroundings.gravity) + times(per_mass, point(external, node))
+    external = point(context.stages.external, node)
+    constant = point_of(*surroundings.gravity) + times(per_mass, external)
     net = (springs, trails, node)
     _look(body, *net)
 
@@ -316,7 +308,7 @@ def ring_frequencies(
     """
     for s in range(last_ring + 2):
         out[s] = 0.0
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         node = rings.order[k]
         ring = rings.ring[node]
         if ring <= last_ring and not body.fixed[node]:

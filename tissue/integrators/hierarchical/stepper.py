@@ -1,5 +1,4 @@
-"""`HierarchicalStepper`: owns the arrays of the hierarchical relaxation, and finds frames that are
-stable."""
+"""The integrator of the paper's hierarchical relaxation: its arrays, and frames that are stable."""
 
 import math
 from collections.abc import Sequence
@@ -12,27 +11,30 @@ from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.focus import find_held, find_rings
 from tissue.integrators.hierarchical.kernels import (
+    Frame,
     grown_trails,
     hierarchical_frame,
     new_trails,
     ring_frequencies,
 )
-from tissue.integrators.node_rings import N_FOUND, grown_rings, new_rings
+from tissue.integrators.node_rings import grown_rings, new_rings
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
-from tissue.integrators.step_context import Motion, end_step
+from tissue.integrators.step_context import Increment
+from tissue.integrators.step_end import end_step
+from tissue.integrators.system import System
 from tissue.mesh.body import Body
 from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
 class HierarchicalStepper:
-    """The paper's hierarchical relaxation; see `tissue.integrators.step_context.Relaxation`.
+    """The paper's hierarchical relaxation as an `Integrator`.
 
     The focus is the tetrahedron that the blade holds nearest to its tip; when it has let go, the
     one that it held last.
 
     Args:
-        options: Its settings.
+        options: Updates, rings, and the fate of nodes beyond.
         n_nodes: Room for nodes.
     """
 
@@ -47,77 +49,61 @@ class HierarchicalStepper:
 
     @property
     def moved(self) -> Moved | None:
-        """Nodes that moved since it was emptied; None where all do."""
+        """Nodes that moved since the list was emptied; None where all do."""
         return self._moved if self._is_far_frozen else None
 
     @property
     def moving(self) -> tuple[IntArray, int] | None:
-        """Nodes that may have moved in the last call of `relax`, and how many; None where all."""
+        """Nodes that may have moved in the last `advance`, and how many; None where all."""
         if not self._is_far_frozen:
             return None
-        return self._rings.order, int(self._rings.state[N_FOUND])
+        return self._rings.order, self._rings.n_found
 
     @property
     def _is_far_frozen(self) -> bool:
         return self._options.far == "frozen"
 
-    def relax(self, motion: Motion) -> int:
-        """Advance the motion; return how many steps the nodes of the focus took."""
-        options, body = self._options, motion.body
-        springs = motion.elasticity.arrays.springs
-        self._find_rings(motion)
-        n, every = self._divide(motion)
-        if motion.contact.is_awake:
-            prepare(motion.contact.arrays, body)
-        hierarchical_frame(
-            body,
-            springs,
-            motion.tool,
-            motion.edge,
-            self._rings,
-            self._trails,
-            motion.stages.external,
-            motion.surroundings,
-            motion.dt,
-            motion.begin,
-            motion.end - motion.begin,
-            n,
-            every,
-            options.rings,
-            self._is_far_frozen,
-        )
-        end_step(motion, motion.span, motion.end)
-        note_moved(self._moved, self._rings.order, int(self._rings.state[N_FOUND]))
+    def advance(self, system: System, increment: Increment) -> int:
+        """Advance the motion by one frame; return how many steps the nodes of the focus took."""
+        options, body, contact = self._options, system.body, system.contact
+        self._find_rings(system)
+        n, every = self._divide(system, increment.span)
+        if contact.is_awake:
+            prepare(contact.arrays, body)
+        times = (increment.dt, increment.begin, increment.end)
+        frame = Frame(*times, n, options.rings, self._is_far_frozen)
+        rings, trails = self._rings, self._trails
+        hierarchical_frame(system.context, increment.edge, rings, trails, every, frame)
+        end_step(system, increment, increment.span, increment.end)
+        note_moved(self._moved, rings.order, rings.n_found)
         return n
 
-    def _find_rings(self, motion: Motion) -> None:
+    def _find_rings(self, system: System) -> None:
         """Find the rings around what the blade holds."""
-        springs = motion.elasticity.arrays.springs
-        find_held(self._held, motion.body, motion.tool)
-        last = self._options.rings + 1
+        find_held(self._held, system.body, system.interaction.tool)
+        springs, last = system.elasticity.arrays.springs, self._options.rings + 1
         find_rings(self._rings, self._held, springs, last, self._scratch)
 
-    def _divide(self, motion: Motion) -> tuple[int, IntArray]:
-        """Return how many micro steps to take, and after how many each ring is moved."""
-        elasticity, body = motion.elasticity, motion.body
+    def _divide(self, system: System, span: float) -> tuple[int, IntArray]:
+        """Return how many micro steps to take in `span` [s], and after how many each ring moves."""
+        body, by_node = system.body, system.elasticity.arrays.frequency_squared
         highest, options = self._highest, self._options
-        by_node = elasticity.arrays.frequency_squared
         ring_frequencies(body, by_node, self._rings, options.rings, self._is_far_frozen, highest)
-        near = frequency_with_tool(motion.tool, body, by_node, motion.stages.external)
+        near = frequency_with_tool(system.interaction.tool, body, by_node, system.stages.external)
         highest[0] = max(highest[0], near)
-        around = motion.surroundings
+        around = system.surroundings
         needed = []
         for squared in highest:
             step = largest_stable_step(math.sqrt(squared), around.retardation_time, around.drag)
-            needed.append(motion.span / (SAFETY * step))
+            needed.append(span / (SAFETY * step))
         return ring_steps(options, needed)
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
-        """Nodes that are new may have moved as others did."""
-        note_moved(self._moved, nodes, n)
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+        """Note nodes that may be new: they may have moved as others did."""
+        note_moved(self._moved, nodes, len(nodes))
 
     def body_moved(self, body: Body, elasticity: Elasticity) -> None:
-        """Nothing is remembered that this would change."""
+        """Do nothing: a frame depends on the one before by its rings alone."""
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes."""

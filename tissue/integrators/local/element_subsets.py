@@ -9,14 +9,11 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.elasticity.finite_elements import Solid, n_blocks, tetrahedron_at
 from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
-from tissue.integrators.node_rings import N_FOUND, Rings
-
-N_VOLUMES, N_PRESSURES, N_FORCES, _EPOCH = 0, 1, 2, 3
-"""Places in `Patch.state`."""
+from tissue.integrators.node_rings import Rings
 
 
 class Patch(Arrays):
@@ -25,18 +22,25 @@ class Patch(Arrays):
     volumes: IntArray
     """Blocks whose volumes are needed, shape (block capacity,)."""
     pressures: IntArray
-    """Nodes whose pressures are, shape (node capacity,)."""
+    """Nodes whose pressures are needed, shape (node capacity,)."""
     forces: IntArray
-    """Blocks whose forces are, shape (block capacity,)."""
+    """Blocks whose forces are needed, shape (block capacity,)."""
     seen: IntArray
     """Search that listed each block last, shape (block capacity,)."""
-    state: IntArray
-    """Lengths of the three lists, and the number of the search; shape (4,)."""
+    n_volumes: IntCell
+    """Number of entries in `volumes`."""
+    n_pressures: IntCell
+    """Number of entries in `pressures`."""
+    n_forces: IntCell
+    """Number of entries in `forces`."""
+    epoch: IntCell
+    """Number of the search."""
 
     def sort(self) -> None:
-        """Sort the lists, as memory is: for a patch that is evaluated many times."""
-        for places, n in zip((self.volumes, self.pressures, self.forces), self.state, strict=False):
-            places[:n].sort()
+        """Sort the lists by address, for a subset that is evaluated many times."""
+        self.volumes[: self.n_volumes].sort()
+        self.pressures[: self.n_pressures].sort()
+        self.forces[: self.n_forces].sort()
 
 
 def new_patch(n_nodes: int, n_tetrahedra: int) -> Patch:
@@ -47,13 +51,16 @@ def new_patch(n_nodes: int, n_tetrahedra: int) -> Patch:
         pressures=np.zeros(n_nodes, np.int64),
         forces=np.zeros(blocks, np.int64),
         seen=np.zeros(blocks, np.int64),
-        state=np.zeros(4, np.int64),
+        n_volumes=0,
+        n_pressures=0,
+        n_forces=0,
+        epoch=0,
     )
 
 
 @kernel
 def reach_of(elastic: Elastic) -> int:
-    """How many edges apart two nodes may be of which one feels the other move."""
+    """Number of edges over which the motion of a node changes the force on another."""
     averaged = elastic.has[TETRAHEDRA_TOO] and has_averaged_volumes(elastic.solid)
     return 2 if averaged else 1
 
@@ -69,35 +76,34 @@ def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, feelin
         moving: Up to which of these rings volumes are needed around the nodes.
         feeling: Up to which of these rings forces are needed around the nodes.
     """
-    state = patch.state
-    state[N_VOLUMES] = state[N_PRESSURES] = state[N_FORCES] = 0
+    patch.n_volumes = patch.n_pressures = patch.n_forces = 0
     if not elastic.has[TETRAHEDRA_TOO]:
         return
     solid = elastic.solid
-    state[N_FORCES] = _blocks_around(patch, solid, rings, feeling, patch.forces)
+    patch.n_forces = _blocks_around(patch, solid, rings, feeling, patch.forces)
     if has_averaged_volumes(solid):
-        state[N_VOLUMES] = _blocks_around(patch, solid, rings, moving, patch.volumes)
-        for k in range(rings.state[N_FOUND]):
+        patch.n_volumes = _blocks_around(patch, solid, rings, moving, patch.volumes)
+        for k in range(rings.n_found):
             if rings.ring[rings.order[k]] > 1:
                 break
             patch.pressures[k] = rings.order[k]
-            state[N_PRESSURES] = k + 1
+            patch.n_pressures = k + 1
 
 
 @kernel
 def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out: IntArray) -> int:
     """Write the blocks of the tetrahedra around nodes up to that ring to `out`; return how many."""
-    patch.state[_EPOCH] += 1
+    patch.epoch += 1
     n = 0
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         node = rings.order[k]
         if rings.ring[node] > last_ring:
             break
         first = solid.first[node]
         for slot in range(first, first + solid.count[node]):
             block = tetrahedron_at(solid, slot) // WIDTH
-            if patch.seen[block] != patch.state[_EPOCH]:
-                patch.seen[block] = patch.state[_EPOCH]
+            if patch.seen[block] != patch.epoch:
+                patch.seen[block] = patch.epoch
                 out[n] = block
                 n += 1
     return n
@@ -107,8 +113,8 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
 def deform_patch(patch: Patch, elastic: Elastic, positions: FloatArray) -> None:
     """Evaluate the tetrahedra of a patch at `positions` [m], for `internal_force`."""
     if elastic.has[TETRAHEDRA_TOO]:
-        solid, state = elastic.solid, patch.state
+        solid = elastic.solid
         if has_averaged_volumes(solid):
-            volumes(solid, positions, patch.volumes, 0, state[N_VOLUMES])
-            pressures(solid, patch.pressures, 0, state[N_PRESSURES])
-        corner_forces(solid, positions, patch.forces, 0, state[N_FORCES])
+            volumes(solid, positions, patch.volumes, 0, patch.n_volumes)
+            pressures(solid, patch.pressures, 0, patch.n_pressures)
+        corner_forces(solid, positions, patch.forces, 0, patch.n_forces)

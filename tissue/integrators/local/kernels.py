@@ -22,60 +22,60 @@ both sides of that instant alike, so that a steady motion of the blade cancels.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from tissue.blade.anchors import Edge
-from tissue.blade.forces import Tool, act, clear_tool, give_way
+from tissue.blade.forces import act, clear_tool, give_way
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
-from tissue.elasticity.internal_forces import Elastic, Surroundings, internal_force
+from tissue.elasticity.internal_forces import Surroundings, internal_force
 from tissue.elasticity.spring_forces import damping_force
 from tissue.elasticity.springs import Springs
 from tissue.integrators.local.chebyshev import Chebyshev
 from tissue.integrators.local.element_subsets import Patch, deform_patch, new_patch
-from tissue.integrators.local.sleeping import AWAKE, N_LISTED, VERSION, Activity, wake_pulled
+from tissue.integrators.local.sleeping import AWAKE, Activity, wake_pulled
 from tissue.integrators.node_rings import (
-    N_FOUND,
     UNREACHED,
     Rings,
     grown_rings,
     new_rings,
     ring_of,
 )
+from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body, grown
-from tissue.mesh.star import Visits
 
 
 class Zone(Arrays):
-    """The fine nodes and what they touch; scratch of shape (capacity, 3) each."""
+    """The fine nodes and their neighbours; scratch of shape (capacity, 3) each."""
 
     rings: Rings
-    """Ring 0: fine nodes; further out, up to `reach_of`: nodes that feel one move."""
+    """Ring 0: fine nodes; further out, up to `reach_of`: nodes whose forces depend on one."""
     patch: Patch
-    """What the nodes in the rings feel of the fine ones."""
+    """Tetrahedra to evaluate where fine nodes have moved."""
     fine: IntArray
     """Scratch for the list of fine nodes, shape (capacity,)."""
     bound: FloatArray
     """Bound on w^2 of every listed node, with what the blade adds [1/s2]; shape (capacity,)."""
     start: FloatArray
     """Positions of the fine nodes at the begin of the step [m]."""
-    way: FloatArray
-    """e_m [m]."""
-    way_before: FloatArray
-    """e_{m-1} [m]."""
+    displacement: FloatArray
+    """Displacement e_m [m]."""
+    displacement_before: FloatArray
+    """Displacement e_{m-1} [m]."""
     steady: FloatArray
     """Share of the acceleration that is the same in all substeps [m/s2]."""
     accelerations: FloatArray
-    """At the begin of the step [m/s2], of every listed node."""
+    """Acceleration of every listed node at the begin of the step [m/s2]."""
 
 
 def new_zone(n_nodes: int, n_tetrahedra: int) -> Zone:
     """Return a zone without nodes, with room for that many nodes and tetrahedra."""
-    of_nodes = ("start", "way", "way_before", "steady", "accelerations")
+    of_nodes = ("start", "displacement", "displacement_before", "steady", "accelerations")
     return Zone(
         rings=new_rings(n_nodes),
         patch=new_patch(n_nodes, n_tetrahedra),
@@ -87,115 +87,128 @@ def new_zone(n_nodes: int, n_tetrahedra: int) -> Zone:
 
 def grown_zone(zone: Zone, n_nodes: int, n_tetrahedra: int) -> Zone:
     """Return the zone with room for that many nodes and tetrahedra, its patch empty."""
-    of_nodes = ("fine", "bound", "start", "way", "way_before", "steady", "accelerations")
+    of_nodes = (
+        "fine",
+        "bound",
+        "start",
+        "displacement",
+        "displacement_before",
+        "steady",
+        "accelerations",
+    )
     larger = {name: grown(getattr(zone, name), n_nodes) for name in of_nodes}
     patch = new_patch(n_nodes, n_tetrahedra)
     return zone.replaced(rings=grown_rings(zone.rings, n_nodes), patch=patch, **larger)
 
 
+class LocalState(Arrays):
+    """What local time stepping remembers of a body."""
+
+    activity: Activity
+    """The nodes that are listed: awake, or watched. Only awake nodes move."""
+    listed: Patch
+    """Tetrahedra to evaluate for the forces on all listed nodes."""
+    zone: Zone
+    """The fine nodes."""
+
+
+class MacroStep(NamedTuple):
+    """Macro steps that divide an increment evenly."""
+
+    dt: float
+    """Length of the time step [s]."""
+    begin: float
+    """Fraction of the time step at which the first one begins."""
+    share: float
+    """Length of each, as a fraction of the time step."""
+    kick: float
+    """1, or 0.5 where the velocities are those of this instant: the first step of all."""
+
+
 @kernel
 def macro_steps(
-    body: Body,
-    elastic: Elastic,
-    tool: Tool,
+    context: StepContext,
     edge: Edge,
-    visits: Visits,
-    activity: Activity,
-    listed: Patch,
-    zone: Zone,
+    state: LocalState,
     chebyshev: Chebyshev,
-    external: FloatArray,
-    surroundings: Surroundings,
-    reach: float,
-    queue: IntArray,
-    dt: float,
-    begin: float,
-    share: float,
-    kick: float,
+    step: MacroStep,
     first: int,
     end: int,
     is_free: bool,
 ) -> int:
     """Take macro steps from `first` to before `end`; return the next one.
 
-    Where nothing touches (`is_free`), what the blade does not hold gives way after each, and what
-    is pulled wakes: `listed` must then be found anew before another step. `visits`, `reach` and
-    `queue`: see `tissue.blade.forces.give_way`; the rest: see `macro_step`.
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        state: Written. Where the list of nodes changes, the steps end: `state.listed` must be found
+            again before another one.
+        chebyshev: Coefficients for the substeps.
+        step: Times of the steps.
+        first: Number of the first step.
+        end: Number behind the last one.
+        is_free: Whether nothing touches: then the blade slips after each step, and nodes that are
+            pulled wake.
     """
-    version = activity.counts[VERSION]
+    body, activity, zone = context.body, state.activity, state.zone
+    springs, external = context.elastic.springs, context.stages.external
+    version = activity.version
     for i in range(first, end):
-        at = begin + i * share
-        macro_step(
-            body,
-            elastic,
-            tool,
-            edge,
-            activity,
-            listed,
-            zone,
-            chebyshev,
-            external,
-            surroundings,
-            dt,
-            at,
-            share,
-            kick,
-        )
+        at = step.begin + i * step.share
+        macro_step(context, edge, state, chebyshev, step, at)
         if is_free:
-            give_way(tool, body, visits, edge, external, at + share, share * dt, reach, queue)
-            wake_pulled(activity, body, elastic.springs, zone.accelerations)
-            if activity.counts[VERSION] != version:
+            now, seconds = at + step.share, step.share * step.dt
+            give_way(
+                context.tool,
+                body,
+                context.visits,
+                edge,
+                external,
+                now,
+                seconds,
+                context.reach,
+                context.queue,
+            )
+            wake_pulled(activity, body, springs, zone.accelerations)
+            if activity.version != version:
                 return i + 1
     return end
 
 
 @kernel
 def macro_step(
-    body: Body,
-    elastic: Elastic,
-    tool: Tool,
+    context: StepContext,
     edge: Edge,
-    activity: Activity,
-    listed: Patch,
-    zone: Zone,
+    state: LocalState,
     chebyshev: Chebyshev,
-    external: FloatArray,
-    surroundings: Surroundings,
-    dt: float,
+    step: MacroStep,
     at: float,
-    share: float,
-    kick: float,
 ) -> None:
-    """Advance the listed nodes from fraction `at` of the time step by `share` of it.
+    """Advance the listed nodes by one macro step.
 
     Args:
-        body: Positions and velocities are written.
-        elastic: What the forces inside the body follow from.
-        tool: Acts in every substep.
-        edge: The cutting edge over the whole time step of length `dt` [s].
-        activity: Only awake nodes move.
-        listed: What the listed nodes feel.
-        zone: Of `find_zone`.
+        context: What takes part. The blade acts in every substep.
+        edge: The cutting edge over the time step.
+        state: The nodes that move, those that are fine, and the tetrahedra around them.
         chebyshev: Coefficients for the substeps.
-        external: Scratch for the forces of the blade [N], shape (capacity, 3).
-        surroundings: Gravity and damping.
-        dt: Length of the time step [s].
-        at: Where in the time step the macro step begins.
-        share: Which share of it the macro step is.
-        kick: 1, or 0.5 where the velocities are those of this instant: the first step of all.
+        step: Length of the step, and its kick.
+        at: Fraction of the time step at which it begins.
     """
+    body, elastic, tool = context.body, context.elastic, context.tool
+    activity, zone, surroundings = state.activity, state.zone, context.surroundings
+    external, share, kick, dt = context.stages.external, step.share, step.kick, step.dt
     h = share * dt
     springs = elastic.springs
-    deform_patch(listed, elastic, body.positions)
+    deform_patch(state.listed, elastic, body.positions)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
         act(tool, body, edge, body.positions, at, part, dt, external)
         if m == 0:
-            _accelerate_coarse(body, elastic, activity, zone, external, surroundings)
+            _accelerate_coarse(context, activity, zone)
             _begin_fine(body, springs, zone, surroundings)
         else:
             deform_patch(zone.patch, elastic, body.positions)
-        _substep(body, elastic, activity, zone, chebyshev, external, h, m)
+        _substep(context, state, chebyshev, h, m)
     clear_tool(tool, body, external)
     _kick(body, activity, zone, surroundings.drag, h, kick)
     if surroundings.retardation_time > 0.0:
@@ -204,18 +217,13 @@ def macro_step(
 
 
 @kernel
-def _accelerate_coarse(
-    body: Body,
-    elastic: Elastic,
-    activity: Activity,
-    zone: Zone,
-    external: FloatArray,
-    surroundings: Surroundings,
-) -> None:
-    """Accelerations of the nodes that feel no fine one move: they are the same in all substeps."""
+def _accelerate_coarse(context: StepContext, activity: Activity, zone: Zone) -> None:
+    """Find the accelerations that no fine node changes: they are the same in all substeps."""
+    body, elastic, external = context.body, context.elastic, context.stages.external
+    surroundings = context.surroundings
     gravity = point_of(*surroundings.gravity)
     time = surroundings.retardation_time
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if body.fixed[node] or ring_of(zone.rings, node) != UNREACHED:
             continue
@@ -229,7 +237,7 @@ def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surround
     rings = zone.rings
     nowhere = point_of(0.0, 0.0, 0.0)
     time = surroundings.retardation_time
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         node = rings.order[k]
         steady = point_of(*surroundings.gravity)
         if rings.ring[node] == 0:
@@ -241,25 +249,20 @@ def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surround
                 force = _coarse_damping(springs, body, rings, node)
             steady = steady + times(time / body.masses[node], force)
         store_point(zone.steady, node, steady)
-        store_point(zone.way, node, nowhere)
-        store_point(zone.way_before, node, nowhere)
+        store_point(zone.displacement, node, nowhere)
+        store_point(zone.displacement_before, node, nowhere)
 
 
 @kernel
 def _substep(
-    body: Body,
-    elastic: Elastic,
-    activity: Activity,
-    zone: Zone,
-    chebyshev: Chebyshev,
-    external: FloatArray,
-    h: float,
-    m: int,
+    context: StepContext, state: LocalState, chebyshev: Chebyshev, h: float, m: int
 ) -> None:
-    """From e_m to e_{m+1}."""
-    rings, way, way_before = zone.rings, zone.way, zone.way_before
+    """Advance the displacement of the fine nodes from e_m to e_{m+1}."""
+    body, elastic, external = context.body, context.elastic, context.stages.external
+    activity, zone = state.activity, state.zone
+    rings, e_m, e_before = zone.rings, zone.displacement, zone.displacement_before
     onward, back, push = chebyshev.onward[m], chebyshev.back[m], chebyshev.push[m] * h * h
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         node = rings.order[k]
         if body.fixed[node]:
             continue
@@ -270,28 +273,28 @@ def _substep(
             store_point(zone.accelerations, node, r)
         if activity.state[node] != AWAKE:
             continue
-        e = point(way, node)
-        moved = times(onward, e) - times(back, point(way_before, node)) + times(push, r)
-        store_point(way_before, node, e)
-        store_point(way, node, moved)
+        e = point(e_m, node)
+        moved = times(onward, e) - times(back, point(e_before, node)) + times(push, r)
+        store_point(e_before, node, e)
+        store_point(e_m, node, moved)
     # Only now: until here the nodes saw each other at e_m.
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         node = rings.order[k]
         if rings.ring[node] > 0:
             break
-        store_point(body.positions, node, point(zone.start, node) + point(way, node))
+        store_point(body.positions, node, point(zone.start, node) + point(e_m, node))
 
 
 @kernel
 def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kick: float) -> None:
     half = math.exp(-0.5 * drag * h)
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] != AWAKE:
             continue
         gain = scale(kick * h, vec3(zone.accelerations, node))
         if ring_of(zone.rings, node) != UNREACHED:
-            gain = scale(2.0 * kick / h, vec3(zone.way, node))
+            gain = scale(2.0 * kick / h, vec3(zone.displacement, node))
         v = axpy(half * half, vec3(body.velocities, node), scale(half, gain))
         store(body.velocities, node, v)
 
@@ -300,9 +303,9 @@ def _kick(body: Body, activity: Activity, zone: Zone, drag: float, h: float, kic
 def _damp_fine(
     body: Body, springs: Springs, activity: Activity, rings: Rings, seconds: float
 ) -> None:
-    """Let the dampers at fine nodes act one after the other; `seconds` is h times retardation."""
+    """Apply the dampers at fine nodes one after the other; `seconds` is h times retardation."""
     x, v = body.positions, body.velocities
-    for i in range(rings.state[N_FOUND]):
+    for i in range(rings.n_found):
         a = rings.order[i]
         if rings.ring[a] > 0:
             break
@@ -325,7 +328,7 @@ def _damp_fine(
 
 @kernel
 def _drift(body: Body, activity: Activity, zone: Zone, h: float) -> None:
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] == AWAKE:
             is_fine = ring_of(zone.rings, node) == 0

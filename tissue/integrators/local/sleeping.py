@@ -1,4 +1,4 @@
-"""Which nodes move: what is at rest sleeps, and is woken.
+"""Sleeping: nodes at rest are not moved until something pulls on them.
 
 An awake node moves. A watched node is asleep beside one that is awake: it does not move, but its
 acceleration is looked at, and wakes it. All others are asleep and cost nothing, so that a step
@@ -7,7 +7,7 @@ costs what the nodes in the list cost, however large the body is.
 A sleeping node is held in its place. The force that this takes is at most its mass times
 `WAKE_ACCELERATION`, 2 % of its weight: what sleeps is displaced from equilibrium by no more than
 that share of the sag under its own weight. The momentum that it had when it fell
-asleep is at most its mass times `SLEEP_SPEED`, and is counted.
+asleep is at most its mass times `SLEEP_SPEED`, and is summed up.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from tissue.contact.constraints import Contacts
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, dot, vec3
 from tissue.elasticity.springs import Springs
 from tissue.mesh.body import Body, grown
@@ -39,9 +39,6 @@ CALM = 0.05
 """How long a node must be slow before it sleeps [s]. A swing passes through slow and unaccelerated
 instants; tissue swings at 5 to 50 Hz, so that this is a good part of a period."""
 
-N_LISTED, N_AWAKE, VERSION = 0, 1, 2
-"""Places in `Activity.counts`."""
-
 
 class Activity(Arrays):
     """The list of nodes that are awake or watched, in the order in which they came in."""
@@ -52,9 +49,12 @@ class Activity(Arrays):
     """ASLEEP, WATCHED or AWAKE, shape (capacity,)."""
     calm: FloatArray
     """How long each has been calm [s], shape (capacity,)."""
-    counts: IntArray
-    """How many are listed, how many of them are awake, and how often the list has changed; shape
-    (3,)."""
+    n_listed: IntCell
+    """Number of nodes listed."""
+    n_awake: IntCell
+    """Number of them that are awake."""
+    version: IntCell
+    """Number of changes of the list so far."""
     given_up: FloatArray
     """Sum of the momenta that nodes had when they fell asleep [kg m/s], shape (3,)."""
 
@@ -65,7 +65,9 @@ def all_asleep(n_nodes: int) -> Activity:
         listed=np.zeros(n_nodes, np.int64),
         state=np.zeros(n_nodes, np.int64),
         calm=np.zeros(n_nodes),
-        counts=np.zeros(3, np.int64),
+        n_listed=0,
+        n_awake=0,
+        version=0,
         given_up=np.zeros(3),
     )
 
@@ -78,13 +80,13 @@ def grown_activity(activity: Activity, n_nodes: int) -> Activity:
 
 @kernel
 def wake(activity: Activity, body: Body, springs: Springs, node: int) -> None:
-    """Wake a node, and watch its neighbours; it does not sleep before it has been calm anew."""
+    """Wake a node, and watch its neighbours; it does not sleep before it has been calm again."""
     activity.calm[node] = 0.0
     if activity.state[node] == AWAKE or body.fixed[node]:
         return
     _list(activity, node)
     activity.state[node] = AWAKE
-    activity.counts[N_AWAKE] += 1
+    activity.n_awake += 1
     first = springs.first[node]
     for slot in range(first, first + springs.count[node]):
         _list(activity, springs.neighbour[slot])
@@ -99,7 +101,7 @@ def wake_each(activity: Activity, body: Body, springs: Springs, nodes: IntArray,
 
 @kernel
 def wake_all(activity: Activity, body: Body, springs: Springs) -> None:
-    """Wake every node: gravity or what holds the body has changed."""
+    """Wake every node: gravity or the fixed nodes have changed."""
     for node in range(body.n_nodes):
         wake(activity, body, springs, node)
 
@@ -108,9 +110,9 @@ def wake_all(activity: Activity, body: Body, springs: Springs) -> None:
 def _list(activity: Activity, node: int) -> None:
     if activity.state[node] == ASLEEP:
         activity.state[node] = WATCHED
-        activity.listed[activity.counts[N_LISTED]] = node
-        activity.counts[N_LISTED] += 1
-        activity.counts[VERSION] += 1
+        activity.listed[activity.n_listed] = node
+        activity.n_listed += 1
+        activity.version += 1
 
 
 @kernel
@@ -118,7 +120,7 @@ def wake_pulled(
     activity: Activity, body: Body, springs: Springs, accelerations: FloatArray
 ) -> None:
     """Wake every watched node whose acceleration [m/s2] says so."""
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] == WATCHED and not body.fixed[node]:
             a = vec3(accelerations, node)
@@ -128,7 +130,7 @@ def wake_pulled(
 
 @kernel
 def wake_touching(activity: Activity, body: Body, springs: Springs, contacts: Contacts) -> None:
-    """Wake every node that touches something."""
+    """Wake every node of a contact."""
     for k in range(contacts.count[0]):
         for q in range(4):
             wake(activity, body, springs, contacts.node[k, q])
@@ -142,16 +144,16 @@ def doze(
     accelerations: FloatArray,
     seconds: float,
 ) -> None:
-    """Let nodes sleep that have been calm for `CALM`, and forget those that nothing awake is near.
+    """Put nodes to sleep that were calm for `CALM`; drop watched ones with none awake beside them.
 
     Args:
-        activity: The list is written anew, in its order.
+        activity: The list is compacted, in its order.
         body: Velocities of nodes that fall asleep are set to zero.
-        springs: The rows.
-        accelerations: Of the last step [m/s2], shape (capacity, 3).
-        seconds: Since the last call [s].
+        springs: The rows of neighbours.
+        accelerations: Accelerations of the last step [m/s2], shape (capacity, 3).
+        seconds: Time since the last call [s].
     """
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] != AWAKE:
             continue
@@ -166,22 +168,22 @@ def doze(
         if activity.calm[node] >= CALM:
             _fall_asleep(activity, body, node, v)
     kept = 0
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] == WATCHED and not _beside_awake(activity, springs, node):
             activity.state[node] = ASLEEP
             continue
         activity.listed[kept] = node
         kept += 1
-    if kept < activity.counts[N_LISTED]:
-        activity.counts[N_LISTED] = kept
-        activity.counts[VERSION] += 1
+    if kept < activity.n_listed:
+        activity.n_listed = kept
+        activity.version += 1
 
 
 @kernel
 def _fall_asleep(activity: Activity, body: Body, node: int, v: Vec3) -> None:
     activity.state[node] = WATCHED
-    activity.counts[N_AWAKE] -= 1
+    activity.n_awake -= 1
     for c in range(3):
         activity.given_up[c] += body.masses[node] * v[c]
         body.velocities[node, c] = 0.0

@@ -1,4 +1,4 @@
-"""Which nodes take substeps, and how many: from their stiffness, and from where the blade is."""
+"""Step selection: which nodes take substeps, and how many, by stiffness and by the blade."""
 
 import math
 
@@ -7,17 +7,19 @@ import numpy as np
 from tissue.blade.forces import Tool, add_tool_frequency
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
 from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
 from tissue.elasticity.springs import Springs
 from tissue.integrators.focus import find_held
+from tissue.integrators.local.chebyshev import substep_limits
 from tissue.integrators.local.element_subsets import Patch, find_patch, reach_of
 from tissue.integrators.local.kernels import Zone
-from tissue.integrators.local.sleeping import AWAKE, N_LISTED, Activity
-from tissue.integrators.node_rings import N_FOUND, Rings, add_focus, begin_search, search
+from tissue.integrators.local.sleeping import AWAKE, Activity
+from tissue.integrators.node_rings import Rings, add_focus, begin_search, search
 from tissue.mesh.body import Body
 
-SAFETY = 0.8
-"""Share of the stable step that is used: that of the Runge-Kutta method, for the same reason."""
+STEP_SAFETY = 0.8
+"""Share of the stable step that is used: `SAFETY` of the Runge-Kutta method, for its reason."""
 
 MOST_STEPS = 64
 """Divisions of a time step that are considered."""
@@ -26,36 +28,50 @@ COST_OF_FINE = 3.0
 """What a substep of a fine node costs, with the neighbours that take part, in steps of others."""
 
 
+class StepTables(Arrays):
+    """Tables by the number of divisions, for `plan_steps`."""
+
+    substep_limits: FloatArray
+    """Largest stable frequency times step by number of substeps; see `chebyshev.substep_limits`."""
+    limits: FloatArray
+    """Scratch, shape (MOST_STEPS + 1,)."""
+    n_above: FloatArray
+    """Scratch, shape (MOST_STEPS + 1,)."""
+
+
+def new_step_tables(stabilisation: float) -> StepTables:
+    """Return the tables for a scheme with that nu."""
+    limits, n_above = np.zeros((2, MOST_STEPS + 1))
+    return StepTables(substep_limits=substep_limits(stabilisation), limits=limits, n_above=n_above)
+
+
 @kernel
-def plan(
+def plan_steps(
     activity: Activity,
     fixed: BoolArray,
     frequency_squared: FloatArray,
     n_near: int,
     span: float,
     retardation_time: float,
-    substep_limits: FloatArray,
-    limits: FloatArray,
-    n_above: FloatArray,
+    tables: StepTables,
 ) -> tuple[int, int, float]:
-    """Return how many macro steps to take, in how many substeps each, and what is fine.
+    """Return the number of macro steps, the number of substeps of each, and the fine limit.
 
-    Of all pairs that are stable, the one that costs least. The third is the bound on w^2 [1/s2]
+    Of all pairs that are stable, the one that costs least. The limit is the bound on w^2 [1/s2]
     above which a node is fine.
 
     Args:
-        activity: The nodes.
+        activity: The listed nodes.
         fixed: Which nodes do not move.
-        frequency_squared: Bound on w^2 of each, with what the blade adds [1/s2].
-        n_near: Fine nodes anyway, around the blade.
-        span: What is to be divided [s].
+        frequency_squared: Bound on w^2 of each node, with what the blade adds [1/s2].
+        n_near: Number of nodes around the blade that are fine anyway.
+        span: Time to be divided [s].
         retardation_time: Damping along springs [s].
-        substep_limits: Of `chebyshev`.
-        limits: Scratch, shape (MOST_STEPS + 1,).
-        n_above: Scratch, shape (MOST_STEPS + 1,).
+        tables: Limits of the substeps, and scratch.
     """
+    substep_limits, limits, n_above = tables.substep_limits, tables.limits, tables.n_above
     highest = 0.0
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         if not fixed[activity.listed[k]]:
             highest = max(highest, frequency_squared[activity.listed[k]])
     most = 1
@@ -65,7 +81,7 @@ def plan(
         if limits[most] >= highest or most == MOST_STEPS:
             break
         most += 1
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         w2 = 0.0 if fixed[node] else frequency_squared[node]
         n = 1
@@ -77,7 +93,7 @@ def plan(
         p = n_substeps(highest, span / n, substep_limits)
         if p == len(substep_limits):
             continue
-        cost = n * (activity.counts[N_LISTED] + p * COST_OF_FINE * (n_near + n_above[n]))
+        cost = n * (activity.n_listed + p * COST_OF_FINE * (n_near + n_above[n]))
         if cost < best_cost:
             best, best_substeps, best_cost = n, p, cost
     return best, best_substeps, limits[best]
@@ -89,7 +105,7 @@ def coarse_limit(h: float, retardation_time: float) -> float:
 
     The exact limit of x'' = -w^2 (x + b x') is (w h)^2 / 4 + w^2 b h / 2 = 1.
     """
-    return SAFETY * SAFETY / (0.25 * h * h + 0.5 * retardation_time * h)
+    return STEP_SAFETY * STEP_SAFETY / (0.25 * h * h + 0.5 * retardation_time * h)
 
 
 @kernel
@@ -100,7 +116,7 @@ def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -
     """
     p = 1
     phase = math.sqrt(frequency_squared) * h
-    while p < len(substep_limits) and phase > SAFETY * substep_limits[p]:
+    while p < len(substep_limits) and phase > STEP_SAFETY * substep_limits[p]:
         p += 1
     return p
 
@@ -119,7 +135,7 @@ def find_bounds(
     All nodes that it acts on are listed, but for those that are fixed. `scratch`: see
     `add_tool_frequency`.
     """
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         zone.bound[activity.listed[k]] = elastic.frequency_squared[activity.listed[k]]
     add_tool_frequency(tool, body, zone.bound, scratch)
 
@@ -135,7 +151,7 @@ def find_near(body: Body, springs: Springs, tool: Tool, zone: Zone, n_rings: int
         return 0
     search(rings, springs, n_rings)
     n = 0
-    for k in range(rings.state[N_FOUND]):
+    for k in range(rings.n_found):
         if not body.fixed[rings.order[k]]:
             zone.fine[n] = rings.order[k]
             n += 1
@@ -152,7 +168,7 @@ def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, lim
     begin_search(rings)
     for k in range(n_near):
         add_focus(rings, zone.fine[k])
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         node = activity.listed[k]
         if activity.state[node] == AWAKE and zone.bound[node] > limit:
             add_focus(rings, node)
@@ -170,7 +186,7 @@ def find_listed_patch(patch: Patch, elastic: Elastic, activity: Activity, around
     if not elastic.has[TETRAHEDRA_TOO]:
         return
     begin_search(around)
-    for k in range(activity.counts[N_LISTED]):
+    for k in range(activity.n_listed):
         add_focus(around, activity.listed[k])
     search(around, elastic.springs, 1)
     find_patch(patch, elastic, around, 1, 0)

@@ -1,18 +1,20 @@
-"""`LocalStepper`: owns the arrays of local time stepping, and which nodes are awake."""
-
-import numpy as np
+"""The integrator of local time stepping: its arrays, and which nodes are awake."""
 
 from tissue.contact.resolve import note_positions, prepare
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import TETRAHEDRA_TOO
 from tissue.elasticity.strained_frequency import strain_frequencies
-from tissue.integrators.local.chebyshev import chebyshev, substep_limits
-from tissue.integrators.local.element_subsets import N_FORCES, new_patch
-from tissue.integrators.local.kernels import grown_zone, macro_steps, new_zone
+from tissue.integrators.local.chebyshev import chebyshev
+from tissue.integrators.local.element_subsets import new_patch
+from tissue.integrators.local.kernels import (
+    LocalState,
+    MacroStep,
+    grown_zone,
+    macro_steps,
+    new_zone,
+)
 from tissue.integrators.local.sleeping import (
-    N_LISTED,
-    VERSION,
     all_asleep,
     doze,
     grown_activity,
@@ -22,27 +24,29 @@ from tissue.integrators.local.sleeping import (
     wake_touching,
 )
 from tissue.integrators.local.step_selection import (
-    MOST_STEPS,
     find_bounds,
     find_listed_patch,
     find_near,
     find_zone,
-    plan,
+    new_step_tables,
+    plan_steps,
 )
 from tissue.integrators.node_rings import new_rings
 from tissue.integrators.options import LocalTimeStepping
-from tissue.integrators.step_context import Motion, end_step
+from tissue.integrators.step_context import Increment
+from tissue.integrators.step_end import end_step
+from tissue.integrators.system import System
 from tissue.mesh.body import Body
 from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 
 
 class LocalStepper:
-    """Local time stepping; see `tissue.integrators.step_context.Relaxation`.
+    """Local time stepping as an `Integrator`.
 
     Args:
-        options: Its settings.
-        body: All its nodes are awake at first.
-        elasticity: What its forces follow from.
+        options: Rings, sleeping, and stabilisation.
+        body: The body; all its nodes are awake at first.
+        elasticity: Forces inside the body.
     """
 
     def __init__(self, options: LocalTimeStepping, body: Body, elasticity: Elasticity) -> None:
@@ -54,8 +58,8 @@ class LocalStepper:
         self._around_listed = new_rings(n_nodes)
         self._listed_version = -1
         self._moved = none_moved(n_nodes)
-        self._substep_limits = substep_limits(options.stabilisation)
-        self._limits, self._n_above = np.zeros((2, MOST_STEPS + 1))
+        self._tables = new_step_tables(options.stabilisation)
+        self._local_state: LocalState | None = None
         self._starts = True
         self._is_prepared = False
         self._has_new_nodes = False
@@ -63,13 +67,13 @@ class LocalStepper:
 
     @property
     def moved(self) -> Moved:
-        """Nodes that moved since it was emptied."""
+        """Nodes that moved since the list was emptied."""
         return self._moved
 
     @property
     def n_awake(self) -> int:
         """Nodes that are awake, or watched beside one that is."""
-        return int(self._activity.counts[N_LISTED])
+        return self._activity.n_listed
 
     @property
     def momentum_given_up(self) -> FloatArray:
@@ -78,117 +82,107 @@ class LocalStepper:
 
     @property
     def moving(self) -> tuple[IntArray, int]:
-        """Nodes that may have moved in the last call of `relax`, and how many."""
+        """Nodes that may have moved in the last `advance`, and how many."""
         return self._activity.listed, self.n_awake
 
-    def relax(self, motion: Motion) -> int:
-        """Advance the motion; return how many steps the finest nodes took."""
-        body, activity, zone = motion.body, self._activity, self._zone
-        elastic, contact = motion.elasticity.arrays, motion.contact
-        n, p = self._divide(motion)
-        share = (motion.end - motion.begin) / n
+    def advance(self, system: System, increment: Increment) -> int:
+        """Advance the motion by an increment; return how many steps the finest nodes took."""
+        activity, zone, contact = self._activity, self._zone, system.contact
+        n, p = self._divide(system, increment.span)
+        share = (increment.end - increment.begin) / n
         coefficients = chebyshev(p, self._options.stabilisation)
         done = 0
         while done < n:
-            self._prepare(motion)
-            self._renew_patch(motion)
-            done = macro_steps(
-                body,
-                elastic,
-                motion.tool,
-                motion.edge,
-                motion.visits,
-                activity,
-                self._listed,
-                zone,
-                coefficients,
-                motion.stages.external,
-                motion.surroundings,
-                motion.reach,
-                motion.queue,
-                motion.dt,
-                motion.begin,
-                share,
-                0.5 if self._starts else 1.0,
-                done,
-                # What touches is set right, and what has begun to move kicked, after each step.
-                done + 1 if contact.is_awake or self._starts else n,
-                not contact.is_awake,
-            )
+            self._note_positions(system)
+            self._update_listed(system)
+            kick = 0.5 if self._starts else 1.0
+            step = MacroStep(increment.dt, increment.begin, share, kick)
+            # Contact is resolved, and what has begun to move kicked, after each step.
+            end = done + 1 if contact.is_awake or self._starts else n
+            edge, is_free = increment.edge, not contact.is_awake
+            state = self._state()
+            done = macro_steps(system.context, edge, state, coefficients, step, done, end, is_free)
             self._starts = False
             if contact.is_awake:
-                at = motion.begin + (done - 1) * share
-                end_step(motion, share * motion.dt, at + share)
-                wake_pulled(activity, body, elastic.springs, zone.accelerations)
-                wake_touching(activity, body, elastic.springs, contact.arrays.contacts)
+                at = increment.begin + (done - 1) * share
+                end_step(system, increment, share * increment.dt, at + share)
+                springs = system.elasticity.arrays.springs
+                wake_pulled(activity, system.body, springs, zone.accelerations)
+                wake_touching(activity, system.body, springs, contact.arrays.contacts)
         note_moved(self._moved, activity.listed, self.n_awake)
         if self._options.sleep:
-            if contact.is_awake:
-                note_positions(contact.arrays, body, activity.listed, self.n_awake)
-            doze(activity, body, elastic.springs, zone.accelerations, motion.span)
+            self._doze(system, increment.span)
         return n * p
 
-    def _divide(self, motion: Motion) -> tuple[int, int]:
-        """Find the fine nodes; return the macro steps to take, and the substeps of each."""
-        body, activity, zone = motion.body, self._activity, self._zone
-        elastic, tool, rings = motion.elasticity.arrays, motion.tool, self._options.rings
+    def _doze(self, system: System, span: float) -> None:
+        """Put nodes to sleep that are at rest, `span` [s] after the last call."""
+        body, activity, contact = system.body, self._activity, system.contact
+        if contact.is_awake:
+            note_positions(contact.arrays, body, activity.listed, self.n_awake)
+        springs = system.elasticity.arrays.springs
+        doze(activity, body, springs, self._zone.accelerations, span)
+
+    def _state(self) -> LocalState:
+        """Return the arrays as one struct; another one where one of them was replaced."""
+        state, mine = self._local_state, (self._activity, self._listed, self._zone)
+        if state is None or (state.activity, state.listed, state.zone) != mine:
+            activity, listed, zone = mine
+            self._local_state = state = LocalState(activity=activity, listed=listed, zone=zone)
+        return state
+
+    def _divide(self, system: System, span: float) -> tuple[int, int]:
+        """Find the fine nodes; return the macro steps to take in `span` [s], and their substeps."""
+        body, activity, zone = system.body, self._activity, self._zone
+        elastic, tool = system.elasticity.arrays, system.interaction.tool
+        rings = self._options.rings
         n_near = find_near(body, elastic.springs, tool, zone, max(rings - 1, 0))
         wake_each(activity, body, elastic.springs, zone.fine, n_near)
         n_near = n_near if rings > 0 else 0
-        self._strain(motion)
-        find_bounds(body, elastic, tool, activity, zone, motion.stages.external)
-        n, p, limit = plan(
-            activity,
-            body.fixed,
-            zone.bound,
-            n_near,
-            motion.span,
-            motion.surroundings.retardation_time,
-            self._substep_limits,
-            self._limits,
-            self._n_above,
-        )
+        self._strain(system)
+        find_bounds(body, elastic, tool, activity, zone, system.stages.external)
+        time = system.surroundings.retardation_time
+        n, p, limit = plan_steps(activity, body.fixed, zone.bound, n_near, span, time, self._tables)
         find_zone(elastic, activity, zone, n_near, limit)
         return n, p
 
-    def _strain(self, motion: Motion) -> None:
+    def _strain(self, system: System) -> None:
         """Raise the bounds of the listed nodes where tetrahedra are stretched."""
-        elastic = motion.elasticity.arrays
+        elastic = system.elasticity.arrays
         if elastic.has[TETRAHEDRA_TOO]:
-            self._renew_patch(motion)
+            self._update_listed(system)
             patch, nodes = self._listed, self._activity.listed
-            blocks = (patch.forces, patch.state[N_FORCES])
-            strain_frequencies(elastic, motion.body.positions, *blocks, nodes, self.n_awake)
+            blocks = (patch.forces, patch.n_forces)
+            strain_frequencies(elastic, system.body.positions, *blocks, nodes, self.n_awake)
 
-    def _renew_patch(self, motion: Motion) -> None:
-        """Find what the listed nodes feel, where the list or the mesh has changed."""
-        version = int(self._activity.counts[VERSION])
+    def _update_listed(self, system: System) -> None:
+        """Find the tetrahedra around the listed nodes, if the list or the mesh has changed."""
+        version = self._activity.version
         if version != self._listed_version:
             self._listed_version = version
-            elastic, activity = motion.elasticity.arrays, self._activity
-            activity.listed[: self.n_awake].sort()  # as memory is
+            elastic, activity = system.elasticity.arrays, self._activity
+            activity.listed[: self.n_awake].sort()  # by address
             find_listed_patch(self._listed, elastic, activity, self._around_listed)
             self._listed.sort()
 
-    def _prepare(self, motion: Motion) -> None:
+    def _note_positions(self, system: System) -> None:
         """Let contact note where the nodes are before the step."""
-        contact, body, activity = motion.contact, motion.body, self._activity
+        contact, body, activity = system.contact, system.body, self._activity
         if not contact.is_awake:
             self._is_prepared = False
         elif self._is_prepared:  # those that sleep are where they were
             note_positions(contact.arrays, body, activity.listed, self.n_awake)
             if self._has_new_nodes:  # fixed ones among them are never listed
                 moved = self._moved
-                note_positions(contact.arrays, body, moved.nodes, int(moved.n_nodes))
+                note_positions(contact.arrays, body, moved.nodes, moved.n_nodes)
         else:
             prepare(contact.arrays, body)
             self._is_prepared = True
         self._has_new_nodes = False
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray, n: int) -> None:
-        """Wake the first `n` of `nodes`."""
-        wake_each(self._activity, body, elasticity.arrays.springs, nodes, n)
-        note_moved(self._moved, nodes, n)
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+        """Wake these nodes: the mesh around them changed."""
+        wake_each(self._activity, body, elasticity.arrays.springs, nodes, len(nodes))
+        note_moved(self._moved, nodes, len(nodes))
         self._has_new_nodes = True
         self._listed_version = -1
 

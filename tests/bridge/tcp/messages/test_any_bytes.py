@@ -40,7 +40,7 @@ def real_messages():
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
         "pieces": (pack_pieces(1), unpack_pieces),
-        "quality": (pack_quality(tissue.quality()), unpack_quality),
+        "quality": (pack_quality(tissue.cut_report()), unpack_quality),
         "description": (pack_description(described), unpack_description),
         "error": (pack_error("no blade"), unpack_error),
     }

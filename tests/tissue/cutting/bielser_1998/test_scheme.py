@@ -7,7 +7,7 @@ import pytest
 
 from tests import bodies, soundness, strokes
 from tests.tissue.kernels_of import row, springs_of
-from tissue import Material, Tissue, block
+from tissue import Material, SolverSettings, Tissue, block
 
 CELL = 0.01
 NO_GRAVITY = (0.0, 0.0, 0.0)
@@ -19,8 +19,9 @@ def block_of(*cells):
     return block(cells, [n * CELL for n in cells])
 
 
-def uncut(mesh, **options):
-    return Tissue(mesh, **{"gravity": NO_GRAVITY, "scheme": "paper"} | options)
+def uncut(mesh, scheme="paper", **options):
+    options = {"gravity": NO_GRAVITY, "solver": SolverSettings(scheme=scheme)} | options
+    return Tissue(mesh, **options)
 
 
 def upright(mesh, x=0.4, depth=1.2, stop=1.15, rake=0.0, yaw=0.0):
@@ -173,7 +174,7 @@ def test_codes_that_are_not_in_the_table_are_left_whole_and_counted():
     """Two cuts, each of one edge of a tetrahedron, that do not meet: opposite edges are cut."""
     mesh = bodies.unit_tetrahedron()
     tissue = uncut(mesh)
-    records = tissue._scheme._records
+    records = tissue._incision.scheme._records
     records.crossed_at[records.edges_of[0, [0, 4]]] = 0.5  # AB and CD
     tissue.incise([[(0.1, -1.0, 2.0), (0.1, -1.0, 3.0)], [(0.1, 2.0, 2.0), (0.1, 2.0, 3.0)]], Y)
     statistics = tissue.scheme_statistics()
@@ -186,10 +187,10 @@ def test_a_tetrahedron_is_split_when_the_blade_has_left_it_and_not_before():
     tissue = uncut(mesh, fixed=bodies.sides(mesh))
     for sweep in strokes.sweeps(strokes.upright(0.008, -0.005, 0.03, -0.01, 0.03)):
         tissue.step(sweep, strokes.DT)
-        records = tissue._scheme._records
+        records = tissue._incision.scheme._records
         split = records.first_child >= 0
         behind = mesh.positions[mesh.tetrahedra[split]][:, :, 1].max(axis=1)
-        anchors = tissue._grip.tool.anchors
+        anchors = tissue._system.interaction.tool.anchors
         seeds = anchors.tetrahedron[anchors.state > 0]
         assert not split[[t for t in seeds if t < len(split)]].any()
         assert not len(behind) or behind.max() < sweep.t1.tip[1] + CELL
@@ -203,7 +204,7 @@ def test_springs_and_masses_follow_from_the_split_mesh():
     tissue = uncut(mesh)
     tissue.incise(upright(mesh, depth=0.5), Y)
     body, n = tissue._body, tissue.n_nodes
-    kept = [row(tissue._elasticity.arrays.springs, i) for i in range(n)]
+    kept = [row(tissue._system.elasticity.arrays.springs, i) for i in range(n)]
     masses = body.masses[:n].copy()
     from_scratch = springs_of(body, tissue.material.young_modulus)
     assert kept == [row(from_scratch, i) for i in range(n)]
@@ -245,7 +246,7 @@ def test_a_cut_that_needs_more_room_than_there_is_takes_several_passes():
 
 def test_an_unknown_scheme_is_refused_by_name():
     with pytest.raises(ValueError, match=r"no scheme 'papre'.*stellar, paper"):
-        Tissue(block_of(1, 1, 1), scheme="papre")
+        Tissue(block_of(1, 1, 1), solver=SolverSettings(scheme="papre"))
 
 
 def test_other_schemes_have_no_such_statistics():

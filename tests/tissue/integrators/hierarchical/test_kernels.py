@@ -87,7 +87,7 @@ def naive_frame(network, focus, span, updates, last_ring):
     """
     body, springs, around = network.body, network.springs, network.surroundings
     rings = rings_around(network, focus, last_ring + 1)
-    order = rings.order[: rings.state[0]].tolist()
+    order = rings.order[: rings.n_found].tolist()
     x, v, stamp = body.positions, body.velocities, np.zeros(len(body.rest))
     v[[ring_of(rings, i) in (UNREACHED, last_ring + 1) for i in range(len(x))]] = 0.0
     gravity = np.array(around.gravity)

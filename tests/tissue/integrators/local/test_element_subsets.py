@@ -10,7 +10,7 @@ from tissue.core.simd import store_point
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import deform, internal_force
 from tissue.integrators.local.element_subsets import deform_patch, find_patch, new_patch, reach_of
-from tissue.integrators.node_rings import N_FOUND, add_focus, begin_search, new_rings, search
+from tissue.integrators.node_rings import add_focus, begin_search, new_rings, search
 from tissue.mesh.body import build_body
 from tissue.mesh.star import no_visits
 
@@ -86,7 +86,7 @@ def test_where_one_node_moves_all_that_feel_it_are_found(shaken, node):
     body.positions[node] += 1e-4
     deform_patch(patch_of(elastic, rings, 0, reach - 1), elastic, body.positions)
     out = before.copy()
-    n = int(rings.state[N_FOUND])
+    n = rings.n_found
     elastic_forces(elastic, body, rings.order, n, out)
     expected = all_forces(elastic, body)
     np.testing.assert_array_equal(out, expected)

@@ -8,8 +8,6 @@ from tissue.integrators.local.sleeping import (
     ASLEEP,
     AWAKE,
     CALM,
-    N_AWAKE,
-    N_LISTED,
     SLEEP_ACCELERATION,
     SLEEP_SPEED,
     WAKE_ACCELERATION,
@@ -34,7 +32,7 @@ def states(activity):
 
 
 def listed(activity):
-    return activity.listed[: activity.counts[N_LISTED]].tolist()
+    return activity.listed[: activity.n_listed].tolist()
 
 
 def one_awake():
@@ -64,7 +62,7 @@ def test_fixed_nodes_never_wake():
     activity = all_asleep(N_NODES)
     wake_all(activity, BODY, SPRINGS)
     free = int((~BODY.fixed).sum())
-    assert activity.counts[N_AWAKE] == free
+    assert activity.n_awake == free
     assert [i for i, state in enumerate(states(activity)) if state == AWAKE] == np.flatnonzero(
         ~BODY.fixed
     ).tolist()

@@ -6,18 +6,18 @@ import pytest
 from tests.tissue.integrators.networks import block, found
 from tests.tissue.kernels_of import elastic_of, tool_with
 from tissue.blade.anchors import ANCHORED, new_anchors
-from tissue.integrators.local.chebyshev import substep_limits
+from tissue.integrators.local.chebyshev import STABILISATION, substep_limits
 from tissue.integrators.local.kernels import new_zone
 from tissue.integrators.local.sleeping import all_asleep, wake_all
 from tissue.integrators.local.step_selection import (
-    MOST_STEPS,
-    SAFETY,
+    STEP_SAFETY,
     coarse_limit,
     find_bounds,
     find_near,
     find_zone,
     n_substeps,
-    plan,
+    new_step_tables,
+    plan_steps,
 )
 from tissue.integrators.node_rings import ring_of
 
@@ -28,15 +28,15 @@ BODY, SPRINGS = NETWORK.body, NETWORK.springs
 N_NODES = len(BODY.rest)
 ROOM = (N_NODES, len(BODY.tetrahedra))
 LIMITS = substep_limits()
+TABLES = new_step_tables(STABILISATION)
 
 
 def divided(frequencies, span, n_near=0):
     """Return the plan for a body whose nodes have these bounds on w [1/s]."""
     activity = awake()
-    scratch = np.zeros((2, MOST_STEPS + 1))
     squared = np.array(frequencies) ** 2
     still = np.zeros(N_NODES, dtype=bool)
-    return plan(activity, still, squared, n_near, span, 0.0, LIMITS, *scratch)
+    return plan_steps(activity, still, squared, n_near, span, 0.0, TABLES)
 
 
 def test_a_body_that_bears_the_step_takes_one():
@@ -80,15 +80,15 @@ def test_what_anchors_add_counts():
 @pytest.mark.parametrize("phase", [0.5, 1.5, 3.0, 10.0, 50.0])
 def test_as_many_substeps_as_stability_needs_and_no_more(phase):
     p = n_substeps((phase / 1e-3) ** 2, 1e-3, LIMITS)
-    assert phase <= SAFETY * LIMITS[p]
-    assert p == 1 or phase > SAFETY * LIMITS[p - 1]
+    assert phase <= STEP_SAFETY * LIMITS[p]
+    assert p == 1 or phase > STEP_SAFETY * LIMITS[p - 1]
 
 
 @pytest.mark.parametrize("retardation_time", [0.0, 1e-4, 1e-2])
 def test_the_coarse_limit_is_that_of_leap_frog_with_lagging_dampers(retardation_time):
     """x'' = -w^2 (x + b x'), x' half a step ago: at the limit, without safety, a root is -1."""
     h = 1e-3
-    squared = coarse_limit(h, retardation_time) / SAFETY**2
+    squared = coarse_limit(h, retardation_time) / STEP_SAFETY**2
     kick = np.array([[1.0, 0.0], [-h * squared, 1.0 - h * squared * retardation_time]])
     drift = np.array([[1.0, h], [0.0, 1.0]])
     roots = np.linalg.eigvals(drift @ kick)

@@ -1,0 +1,129 @@
+"""`Incision`: brings the path of the blade into the mesh, from the first contact to the last."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tissue.cutting.blade_path import Path, new_path, path_travel, put_on_lattice
+from tissue.cutting.scheme import Scheme
+from tissue.mesh.body import Body
+from tissue.mesh.star import Visits
+
+INCREMENT = 0.25
+"""Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
+steep curves leave tetrahedra that bridge the cut."""
+
+RESTING_SPEED = 0.2
+"""Mean node sizes per second below which the edge counts as at rest."""
+
+RESTING_TIME = 0.02
+"""How long it is so before the cut opens up to the edge [s]. A trembling hand stands still for an
+instant at each turn; to lay a crack front there each time would shred the mesh."""
+
+
+class CutHooks(NamedTuple):
+    """Calls of the owner of the mesh while it is cut."""
+
+    before_cut: Callable[[], None]
+    """Called before the passes of a cut step."""
+    after_pass: Callable[[], None]
+    """Called after each pass: updates what depends on the mesh, and makes room for another pass."""
+    after_cut: Callable[[], None]
+    """Called after the last pass."""
+    mesh: Callable[[], tuple[Body, Visits]]
+    """Returns the body as it is now, and scratch for searches."""
+
+
+class Incision:
+    """The current incision: its path, its state, and the passes that cut it.
+
+    Args:
+        scheme: How the mesh is cut.
+        node_size: Mean node size of the body [m].
+        hooks: Calls of the owner of the mesh.
+    """
+
+    def __init__(self, scheme: Scheme, node_size: float, hooks: CutHooks) -> None:
+        self.scheme = scheme
+        self.path = new_path(2)
+        """Path of the edge through the body at rest, in this step."""
+        self.has_begun = False
+        """Whether the edge is in the tissue, or was in the last step."""
+        self._node_size = node_size
+        self._hooks = hooks
+        self._is_open = False
+        self._resting_time = 0.0
+
+    @property
+    def cut_area(self) -> float:
+        """Area of the faces cut so far, at rest, one side of each [m2]."""
+        return self.scheme.change.area
+
+    def n_increments(self, travel: float) -> int:
+        """Return in how many increments the edge moves that far [m], little in each."""
+        return max(1, math.ceil(travel / (INCREMENT * self._node_size)))
+
+    def take_edge(self, n_samples: int) -> None:
+        """Prepare for an edge of that many samples."""
+        self.path = new_path(n_samples)
+
+    def detect(self) -> bool:
+        """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
+        if not self.has_begun or path_travel(self.path) == 0.0:
+            return False
+        self._is_open = False
+        self._detect()
+        return True
+
+    def cut(self) -> None:
+        """Cut what was detected."""
+        self._cut_in_passes(self.scheme.cut)
+
+    def open_to_edge(self) -> None:
+        """Cut up to the edge itself, which rests or leaves the way that it came."""
+        self._detect()
+        self._cut_in_passes(self.scheme.rest)
+        self._is_open = True
+
+    def open_if_at_rest(self, travel: float, dt: float) -> None:
+        """Cut up to the edge if it has rested for a while.
+
+        Args:
+            travel: How far the edge moved in this step [m].
+            dt: Length of the step [s].
+        """
+        if not self.has_begun or self._is_open:
+            return
+        travel = max(travel, path_travel(self.path))
+        if travel > RESTING_SPEED * self._node_size * dt:
+            self._resting_time = 0.0
+        else:
+            self._resting_time += dt
+        if self._resting_time >= RESTING_TIME:
+            self.open_to_edge()
+
+    def end(self) -> None:
+        """Resolve what the blade left uncut; the next contact begins another incision."""
+        if not self._is_open:
+            self.open_to_edge()
+        self._is_open = False
+        self._cut_in_passes(self.scheme.end)
+        self.scheme.forget()
+        self.has_begun = False
+
+    def _detect(self) -> None:
+        body, visits = self._hooks.mesh()
+        put_on_lattice(self.path, body.lattice)
+        self.scheme.detect(body, visits, self.path)
+
+    def _cut_in_passes(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
+        """Cut; where room runs out, make some and cut on."""
+        self._hooks.before_cut()
+        while True:
+            one_pass(*self._hooks.mesh(), self.path)
+            is_full = bool(self.scheme.change.is_full)
+            self._hooks.after_pass()
+            if not is_full:
+                break
+            self.scheme.detect(*self._hooks.mesh(), self.path)
+        self._hooks.after_cut()

@@ -1,0 +1,58 @@
+"""What an integrator does for a tissue, which one a choice stands for, and the end of a step."""
+
+from typing import Protocol
+
+from tissue.core.array_types import IntArray
+from tissue.elasticity.elasticity import Elasticity
+from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.options import Hierarchical, IntegratorOptions, LocalTimeStepping
+from tissue.integrators.step_context import Increment
+from tissue.integrators.system import System
+from tissue.mesh.body import Body
+from tissue.mesh.moved_nodes import Moved
+
+
+class Integrator(Protocol):
+    """A method that advances the motion. It owns what it remembers from step to step."""
+
+    @property
+    def moved(self) -> Moved | None:
+        """Nodes that moved since the list was emptied; None where all do."""
+        ...
+
+    @property
+    def moving(self) -> tuple[IntArray, int] | None:
+        """Nodes that may have moved in the last `advance`, and how many; None where all may."""
+        ...
+
+    def advance(self, system: System, increment: Increment) -> int:
+        """Advance the motion by an increment; return how many steps the finest nodes took."""
+        ...
+
+    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+        """Take note that the mesh around these nodes changed."""
+        ...
+
+    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
+        """Take note that every node moved by other means, and is at rest."""
+        ...
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for that many nodes and tetrahedra."""
+        ...
+
+
+def integrator_of(
+    options: IntegratorOptions, global_stepper: GlobalStepper, body: Body, elasticity: Elasticity
+) -> Integrator:
+    """Return the integrator that a user chose, for that body."""
+    # Imported late: kernels that are not used cost no start.
+    if isinstance(options, Hierarchical):
+        from tissue.integrators.hierarchical.stepper import HierarchicalStepper
+
+        return HierarchicalStepper(options, len(body.rest))
+    if isinstance(options, LocalTimeStepping):
+        from tissue.integrators.local.stepper import LocalStepper
+
+        return LocalStepper(options, body, elasticity)
+    return global_stepper

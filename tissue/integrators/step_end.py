@@ -1,0 +1,42 @@
+"""What follows each step of every integrator: contact is resolved, and the blade slips."""
+
+from tissue.blade.forces import give_way
+from tissue.contact.resolve import resolve
+from tissue.integrators.step_context import Increment
+from tissue.integrators.system import System
+
+
+def end_step(system: System, increment: Increment, seconds: float, when: float) -> None:
+    """Resolve contact, then let the blade slip.
+
+    Args:
+        system: What took the step.
+        increment: The increment that the step is a part of.
+        seconds: Length of the step [s].
+        when: End of the step, as a fraction of the time step.
+    """
+    if system.contact.is_awake:
+        resolve_contact(system, seconds)
+    slip_blade(system, increment, seconds, when)
+
+
+def resolve_contact(system: System, seconds: float) -> None:
+    """Correct positions and velocities after a step of that length [s], with room as needed."""
+    while not resolve(system.contact.arrays, system.body, seconds):
+        system.contact.make_room()
+
+
+def slip_blade(system: System, increment: Increment, seconds: float, when: float) -> None:
+    """Apply plastic slip at the edge and frictional sliding on the faces; see `end_step`."""
+    context = system.context
+    give_way(
+        context.tool,
+        context.body,
+        context.visits,
+        increment.edge,
+        context.stages.external,
+        when,
+        seconds,
+        context.reach,
+        context.queue,
+    )
