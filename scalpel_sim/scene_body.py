@@ -7,7 +7,7 @@ import numpy as np
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
 from tissue import FloatArray, SolverSettings, Tissue, fixed_nodes
-from tissue.blade.toughness import resistance_of
+from tissue.blade.toughness import toughness_law_of
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -74,7 +74,7 @@ def check(scene: Scene) -> None:
 def toughest(scene: Scene) -> float:
     """Return the most that a square metre of the scene's cut costs [J/m2]: skin, speed, edge."""
     material = scene.material
-    resistance = resistance_of(material, scene.blade)
+    resistance = toughness_law_of(material, scene.blade)
     at_speed = resistance.toughness
     if material.toughness_exponent > 0.0:
         ratio = scene.speed / material.toughness_speed

@@ -1,14 +1,9 @@
 """`Audit`: the account of energy of a body, from the work of the blade to where it went."""
 
-from tissue.blade.anchors import Edge, anchors_energy
-from tissue.blade.impulse_totals import (
-    RELEASED,
-    WORK_OF_BLADE,
-    WORK_OF_BREAKING,
-    WORK_OF_CUTTING,
-    WORK_OF_FRICTION,
-)
-from tissue.blade.side_contact import flanks_energy
+from tissue.blade.edge import Edge
+from tissue.blade.forces import edge_energy
+from tissue.blade.impulse_totals import clear_works
+from tissue.blade.side_contact import sides_energy
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.energy import body_energy, kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
@@ -30,7 +25,7 @@ class Audit:
     def begin(self, system: System) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
         self.audited.damping = self.audited.contact = self._topology = 0.0
-        system.interaction.tool.anchors.totals[WORK_OF_BLADE:] = 0.0
+        clear_works(system.interaction.state.totals)
         self._at_first = self._stored(system)
 
     def before_cut(self, system: System, edge: Edge, when: float) -> None:
@@ -43,24 +38,24 @@ class Audit:
 
     def energies(self, system: System, edge: Edge) -> Energies:
         """Return the account at the end of a step."""
-        tool = system.interaction.tool
-        totals = tool.anchors.totals
+        blade = system.interaction.state
+        totals = blade.totals
         elastic, kinetic, potential = self._stored(system)
         elastic_first, kinetic_first, potential_first = self._at_first
-        held = anchors_energy(tool.anchors, system.body, edge, 1.0, tool.resistance)
+        held = edge_energy(blade, system.body, edge, 1.0)
         return Energies(
-            work_of_blade=float(totals[WORK_OF_BLADE]),
+            work_of_blade=totals.work_of_blade,
             elastic=elastic - elastic_first,
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,
-            held=held + flanks_energy(tool.flanks),
+            held=held + sides_energy(blade.sides),
             damping=self.audited.damping,
-            cutting=float(totals[WORK_OF_CUTTING]),
-            breaking=float(totals[WORK_OF_BREAKING]),
-            friction=float(totals[WORK_OF_FRICTION]),
+            cutting=totals.work_of_cutting,
+            breaking=totals.work_of_breaking,
+            friction=totals.work_of_friction,
             contact=self.audited.contact,
             topology=self._topology,
-            released=float(totals[RELEASED]),
+            released=totals.released,
         )
 
     def _stored(self, system: System) -> tuple[float, float, float]:
@@ -70,6 +65,6 @@ class Audit:
 
     def _all(self, system: System, edge: Edge, when: float) -> float:
         """Return the energy of the body and of the anchors [J]."""
-        body, tool = system.body, system.interaction.tool
+        body, blade = system.body, system.interaction.state
         stored = body_energy(body, system.elasticity.arrays, self._gravity)
-        return stored + anchors_energy(tool.anchors, body, edge, when, tool.resistance)
+        return stored + edge_energy(blade, body, edge, when)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.anchors import Edge
+from tissue.blade.edge import Edge
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme

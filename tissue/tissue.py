@@ -6,9 +6,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.anchors import Edge, anchored_length
-from tissue.blade.forces import begin_step, clear_tool
-from tissue.blade.impulse_totals import WORK_OF_BLADE, WORK_OF_CUTTING
+from tissue.blade.edge import Edge
 from tissue.blade.path_tracing import forget_path, trace_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade_shape import BladeShape
@@ -249,7 +247,7 @@ class Tissue(BodyQueries):
     def _begin_step(self, edge: Edge, dt: float) -> None:
         """Start the totals of a step."""
         self._edge_now = (edge, 0.0)
-        begin_step(self._system.interaction.tool, self._system.body, edge, dt)
+        self._system.interaction.begin_step(self._system.body, edge, dt)
         self._system.contact.begin()
 
     def _increments(self, edge: Edge, travel: float, dt: float) -> Iterator[Increment]:
@@ -263,7 +261,7 @@ class Tissue(BodyQueries):
         system, moved = self._system, self._integrator.moved
         edge = increment.edge if has_blade else None
         where = (edge, increment.begin, self._box)
-        system.interaction.feel(system.body, system.visits, moved, *where)
+        system.interaction.update_faces(system.body, system.visits, moved, *where)
 
     def _advance(self, increment: Increment) -> int:
         """Advance the motion by an increment; return the substeps that it took."""
@@ -286,11 +284,11 @@ class Tissue(BodyQueries):
     def _update_anchors(self, increment: Increment) -> None:
         """Anchor the edge to tissue that it has entered; release what it has left."""
         system, moved = self._system, self._integrator.moved
-        clear_tool(system.interaction.tool, system.body, system.stages.external)
+        system.interaction.clear_forces(system.body, system.stages.external)
         reach = EXPLAINED * self.solver.cut.floor * self.node_size
         where = (increment.edge, increment.end, self._box, reach)
         path = self._incision.path
-        system.interaction.hold(system.body, system.visits, path, moved, *where)
+        system.interaction.update_anchors(system.body, system.visits, path, moved, *where)
 
     def _trace(self, increment: Increment) -> bool:
         """Trace the path of the edge through the material; return whether it is in the tissue."""
@@ -299,7 +297,7 @@ class Tissue(BodyQueries):
             return False
         incision.has_begun = True
         edge, when, margin = increment.edge, increment.end, SHEET_MARGIN * self.node_size
-        trace_path(interaction.tool.anchors, self._system.body, edge, when, margin, incision.path)
+        trace_path(interaction.state.anchors, self._system.body, edge, when, margin, incision.path)
         return True
 
     def _end_incision(self) -> None:
@@ -315,8 +313,8 @@ class Tissue(BodyQueries):
         """Return what the step did."""
         low, high, _ = self._box
         interaction = self._system.interaction
-        anchors = interaction.tool.anchors
-        interaction.report(self._system.body, edge)
+        totals = interaction.state.totals
+        interaction.write_report(self._system.body, edge)
         point = np.array(edge.tip_t1) if has_blade else np.zeros(3)
         return StepResult(
             wrench=interaction.mean_wrench(point, dt),
@@ -329,10 +327,10 @@ class Tissue(BodyQueries):
             n_nodes=self.n_nodes,
             n_active=self._incision.scheme.n_active,
             active_point_tetrahedron=int(self._incision.path.seed[0]) if has_blade else -1,
-            anchored_length=anchored_length(anchors),
+            anchored_length=interaction.anchored_length,
             cut_area=self._incision.cut_area,
-            work_of_blade=float(anchors.totals[WORK_OF_BLADE]),
-            work_of_cutting=float(anchors.totals[WORK_OF_CUTTING]),
+            work_of_blade=totals.work_of_blade,
+            work_of_cutting=totals.work_of_cutting,
             n_substeps=n_substeps,
             touch=self._system.contact.touch(dt),
             profile=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
@@ -376,9 +374,9 @@ class Tissue(BodyQueries):
         """Take the edge of this blade; another blade, or none, releases the tissue."""
         length = 0.0 if edge is None else math.dist(edge.tip_t1, edge.heel_t1)
         interaction = self._system.interaction
-        if interaction.is_another(length):
+        if interaction.is_other_edge(length):
             self._end_incision()
-            interaction.take(length, self._system.body, *self._edge_now)
+            interaction.replace_edge(length, self._system.body, *self._edge_now)
             self._incision.take_edge(interaction.n_samples)
 
     # figures

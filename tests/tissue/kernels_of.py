@@ -6,9 +6,7 @@ import numpy as np
 
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
-from tissue.blade.forces import Tool
-from tissue.blade.side_contact import new_flanks
-from tissue.blade.toughness import resistance_of
+from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.contact.self_contact import SelfContact
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
@@ -101,13 +99,9 @@ def elastic_of(springs: Springs) -> Elastic:
     return Elastic(springs=springs, solid=solid, has=has, frequency_squared=frequencies)
 
 
-def tool_with(anchors: Anchors, material: Material = Material()) -> Tool:
+def tool_with(anchors: Anchors, material: Material = Material()) -> BladeState:
     """Return a blade that is a line."""
-    return Tool(
-        anchors=anchors,
-        flanks=new_flanks(None, material, 1.0, 0),
-        resistance=resistance_of(material, None),
-    )
+    return new_blade_state(anchors, None, material, 1.0, 0)
 
 
 class Network(NamedTuple):
@@ -115,7 +109,7 @@ class Network(NamedTuple):
 
     body: Body
     springs: Springs
-    tool: Tool
+    tool: BladeState
     stages: Stages
     surroundings: Surroundings
 
@@ -126,13 +120,11 @@ class Network(NamedTuple):
         return StepContext(
             body=self.body,
             elastic=elastic_of(self.springs),
-            tool=self.tool,
+            blade=self.tool,
             contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
             surroundings=self.surroundings,
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
-            queue=np.zeros(LARGEST_STAR, dtype=np.int64),
-            reach=1.0,
         )
 
     def forces(self) -> FloatArray:

@@ -1,1 +1,22 @@
-"""The blade in the tissue: its edge, which cuts, and its faces, which press and rub."""
+"""The blade in the tissue: its edge, which cuts, and its side faces, which press and rub.
+
+In reading order:
+
+- `edge`: the cutting edge over a step, and the pose of the blade at an instant.
+- `toughness`: the energy that cutting takes, per area.
+- `impulse_totals`: impulses and works that blade and tissue exchanged.
+- `anchors`: the springs between edge and material, and their energy.
+- `side_contact`: the law of pressure and friction on the side faces.
+- `blade_state`: all that blade and tissue remember of each other.
+- `edge_forces`: forces of the edge on the nodes.
+- `side_forces`: forces of the side faces on the nodes, and sliding.
+- `material_frame`: vectors mapped to the body at rest.
+- `return_mapping`: plastic slip of the anchors.
+- `engagement`: which samples of the edge are anchored.
+- `side_search`: which faces of the tissue are near the blade.
+- `forces`: what an integrator calls.
+- `path_tracing`: the path of the edge through the material, from the anchors.
+- `prescribed_path`: the path of an edge that is given.
+- `wrench`: the wrench on the blade.
+- `interaction`: `BladeInteraction`, which `Tissue` calls.
+"""

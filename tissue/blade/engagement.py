@@ -1,58 +1,93 @@
-"""How samples of the edge come to hold the tissue: by meeting it, or beside one that does."""
+"""Which samples of the edge are anchored: where the edge meets tissue, or beside an anchored one.
+
+A sample that comes into tissue by itself is anchored where it is, unless it is in a slit that is
+there already, where nothing is left to cut. A sample that backed off and then went elsewhere is
+freed.
+"""
 
 from tissue.blade.anchors import (
     ANCHORED,
     FREE,
     RETRACTED,
     Anchors,
-    Edge,
     anchor_position,
-    edge_frame,
-    sample_point,
     stored_energy,
 )
-from tissue.blade.impulse_totals import RELEASED
-from tissue.blade.material_frame import mean_rotation, turned_back
-from tissue.blade.return_mapping import find, put
-from tissue.blade.slit import behind_edge, in_slit
-from tissue.blade.toughness import Resistance
-from tissue.core.array_types import IntArray
+from tissue.blade.blade_state import BladeState
+from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
+from tissue.blade.material_frame import mean_rotation, rest_offset, to_material
+from tissue.blade.return_mapping import locate, set_anchor
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, norm, sub, vec3
-from tissue.cutting.blade_path import Path
+from tissue.core.vec3 import Vec3, add, cross, dot, norm, sub, vec3
+from tissue.cutting.blade_path import Path, nearest_on_edge
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
-    Matrix3,
     barycentric_in,
     interpolate,
+    nearest_on_segment,
+    nearest_on_triangle,
+    normalised,
 )
-from tissue.mesh.body import Body
+from tissue.mesh.body import CUT, Body
 from tissue.mesh.point_location import TetrahedronGrid, tetrahedron_at
 from tissue.mesh.star import Visits
 
-
-@kernel
-def offset_from(edge: Edge, rotation: Matrix3, when: float, n: int, k: int, beside: int) -> Vec3:
-    """The way from sample `beside` to sample `k` of `n` [m], in the body at rest."""
-    offset = sub(sample_point(edge, k, n, when), sample_point(edge, beside, n, when))
-    return turned_back(rotation, offset)
+_BESIDE = 0.7
+"""Cosine of the angle between the blade's normal and the direction to the nearest cut face, from
+which the point is beside that face, in the slit. Below, it is ahead of the rim, or under the
+bottom."""
 
 
 @kernel
-def let_go(
-    anchors: Anchors,
+def update_engagement(
+    blade: BladeState,
     body: Body,
     visits: Visits,
     path: Path,
     edge: Edge,
     when: float,
-    queue: IntArray,
+    low: Vec3,
+    high: Vec3,
+) -> bool:
+    """Free what backed off elsewhere, and anchor what is beside an anchored sample.
+
+    Returns whether a free sample is in the box of the tissue, so that `anchor_entering` is needed.
+    One call in place of three, whose overhead would exceed the work in them.
+
+    Args:
+        blade: The anchors are written.
+        body: The tissue.
+        visits: For searches.
+        path: Path of the edge through the material.
+        edge: The cutting edge over the time step.
+        when: Instant, as a fraction of the time step.
+        low: Lowest corner of the tissue's box [m].
+        high: Highest corner of the tissue's box [m].
+    """
+    pose = pose_at(edge, when)
+    free_retracted(blade, body, visits, path, pose)
+    anchor_beside(blade, body, visits, pose)
+    return any_free_in_box(blade.anchors, pose, low, high)
+
+
+@kernel
+def free_retracted(
+    blade: BladeState, body: Body, visits: Visits, path: Path, pose: BladePose
 ) -> None:
     """Free the samples that backed off and then went elsewhere: into tissue not cut yet.
 
     A blade that backs off, goes deeper and then forward again cuts below its old slit: the path of
-    its samples begins anew. That of a sample beside one that holds goes on from where it was, or
-    the tissue between would stay whole.
+    its samples begins again. The path of a sample beside an anchored one goes on from where it was,
+    or the tissue between would stay whole.
+
+    Args:
+        blade: The anchors are written.
+        body: The tissue.
+        visits: For searches.
+        path: Path of the edge through the material.
+        pose: Pose of the blade.
     """
+    anchors = blade.anchors
     n = len(anchors.state)
     any_retracted = False
     for k in range(n):
@@ -64,129 +99,108 @@ def let_go(
         if anchors.state[k] != RETRACTED:
             continue
         a = anchor_position(anchors, body, body.positions, k)
-        way = turned_back(rotation, sub(sample_point(edge, k, n, when), a))
-        p = add(vec3(anchors.rest, k), way)
-        if behind_edge(path, p):
+        offset = apply_transposed(rotation, sub(sample_point(pose, k, n), a))
+        p = add(vec3(anchors.rest, k), offset)
+        if is_behind_edge(path, p):
             continue
-        if find(body, visits, p, anchors.tetrahedron[k], queue).inside:
+        if locate(body, visits, p, anchors.tetrahedron[k], blade.queue).inside:
             anchors.state[k] = FREE
             path.known[k] = _is_beside_anchored(anchors, k)
 
 
 @kernel
 def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
-    """Whether the sample before or behind sample `k` is anchored."""
+    """Return whether the sample before or behind sample `k` is anchored."""
     state = anchors.state
     return (k > 0 and state[k - 1] == ANCHORED) or (k + 1 < len(state) and state[k + 1] == ANCHORED)
 
 
 @kernel
-def hold_on(
-    anchors: Anchors,
-    body: Body,
-    visits: Visits,
-    path: Path,
-    edge: Edge,
-    when: float,
-    far: float,
-    resistance: Resistance,
-    low: Vec3,
-    high: Vec3,
-    queue: IntArray,
-) -> bool:
-    """Let go and seize; return whether a free sample is in the box of the tissue and may `meet` it.
-
-    The tissue lies between `low` and `high` [m]. One call in place of three, which would take
-    longer to make than the work in them.
-    """
-    let_go(anchors, body, visits, path, edge, when, queue)
-    seize(anchors, body, visits, edge, when, far, resistance, queue)
-    return any_free_in_box(anchors, edge, when, low, high)
-
-
-@kernel
-def seize(
-    anchors: Anchors,
-    body: Body,
-    visits: Visits,
-    edge: Edge,
-    when: float,
-    far: float,
-    resistance: Resistance,
-    queue: IntArray,
-) -> None:
+def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
     The edge trails behind the blade by the same distance along its length: a sample is in the
-    tissue if the point that far behind it is. `far` [m]: from further away no tissue is taken
-    hold of.
+    tissue if the point that far behind it is. Tissue beyond `BladeState.reach` is left alone.
     """
+    anchors = blade.anchors
     n = len(anchors.state)
     rotation = mean_rotation(anchors, body)
-    frame = edge_frame(edge, when)
-    for sweep in range(2):
+    for direction in range(2):
         for i in range(n):
-            k = i if sweep == 0 else n - 1 - i
-            beside = k - 1 if sweep == 0 else k + 1
+            k = i if direction == 0 else n - 1 - i
+            beside = k - 1 if direction == 0 else k + 1
             if anchors.state[k] != FREE or not 0 <= beside < n:
                 continue
             if anchors.state[beside] != ANCHORED:
                 continue
-            offset = offset_from(edge, rotation, when, n, k, beside)
+            offset = rest_offset(pose, rotation, n, k, beside)
             p = add(vec3(anchors.rest, beside), offset)
-            place = find(body, visits, p, anchors.tetrahedron[beside], queue)
-            if not place.inside:
+            location = locate(body, visits, p, anchors.tetrahedron[beside], blade.queue)
+            if not location.inside:
                 continue
-            w = barycentric_in(p, body.rest, body.tetrahedra, place.tetrahedron)
-            here = interpolate(w, body.positions, body.tetrahedra, place.tetrahedron)
-            d = sub(sample_point(edge, k, n, when), here)
-            if norm(d) > far:  # the tissue there is turned otherwise than what the edge holds
+            t = location.tetrahedron
+            w = barycentric_in(p, body.rest, body.tetrahedra, t)
+            here = interpolate(w, body.positions, body.tetrahedra, t)
+            stretch = sub(sample_point(pose, k, n), here)
+            if norm(stretch) > blade.reach:  # the tissue there is turned unlike that of `beside`
                 continue
-            put(anchors, body, k, place.tetrahedron, p)
-            anchors.slipped[k] = False
-            anchors.at_skin[k] = False
-            anchors.totals[RELEASED] -= stored_energy(anchors, k, d, frame, resistance)
+            _begin_anchor(anchors, body, k, t, p, False)
+            blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
 @kernel
-def meet(
+def anchor_entering(
     anchors: Anchors,
     body: Body,
     grid: TetrahedronGrid,
     edge: Edge,
     when: float,
-    reach: float,
+    slit_reach: float,
     low: Vec3,
     high: Vec3,
 ) -> None:
     """Anchor the free samples that have come into the tissue by themselves.
 
-    `reach` [m]: see `in_slit`. The tissue lies between `low` and `high` [m].
+    Args:
+        anchors: The samples.
+        body: The tissue.
+        grid: Where its tetrahedra are.
+        edge: The cutting edge over the time step.
+        when: Instant, as a fraction of the time step.
+        slit_reach: Distance from a cut face up to which a point is in the slit [m] (`is_in_slit`).
+        low: Lowest corner of the tissue's box [m].
+        high: Highest corner of the tissue's box [m].
     """
     n = len(anchors.state)
-    along, forward, _ = edge_frame(edge, when)
+    pose = pose_at(edge, when)
     for k in range(n):
         if anchors.state[k] != FREE:
             continue
-        b = sample_point(edge, k, n, when)
+        b = sample_point(pose, k, n)
         if not _in_box(b, low, high):
             continue
         t = tetrahedron_at(body, grid, body.positions, b)
         if t >= 0:
             w = barycentric_in(b, body.positions, body.tetrahedra, t)
             p = interpolate(w, body.rest, body.tetrahedra, t)
-            if not in_slit(body, t, p, along, forward, reach):
-                put(anchors, body, k, t, p)
-                anchors.slipped[k] = False
-                anchors.at_skin[k] = True
+            if not is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
+                _begin_anchor(anchors, body, k, t, p, True)
 
 
 @kernel
-def any_free_in_box(anchors: Anchors, edge: Edge, when: float, low: Vec3, high: Vec3) -> bool:
-    """Whether a free sample lies in the box from `low` to `high` [m]."""
+def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin: bool) -> None:
+    """Anchor sample `k`, which has not cut yet, at rest point `p` [m] of tetrahedron `t`."""
+    set_anchor(anchors, body, k, t, p)
+    anchors.slipped[k] = False
+    anchors.at_skin[k] = at_skin
+
+
+@kernel
+def any_free_in_box(anchors: Anchors, pose: BladePose, low: Vec3, high: Vec3) -> bool:
+    """Return whether a free sample lies in the box from `low` to `high` [m]."""
     n = len(anchors.state)
     for k in range(n):
-        if anchors.state[k] == FREE and _in_box(sample_point(edge, k, n, when), low, high):
+        if anchors.state[k] == FREE and _in_box(sample_point(pose, k, n), low, high):
             return True
     return False
 
@@ -194,3 +208,87 @@ def any_free_in_box(anchors: Anchors, edge: Edge, when: float, low: Vec3, high: 
 @kernel
 def _in_box(p: Vec3, low: Vec3, high: Vec3) -> bool:
     return low.x <= p.x <= high.x and low.y <= p.y <= high.y and low.z <= p.z <= high.z
+
+
+@kernel
+def is_in_slit(body: Body, t: int, p: Vec3, along: Vec3, forward: Vec3, reach: float) -> bool:
+    """Return whether a point of the body at rest is beside a cut face that the blade is along.
+
+    A sheet so near to a cut would be brought into the mesh as that cut: there is nothing to add,
+    and no tissue ahead that resists.
+
+    Args:
+        body: The tissue.
+        t: The tetrahedron that holds `p`.
+        p: The point [m].
+        along: Unit vector along the edge, in the deformed body.
+        forward: Unit vector in which the edge cuts.
+        reach: Distance within which a crossing moves to nodes that are there [m].
+    """
+    if not _near_cut(body, t):
+        return False
+    normal = normalised(cross(to_material(body, t, forward), to_material(body, t, along)))
+    if _is_beside(body, t, p, normal, reach):
+        return True
+    for f in range(4):
+        link = body.links[t, f]
+        if link < 0:
+            continue
+        other = link // 4
+        if _is_beside(body, other, p, normal, reach):
+            return True
+        for g in range(4):
+            further = body.links[other, g]
+            if further >= 0 and _is_beside(body, further // 4, p, normal, reach):
+                return True
+    return False
+
+
+@kernel
+def _near_cut(body: Body, t: int) -> bool:
+    """Return whether a tetrahedron with a face of `t` has a node that a cut doubled."""
+    for f in range(4):
+        if body.twin[body.tetrahedra[t, f]] != body.tetrahedra[t, f]:
+            return True
+    for f in range(4):
+        link = body.links[t, f]
+        if link >= 0:
+            node = body.tetrahedra[link // 4, link % 4]
+            if body.twin[node] != node:
+                return True
+    return False
+
+
+@kernel
+def _is_beside(body: Body, t: int, p: Vec3, normal: Vec3, reach: float) -> bool:
+    """Return whether a cut face of `t` is within `reach` of `p`, in the direction of `normal`."""
+    for f in range(4):
+        if body.links[t, f] != CUT:
+            continue
+        d = sub(
+            p,
+            nearest_on_triangle(
+                p,
+                vec3(body.rest, body.tetrahedra[t, (f + 1) % 4]),
+                vec3(body.rest, body.tetrahedra[t, (f + 2) % 4]),
+                vec3(body.rest, body.tetrahedra[t, (f + 3) % 4]),
+            ),
+        )
+        distance = norm(d)
+        if distance <= reach and abs(dot(d, normal)) >= _BESIDE * distance:
+            return True
+    return False
+
+
+@kernel
+def is_behind_edge(path: Path, p: Vec3) -> bool:
+    """Return whether a point of the body at rest [m] is behind the edge, between tip and heel."""
+    k, along = nearest_on_edge(path, p)
+    if k < 0:
+        return False
+    is_first = k == 0 or not path.linked[k - 1]
+    is_last = k + 2 == len(path.linked) or not path.linked[k + 1]
+    if (is_first and along < 0.0) or (is_last and along > 1.0):
+        return False
+    at = nearest_on_segment(vec3(path.t1, k), vec3(path.t1, k + 1), p)
+    return dot(sub(p, at), vec3(path.forward, k)) <= 0.0

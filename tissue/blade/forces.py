@@ -1,70 +1,55 @@
-"""The blade in the tissue: its edge, which cuts, and its faces, which part what is cut."""
+"""What an integrator calls: the blade's forces on the nodes, slip after a step, and stiffness."""
 
 from tissue.blade.anchors import (
-    Anchors,
-    Edge,
-    add_stiffness,
+    add_anchor_stiffness,
     anchors_energy,
-    clear_forces,
-    highest_frequency,
+    clear_anchor_forces,
+    highest_anchor_frequency,
     measure_speeds,
-    pull,
 )
-from tissue.blade.impulse_totals import (
-    RELEASED,
-    WORK_OF_BLADE,
-    WORK_OF_BREAKING,
+from tissue.blade.blade_state import BladeState
+from tissue.blade.edge import Edge, motion_at, pose_at
+from tissue.blade.edge_forces import apply_edge_forces
+from tissue.blade.impulse_totals import clear_impulses
+from tissue.blade.return_mapping import slip_anchors
+from tissue.blade.side_forces import (
+    add_side_stiffness,
+    apply_side_forces,
+    apply_sliding,
+    clear_side_forces,
+    highest_side_frequency,
 )
-from tissue.blade.return_mapping import slip
-from tissue.blade.side_contact import (
-    Flanks,
-    add_flank_stiffness,
-    clear_flanks,
-    highest_flank_frequency,
-    press_flanks,
-    slide_flanks,
-)
-from tissue.blade.toughness import Resistance
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 
-class Tool(Arrays):
-    """All through which blade and tissue act on each other."""
-
-    anchors: Anchors
-    flanks: Flanks
-    resistance: Resistance
-
-
 @kernel
-def clear_tool(tool: Tool, body: Body, external: FloatArray) -> None:
-    """Set the forces on the nodes that the blade acts on to zero: the others are zero anyway."""
-    clear_forces(tool.anchors, body, external)
-    clear_flanks(tool.flanks, external)
-
-
-@kernel
-def begin_step(tool: Tool, body: Body, edge: Edge, dt: float) -> None:
-    """Begin to count impulse and area; measure how fast the edge goes in this step of `dt` [s]."""
-    anchors = tool.anchors
-    for i in range(WORK_OF_BLADE):
-        anchors.totals[i] = 0.0
+def begin_blade_step(blade: BladeState, body: Body, edge: Edge, dt: float) -> None:
+    """Begin to count impulse and area; measure how fast the edge moves in this step of `dt` [s]."""
+    anchors = blade.anchors
+    clear_impulses(blade.totals)
     for k in range(len(anchors.state)):
         anchors.cut[k] = 0.0
-    before = anchors_energy(anchors, body, edge, 0.0, tool.resistance)
+    pose = pose_at(edge, 0.0)
+    before = anchors_energy(anchors, body, pose, blade.toughness)
     measure_speeds(anchors, edge, dt)
     # An edge that slows down meets less: what it holds too much, it is about to cut.
-    after = anchors_energy(anchors, body, edge, 0.0, tool.resistance)
-    anchors.totals[WORK_OF_BREAKING] += before - after
+    after = anchors_energy(anchors, body, pose, blade.toughness)
+    blade.totals.work_of_breaking += before - after
 
 
 @kernel
-def act(
-    tool: Tool,
+def clear_blade_forces(blade: BladeState, body: Body, external: FloatArray) -> None:
+    """Set the forces on the nodes that the blade acts on to zero: the others are zero anyway."""
+    clear_anchor_forces(blade.anchors, body, external)
+    clear_side_forces(blade.sides, external)
+
+
+@kernel
+def apply_blade_forces(
+    blade: BladeState,
     body: Body,
     edge: Edge,
     positions: FloatArray,
@@ -73,80 +58,82 @@ def act(
     dt: float,
     external: FloatArray,
 ) -> None:
-    """Write the blade's forces on the nodes to `external` [N] and count impulse and work.
+    """Write the blade's forces on the nodes, and count impulse and work.
 
     Args:
-        tool: Its totals are written.
+        blade: Its totals are written.
         body: For the nodes.
-        edge: The cutting edge over the step.
+        edge: The cutting edge over the time step.
         positions: Where the nodes are [m].
-        when: Instant, as a fraction of the step.
+        when: Instant, as a fraction of the time step.
         share: Weight of this evaluation in the integral over the step; they add up to 1.
-        dt: Length of the step [s].
-        external: Forces on the nodes; cleared first.
+        dt: Length of the time step [s].
+        external: Forces on the nodes [N], shape (capacity, 3); cleared first.
     """
-    clear_tool(tool, body, external)
-    anchors = tool.anchors
-    pull(anchors, body, edge, positions, when, share, dt, tool.resistance, external)
-    press_flanks(tool.flanks, edge, positions, when, share, dt, external, anchors.totals)
+    clear_blade_forces(blade, body, external)
+    motion = motion_at(edge, when)
+    apply_edge_forces(blade, body, motion, positions, share, dt, external)
+    apply_side_forces(blade, motion, positions, share, dt, external)
 
 
 @kernel
-def give_way(
-    tool: Tool,
+def apply_slip(
+    blade: BladeState,
     body: Body,
     visits: Visits,
     edge: Edge,
     external: FloatArray,
     when: float,
     seconds: float,
-    reach: float,
-    queue: IntArray,
 ) -> None:
-    """After a step: let slip and slide what does not hold. Clears `external` [N].
+    """Apply plastic slip at the edge and frictional sliding on the faces, after a step.
 
     Args:
-        tool: Written.
+        blade: Anchors, side contacts and totals are written.
         body: The tissue.
         visits: For searches.
         edge: The cutting edge over the time step.
-        external: Forces on the nodes.
+        external: Forces on the nodes [N], shape (capacity, 3); the blade's are cleared.
         when: Instant, as a fraction of the time step.
-        seconds: Since the last call [s].
-        reach: See `slip` [m].
-        queue: Scratch.
+        seconds: Time since the last call [s].
     """
-    clear_tool(tool, body, external)  # before anchors go to other nodes
-    slip(tool.anchors, body, visits, edge, when, tool.resistance, reach, queue)
-    slide_flanks(tool.flanks, edge, body.positions, when, seconds, tool.anchors.totals)
+    clear_blade_forces(blade, body, external)  # before anchors move to other nodes
+    pose = pose_at(edge, when)
+    slip_anchors(blade, body, visits, pose)
+    apply_sliding(blade, pose, body.positions, seconds)
 
 
 @kernel
-def release_edge(tool: Tool, body: Body, edge: Edge, when: float) -> None:
-    """Count the energy of all that the edge holds as released: the blade is taken away."""
-    anchors = tool.anchors
-    anchors.totals[RELEASED] += anchors_energy(anchors, body, edge, when, tool.resistance)
+def edge_energy(blade: BladeState, body: Body, edge: Edge, when: float) -> float:
+    """Return the energy stored in the anchors of the edge at an instant of the time step [J]."""
+    return anchors_energy(blade.anchors, body, pose_at(edge, when), blade.toughness)
 
 
 @kernel
-def add_tool_frequency(
-    tool: Tool, body: Body, frequency_squared: FloatArray, scratch: FloatArray
+def release_edge(blade: BladeState, body: Body, edge: Edge, when: float) -> None:
+    """Count the energy of all anchors as released: the blade is taken away."""
+    blade.totals.released += edge_energy(blade, body, edge, when)
+
+
+@kernel
+def add_blade_frequency(
+    blade: BladeState, body: Body, frequency_squared: FloatArray, scratch: FloatArray
 ) -> None:
     """Add what the blade adds to the bound on w^2 [1/s2] of each node that it acts on.
 
-    `scratch` as in `frequency_with_tool`.
+    `scratch`, shape (capacity, 3), must be zero at those nodes and is so again afterwards.
     """
-    anchors, flanks = tool.anchors, tool.flanks
-    add_stiffness(anchors, body, scratch)
-    add_flank_stiffness(flanks, scratch)
+    anchors, sides = blade.anchors, blade.sides
+    add_anchor_stiffness(anchors, body, scratch)
+    add_side_stiffness(sides, scratch)
     for k in range(len(anchors.state)):
         for q in range(4):
             _add_frequency(
                 body, frequency_squared, scratch, body.tetrahedra[anchors.tetrahedron[k], q]
             )
-    for i in range(flanks.count[0]):
+    for i in range(sides.n_faces):
         for corner in range(3):
-            _add_frequency(body, frequency_squared, scratch, flanks.node[i, corner])
+            _add_frequency(body, frequency_squared, scratch, sides.node[i, corner])
 
 
 @kernel
@@ -159,18 +146,18 @@ def _add_frequency(
 
 
 @kernel
-def frequency_with_tool(
-    tool: Tool, body: Body, frequency_squared: FloatArray, scratch: FloatArray
+def frequency_with_blade(
+    blade: BladeState, body: Body, frequency_squared: FloatArray, scratch: FloatArray
 ) -> float:
-    """Bound on w^2 [1/s2] over the nodes that the blade acts on: body and blade together.
+    """Return a bound on w^2 [1/s2] over the nodes that the blade acts on: body and blade together.
 
     `scratch`, shape (capacity, 3), must be zero at those nodes and is so again afterwards.
     """
-    add_stiffness(tool.anchors, body, scratch)
-    add_flank_stiffness(tool.flanks, scratch)
+    add_anchor_stiffness(blade.anchors, body, scratch)
+    add_side_stiffness(blade.sides, scratch)
     worst = max(
-        highest_frequency(tool.anchors, body, frequency_squared, scratch),
-        highest_flank_frequency(tool.flanks, body, frequency_squared, scratch),
+        highest_anchor_frequency(blade.anchors, body, frequency_squared, scratch),
+        highest_side_frequency(blade.sides, body, frequency_squared, scratch),
     )
-    clear_tool(tool, body, scratch)
+    clear_blade_forces(blade, body, scratch)
     return worst

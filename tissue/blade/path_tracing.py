@@ -1,16 +1,17 @@
-"""The way of the cutting edge through the material: from anchors to the path that is cut.
+"""The path of the cutting edge through the material: from anchors to the path that is cut.
 
 The path is a chain of material points, one a sample. Samples in the tissue are at their anchors. A
 few samples more on either side reach out through the skin, so that the sheet always ends outside
 the body or at a real end of the blade; they lie from their anchored neighbour as the blade does.
 """
 
-from tissue.blade.anchors import FREE, LEFT, Anchors, Edge, edge_frame, sample_point
-from tissue.blade.engagement import offset_from
-from tissue.blade.material_frame import mean_rotation, turned_back
+from tissue.blade.anchors import FREE, LEFT, Anchors
+from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
+from tissue.blade.material_frame import mean_rotation, rest_offset
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import Matrix3
 from tissue.mesh.body import OUTER, Body, walk
 
@@ -22,14 +23,15 @@ SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
 
 STEEPEST = 1.0
-"""How far the path may go sideways per way ahead. Steeper steps leave tetrahedra uncut."""
+"""Displacement of the path sideways per displacement ahead, at most. Steeper steps leave tetrahedra
+uncut."""
 
 
 @kernel
 def trace_path(
     anchors: Anchors, body: Body, edge: Edge, when: float, margin: float, path: Path
 ) -> None:
-    """Write the way of the samples since the last call to `path`. Samples that left are freed.
+    """Write the path of the samples since the last call. Samples that left are freed.
 
     Args:
         anchors: The samples at the end of the step.
@@ -37,13 +39,13 @@ def trace_path(
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
         margin: How far outside the skin the sheet begins and ends [m].
-        path: Its last end is the new start.
+        path: Written; its last end is the new start.
     """
     n = len(anchors.state)
-    _, forward, flat = edge_frame(edge, when)
+    pose = pose_at(edge, when)
     rotation = mean_rotation(anchors, body)
-    ahead = turned_back(rotation, forward)
-    sideways = turned_back(rotation, flat)
+    ahead = apply_transposed(rotation, pose.forward)
+    sideways = apply_transposed(rotation, pose.normal)
     store(path.sideways, 0, sideways)
     gone = True
     begun = False
@@ -61,19 +63,23 @@ def trace_path(
                 store(path.t1, k, vec3(anchors.rest, k))
             elif not path.known[k]:
                 store(path.t1, k, _behind(body, vec3(anchors.rest, k), margin, ahead, path.seed[k]))
-            if anchors.state[k] == LEFT and _advances(edge, forward, k, n):
-                _reach_out(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
+            # Where the blade backs off, the sheet does not go on.
+            if (
+                anchors.state[k] == LEFT
+                and dot(sample_displacement(edge, k, n), pose.forward) > 0.0
+            ):
+                _extend_beyond_skin(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
     for k in range(n):
         if anchors.state[k] == FREE:
-            _place_beside(anchors, edge, rotation, when, k, path)
+            _place_beside(anchors, pose, rotation, k, path)
     _smooth(path, sideways)
     for k in range(n):
         if path.member[k]:
             if gone:
                 store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
             if path.known[k]:
-                _never_back(path, k, sideways)
-            elif begun:  # a new member begins outside the skin, behind where it is met now
+                _limit_step(path, k, sideways)
+            elif begun:  # a new member begins outside the skin, behind where it is now
                 store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
             else:
                 store(path.t0, k, vec3(path.t1, k))
@@ -86,22 +92,15 @@ def trace_path(
 
 @kernel
 def forget_path(path: Path) -> None:
-    """Let the next path begin at the next contact."""
+    """Forget where the edge has been: the next path begins at the next contact."""
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False
 
 
 @kernel
-def _advances(edge: Edge, forward: Vec3, k: int, n: int) -> bool:
-    """Whether the blade moves forward at sample `k` of `n`, rather than backs off."""
-    way = sub(sample_point(edge, k, n, 1.0), sample_point(edge, k, n, 0.0))
-    return dot(way, forward) > 0.0
-
-
-@kernel
 def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
-    """Where a sheet begins that is met at `p` [m]: outside the skin, or in a slit that is there.
+    """Return where a sheet begins that the edge enters at `p` [m]: outside the skin, or in a slit.
 
     In the midst of tissue, where a tip was driven in, it begins at `p` itself.
     """
@@ -112,17 +111,15 @@ def _behind(body: Body, p: Vec3, margin: float, ahead: Vec3, seed: int) -> Vec3:
 
 
 @kernel
-def _reach_out(body: Body, k: int, p: Vec3, path: Path) -> None:
-    """Let the sheet end at `p` [m] where a sample left the body, if that is outside."""
+def _extend_beyond_skin(body: Body, k: int, p: Vec3, path: Path) -> None:
+    """End the sheet at `p` [m], where sample `k` left the body, if that is outside."""
     at = walk(body, p, path.seed[k])
     if not at.inside and at.link == OUTER:
         store(path.t1, k, p)
 
 
 @kernel
-def _place_beside(
-    anchors: Anchors, edge: Edge, rotation: Matrix3, when: float, k: int, path: Path
-) -> None:
+def _place_beside(anchors: Anchors, pose: BladePose, rotation: Matrix3, k: int, path: Path) -> None:
     """Place a free sample from the nearest samples that are, or just were, in the tissue."""
     n_beside = 0
     p = Vec3(0.0, 0.0, 0.0)
@@ -130,7 +127,7 @@ def _place_beside(
         for beside in range(k - distance, k + distance + 1, 2 * distance):
             if 0 <= beside < len(anchors.state) and anchors.state[beside] != FREE:
                 n_beside += 1
-                offset = offset_from(edge, rotation, when, len(anchors.state), k, beside)
+                offset = rest_offset(pose, rotation, len(anchors.state), k, beside)
                 p = add(p, add(vec3(path.t1, beside), offset))
         if n_beside > 0:
             path.member[k] = True
@@ -140,7 +137,7 @@ def _place_beside(
 
 @kernel
 def _smooth(path: Path, sideways: Vec3) -> None:
-    """Even out how far samples beside each other lie sideways, over about a node size.
+    """Smooth how far samples beside each other lie sideways, over about a node size.
 
     Anchors in different tetrahedra are dragged sideways by different amounts. The mesh cannot hold
     a fold of the sheet that is finer than its tetrahedra; it would tear along one.
@@ -163,8 +160,8 @@ def _smooth(path: Path, sideways: Vec3) -> None:
 
 
 @kernel
-def _never_back(path: Path, k: int, sideways: Vec3) -> None:
-    """Hold a sample that is not ahead of where it has been, or goes more sideways than ahead.
+def _limit_step(path: Path, k: int, sideways: Vec3) -> None:
+    """Hold a sample back that is not ahead of where it has been, or moves more sideways than ahead.
 
     The first is in its own cut; the second would fold the sheet.
     """

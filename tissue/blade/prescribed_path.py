@@ -1,4 +1,4 @@
-"""The path of an edge whose way through the body at rest is given, not traced by anchors."""
+"""The path of an edge that is given in the body at rest, not traced by anchors."""
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -15,7 +15,7 @@ from tissue.mesh.point_location import (
 
 @kernel
 def begin_path(path: Path, points: FloatArray) -> None:
-    """Let the edge be at `points` [m], shape (n, 3), at rest; it has not moved yet."""
+    """Begin the path with the edge at `points` [m], shape (n, 3), in the body at rest."""
     n = len(path.member)
     for k in range(n):
         store(path.t1, k, vec3(points, k))
@@ -29,15 +29,22 @@ def begin_path(path: Path, points: FloatArray) -> None:
 def prescribe_path(
     path: Path, body: Body, grid: TetrahedronGrid, points: FloatArray, forward: Vec3
 ) -> None:
-    """Let the edge go on to `points` [m], shape (n, 3), at rest, cutting `forward`.
+    """Advance the edge to given points.
 
     A sample that is not ahead of where it has been is held there: only the edge cuts, not the back.
+
+    Args:
+        path: Written; its last end is the new start.
+        body: The tissue.
+        grid: Where its tetrahedra are at rest; appended ones are listed.
+        points: Points of the edge in the body at rest [m], shape (n, 3).
+        forward: Unit vector in which the edge cuts, in the body at rest.
     """
     list_appended(body, body.rest, grid)
     n = len(path.member)
     along = sub(vec3(points, n - 1), vec3(points, 0))
-    flat = cross(forward, along)
-    store(path.sideways, 0, scale(1.0 / norm(flat), flat))
+    normal = cross(forward, along)
+    store(path.sideways, 0, scale(1.0 / norm(normal), normal))
     for k in range(n):
         start = vec3(path.t1, k)
         p = vec3(points, k)
@@ -51,7 +58,7 @@ def prescribe_path(
 
 @kernel
 def _find_seed(path: Path, body: Body, grid: TetrahedronGrid, k: int) -> int:
-    """A tetrahedron that holds sample `k`, or else one that the way of its segment may meet."""
+    """Return a tetrahedron that holds sample `k`, or one that its segment may sweep through."""
     p = vec3(path.t1, k)
     if path.seed[k] >= 0:
         at = walk(body, p, path.seed[k])

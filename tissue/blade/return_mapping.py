@@ -1,4 +1,4 @@
-"""How anchors slip through the material, and how their tetrahedra are found (return mapping)."""
+"""Plastic slip of the anchors: where the pull exceeds the toughness (return mapping)."""
 
 from typing import NamedTuple
 
@@ -10,21 +10,14 @@ from tissue.blade.anchors import (
     LEFT,
     RETRACTED,
     Anchors,
-    Edge,
     anchor_position,
-    edge_frame,
     held_toughness,
-    sample_point,
     stored_energy,
-    surplus_of,
+    surplus_stretch,
 )
-from tissue.blade.impulse_totals import (
-    RELEASED,
-    WORK_OF_BREAKING,
-    WORK_OF_CUTTING,
-)
+from tissue.blade.blade_state import SEARCH, BladeState
+from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.material_frame import to_material
-from tissue.blade.toughness import Resistance
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
@@ -38,31 +31,35 @@ from tissue.mesh.body import INSIDE_TOLERANCE, OUTER, Body, walk
 from tissue.mesh.nonconforming import behind, is_open, n_behind
 from tissue.mesh.star import Visits
 
-SEARCH = 512
-"""Tetrahedra that the search beyond a cut face looks at, at most."""
 
-
-class Place(NamedTuple):
+class Location(NamedTuple):
     """Where a material point is."""
 
     tetrahedron: int
-    """Which holds it, or the one nearest by."""
+    """Tetrahedron that holds the point, or else the nearest one found."""
     inside: bool
-    """Whether it holds the point."""
+    """Whether the tetrahedron holds the point."""
     beyond_skin: bool
-    """Where it does not: whether the skin is between them, or the lip of an earlier cut."""
+    """Whether the skin, or the lip of an earlier cut, is between tetrahedron and point."""
 
 
 @kernel
-def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Place:
-    """Find the tetrahedron that holds the rest point `p` [m], searching from `start`.
+def locate(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Location:
+    """Find the tetrahedron that holds a point of the body at rest.
 
     Walks through faces; where a cut face stops the walk, the tetrahedra around are searched, since
     the other lip hangs together with this one around the rim of the cut.
+
+    Args:
+        body: The tissue.
+        visits: For searches.
+        p: The point [m].
+        start: Tetrahedron to begin with.
+        queue: Scratch, shape (SEARCH,) or longer.
     """
     at = walk(body, p, start)
     if at.inside or at.link == OUTER:
-        return Place(at.tetrahedron, at.inside, not at.inside)
+        return Location(at.tetrahedron, at.inside, not at.inside)
     visits.epoch += 1
     epoch = visits.epoch
     queue[0] = at.tetrahedron
@@ -87,17 +84,25 @@ def find(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Pl
                     queue[n] = other
                     n += 1
     if closest_weight >= -INSIDE_TOLERANCE:
-        return Place(closest, True, False)
+        return Location(closest, True, False)
     w = barycentric_in(p, body.rest, body.tetrahedra, closest)
     for f in range(4):
         if w[f] == closest_weight:
-            return Place(closest, False, is_open(body.links[closest, f]))
-    return Place(closest, False, False)
+            return Location(closest, False, is_open(body.links[closest, f]))
+    return Location(closest, False, False)
 
 
 @kernel
-def put(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
-    """Anchor sample `k` at rest point `p` [m] in tetrahedron `t`, or at a point of it nearby."""
+def set_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
+    """Anchor a sample at a point of the body at rest.
+
+    Args:
+        anchors: The samples.
+        body: The tissue.
+        k: The sample.
+        t: Tetrahedron that holds the point, or is near it.
+        p: The point [m]; where it is outside the tetrahedron, a point of it nearby is taken.
+    """
     w = barycentric_in(p, body.rest, body.tetrahedra, t)
     total = max(w.a, 0.0) + max(w.b, 0.0) + max(w.c, 0.0) + max(w.d, 0.0)
     w = Weights(
@@ -113,121 +118,93 @@ def put(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
 
 
 @kernel
-def relocate(anchors: Anchors, body: Body, visits: Visits, queue: IntArray) -> None:
+def relocate(blade: BladeState, body: Body, visits: Visits) -> None:
     """Find the anchors' tetrahedra again after the mesh changed. Material points do not move."""
+    anchors = blade.anchors
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED or anchors.state[k] == RETRACTED:
             state = anchors.state[k]
             p = vec3(anchors.rest, k)
-            put(
-                anchors,
-                body,
-                k,
-                find(body, visits, p, anchors.tetrahedron[k], queue).tetrahedron,
-                p,
-            )
+            location = locate(body, visits, p, anchors.tetrahedron[k], blade.queue)
+            set_anchor(anchors, body, k, location.tetrahedron, p)
             anchors.state[k] = state
 
 
 @kernel
-def slip(
-    anchors: Anchors,
-    body: Body,
-    visits: Visits,
-    edge: Edge,
-    when: float,
-    resistance: Resistance,
-    reach: float,
-    queue: IntArray,
-) -> None:
-    """Let every anchor slip whose pull exceeds toughness times length (return mapping).
+def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
+    """Slip every anchor whose pull exceeds toughness times length (return mapping).
 
-    Args:
-        anchors: The samples.
-        body: The tissue.
-        visits: For searches.
-        edge: The cutting edge over the step.
-        when: Instant, as a fraction of the step.
-        resistance: Of the tissue.
-        reach: How far beside its anchor a blade that backed off still belongs to it [m].
-        queue: Scratch, shape (SEARCH,) or longer.
+    Where the blade backed off, the anchor is retracted; where it comes back, anchored again.
     """
+    anchors, totals = blade.anchors, blade.totals
     n = len(anchors.state)
-    frame = edge_frame(edge, when)
-    along, forward, flat = frame
     for k in range(n):
         if anchors.state[k] != ANCHORED and anchors.state[k] != RETRACTED:
             continue
-        d = sub(sample_point(edge, k, n, when), anchor_position(anchors, body, body.positions, k))
-        if dot(d, forward) < 0.0:
+        a = anchor_position(anchors, body, body.positions, k)
+        stretch = sub(sample_point(pose, k, n), a)
+        if dot(stretch, pose.forward) < 0.0:
             if anchors.state[k] == ANCHORED:
-                anchors.totals[RELEASED] += 0.5 * anchors.stiffness[k] * dot(d, d)
-            anchors.state[k] = FREE if abs(dot(d, flat)) > reach else RETRACTED
+                totals.released += 0.5 * anchors.stiffness[k] * dot(stretch, stretch)
+            is_far = abs(dot(stretch, pose.normal)) > blade.reach
+            anchors.state[k] = FREE if is_far else RETRACTED
             continue
         if anchors.state[k] == RETRACTED:
-            if abs(dot(d, along)) > reach:  # it comes back elsewhere
+            if abs(dot(stretch, pose.along)) > blade.reach:  # it comes back elsewhere
                 anchors.state[k] = FREE
                 continue
-            anchors.totals[RELEASED] -= stored_energy(anchors, k, d, frame, resistance)
+            totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
             anchors.state[k] = ANCHORED
-        _slip_anchor(anchors, body, visits, k, d, frame, resistance, queue)
+        _slip_anchor(blade, body, visits, k, stretch, pose)
 
 
 @kernel
 def _slip_anchor(
-    anchors: Anchors,
-    body: Body,
-    visits: Visits,
-    k: int,
-    d: Vec3,
-    frame: tuple[Vec3, Vec3, Vec3],
-    resistance: Resistance,
-    queue: IntArray,
+    blade: BladeState, body: Body, visits: Visits, k: int, stretch: Vec3, pose: BladePose
 ) -> None:
-    """Let anchor `k` slip along its pull `d` [m], as far as it does not hold; count the work."""
-    _, forward, flat = frame
-    in_plane = axpy(-dot(d, flat), flat, d)
-    stretch = norm(in_plane)
-    if stretch == 0.0:
+    """Slip anchor `k` along its stretch [m] until the tissue holds it; count the work."""
+    anchors, totals, law = blade.anchors, blade.totals, blade.toughness
+    in_plane = axpy(-dot(stretch, pose.normal), pose.normal, stretch)
+    distance = norm(in_plane)
+    if distance == 0.0:
         return
-    across = anchors.length[k] * dot(in_plane, forward) / stretch
-    surplus = norm(surplus_of(anchors, k, d, frame, resistance))
+    across = anchors.length[k] * dot(in_plane, pose.forward) / distance
+    surplus = norm(surplus_stretch(anchors, k, stretch, pose, law))
     anchors.slips[k] = surplus > 0.0
     if surplus == 0.0:
         return
-    before = stored_energy(anchors, k, d, frame, resistance)
-    spent = held_toughness(anchors, k, resistance) * across * surplus
+    before = stored_energy(anchors, k, stretch, pose, law)
+    spent = held_toughness(anchors, k, law) * across * surplus
     anchors.at_skin[k] = False  # what is broken holds no more than the rest of the tissue
-    way = norm(surplus_of(anchors, k, d, frame, resistance))
+    slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
     a = anchor_position(anchors, body, body.positions, k)
-    _slip_by(anchors, body, visits, k, scale(way / stretch, in_plane), queue)
+    _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
     if anchors.state[k] == LEFT:
         anchors.cut[k] += surplus * across
-        anchors.totals[WORK_OF_CUTTING] += spent
-        anchors.totals[RELEASED] += before - spent
+        totals.work_of_cutting += spent
+        totals.released += before - spent
         return
     # Where the tissue is very distorted an anchor slips less far than it was told to.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
-    area = across * dot(slipped, in_plane) / stretch
-    cost = held_toughness(anchors, k, resistance) * area
+    area = across * dot(slipped, in_plane) / distance
+    cost = held_toughness(anchors, k, law) * area
     anchors.cut[k] += area
-    left = stored_energy(anchors, k, sub(d, slipped), frame, resistance)
-    anchors.totals[WORK_OF_CUTTING] += cost
-    anchors.totals[WORK_OF_BREAKING] += before - left - cost
+    left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
+    totals.work_of_cutting += cost
+    totals.work_of_breaking += before - left - cost
 
 
 @kernel
-def _slip_by(
-    anchors: Anchors, body: Body, visits: Visits, k: int, step: Vec3, queue: IntArray
-) -> None:
-    """Move anchor `k` by `step` [m], a vector in the body as it is, through the material."""
+def _move_anchor(blade: BladeState, body: Body, visits: Visits, k: int, step: Vec3) -> None:
+    """Move anchor `k` through the material by `step` [m], a vector in the deformed body."""
+    anchors = blade.anchors
     anchors.slipped[k] = True
     t = anchors.tetrahedron[k]
     p = add(vec3(anchors.rest, k), to_material(body, t, step))
-    place = find(body, visits, p, t, queue)
-    if place.beyond_skin:
+    location = locate(body, visits, p, t, blade.queue)
+    if location.beyond_skin:
         anchors.state[k] = LEFT
         store(anchors.rest, k, p)
-        anchors.tetrahedron[k] = place.tetrahedron
+        anchors.tetrahedron[k] = location.tetrahedron
         return
-    put(anchors, body, k, place.tetrahedron, p)
+    set_anchor(anchors, body, k, location.tetrahedron, p)

@@ -1,4 +1,4 @@
-"""Which faces of the tissue are near the blade: found anew in each part of a step.
+"""The search for the faces of the tissue near the blade, repeated in each part of a step.
 
 The cost is that of the tetrahedra in the box of the blade. A face that was known keeps its state; a
 face that is new and already within the blade begins where it is (see `tissue.blade.side_contact`).
@@ -6,50 +6,46 @@ face that is new and already within the blade begins where it is (see `tissue.bl
 
 import numpy as np
 
-from tissue.blade.anchors import Edge
-from tissue.blade.impulse_totals import RELEASED
+from tissue.blade.blade_state import BladeState
+from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
 from tissue.blade.side_contact import (
-    LATE,
     POINTS,
-    SPEED,
-    STUCK_ALONG,
-    STUCK_BEHIND,
-    Flanks,
-    blade_frame,
-    depth,
-    face_point,
-    friction_at,
-    in_blade,
+    ContactStates,
+    SideContacts,
+    contact_point,
+    friction_stretch,
+    penetration,
 )
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 from tissue.mesh.body import Body
 from tissue.mesh.nonconforming import is_open
-from tissue.mesh.point_location import TetrahedronGrid, cell_along
+from tissue.mesh.point_location import ENTRIES, LISTED, TetrahedronGrid, cell_along
 from tissue.mesh.star import Visits
 
-_N_AROUND, _CELLS, COUNTS = 0, 1, 7
-"""Places in `Flanks.searched`."""
-
-_SIDE, _AREA, ENERGY = 0, 1, 2
-"""Places in `Flanks.faces_before`."""
-
 LEAST_COSINE = 0.5
-"""Between the normals of a face and of the blade, for a face that is beside the blade. The edge
-presses the others, such as the skin that it goes through. With 0.05 that skin, once tilted by three
-degrees, was pressed aside whole: the force on a blade rose by a third to a half on its way."""
+"""Cosine of the angle between the normals of a face and of the blade, for a face that is beside the
+blade. The edge presses the others, such as the skin that it goes through. With 0.05 that skin, once
+tilted by three degrees, was pressed aside whole: the force on a blade rose by a third to a half
+while it went in."""
 
 
 @kernel
-def blade_box(flanks: Flanks, edge: Edge, when: float, margin: float) -> tuple[Vec3, Vec3]:
-    """Lowest and highest corner of the box around the blade [m]."""
-    tip, along, forward, normal, length = blade_frame(edge, when)
-    low, high = tip, tip
+def blade_box(sides: SideContacts, edge: Edge, when: float) -> tuple[Vec3, Vec3]:
+    """Return the lowest and highest corner of the box in which faces are listed [m]."""
+    return _box_at(sides, pose_at(edge, when))
+
+
+@kernel
+def _box_at(sides: SideContacts, pose: BladePose) -> tuple[Vec3, Vec3]:
+    """Return the lowest and highest corner of the box around a blade and its margin [m]."""
+    low, high = pose.tip, pose.tip
+    half, margin = sides.half_thickness, sides.margin
     for corner in range(8):
-        p = axpy(length if corner & 1 else 0.0, along, tip)
-        p = axpy(-flanks.height if corner & 2 else 0.0, forward, p)
-        p = axpy(flanks.half_thickness if corner & 4 else -flanks.half_thickness, normal, p)
+        p = axpy(pose.length if corner & 1 else 0.0, pose.along, pose.tip)
+        p = axpy(-sides.height if corner & 2 else 0.0, pose.forward, p)
+        p = axpy(half if corner & 4 else -half, pose.normal, p)
         low = Vec3(min(low.x, p.x), min(low.y, p.y), min(low.z, p.z))
         high = Vec3(max(high.x, p.x), max(high.y, p.y), max(high.z, p.z))
     return (
@@ -59,86 +55,95 @@ def blade_box(flanks: Flanks, edge: Edge, when: float, margin: float) -> tuple[V
 
 
 @kernel
-def forget_faces(flanks: Flanks, totals: FloatArray) -> None:
-    """Let go of all."""
-    for i in range(flanks.count[0]):
-        totals[RELEASED] += flanks.energy[i]
-        flanks.place[flanks.face[i]] = -1
-    flanks.count[0] = 0
+def release_faces(blade: BladeState) -> None:
+    """End all side contacts, and count their energy as released."""
+    sides, totals = blade.sides, blade.totals
+    for i in range(sides.n_faces):
+        totals.released += sides.states.energy[i]
+        sides.row_of_face[sides.face[i]] = -1
+    sides.n_faces = 0
 
 
 @kernel
-def forget_changed_faces(flanks: Flanks, dirty: IntArray, n: int) -> None:
-    """Let the faces of the first `n` of `dirty`, tetrahedra that were cut, count as new."""
-    forget_cells(flanks)
+def forget_changed_faces(sides: SideContacts, changed: IntArray, n: int) -> None:
+    """Treat the faces of the first `n` of `changed`, tetrahedra that were cut, as new."""
+    forget_cells(sides)
     for i in range(n):
         for f in range(4):
-            flanks.place[4 * dirty[i] + f] = -1
+            sides.row_of_face[4 * changed[i] + f] = -1
+
+
+@kernel
+def forget_cells(sides: SideContacts) -> None:
+    """List the faces around the blade again at the next search: the mesh or the grid changed."""
+    sides.n_around = -1
 
 
 @kernel
 def find_faces(
-    flanks: Flanks,
+    blade: BladeState,
     body: Body,
     visits: Visits,
     grid: TetrahedronGrid,
     edge: Edge,
     when: float,
-    margin: float,
-    totals: FloatArray,
 ) -> bool:
-    """Find the open faces within `margin` [m] of the blade; return False if there is no room.
+    """Find the open faces near the blade; return False if there is no room for them.
 
-    Where there is none the old faces stay as they were.
+    Where there is none the old contacts stay as they were.
+
+    Args:
+        blade: Its side contacts are written.
+        body: The tissue.
+        visits: For searches.
+        grid: Where its tetrahedra are.
+        edge: The cutting edge over the time step.
+        when: Instant, as a fraction of the time step.
     """
-    low, high = blade_box(flanks, edge, when, margin)
-    if _are_other_cells(flanks.searched, grid, low, high):
-        flanks.searched[_N_AROUND] = _open_faces(flanks, body, visits, grid)
-    if flanks.searched[_N_AROUND] < 0:
+    sides, pose = blade.sides, pose_at(edge, when)
+    low, high = _box_at(sides, pose)
+    if _are_other_cells(sides, grid, low, high):
+        sides.n_around = _list_open_faces(sides, body, visits, grid)
+    if sides.n_around < 0:
         return False
-    frame = blade_frame(edge, when)
     n = 0
-    for i in range(flanks.searched[_N_AROUND]):
-        face = flanks.around[i]
-        if _is_near(flanks, body, frame, face // 4, face % 4, margin):
-            flanks.found[n] = face
+    for i in range(sides.n_around):
+        face = sides.around[i]
+        if _is_near(sides, body, pose, face // 4, face % 4):
+            sides.found[n] = face
             n += 1
-    _take_over(flanks, body, frame, n, totals)
+    _replace_faces(blade, body, pose, n)
     return True
 
 
 @kernel
-def forget_cells(flanks: Flanks) -> None:
-    """Let the faces around the blade be looked for anew: the mesh or the grid is another."""
-    flanks.searched[_N_AROUND] = -1
-
-
-@kernel
-def _are_other_cells(searched: IntArray, grid: TetrahedronGrid, low: Vec3, high: Vec3) -> bool:
+def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, low: Vec3, high: Vec3) -> bool:
     """Write which cells the box from `low` to `high` [m] meets; return whether they were others.
 
-    Or whether they list others now. A blade goes for many steps through the same cells.
+    Or whether they list others now. A blade moves for many steps within the same cells.
     """
-    are_others = searched[_N_AROUND] < 0
+    cells = sides.cells
+    are_others = sides.n_around < 0
     for c in range(3):
         first, last = cell_along(grid, low[c], c), cell_along(grid, high[c], c)
-        are_others = are_others or searched[_CELLS + c] != first or searched[_CELLS + 3 + c] != last
-        searched[_CELLS + c], searched[_CELLS + 3 + c] = first, last
-    for k in range(len(grid.counts)):
-        are_others = are_others or searched[COUNTS + k] != grid.counts[k]
-        searched[COUNTS + k] = grid.counts[k]
+        are_others = are_others or cells[c] != first or cells[3 + c] != last
+        cells[c], cells[3 + c] = first, last
+    n_listed, n_entries = grid.counts[LISTED], grid.counts[ENTRIES]
+    are_others = are_others or sides.n_listed != n_listed or sides.n_entries != n_entries
+    sides.n_listed = n_listed
+    sides.n_entries = n_entries
     return are_others
 
 
 @kernel
-def _open_faces(flanks: Flanks, body: Body, visits: Visits, grid: TetrahedronGrid) -> int:
-    """Write the open faces in those cells to `flanks.around`; return how many, -1 without room."""
+def _list_open_faces(sides: SideContacts, body: Body, visits: Visits, grid: TetrahedronGrid) -> int:
+    """Write the open faces in those cells to `sides.around`; return how many, -1 without room."""
     visits.epoch += 1
-    epoch, cells = visits.epoch, flanks.searched
+    epoch, cells = visits.epoch, sides.cells
     n = 0
-    for i in range(cells[_CELLS], cells[_CELLS + 3] + 1):
-        for j in range(cells[_CELLS + 1], cells[_CELLS + 4] + 1):
-            for k in range(cells[_CELLS + 2], cells[_CELLS + 5] + 1):
+    for i in range(cells[0], cells[3] + 1):
+        for j in range(cells[1], cells[4] + 1):
+            for k in range(cells[2], cells[5] + 1):
                 entry = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
                 while entry >= 0:
                     t = grid.entry[entry]
@@ -148,35 +153,30 @@ def _open_faces(flanks: Flanks, body: Body, visits: Visits, grid: TetrahedronGri
                     visits.tetrahedra[t] = epoch
                     for f in range(4):
                         if is_open(body.links[t, f]):
-                            if n == len(flanks.around):
+                            if n == len(sides.around):
                                 return -1
-                            flanks.around[n] = 4 * t + f
+                            sides.around[n] = 4 * t + f
                             n += 1
     return n
 
 
 @kernel
-def _is_near(
-    flanks: Flanks,
-    body: Body,
-    frame: tuple[Vec3, Vec3, Vec3, Vec3, float],
-    t: int,
-    f: int,
-    margin: float,
-) -> bool:
-    """Whether the box of a face in the coordinates of the blade meets the blade."""
+def _is_near(sides: SideContacts, body: Body, pose: BladePose, t: int, f: int) -> bool:
+    """Return whether the box of a face, in the axes of the blade, meets the blade."""
     low_a = low_s = low_z = np.inf
     high_a = high_s = high_z = -np.inf
     for k in range(3):
-        at = in_blade(frame, vec3(body.positions, body.tetrahedra[t, flanks.outward[f, k]]))
-        low_a, high_a = min(low_a, at.x), max(high_a, at.x)
-        low_s, high_s = min(low_s, at.y), max(high_s, at.y)
-        low_z, high_z = min(low_z, at.z), max(high_z, at.z)
-    reach = flanks.half_thickness + margin
+        p = vec3(body.positions, body.tetrahedra[t, sides.outward[f, k]])
+        at = blade_coordinates(pose, p)
+        low_a, high_a = min(low_a, at.along), max(high_a, at.along)
+        low_s, high_s = min(low_s, at.behind), max(high_s, at.behind)
+        low_z, high_z = min(low_z, at.across), max(high_z, at.across)
+    margin = sides.margin
+    reach = sides.half_thickness + margin
     return (
-        low_a < frame[4] + margin
+        low_a < pose.length + margin
         and high_a > -margin
-        and low_s < flanks.height + margin
+        and low_s < sides.height + margin
         and high_s > -margin
         and low_z < reach
         and high_z > -reach
@@ -184,107 +184,107 @@ def _is_near(
 
 
 @kernel
-def _take_over(
-    flanks: Flanks,
-    body: Body,
-    frame: tuple[Vec3, Vec3, Vec3, Vec3, float],
-    n: int,
-    totals: FloatArray,
-) -> None:
-    """Put the faces found in the place of those known, which keep their state."""
-    for i in range(POINTS * flanks.count[0]):
-        for c in range(4):
-            flanks.before[i, c] = flanks.state[i, c]
-    for i in range(flanks.count[0]):
-        flanks.faces_before[i, _SIDE] = flanks.side[i]
-        flanks.faces_before[i, _AREA] = flanks.area[i]
-        flanks.faces_before[i, ENERGY] = flanks.energy[i]
-    for i in range(n):
-        flanks.known_as[i] = flanks.place[flanks.found[i]]
-    forget_faces(flanks, totals)
-    for i in range(n):
-        row = flanks.count[0]
-        face = flanks.found[i]
-        _name_nodes(flanks, body, row, face)
-        old = flanks.known_as[i]
-        # What is pressed keeps its side and area: to measure a lip that trembles anew in each step
-        # gave it energy, a tenth of what the blade did in an organ.
-        if old >= 0 and flanks.faces_before[old, ENERGY] > 0.0:
-            flanks.side[row] = flanks.faces_before[old, _SIDE]
-            flanks.area[row] = flanks.faces_before[old, _AREA]
-        elif not _measure(flanks, body, frame, row):
-            continue
-        is_known = old >= 0 and flanks.faces_before[old, _SIDE] == flanks.side[row]
-        flanks.face[row] = face
-        flanks.place[face] = row
-        flanks.count[0] = row + 1
+def _replace_faces(blade: BladeState, body: Body, pose: BladePose, n: int) -> None:
+    """Replace the faces in contact by the first `n` found; those known keep their state."""
+    sides = blade.sides
+    states, before = sides.states, sides.states_before
+    for i in range(sides.n_faces):
+        _copy_face(states, before, i, i)
         for q in range(POINTS):
-            if not is_known:
-                _begin(flanks, body, frame, row, q)
-                continue
-            for c in range(4):
-                flanks.state[POINTS * row + q, c] = flanks.before[POINTS * old + q, c]
-        flanks.energy[row] = _energy(flanks, body, frame, row)
-        totals[RELEASED] -= flanks.energy[row]
+            _copy_point(states, before, i, i, q)
+    for i in range(n):
+        sides.row_before[i] = sides.row_of_face[sides.found[i]]
+    release_faces(blade)
+    for i in range(n):
+        row = sides.n_faces
+        face = sides.found[i]
+        _write_nodes(sides, body, row, face)
+        old = sides.row_before[i]
+        # What is pressed keeps its side and area: to measure a lip that trembles again in each step
+        # gave it energy, a tenth of what the blade did in an organ.
+        if old >= 0 and before.energy[old] > 0.0:
+            _copy_face(before, states, old, row)
+        elif not _measure_face(sides, body, pose, row):
+            continue
+        is_known = old >= 0 and before.side[old] == states.side[row]
+        sides.face[row] = face
+        sides.row_of_face[face] = row
+        sides.n_faces = row + 1
+        for q in range(POINTS):
+            if is_known:
+                _copy_point(before, states, old, row, q)
+            else:
+                _begin_point(sides, body, pose, row, q)
+        states.energy[row] = _face_energy(sides, body, pose, row)
+        blade.totals.released -= states.energy[row]
 
 
 @kernel
-def _name_nodes(flanks: Flanks, body: Body, row: int, face: int) -> None:
+def _copy_face(source: ContactStates, target: ContactStates, i: int, j: int) -> None:
+    """Copy side, area and energy from row `i` of `source` to row `j` of `target`."""
+    target.side[j] = source.side[i]
+    target.area[j] = source.area[i]
+    target.energy[j] = source.energy[i]
+
+
+@kernel
+def _copy_point(source: ContactStates, target: ContactStates, i: int, j: int, q: int) -> None:
+    """Copy the state of point `q` from row `i` of `source` to row `j` of `target`."""
+    target.delay[j, q] = source.delay[i, q]
+    target.stuck_along[j, q] = source.stuck_along[i, q]
+    target.stuck_behind[j, q] = source.stuck_behind[i, q]
+    target.sliding_speed[j, q] = source.sliding_speed[i, q]
+
+
+@kernel
+def _write_nodes(sides: SideContacts, body: Body, row: int, face: int) -> None:
     """Write the nodes of a face to `row`."""
     for k in range(3):
-        flanks.node[row, k] = body.tetrahedra[face // 4, flanks.outward[face % 4, k]]
+        sides.node[row, k] = body.tetrahedra[face // 4, sides.outward[face % 4, k]]
 
 
 @kernel
-def _measure(
-    flanks: Flanks, body: Body, frame: tuple[Vec3, Vec3, Vec3, Vec3, float], row: int
-) -> bool:
+def _measure_face(sides: SideContacts, body: Body, pose: BladePose, row: int) -> bool:
     """Write side and area of the face in `row`; return whether it has a side."""
-    a = vec3(body.positions, flanks.node[row, 0])
-    b = vec3(body.positions, flanks.node[row, 1])
-    c = vec3(body.positions, flanks.node[row, 2])
+    a = vec3(body.positions, sides.node[row, 0])
+    b = vec3(body.positions, sides.node[row, 1])
+    c = vec3(body.positions, sides.node[row, 2])
     area = cross(sub(b, a), sub(c, a))
-    seen = dot(area, frame[3])
+    seen = dot(area, pose.normal)
     if abs(seen) <= LEAST_COSINE * norm(area):
         return False
-    flanks.side[row] = -1.0 if seen > 0.0 else 1.0
-    flanks.area[row] = 0.5 * abs(seen) / POINTS
+    sides.states.side[row] = -1.0 if seen > 0.0 else 1.0
+    sides.states.area[row] = 0.5 * abs(seen) / POINTS
     return True
 
 
 @kernel
-def _begin(
-    flanks: Flanks,
-    body: Body,
-    frame: tuple[Vec3, Vec3, Vec3, Vec3, float],
-    row: int,
-    q: int,
-) -> None:
-    """Begin a point that was not looked at before where it is."""
-    state = flanks.state
-    at = in_blade(frame, face_point(flanks, body.positions, row, q))
-    at_row = POINTS * row + q
-    state[at_row, LATE] = 0.0
-    inside = depth(flanks, frame[4], row, q, at)
-    if inside.z > 0.0:
-        # The bevel's reach becomes where the point is.
-        state[at_row, LATE] = flanks.side[row] * at.z - flanks.slope * at.y
-    state[at_row, STUCK_ALONG] = at.x
-    state[at_row, STUCK_BEHIND] = at.y
-    state[at_row, SPEED] = 0.0
+def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: int) -> None:
+    """Begin a contact point of a new face where it is."""
+    states = sides.states
+    at = blade_coordinates(pose, contact_point(sides, body.positions, row, q))
+    states.delay[row, q] = 0.0
+    if penetration(sides, pose.length, row, q, at).depth > 0.0:
+        # The outline of the bevel is moved to where the point is.
+        states.delay[row, q] = states.side[row] * at.across - sides.slope * at.behind
+    states.stuck_along[row, q] = at.along
+    states.stuck_behind[row, q] = at.behind
+    states.sliding_speed[row, q] = 0.0
 
 
 @kernel
-def _energy(
-    flanks: Flanks, body: Body, frame: tuple[Vec3, Vec3, Vec3, Vec3, float], row: int
-) -> float:
-    """Of a face against the blade [J], friction too."""
-    stiffness = flanks.stiffness * flanks.area[row]
+def _face_energy(sides: SideContacts, body: Body, pose: BladePose, row: int) -> float:
+    """Return the energy between a face and the blade, by pressure and friction [J]."""
+    stiffness = sides.stiffness * sides.states.area[row]
     energy = 0.0
     for q in range(POINTS):
-        at = in_blade(frame, face_point(flanks, body.positions, row, q))
-        pressed = depth(flanks, frame[4], row, q, at)
-        if pressed.z > 0.0:
-            held = friction_at(flanks, row, q, at, stiffness * pressed.z)
-            energy += 0.5 * stiffness * (pressed.z * pressed.z + held.x * held.x + held.y * held.y)
+        at = blade_coordinates(pose, contact_point(sides, body.positions, row, q))
+        depth = penetration(sides, pose.length, row, q, at).depth
+        if depth > 0.0:
+            held = friction_stretch(sides, row, q, at, stiffness * depth)
+            energy += (
+                0.5
+                * stiffness
+                * (depth * depth + held.along * held.along + held.behind * held.behind)
+            )
     return energy

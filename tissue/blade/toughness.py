@@ -1,4 +1,4 @@
-"""What it takes an edge to cut: energy per area, more of it at speed, and to break the skin."""
+"""The energy that cutting takes: per area, more of it at speed, and more to break the skin."""
 
 from tissue.blade_shape import BladeShape
 from tissue.core.jit import kernel
@@ -6,39 +6,39 @@ from tissue.core.structs import Arrays
 from tissue.material import Material
 
 
-class Resistance(Arrays):
-    """Energy that an area of cut costs."""
+class ToughnessLaw(Arrays):
+    """Energy per area of cut, as a function of the speed of the edge."""
 
     toughness: float
-    """Of a slow cut [J/m2]."""
+    """Energy per area of a slow cut [J/m2]."""
     skin_toughness: float
-    """Until the edge has broken in [J/m2]."""
+    """Energy per area until the edge has broken the skin [J/m2]."""
     exponent: float
-    """Of the dependence on speed; 0 for none."""
-    speed: float
-    """At which toughness is twice that of a slow cut [m/s]."""
+    """Exponent of the dependence on speed; 0 for none."""
+    doubling_speed: float
+    """Speed at which the toughness is twice that of a slow cut [m/s]."""
 
 
-def resistance_of(material: Material, shape: BladeShape | None) -> Resistance:
-    """Return what this tissue sets against this edge; None is a perfectly sharp one.
+def toughness_law_of(material: Material, shape: BladeShape | None) -> ToughnessLaw:
+    """Return the law of this tissue and this edge; None is a perfectly sharp edge.
 
     An edge of radius r does not part two faces, it destroys a layer as thick as itself: 2 r times
     the work to rupture is added to the toughness. That is the slope over the radius that Zhang and
     Hutchens (2021, Soft Matter 17: 6728) find in cutting against tearing.
     """
     blunt = 0.0 if shape is None else 2.0 * shape.edge_radius * material.work_to_rupture
-    return Resistance(
+    return ToughnessLaw(
         toughness=float(material.toughness + blunt),
         skin_toughness=float(max(material.skin_toughness, material.toughness) + blunt),
         exponent=float(material.toughness_exponent),
-        speed=float(material.toughness_speed),
+        doubling_speed=float(material.toughness_speed),
     )
 
 
 @kernel
-def toughness_at(resistance: Resistance, speed: float) -> float:
-    """Energy per area of a cut that grows at that speed [J/m2]: J0 (1 + (v / v0)^n)."""
-    if resistance.exponent == 0.0 or speed <= 0.0:
-        return resistance.toughness
-    more = (speed / resistance.speed) ** resistance.exponent
-    return resistance.toughness * (1.0 + more)
+def toughness_at(law: ToughnessLaw, speed: float) -> float:
+    """Return the energy per area of a cut at that speed [m/s]: J0 (1 + (v / v0)^n) [J/m2]."""
+    if law.exponent == 0.0 or speed <= 0.0:
+        return law.toughness
+    more: float = (speed / law.doubling_speed) ** law.exponent
+    return law.toughness * (1.0 + more)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tissue.blade.anchors import anchors_energy
+from tissue.blade.forces import edge_energy
 from tissue.contact.resolve import prepare
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.energy import body_energy, dissipated_power
@@ -79,6 +79,6 @@ class Audited:
     @staticmethod
     def _energy(system: System, increment: Increment, when: float) -> float:
         """Return the energy of the body and of the anchors [J]."""
-        body, tool = system.body, system.interaction.tool
+        body, blade = system.body, system.interaction.state
         stored = body_energy(body, system.elasticity.arrays, system.surroundings.gravity)
-        return stored + anchors_energy(tool.anchors, body, increment.edge, when, tool.resistance)
+        return stored + edge_energy(blade, body, increment.edge, when)

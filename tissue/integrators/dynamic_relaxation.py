@@ -7,7 +7,7 @@ Khan (1994) for kinetic damping.
 
 import numpy as np
 
-from tissue.blade.anchors import Edge
+from tissue.blade.edge import Edge
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step

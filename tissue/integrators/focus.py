@@ -1,7 +1,7 @@
 """The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
 
 from tissue.blade.anchors import ANCHORED
-from tissue.blade.forces import Tool
+from tissue.blade.blade_state import BladeState
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.elasticity.springs import Springs
@@ -13,12 +13,12 @@ N_CORNERS = 4
 
 
 @kernel
-def find_held(held: Rings, body: Body, tool: Tool) -> bool:
+def find_held(held: Rings, body: Body, blade: BladeState) -> bool:
     """Make the nodes that the blade acts on ring 0 of `held`; return whether there are any.
 
     The nodes of the anchor nearest to the tip come first. Without any, `held` stays as it was.
     """
-    anchors, flanks = tool.anchors, tool.flanks
+    anchors, sides = blade.anchors, blade.sides
     n = 0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
@@ -27,12 +27,12 @@ def find_held(held: Rings, body: Body, tool: Tool) -> bool:
             n += 1
             for q in range(N_CORNERS):
                 add_focus(held, body.tetrahedra[anchors.tetrahedron[k], q])
-    for i in range(flanks.count[0]):
+    for i in range(sides.n_faces):
         if n == 0:
             begin_search(held)
         n += 1
         for corner in range(3):
-            add_focus(held, flanks.node[i, corner])
+            add_focus(held, sides.node[i, corner])
     return n > 0
 
 

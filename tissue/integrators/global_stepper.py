@@ -2,7 +2,7 @@
 
 import math
 
-from tissue.blade.forces import frequency_with_tool
+from tissue.blade.forces import frequency_with_blade
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.audited import Audited
@@ -36,9 +36,9 @@ class GlobalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the Runge-Kutta steps taken."""
-        elasticity, tool = system.elasticity, system.interaction.tool
+        elasticity, blade = system.elasticity, system.interaction.state
         by_node = elasticity.arrays.frequency_squared
-        near = frequency_with_tool(tool, system.body, by_node, system.stages.external)
+        near = frequency_with_blade(blade, system.body, by_node, system.stages.external)
         done = 0
         while True:
             # The bound of the strained body is so wide of the truth that it needs no safety on top.

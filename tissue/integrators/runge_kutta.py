@@ -14,8 +14,8 @@ Nystroem's form (Collatz, chapter 2: the paper's reference [4]):
 Elastic forces are evaluated three times a step, damping four times.
 """
 
-from tissue.blade.anchors import Edge
-from tissue.blade.forces import act, give_way
+from tissue.blade.edge import Edge
+from tissue.blade.forces import apply_blade_forces, apply_slip
 from tissue.contact.resolve import prepare, resolve
 from tissue.contact.state import IS_AWAKE, IS_PENDING
 from tissue.core.array_types import FloatArray
@@ -59,17 +59,7 @@ def runge_kutta_steps(
                 return i
             contact.state[IS_PENDING] = 0
         now, seconds = at + share, share * dt
-        give_way(
-            context.tool,
-            body,
-            context.visits,
-            edge,
-            external,
-            now,
-            seconds,
-            context.reach,
-            context.queue,
-        )
+        apply_slip(context.blade, body, context.visits, edge, external, now, seconds)
     return n
 
 
@@ -86,22 +76,22 @@ def runge_kutta_nystroem(
         at: Fraction of the time step at which the step begins.
         share: Length of the step as a fraction of the time step.
     """
-    body, elastic, tool, stages = context.body, context.elastic, context.tool, context.stages
+    body, elastic, blade, stages = context.body, context.elastic, context.blade, context.stages
     h = share * dt
     n = body.n_nodes
     external = stages.external
     half, end = at + 0.5 * share, at + share
-    act(tool, body, edge, body.positions, at, share / 6.0, dt, external)
+    apply_blade_forces(blade, body, edge, body.positions, at, share / 6.0, dt, external)
     deform(elastic, body, body.positions)
     first_stage(context, h, 0, n)
     x2 = stages.positions
-    act(tool, body, edge, x2, half, share * 2.0 / 3.0, dt, external)
+    apply_blade_forces(blade, body, edge, x2, half, share * 2.0 / 3.0, dt, external)
     deform(elastic, body, x2)
     second_stage(context, h, 0, n)
     if context.surroundings.retardation_time > 0.0:
         third_stage(context, h, 0, n)
     x4 = stages.positions_4
-    act(tool, body, edge, x4, end, share / 6.0, dt, external)
+    apply_blade_forces(blade, body, edge, x4, end, share / 6.0, dt, external)
     deform(elastic, body, x4)
     fourth_stage(context, h, 0, n)
 

@@ -2,10 +2,9 @@
 
 from typing import NamedTuple
 
-from tissue.blade.anchors import Edge
-from tissue.blade.forces import Tool
+from tissue.blade.blade_state import BladeState
+from tissue.blade.edge import Edge
 from tissue.contact.state import ContactState
-from tissue.core.array_types import IntArray
 from tissue.core.structs import Arrays
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.stages import Stages
@@ -20,7 +19,7 @@ class StepContext(Arrays):
     """Positions and velocities are written."""
     elastic: Elastic
     """What the forces inside the body follow from."""
-    tool: Tool
+    blade: BladeState
     """The blade: it acts in every stage, and slips after every step."""
     contact: ContactState
     """What may touch; positions and velocities are corrected after every step."""
@@ -30,10 +29,6 @@ class StepContext(Arrays):
     """Scratch of a step, and the forces of the blade."""
     visits: Visits
     """Scratch for searches."""
-    queue: IntArray
-    """Scratch for searches, shape (LARGEST_STAR,)."""
-    reach: float
-    """See `slip` [m]."""
 
 
 class Increment(NamedTuple):

@@ -1,6 +1,6 @@
 """What follows each step of every integrator: contact is resolved, and the blade slips."""
 
-from tissue.blade.forces import give_way
+from tissue.blade.forces import apply_slip
 from tissue.contact.resolve import resolve
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
@@ -28,15 +28,5 @@ def resolve_contact(system: System, seconds: float) -> None:
 
 def slip_blade(system: System, increment: Increment, seconds: float, when: float) -> None:
     """Apply plastic slip at the edge and frictional sliding on the faces; see `end_step`."""
-    context = system.context
-    give_way(
-        context.tool,
-        context.body,
-        context.visits,
-        increment.edge,
-        context.stages.external,
-        when,
-        seconds,
-        context.reach,
-        context.queue,
-    )
+    blade, body, visits = system.interaction.state, system.body, system.visits
+    apply_slip(blade, body, visits, increment.edge, system.stages.external, when, seconds)

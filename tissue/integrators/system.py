@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tissue.blade.interaction import Grip
+from tissue.blade.interaction import BladeInteraction
 from tissue.blade_shape import BladeShape
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
@@ -39,7 +39,7 @@ class System:
         body: Body,
         elasticity: Elasticity,
         contact: SelfContact,
-        interaction: Grip,
+        interaction: BladeInteraction,
         surroundings: Surroundings,
         visits: Visits,
         node_size: float,
@@ -52,7 +52,6 @@ class System:
         self.visits = visits
         self.node_size = node_size
         self.stages = new_stages(len(body.rest))
-        self._queue = np.zeros(LARGEST_STAR, dtype=np.int64)
         self._context: StepContext | None = None
 
     @property
@@ -63,20 +62,18 @@ class System:
             context is None
             or context.body is not self.body
             or context.elastic is not self.elasticity.arrays
-            or context.tool is not self.interaction.tool
+            or context.blade is not self.interaction.state
             or context.contact is not self.contact.arrays
             or context.stages is not self.stages
         ):
             self._context = context = StepContext(
                 body=self.body,
                 elastic=self.elasticity.arrays,
-                tool=self.interaction.tool,
+                blade=self.interaction.state,
                 contact=self.contact.arrays,
                 surroundings=self.surroundings,
                 stages=self.stages,
                 visits=self.visits,
-                queue=self._queue,
-                reach=self.node_size,
             )
         return context
 
@@ -127,6 +124,6 @@ def assembled(
     visits = no_visits(body.n_nodes, body.n_tetrahedra)
     elasticity = Elasticity(material, body, visits, is_tight=is_tight)
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
-    interaction = Grip(blade, material, node_size, body.n_tetrahedra)
+    interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
     contact = SelfContact(body, node_size, material.friction, floor)
     return System(body, elasticity, contact, interaction, surroundings, visits, node_size)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from tissue.blade.forces import act
+from tissue.blade.forces import apply_blade_forces
 from tissue.contact.resolve import prepare
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
@@ -46,20 +46,20 @@ class Threads:
 
     def _step(self, context: StepContext, increment: Increment, at: float, share: float) -> None:
         """Take one step of Nystroem's form, as `runge_kutta_nystroem`."""
-        body, elastic, tool, stages = context.body, context.elastic, context.tool, context.stages
-        edge, dt, external = increment.edge, increment.dt, stages.external
-        n, h = body.n_nodes, share * dt
+        body, elastic, stages = context.body, context.elastic, context.stages
+        x2, x4 = stages.positions, stages.positions_4
+        n, h = body.n_nodes, share * increment.dt
         half, end = at + 0.5 * share, at + share
-        act(tool, body, edge, body.positions, at, share / 6.0, dt, external)
+        _apply_blade(context, increment, body.positions, at, share / 6.0)
         self._deform(body, elastic, body.positions)
         self._share(n, first_stage, context, h)
-        act(tool, body, edge, stages.positions, half, share * 2.0 / 3.0, dt, external)
-        self._deform(body, elastic, stages.positions)
+        _apply_blade(context, increment, x2, half, share * 2.0 / 3.0)
+        self._deform(body, elastic, x2)
         self._share(n, second_stage, context, h)
         if context.surroundings.retardation_time > 0.0:
             self._share(n, third_stage, context, h)
-        act(tool, body, edge, stages.positions_4, end, share / 6.0, dt, external)
-        self._deform(body, elastic, stages.positions_4)
+        _apply_blade(context, increment, x4, end, share / 6.0)
+        self._deform(body, elastic, x4)
         self._share(n, fourth_stage, context, h)
 
     def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
@@ -82,3 +82,12 @@ class Threads:
         loop(*arguments, bounds[0], bounds[1])
         for other in others:
             other.result()
+
+
+def _apply_blade(
+    context: StepContext, increment: Increment, positions: FloatArray, when: float, share: float
+) -> None:
+    """Write the blade's forces on the nodes at `positions` [m]; see `apply_blade_forces`."""
+    blade, body, external = context.blade, context.body, context.stages.external
+    edge, dt = increment.edge, increment.dt
+    apply_blade_forces(blade, body, edge, positions, when, share, dt, external)

@@ -7,30 +7,19 @@ import numpy as np
 import pytest
 
 from tissue import BladeShape, Material, block
-from tissue.blade.anchors import Edge
-from tissue.blade.impulse_totals import (
-    IMPULSE,
-    IMPULSE_TORQUE,
-    N_TOTALS,
-    RELEASED,
-    TISSUE_IMPULSE,
-    WORK_OF_BLADE,
-    WORK_OF_FRICTION,
-)
+from tissue.blade.anchors import new_anchors
+from tissue.blade.blade_state import new_blade_state
+from tissue.blade.edge import BladeCoordinates, Edge, blade_coordinates, motion_at, pose_at
 from tissue.blade.side_contact import (
     POINTS,
-    add_flank_stiffness,
-    blade_frame,
-    depth,
-    face_point,
-    in_blade,
-    new_flanks,
-    press_flanks,
-    profile,
-    slide_flanks,
-    with_more_rows,
+    blade_profile,
+    contact_point,
+    new_side_contacts,
+    penetration,
+    with_more_faces,
 )
-from tissue.blade.side_search import find_faces, forget_cells, forget_faces
+from tissue.blade.side_forces import add_side_stiffness, apply_side_forces, apply_sliding
+from tissue.blade.side_search import find_faces, forget_cells, release_faces
 from tissue.core.vec3 import Vec3, cross, vec3
 from tissue.mesh.body import build_body
 from tissue.mesh.point_location import build_grid
@@ -42,6 +31,8 @@ SHAPE = BladeShape(thickness=2e-3, bevel_angle=math.atan(0.25), height=20e-3)
 MATERIAL = Material(blade_friction=0.5)
 BLOCK = block((2, 2, 2), (0.01, 0.01, 0.01))
 LENGTH = 0.03
+NODE_SIZE = 4e-3
+"""Faces are searched for within half of it [m]."""
 
 
 def edge_at(x, y=0.015, z=-0.01, forward=Vec3(0.0, 1.0, 0.0)):
@@ -56,29 +47,36 @@ class Pressed:
     def __init__(self, x=0.0115, material=MATERIAL):
         self.body = build_body(BLOCK, None, None)
         self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
-        self.flanks = new_flanks(SHAPE, material, 0.005, len(BLOCK.tetrahedra))
-        self.totals = np.zeros(N_TOTALS)
+        anchors = new_anchors(2, LENGTH, material.young_modulus)
+        n = len(BLOCK.tetrahedra)
+        self.blade = new_blade_state(anchors, SHAPE, material, NODE_SIZE, n)
+        self.totals = self.blade.totals
         self.forces = np.zeros_like(self.body.rest)
         self.find(edge_at(x))
 
-    def find(self, edge, margin=2e-3):
-        tetrahedra = build_grid(self.body, self.body.positions, 0.0)
-        forget_cells(self.flanks)
-        self.look(tetrahedra, edge, margin)
+    @property
+    def sides(self):
+        return self.blade.sides
 
-    def look(self, tetrahedra, edge, margin=2e-3):
-        where = (self.body, self.visits, tetrahedra, edge, 1.0, margin, self.totals)
-        while not find_faces(self.flanks, *where):
-            self.flanks = with_more_rows(self.flanks)
+    def find(self, edge):
+        forget_cells(self.sides)
+        self.find_in(build_grid(self.body, self.body.positions, 0.0), edge)
+
+    def find_in(self, grid, edge):
+        while not find_faces(self.blade, self.body, self.visits, grid, edge, 1.0):
+            self.blade = self.blade.replaced(sides=with_more_faces(self.sides))
+
+    def rows(self):
+        return slice(self.sides.n_faces)
 
     def press(self, edge):
         self.forces[:] = 0.0
         x = self.body.positions
-        press_flanks(self.flanks, edge, x, 1.0, 1.0, 1.0, self.forces, self.totals)
+        apply_side_forces(self.blade, motion_at(edge, 1.0), x, 1.0, 1.0, self.forces)
         return self.forces.sum(axis=0)
 
     def slide(self, edge):
-        slide_flanks(self.flanks, edge, self.body.positions, 1.0, 1e-3, self.totals)
+        apply_sliding(self.blade, pose_at(edge, 1.0), self.body.positions, 1e-3)
 
 
 @pytest.fixture
@@ -87,16 +85,16 @@ def pressed():
 
 
 def test_the_profile_is_a_wedge_with_a_back_and_two_ends():
-    flanks = new_flanks(SHAPE, MATERIAL, 0.005, 1)
+    sides = new_side_contacts(SHAPE, MATERIAL, NODE_SIZE, 1)
     reach = [
-        profile(flanks, LENGTH, 0.0, Vec3(a, s, 0.0)).z
+        blade_profile(sides, LENGTH, 0.0, BladeCoordinates(a, s, 0.0)).height
         for a, s in [(0.015, 0.0), (0.015, 2e-3), (0.015, 9e-3), (0.015, 0.02), (0.0, 9e-3)]
     ]
     np.testing.assert_allclose(reach, [0.0, 0.5e-3, 1e-3, 0.0, 0.0], atol=1e-15)
 
 
 def test_the_faces_beside_the_blade_are_found_once_each(pressed):
-    rows = pressed.flanks.face[: pressed.flanks.count[0]]
+    rows = pressed.sides.face[pressed.rows()]
     beside = [row for row in rows if (pressed.body.rest[pressed.body.tetrahedra[row // 4]][
         [k for k in range(4) if k != row % 4], 0] > 0.0099).all()]  # fmt: skip
     assert len(beside) == 8  # four squares of two triangles
@@ -109,19 +107,19 @@ def test_a_blade_that_does_not_reach_the_tissue_does_not_press_it(pressed):
 
 def test_pressure_is_stiffness_times_depth_times_area(pressed):
     force = pressed.press(edge_at(0.0108))  # its side is 0.2 mm inside
-    expected = pressed.flanks.stiffness * 0.2e-3 * 0.01**2
+    expected = pressed.sides.stiffness * 0.2e-3 * 0.01**2
     np.testing.assert_allclose(force, [-expected, 0.0, 0.0], rtol=1e-9, atol=1e-12)
 
 
 def test_what_the_blade_does_to_the_tissue_is_done_to_it(pressed):
     pressed.press(edge_at(0.0108))
-    tissue, blade = pressed.totals[TISSUE_IMPULSE:][:3], pressed.totals[IMPULSE:][:3]
+    tissue, blade = pressed.totals.impulse_on_tissue, pressed.totals.impulse
     np.testing.assert_allclose(tissue, -blade, rtol=1e-12)
     torque = sum(
         np.array(cross(vec3(pressed.body.positions, i), vec3(pressed.forces, i)))
         for i in range(len(pressed.forces))
     )
-    np.testing.assert_allclose(pressed.totals[IMPULSE_TORQUE:][:3], -torque, atol=1e-15)
+    np.testing.assert_allclose(pressed.totals.angular_impulse, -torque, atol=1e-15)
 
 
 def test_a_point_that_is_first_seen_within_the_blade_is_not_thrown_out():
@@ -133,7 +131,7 @@ def test_the_bevel_reaches_such_a_point_as_the_blade_goes_on():
     """2 mm further the bevel, of slope 1/4, is 0.5 mm thicker; the side of the blade is 0.4 in."""
     pressed = Pressed(x=0.0106)
     force = pressed.press(edge_at(0.0106, y=0.017))
-    expected = pressed.flanks.stiffness * 0.4e-3 * 0.01**2
+    expected = pressed.sides.stiffness * 0.4e-3 * 0.01**2
     assert -force[0] == pytest.approx(expected, rel=1e-9)
 
 
@@ -152,7 +150,7 @@ def test_friction_holds_below_its_limit_and_slides_above(pressed):
     normal = -pressed.press(edge)[0]
     little, far = edge_at(0.0108, y=0.0150499), edge_at(0.0108, y=0.016)
     stuck = pressed.press(little)[1]
-    assert stuck == pytest.approx(pressed.flanks.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
+    assert stuck == pytest.approx(pressed.sides.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
     assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
 
 
@@ -160,10 +158,10 @@ def test_sliding_takes_friction_times_way(pressed):
     pressed.slide(edge_at(0.0108))
     normal = -pressed.press(edge_at(0.0108))[0]
     for y in (0.0155, 0.0165):
-        before = pressed.totals[WORK_OF_FRICTION]
+        before = pressed.totals.work_of_friction
         pressed.press(edge_at(0.0108, y=y))
         pressed.slide(edge_at(0.0108, y=y))
-    taken = pressed.totals[WORK_OF_FRICTION] - before
+    taken = pressed.totals.work_of_friction - before
     assert taken == pytest.approx(0.5 * normal * 1e-3, rel=1e-6)
 
 
@@ -186,15 +184,13 @@ def test_the_force_is_the_slope_of_the_energy(pressed):
         end, start = edge_at(b), edge_at(a)
         after = (end.tip_t1, end.heel_t1, end.forward_t1)
         moving = Edge(start.tip_t0, start.heel_t0, start.forward_t0, *after)
-        at_half = pressed.totals
-        press_flanks(
-            pressed.flanks, moving, pressed.body.positions, 0.5, 1.0, 1.0, pressed.forces, at_half
-        )
+        x, at_half = pressed.body.positions, motion_at(moving, 0.5)
+        apply_side_forces(pressed.blade, at_half, x, 1.0, 1.0, pressed.forces)
     pressed.slide(edge_at(0.0108))
-    stored = pressed.flanks.energy[: pressed.flanks.count[0]].sum()
-    assert pressed.totals[WORK_OF_BLADE] == pytest.approx(stored, rel=1e-4)
-    forget_faces(pressed.flanks, pressed.totals)
-    assert pressed.totals[RELEASED] == pytest.approx(stored, rel=1e-12)
+    stored = pressed.sides.states.energy[pressed.rows()].sum()
+    assert pressed.totals.work_of_blade == pytest.approx(stored, rel=1e-4)
+    release_faces(pressed.blade)
+    assert pressed.totals.released == pytest.approx(stored, rel=1e-12)
 
 
 def test_a_known_face_keeps_what_it_holds(pressed):
@@ -211,36 +207,34 @@ def test_to_look_again_at_what_trembles_under_the_blade_gives_it_no_energy(press
     pressed.slide(edge)
     pressed.body.positions[:, 1] *= 1.1  # its faces are larger now
     pressed.slide(edge)
-    before = pressed.totals[RELEASED]
-    areas = pressed.flanks.area[: pressed.flanks.count[0]].copy()
-    held = pressed.flanks.energy[: pressed.flanks.count[0]] > 0.0
+    before = pressed.totals.released
+    areas = pressed.sides.states.area[pressed.rows()].copy()
+    held = pressed.sides.states.energy[pressed.rows()] > 0.0
     assert held.any()
     pressed.find(edge)
-    assert pressed.totals[RELEASED] == pytest.approx(before, abs=1e-18)
-    np.testing.assert_array_equal(pressed.flanks.area[: len(areas)][held], areas[held])
+    assert pressed.totals.released == pytest.approx(before, abs=1e-18)
+    np.testing.assert_array_equal(pressed.sides.states.area[: len(areas)][held], areas[held])
 
 
 def test_nodes_beside_the_blade_count_as_stiffer(pressed):
     rows = np.zeros_like(pressed.body.rest)
-    add_flank_stiffness(pressed.flanks, rows)
-    area = POINTS * pressed.flanks.area[: pressed.flanks.count[0]].sum()
-    assert rows[:, 0].sum() >= pressed.flanks.stiffness * area
+    add_side_stiffness(pressed.sides, rows)
+    area = POINTS * pressed.sides.states.area[pressed.rows()].sum()
+    assert rows[:, 0].sum() >= pressed.sides.stiffness * area
 
 
 def test_coordinates_on_the_blade_are_those_of_its_frame(pressed):
-    at = in_blade(blade_frame(edge_at(0.0), 1.0), Vec3(0.002, 0.005, 0.004))
-    np.testing.assert_allclose(at, [0.014, 0.01, abs(at.z) * np.sign(at.z)], atol=1e-15)
-    assert abs(at.z) == pytest.approx(0.002)
+    at = blade_coordinates(pose_at(edge_at(0.0), 1.0), Vec3(0.002, 0.005, 0.004))
+    np.testing.assert_allclose(at[:2], [0.014, 0.01], atol=1e-15)
+    assert abs(at.across) == pytest.approx(0.002)
 
 
 def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
-    frame = blade_frame(edge_at(0.0108), 1.0)
-    rows = range(int(pressed.flanks.count[0]))
-    depths = [
-        depth(pressed.flanks, LENGTH, i, 0,
-              in_blade(frame, face_point(pressed.flanks, pressed.body.positions, i, 0))).z
-        for i in rows
-    ]  # fmt: skip
+    pose, sides, x = pose_at(edge_at(0.0108), 1.0), pressed.sides, pressed.body.positions
+    depths = []
+    for i in range(sides.n_faces):
+        at = blade_coordinates(pose, contact_point(sides, x, i, 0))
+        depths.append(penetration(sides, LENGTH, i, 0, at).depth)
     assert max(depths) == pytest.approx(0.2e-3, rel=1e-9)
 
 
@@ -268,9 +262,9 @@ def test_a_blade_that_stays_in_its_cells_finds_what_a_search_anew_would():
         faces = []
         for anew in (False, True):
             if anew:
-                forget_cells(pressed.flanks)
-            pressed.look(kept, edge_at(x))
-            faces.append(pressed.flanks.face[: pressed.flanks.count[0]].tolist())
+                forget_cells(pressed.sides)
+            pressed.find_in(kept, edge_at(x))
+            faces.append(pressed.sides.face[pressed.rows()].tolist())
         assert faces[0] == faces[1]
         numbers.append(len(faces[0]))
     assert 0 < numbers.count(0) < len(numbers)

@@ -3,34 +3,35 @@
 import pytest
 
 from tissue import BladeShape, Material
-from tissue.blade.toughness import resistance_of, toughness_at
+from tissue.blade.toughness import toughness_at, toughness_law_of
 
 pytestmark = pytest.mark.kernel
 
 
 def test_a_slow_cut_costs_the_toughness():
-    resistance = resistance_of(Material(toughness=20.0, toughness_exponent=0.5), None)
-    assert toughness_at(resistance, 0.0) == 20.0
+    law = toughness_law_of(Material(toughness=20.0, toughness_exponent=0.5), None)
+    assert toughness_at(law, 0.0) == 20.0
 
 
 def test_toughness_doubles_at_its_speed_and_follows_a_power_law():
-    law = Material(toughness=20.0, toughness_exponent=0.5, toughness_speed=0.1)
-    resistance = resistance_of(law, None)
-    assert toughness_at(resistance, 0.1) == pytest.approx(40.0)
-    assert toughness_at(resistance, 0.4) == pytest.approx(60.0)
+    material = Material(toughness=20.0, toughness_exponent=0.5, toughness_speed=0.1)
+    law = toughness_law_of(material, None)
+    assert toughness_at(law, 0.1) == pytest.approx(40.0)
+    assert toughness_at(law, 0.4) == pytest.approx(60.0)
 
 
 def test_without_an_exponent_speed_costs_nothing():
-    assert toughness_at(resistance_of(Material(toughness=20.0), None), 10.0) == 20.0
+    assert toughness_at(toughness_law_of(Material(toughness=20.0), None), 10.0) == 20.0
 
 
 def test_skin_is_never_weaker_than_what_is_under_it():
-    assert resistance_of(Material(toughness=20.0, skin_toughness=50.0), None).skin_toughness == 50.0
-    assert resistance_of(Material(toughness=20.0), None).skin_toughness == 20.0
+    skinned = Material(toughness=20.0, skin_toughness=50.0)
+    assert toughness_law_of(skinned, None).skin_toughness == 50.0
+    assert toughness_law_of(Material(toughness=20.0), None).skin_toughness == 20.0
 
 
 def test_a_blunt_edge_destroys_a_layer_twice_as_thick_as_its_radius():
     tissue = Material(toughness=20.0, work_to_rupture=1e5)
-    resistance = resistance_of(tissue, BladeShape(edge_radius=50e-6))
-    assert resistance.toughness == pytest.approx(30.0)
-    assert resistance.skin_toughness == pytest.approx(30.0)
+    law = toughness_law_of(tissue, BladeShape(edge_radius=50e-6))
+    assert law.toughness == pytest.approx(30.0)
+    assert law.skin_toughness == pytest.approx(30.0)

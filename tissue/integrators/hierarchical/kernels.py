@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import Edge
-from tissue.blade.forces import act, clear_tool
+from tissue.blade.edge import Edge
+from tissue.blade.forces import apply_blade_forces, clear_blade_forces
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import (
@@ -127,7 +127,7 @@ def hierarchical_frame(
             divides the next. The nodes of ring 0 are moved in each micro step.
         frame: Times, and how far out nodes are moved.
     """
-    body, tool, external = context.body, context.tool, context.stages.external
+    body, blade, external = context.body, context.blade, context.stages.external
     last_ring, is_far_frozen, n = frame.last_ring, frame.is_far_frozen, frame.n
     _lay_trails(body, rings, trails, last_ring, is_far_frozen)
     share = frame.end - frame.begin
@@ -135,7 +135,7 @@ def hierarchical_frame(
     n_far = every[last_ring + 1]
     for j in range(1, n + 1):
         begin = frame.begin + share * (j - 1) / n
-        act(tool, body, edge, body.positions, begin, share / n, frame.dt, external)
+        apply_blade_forces(blade, body, edge, body.positions, begin, share / n, frame.dt, external)
         t1 = span * j / n
         for k in range(rings.n_found):
             node = rings.order[k]
@@ -148,7 +148,7 @@ def hierarchical_frame(
             for node in range(body.n_nodes):
                 if not 0 <= ring_of(rings, node) <= last_ring:
                     _move(context, trails, node, t1)
-    clear_tool(tool, body, external)
+    clear_blade_forces(blade, body, external)
 
 
 @kernel

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tissue.blade.forces import frequency_with_tool
+from tissue.blade.forces import frequency_with_blade
 from tissue.contact.resolve import prepare
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
@@ -80,7 +80,7 @@ class HierarchicalStepper:
 
     def _find_rings(self, system: System) -> None:
         """Find the rings around what the blade holds."""
-        find_held(self._held, system.body, system.interaction.tool)
+        find_held(self._held, system.body, system.interaction.state)
         springs, last = system.elasticity.arrays.springs, self._options.rings + 1
         find_rings(self._rings, self._held, springs, last, self._scratch)
 
@@ -89,7 +89,7 @@ class HierarchicalStepper:
         body, by_node = system.body, system.elasticity.arrays.frequency_squared
         highest, options = self._highest, self._options
         ring_frequencies(body, by_node, self._rings, options.rings, self._is_far_frozen, highest)
-        near = frequency_with_tool(system.interaction.tool, body, by_node, system.stages.external)
+        near = frequency_with_blade(system.interaction.state, body, by_node, system.stages.external)
         highest[0] = max(highest[0], near)
         around = system.surroundings
         needed = []

@@ -26,8 +26,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue.blade.anchors import Edge
-from tissue.blade.forces import act, clear_tool, give_way
+from tissue.blade.edge import Edge
+from tissue.blade.forces import apply_blade_forces, apply_slip, clear_blade_forces
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
@@ -158,17 +158,7 @@ def macro_steps(
         macro_step(context, edge, state, chebyshev, step, at)
         if is_free:
             now, seconds = at + step.share, step.share * step.dt
-            give_way(
-                context.tool,
-                body,
-                context.visits,
-                edge,
-                external,
-                now,
-                seconds,
-                context.reach,
-                context.queue,
-            )
+            apply_slip(context.blade, body, context.visits, edge, external, now, seconds)
             wake_pulled(activity, body, springs, zone.accelerations)
             if activity.version != version:
                 return i + 1
@@ -194,7 +184,7 @@ def macro_step(
         step: Length of the step, and its kick.
         at: Fraction of the time step at which it begins.
     """
-    body, elastic, tool = context.body, context.elastic, context.tool
+    body, elastic, blade = context.body, context.elastic, context.blade
     activity, zone, surroundings = state.activity, state.zone, context.surroundings
     external, share, kick, dt = context.stages.external, step.share, step.kick, step.dt
     h = share * dt
@@ -202,14 +192,14 @@ def macro_step(
     deform_patch(state.listed, elastic, body.positions)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
-        act(tool, body, edge, body.positions, at, part, dt, external)
+        apply_blade_forces(blade, body, edge, body.positions, at, part, dt, external)
         if m == 0:
             _accelerate_coarse(context, activity, zone)
             _begin_fine(body, springs, zone, surroundings)
         else:
             deform_patch(zone.patch, elastic, body.positions)
         _substep(context, state, chebyshev, h, m)
-    clear_tool(tool, body, external)
+    clear_blade_forces(blade, body, external)
     _kick(body, activity, zone, surroundings.drag, h, kick)
     if surroundings.retardation_time > 0.0:
         _damp_fine(body, springs, activity, zone.rings, surroundings.retardation_time * h)

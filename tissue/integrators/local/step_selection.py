@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from tissue.blade.forces import Tool, add_tool_frequency
+from tissue.blade.blade_state import BladeState
+from tissue.blade.forces import add_blade_frequency
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
@@ -125,7 +126,7 @@ def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -
 def find_bounds(
     body: Body,
     elastic: Elastic,
-    tool: Tool,
+    blade: BladeState,
     activity: Activity,
     zone: Zone,
     scratch: FloatArray,
@@ -133,21 +134,21 @@ def find_bounds(
     """Write the bounds of the listed nodes to `zone.bound` [1/s2], with what the blade adds.
 
     All nodes that it acts on are listed, but for those that are fixed. `scratch`: see
-    `add_tool_frequency`.
+    `add_blade_frequency`.
     """
     for k in range(activity.n_listed):
         zone.bound[activity.listed[k]] = elastic.frequency_squared[activity.listed[k]]
-    add_tool_frequency(tool, body, zone.bound, scratch)
+    add_blade_frequency(blade, body, zone.bound, scratch)
 
 
 @kernel
-def find_near(body: Body, springs: Springs, tool: Tool, zone: Zone, n_rings: int) -> int:
+def find_near(body: Body, springs: Springs, blade: BladeState, zone: Zone, n_rings: int) -> int:
     """Write the nodes that the blade acts on, and rings around, to `zone.fine`; return how many.
 
     Only those that can move.
     """
     rings = zone.rings
-    if not find_held(rings, body, tool):
+    if not find_held(rings, body, blade):
         return 0
     search(rings, springs, n_rings)
     n = 0

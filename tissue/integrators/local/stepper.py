@@ -133,13 +133,13 @@ class LocalStepper:
     def _divide(self, system: System, span: float) -> tuple[int, int]:
         """Find the fine nodes; return the macro steps to take in `span` [s], and their substeps."""
         body, activity, zone = system.body, self._activity, self._zone
-        elastic, tool = system.elasticity.arrays, system.interaction.tool
+        elastic, blade = system.elasticity.arrays, system.interaction.state
         rings = self._options.rings
-        n_near = find_near(body, elastic.springs, tool, zone, max(rings - 1, 0))
+        n_near = find_near(body, elastic.springs, blade, zone, max(rings - 1, 0))
         wake_each(activity, body, elastic.springs, zone.fine, n_near)
         n_near = n_near if rings > 0 else 0
         self._strain(system)
-        find_bounds(body, elastic, tool, activity, zone, system.stages.external)
+        find_bounds(body, elastic, blade, activity, zone, system.stages.external)
         time = system.surroundings.retardation_time
         n, p, limit = plan_steps(activity, body.fixed, zone.bound, n_near, span, time, self._tables)
         find_zone(elastic, activity, zone, n_near, limit)

@@ -190,7 +190,7 @@ def test_a_tetrahedron_is_split_when_the_blade_has_left_it_and_not_before():
         records = tissue._incision.scheme._records
         split = records.first_child >= 0
         behind = mesh.positions[mesh.tetrahedra[split]][:, :, 1].max(axis=1)
-        anchors = tissue._system.interaction.tool.anchors
+        anchors = tissue._system.interaction.state.anchors
         seeds = anchors.tetrahedron[anchors.state > 0]
         assert not split[[t for t in seeds if t < len(split)]].any()
         assert not len(behind) or behind.max() < sweep.t1.tip[1] + CELL

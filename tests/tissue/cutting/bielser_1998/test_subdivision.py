@@ -6,7 +6,8 @@ import pytest
 from tests import bodies, naive, soundness
 from tests.tissue.cutting.bielser_1998.splits import splits_of
 from tests.tissue.kernels_of import DENSITY
-from tissue.blade.return_mapping import SEARCH, find
+from tissue.blade.blade_state import SEARCH
+from tissue.blade.return_mapping import locate
 from tissue.core.vec3 import Vec3
 from tissue.cutting.bielser_1998.case_table import TABLE
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, is_cut
@@ -127,7 +128,7 @@ def test_every_child_is_found_from_a_whole_neighbour_and_the_other_way():
     for t in range(len(splits.tetrahedra)):
         centroid = Vec3(*splits.rest[splits.tetrahedra[t]].mean(axis=0))
         for start in (0, 1, t):
-            assert find(splits.body, visits, centroid, start, queue)[:2] == (t, True)
+            assert locate(splits.body, visits, centroid, start, queue)[:2] == (t, True)
 
 
 def test_a_node_that_moved_by_itself_and_mass_that_joins_it_keep_their_momentum():

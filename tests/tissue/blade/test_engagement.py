@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue import Tissue, block
-from tissue.blade.slit import behind_edge, in_slit
+from tissue.blade.engagement import is_behind_edge, is_in_slit
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.mesh.point_location import build_grid, tetrahedron_at
@@ -25,37 +25,37 @@ def slit_body():
     return tissue._body
 
 
-def is_in_slit(body, x, y, z, along=UP, forward=AHEAD) -> bool:
+def in_slit(body, x, y, z, along=UP, forward=AHEAD) -> bool:
     p = Vec3(x, y, z)
     t = tetrahedron_at(body, build_grid(body, body.rest, 0.0), body.rest, p)
     assert 0 <= t < body.n_tetrahedra
-    return in_slit(body, t, p, along, forward, REACH)
+    return is_in_slit(body, t, p, along, forward, REACH)
 
 
 @pytest.mark.parametrize("x", [0.0195, 0.0205])
 def test_a_blade_along_a_cut_face_on_either_side_is_in_the_slit(slit_body, x):
-    assert is_in_slit(slit_body, x, 0.011, 0.033)
+    assert in_slit(slit_body, x, 0.011, 0.033)
 
 
 def test_a_blade_a_few_reaches_beside_the_cut_is_in_whole_tissue(slit_body):
-    assert not is_in_slit(slit_body, 0.025, 0.011, 0.033)
+    assert not in_slit(slit_body, 0.025, 0.011, 0.033)
 
 
 def test_a_blade_ahead_of_the_rim_is_in_whole_tissue(slit_body):
-    assert not is_in_slit(slit_body, 0.0201, 0.0207, 0.033)
+    assert not in_slit(slit_body, 0.0201, 0.0207, 0.033)
 
 
 def test_a_blade_below_the_bottom_is_in_whole_tissue(slit_body):
-    assert not is_in_slit(slit_body, 0.0201, 0.011, 0.0193)
+    assert not in_slit(slit_body, 0.0201, 0.011, 0.0193)
 
 
 def test_a_blade_that_crosses_the_slit_is_in_whole_tissue(slit_body):
-    assert not is_in_slit(slit_body, 0.0195, 0.011, 0.033, forward=ACROSS)
+    assert not in_slit(slit_body, 0.0195, 0.011, 0.033, forward=ACROSS)
 
 
 def test_a_body_without_a_cut_has_no_slit():
     body = Tissue(block((2, 2, 2), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))._body
-    assert not is_in_slit(body, 0.019, 0.011, 0.033)
+    assert not in_slit(body, 0.019, 0.011, 0.033)
 
 
 @pytest.mark.kernel
@@ -75,4 +75,4 @@ def test_a_point_is_behind_the_edge_between_tip_and_heel_only(place, expected):
     path.t1[:] = [[0.0, 0.0, z] for z in (0.0, 0.5, 1.0)]
     path.forward[:] = [0.0, 1.0, 0.0]
     path.linked[:2] = True
-    assert behind_edge(path, Vec3(*place)) == expected
+    assert is_behind_edge(path, Vec3(*place)) == expected

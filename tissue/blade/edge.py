@@ -1,0 +1,130 @@
+"""The cutting edge over a time step, and the pose of the blade at one instant of it.
+
+A kernel that Python calls gets the `Edge` and an instant; it computes the pose once and passes it
+on. An instant is a fraction of the time step: 0 at its start, 1 at its end.
+"""
+
+from typing import NamedTuple
+
+from tissue.core.jit import kernel
+from tissue.core.structs import Vectors
+from tissue.core.vec3 import Vec3, axpy, cross, dot, lerp, norm, scale, sub
+
+
+class Edge(Vectors):
+    """The cutting edge over one time step."""
+
+    tip_t0: Vec3
+    """Tip at the start of the step [m]."""
+    heel_t0: Vec3
+    """Heel at the start of the step [m]."""
+    forward_t0: Vec3
+    """Direction in which the edge cuts at the start of the step, of any length."""
+    tip_t1: Vec3
+    """Tip at the end of the step [m]."""
+    heel_t1: Vec3
+    """Heel at the end of the step [m]."""
+    forward_t1: Vec3
+    """Direction in which the edge cuts at the end of the step, of any length."""
+
+
+class BladePose(NamedTuple):
+    """Position and axes of the blade at one instant."""
+
+    tip: Vec3
+    """Position of the tip [m]."""
+    heel: Vec3
+    """Position of the heel [m]."""
+    along: Vec3
+    """Unit vector along the edge, from tip to heel."""
+    forward: Vec3
+    """Unit vector in which the edge cuts, at right angles to the edge."""
+    normal: Vec3
+    """Unit normal of the blade's plane."""
+    length: float
+    """Length of the edge [m]."""
+
+
+class BladeMotion(NamedTuple):
+    """Pose of the blade at one instant, and how far the blade moves in the whole time step."""
+
+    pose: BladePose
+    """Pose at the instant."""
+    tip: Vec3
+    """Displacement of the tip in the time step [m]."""
+    along: Vec3
+    """Change of `BladePose.along` in the time step."""
+    forward: Vec3
+    """Change of `BladePose.forward` in the time step."""
+    normal: Vec3
+    """Change of `BladePose.normal` in the time step."""
+
+
+class BladeCoordinates(NamedTuple):
+    """A point in the axes of the blade."""
+
+    along: float
+    """Distance from the tip along the edge, positive towards the heel [m]."""
+    behind: float
+    """Distance behind the edge [m]."""
+    across: float
+    """Distance from the blade's plane, positive along its normal [m]."""
+
+
+@kernel
+def pose_at(edge: Edge, when: float) -> BladePose:
+    """Return the pose of the blade at an instant."""
+    tip = lerp(when, edge.tip_t0, edge.tip_t1)
+    heel = lerp(when, edge.heel_t0, edge.heel_t1)
+    from_tip = sub(heel, tip)
+    along = scale(1.0 / norm(from_tip), from_tip)
+    forward = lerp(when, edge.forward_t0, edge.forward_t1)
+    forward = axpy(-dot(forward, along), along, forward)
+    forward = scale(1.0 / norm(forward), forward)
+    return BladePose(tip, heel, along, forward, cross(forward, along), dot(from_tip, along))
+
+
+@kernel
+def motion_at(edge: Edge, when: float) -> BladeMotion:
+    """Return the pose of the blade at an instant, and its motion in the whole time step."""
+    t0, t1 = pose_at(edge, 0.0), pose_at(edge, 1.0)
+    return BladeMotion(
+        pose_at(edge, when),
+        sub(edge.tip_t1, edge.tip_t0),
+        sub(t1.along, t0.along),
+        sub(t1.forward, t0.forward),
+        sub(t1.normal, t0.normal),
+    )
+
+
+@kernel
+def displacement_of(motion: BladeMotion, p: Vec3) -> Vec3:
+    """Return how far the point of the blade that is at `p` [m] moves in the time step [m]."""
+    pose = motion.pose
+    r = sub(p, pose.tip)
+    moved = axpy(dot(r, pose.along), motion.along, motion.tip)
+    moved = axpy(dot(r, pose.forward), motion.forward, moved)
+    return axpy(dot(r, pose.normal), motion.normal, moved)
+
+
+@kernel
+def sample_point(pose: BladePose, k: int, n: int) -> Vec3:
+    """Return the position of sample `k` of `n` along the edge [m]."""
+    return lerp(k / (n - 1.0), pose.tip, pose.heel)
+
+
+@kernel
+def sample_displacement(edge: Edge, k: int, n: int) -> Vec3:
+    """Return how far sample `k` of `n` along the edge moves in the time step [m]."""
+    # The ends are interpolated as at any other instant: they may differ by rounding from t0, t1.
+    tip_t0, heel_t0 = lerp(0.0, edge.tip_t0, edge.tip_t1), lerp(0.0, edge.heel_t0, edge.heel_t1)
+    tip_t1, heel_t1 = lerp(1.0, edge.tip_t0, edge.tip_t1), lerp(1.0, edge.heel_t0, edge.heel_t1)
+    share = k / (n - 1.0)
+    return sub(lerp(share, tip_t1, heel_t1), lerp(share, tip_t0, heel_t0))
+
+
+@kernel
+def blade_coordinates(pose: BladePose, p: Vec3) -> BladeCoordinates:
+    """Return point `p` [m] in the axes of the blade."""
+    r = sub(p, pose.tip)
+    return BladeCoordinates(dot(r, pose.along), -dot(r, pose.forward), dot(r, pose.normal))

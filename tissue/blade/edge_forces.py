@@ -1,0 +1,56 @@
+"""Forces of the cutting edge on the nodes."""
+
+from tissue.blade.anchors import ANCHORED, anchor_position, surplus_stretch
+from tissue.blade.blade_state import BladeState
+from tissue.blade.edge import BladeMotion, displacement_of, sample_point
+from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.vec3 import dot, scale, sub
+from tissue.mesh.body import Body
+
+
+@kernel
+def apply_edge_forces(
+    blade: BladeState,
+    body: Body,
+    motion: BladeMotion,
+    positions: FloatArray,
+    share: float,
+    dt: float,
+    external: FloatArray,
+) -> None:
+    """Add the forces of the anchors to those on the nodes; count impulse and work.
+
+    No anchor pulls harder than it holds, within a Runge-Kutta step either.
+
+    Args:
+        blade: Its totals are written.
+        body: For the nodes of the anchors' tetrahedra.
+        motion: Pose and motion of the blade.
+        positions: Where the nodes are [m].
+        share: Weight of this evaluation in the integral over the step; they add up to 1.
+        dt: Length of the time step [s].
+        external: Forces on the nodes [N], shape (capacity, 3).
+    """
+    anchors, pose = blade.anchors, motion.pose
+    n = len(anchors.state)
+    seconds = share * dt
+    running = running_totals(blade.totals)
+    for k in range(n):
+        if anchors.state[k] != ANCHORED:
+            continue
+        b = sample_point(pose, k, n)
+        stretch = sub(b, anchor_position(anchors, body, positions, k))
+        if dot(stretch, pose.forward) < 0.0:
+            continue  # backed off: an edge pushes, and does not pull
+        surplus = surplus_stretch(anchors, k, stretch, pose, blade.toughness)
+        force = scale(anchors.stiffness[k], sub(stretch, surplus))
+        for q in range(4):
+            node = body.tetrahedra[anchors.tetrahedron[k], q]
+            running = add_to_node(external, running, node, anchors.weights[k, q], force, seconds)
+        # The surplus is about to slip and holds nothing: without it the force points from the
+        # anchor to the blade, so that the torques on the two cancel as well.
+        at = sub(b, surplus)
+        running = add_reaction(running, at, force, displacement_of(motion, at), share, seconds)
+    store_totals(blade.totals, running)
