@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue import FloatArray, IntArray, TetrahedralMesh
-from tissue.elasticity.finite_elements import Law
+from tissue.elasticity.finite_elements import EnergyDensity
 
 
 def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
@@ -36,7 +36,7 @@ def averaged_j(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
     return around_nodes(mesh, v * j) / around_nodes(mesh, v)
 
 
-def energy(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> float:
+def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
     """Elastic energy less that at rest [J]."""
     v, f = volumes(mesh), gradients(mesh, positions)
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
@@ -47,7 +47,7 @@ def energy(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> float:
     return float(total + around_nodes(mesh, v) @ of_nodes)
 
 
-def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> FloatArray:
+def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
     """First Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
     f = gradients(mesh, positions)
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
@@ -58,7 +58,7 @@ def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> FloatArr
     return shear[:, None, None] * f + p[:, None, None] * cofactors
 
 
-def forces(mesh: TetrahedralMesh, positions: FloatArray, law: Law) -> FloatArray:
+def forces(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
     """Force on each node [N]: minus V P grad N of each corner."""
     v, p = volumes(mesh), stresses(mesh, positions, law)
     pulls = -v[:, None, None] * p @ np.linalg.inv(edges(*mesh)).transpose(0, 2, 1)

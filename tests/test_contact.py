@@ -8,8 +8,8 @@ from tissue import Material, Snapshot, TetrahedralMesh, Tissue, block
 from tissue.contact.resolve import prepare
 from tissue.contact.state import CHANGED, IS_STALE
 from tissue.elasticity.internal_forces import elastic_energy
+from tissue.mesh.faces import OUTWARD
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
-from tissue.mesh.surface import OUTWARD
 
 ELEMENT = 0.01
 """Edge of a cell in all bodies of these tests [m]."""

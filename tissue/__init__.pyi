@@ -14,8 +14,8 @@ from .material import Law as Law
 from .material import Material as Material
 from .material_presets import DAMPING_BAND as DAMPING_BAND
 from .material_presets import MATERIALS as MATERIALS
-from .material_presets import Figure as Figure
 from .material_presets import Preset as Preset
+from .material_presets import SourcedValue as SourcedValue
 from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
@@ -49,7 +49,6 @@ __all__ = [
     "CutSettings",
     "DAMPING_BAND",
     "Energies",
-    "Figure",
     "FloatArray",
     "Hierarchical",
     "IntArray",
@@ -64,6 +63,7 @@ __all__ = [
     "SchemeStatistics",
     "Snapshot",
     "SolverSettings",
+    "SourcedValue",
     "StageTimes",
     "StepResult",
     "Surface",

@@ -102,7 +102,7 @@ def _rate(seconds: float) -> str:
     return f"{1.0 / seconds:,.0f}" if seconds > 0.0 else "-"
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def run_command(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     parser = argparse.ArgumentParser(prog="python -m tissue", description=__doc__)
     parser.add_argument(
@@ -140,4 +140,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command())

@@ -196,7 +196,7 @@ def _covered(positions: FloatArray, triangles: npt.NDArray[np.int64], axis: int)
 
 
 def _holds(points: FloatArray) -> bool:
-    """Whether three of the points are off a line, so that holding them stops every rotation."""
+    """Return whether three points are off a line, so that holding them stops every rotation."""
     if len(points) < 3:
         return False
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

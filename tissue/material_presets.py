@@ -14,7 +14,7 @@ presets have their damping ratio, and less between. An upper end of 200 Hz would
 where this does by 0.05, and take three times the steps once a cut has made small tetrahedra."""
 
 
-class Figure(NamedTuple):
+class SourcedValue(NamedTuple):
     """A number, and where it comes from."""
 
     value: float
@@ -33,16 +33,16 @@ class Preset(NamedTuple):
     name: str
     about: str
     law: Law
-    young_modulus: Figure
+    young_modulus: SourcedValue
     """[Pa]."""
-    poisson_ratio: Figure
-    density: Figure
+    poisson_ratio: SourcedValue
+    density: SourcedValue
     """[kg/m3]."""
-    toughness: Figure
+    toughness: SourcedValue
     """[J/m2]."""
-    damping_ratio: Figure
+    damping_ratio: SourcedValue
     """Of bending and stretching, at both ends of `DAMPING_BAND`: half the loss tangent."""
-    blade_friction: Figure
+    blade_friction: SourcedValue
     """Coulomb's coefficient on the steel of a blade."""
 
     @property
@@ -63,26 +63,26 @@ class Preset(NamedTuple):
 ARDA = "Arda et al. 2011, doi:10.2214/AJR.10.5449"
 LIU = "Liu et al. 2022, table 2, doi:10.1186/s10033-022-00767-4"
 ICRU = "ICRU 46, after PMC4201780, table 1"
-WATERY = Figure(
+WATERY = SourcedValue(
     0.45,
     "chosen: models of soft tissue have 0.45 to 0.4999 (0.49 fits a heel's fat pad best); 0.45 for "
     "the sake of the time step",
     "'Current Poisson's ratio values of finite element models are too low to consider soft tissues "
     "nearly-incompressible: illustration on the human heel region'",
 )
-LIKE_LIVER = Figure(
+LIKE_LIVER = SourcedValue(
     0.17,
     "assumed to be that of liver; soft tissue lies at 0.05 to 0.25",
     "",
     is_confirmed=False,
 )
-ON_STEEL = Figure(
+ON_STEEL = SourcedValue(
     0.2,
     "needles in tissue and phantoms: 0.122 to 0.341, less under pressure, more at speed; a sled of "
     "steel on wet bowel 0.007 to 0.054",
     "ASME MSEC 2021, V001T03A008; Tribology Letters 51:377 (2013)",
 )
-RUBBER_ON_STEEL = Figure(0.2, "assumed to be that of wet tissue", "", is_confirmed=False)
+RUBBER_ON_STEEL = SourcedValue(0.2, "assumed to be that of wet tissue", "", is_confirmed=False)
 
 MATERIALS = {
     preset.name: preset
@@ -91,20 +91,20 @@ MATERIALS = {
             "liver",
             "parenchyma of a healthy liver",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 4.74e3,
                 "shear wave elastography in vivo, 115 adults: 4.74 ± 0.91 kPa (2.7 to 7.8)",
                 "Dhar et al., Int. J. Med. Res. Rev. (ijmrr 1395)",
             ),
             WATERY,
-            Figure(1060.0, "table of tissues", "PMC6925591, table 1"),
-            Figure(
+            SourcedValue(1060.0, "table of tissues", "PMC6925591, table 1"),
+            SourcedValue(
                 164.0,
                 "needles of four diameters, bovine: 164 ± 6 J/m2; porcine: needle 76 to 185, "
                 "blade 187 to 225",
                 f"Gokgol et al. 2012, doi:10.1016/j.medengphy.2011.09.030; {LIU}",
             ),
-            Figure(
+            SourcedValue(
                 0.17,
                 "magnetic resonance elastography in vivo, 8 adults: a standard linear solid of "
                 "1.16 and 1.97 kPa and 7.3 Pa s has a loss tangent of 0.35 at 10 Hz",
@@ -116,10 +116,12 @@ MATERIALS = {
             "kidney",
             "cortex of a healthy kidney",
             "neo_hookean",
-            Figure(5.0e3, "shear wave elastography in vivo, 127 adults: 5.0 ± 2.9 kPa", ARDA),
+            SourcedValue(5.0e3, "shear wave elastography in vivo, 127 adults: 5.0 ± 2.9 kPa", ARDA),
             WATERY,
-            Figure(1050.0, "table of tissues", "Mech. Mater. 2012, table 3", is_confirmed=False),
-            Figure(164.0, "no measurement found: that of liver", "", is_confirmed=False),
+            SourcedValue(
+                1050.0, "table of tissues", "Mech. Mater. 2012, table 3", is_confirmed=False
+            ),
+            SourcedValue(164.0, "no measurement found: that of liver", "", is_confirmed=False),
             LIKE_LIVER,
             ON_STEEL,
         ),
@@ -127,7 +129,7 @@ MATERIALS = {
             "skin",
             "dermis and epidermis as one",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 100e3,
                 "chosen between in vivo shear wave elastography (forearm 14.8 kPa, 3.5 to 26) and "
                 "tension (MPa); 5 kPa to 140 MPa are reported",
@@ -135,8 +137,8 @@ MATERIALS = {
                 is_confirmed=False,
             ),
             WATERY,
-            Figure(1100.0, "table of tissues", ICRU),
-            Figure(
+            SourcedValue(1100.0, "table of tissues", ICRU),
+            SourcedValue(
                 1136.0,
                 "needle, porcine; scissors 1700 (rat) and 2800 (chicken); tearing 17,000 to 30,000",
                 LIU,
@@ -148,15 +150,15 @@ MATERIALS = {
             "fat",
             "fat below the skin",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 26.1e3,
                 "compression under a probe at 1 N, gluteal, 21 men: 26.1 ± 19.0 kPa; at 30 N "
                 "2,200 kPa; by magnetic resonance elastography, unloaded, some 2.3 kPa",
                 "Isogai et al. 2022, doi:10.1589/jpts.34.777",
             ),
             WATERY,
-            Figure(950.0, "table of tissues", ICRU),
-            Figure(
+            SourcedValue(950.0, "table of tissues", ICRU),
+            SourcedValue(
                 200.0,
                 "no measurement with a blade found: that of liver; tearing takes 4100 (porcine)",
                 LIU,
@@ -169,15 +171,15 @@ MATERIALS = {
             "muscle",
             "skeletal muscle at rest, as if it were the same in all directions",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 11.1e3,
                 "shear wave elastography in vivo, gastrocnemius, 127 adults: 11.1 ± 4.1 kPa; "
                 "compression at 5 N (gluteal) 62 ± 10 kPa",
                 f"{ARDA}; Isogai et al. 2022, doi:10.1589/jpts.34.777",
             ),
             WATERY,
-            Figure(1050.0, "table of tissues", ICRU),
-            Figure(550.0, "notched tension, porcine: 550 to 8000, the lowest taken", LIU),
+            SourcedValue(1050.0, "table of tissues", ICRU),
+            SourcedValue(550.0, "notched tension, porcine: 550 to 8000, the lowest taken", LIU),
             LIKE_LIVER,
             ON_STEEL,
         ),
@@ -185,22 +187,24 @@ MATERIALS = {
             "gelatin",
             "gelatin of 10 % by weight, a common phantom",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 18.3e3,
                 "fast compression; a power law between 277 ± 30 kPa (2 parts of water to 1 of "
                 "powder) and 4.34 ± 0.64 kPa (20 parts), at 9 parts",
                 "Bonavia 2025, arXiv:2512.20502",
             ),
             WATERY,
-            Figure(1027.0, "computed from water and protein of 1350 kg/m3", "", is_confirmed=False),
-            Figure(
+            SourcedValue(
+                1027.0, "computed from water and protein of 1350 kg/m3", "", is_confirmed=False
+            ),
+            SourcedValue(
                 20.0,
                 "wire cutting: 1.1 J/m2 up to 10 mm/min, then as the square root of speed, carried "
                 "on to 60 mm/s",
                 "Forte et al. 2015",
                 is_confirmed=False,
             ),
-            Figure(
+            SourcedValue(
                 0.04,
                 "shear between plates, a softer gel: loss tangent 0.06 to 0.14, 20 to 200 Hz",
                 "Okamoto et al. 2011",
@@ -211,22 +215,24 @@ MATERIALS = {
             "silicone",
             "platinum-cured silicone of Shore 00-30",
             "neo_hookean",
-            Figure(
+            SourcedValue(
                 118e3,
                 "tension: 69 kPa at 100 % stretch is 118 kPa at small strain (neo-Hookean)",
                 "data sheet of Ecoflex 00-30",
                 is_confirmed=False,
             ),
-            Figure(0.45, "chosen: rubber keeps its volume; 0.45 for the time step", ""),
-            Figure(1070.0, "specific gravity", "data sheet of Ecoflex 00-30", is_confirmed=False),
-            Figure(
+            SourcedValue(0.45, "chosen: rubber keeps its volume; 0.45 for the time step", ""),
+            SourcedValue(
+                1070.0, "specific gravity", "data sheet of Ecoflex 00-30", is_confirmed=False
+            ),
+            SourcedValue(
                 300.0,
                 "notched tension of a plain silicone network: some 300 J/m2; commercial grades "
                 "with filler tear at ten times as much",
                 "PNAS 2019, PMC6442615",
                 is_confirmed=False,
             ),
-            Figure(
+            SourcedValue(
                 0.02,
                 "5 % of the work of a cycle is lost: a loss tangent of some 0.03",
                 "PNAS 2019, PMC6442615",

@@ -40,7 +40,7 @@ from tissue.integrators.system import assembled
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.body_queries import BodyQueries
-from tissue.mesh.bounding_boxes import survey, survey_of
+from tissue.mesh.bounding_boxes import body_bounds, bounds_after_motion
 from tissue.mesh.changes import touched_nodes
 from tissue.mesh.cut_error import path_error
 from tissue.mesh.star import Visits
@@ -135,7 +135,7 @@ class Tissue(BodyQueries):
         self._at_first = self._system.measures()
         elasticity = self._system.elasticity
         self._integrator = integrator_of(options, self._global_stepper, body, elasticity)
-        self._box = survey(body)
+        self._box = body_bounds(body)
         self._edge_now = (NOWHERE, 1.0)
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
@@ -221,7 +221,7 @@ class Tissue(BodyQueries):
         system = self._system
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body, system.elasticity)
-        self._box = survey(system.body)
+        self._box = body_bounds(system.body)
         self._begin_audit()
         return n_steps
 
@@ -271,9 +271,9 @@ class Tissue(BodyQueries):
             return 0
         moving, body = self._integrator.moving, self._system.body
         if moving is None or 2 * moving[1] > self.n_nodes:
-            self._box = survey(body)
+            self._box = body_bounds(body)
         else:
-            self._box = survey_of(body, *moving, self._box)
+            self._box = bounds_after_motion(body, *moving, self._box)
         if not self._box.is_finite:
             raise TissueError(
                 "the motion of the tissue became unstable: the position of a node is not a finite "

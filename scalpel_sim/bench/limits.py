@@ -6,7 +6,7 @@ from scalpel_sim.bench.machine import Caches
 from scalpel_sim.bench.timing import Case
 from tissue import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.simd import WIDTH, lanes, load, store
+from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 
 BYTES_PER_ELEMENT = 24
 """Of the triad: two doubles read, one written. The line that a store must fetch first is not
@@ -69,10 +69,10 @@ def _triad(a: FloatArray, b: FloatArray, c: FloatArray, n: int) -> None:
 
 @kernel
 def _chains(values: FloatArray, n: int) -> None:
-    a, b = load(values, 0), load(values, WIDTH)
-    c, d = load(values, 2 * WIDTH), load(values, 3 * WIDTH)
-    e, f = load(values, 4 * WIDTH), load(values, 5 * WIDTH)
-    g, h = load(values, 6 * WIDTH), load(values, 7 * WIDTH)
+    a, b = load_lanes(values, 0), load_lanes(values, WIDTH)
+    c, d = load_lanes(values, 2 * WIDTH), load_lanes(values, 3 * WIDTH)
+    e, f = load_lanes(values, 4 * WIDTH), load_lanes(values, 5 * WIDTH)
+    g, h = load_lanes(values, 6 * WIDTH), load_lanes(values, 7 * WIDTH)
     factor, term = lanes(0.5), lanes(1.0)
     for _ in range(n * LINKS):
         a = a * factor + term
@@ -83,4 +83,4 @@ def _chains(values: FloatArray, n: int) -> None:
         f = f * factor + term
         g = g * factor + term
         h = h * factor + term
-    store(values, 0, a + b + c + d + e + f + g + h)
+    store_lanes(values, 0, a + b + c + d + e + f + g + h)

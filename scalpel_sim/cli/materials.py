@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.errors import unknown
-from tissue import DAMPING_BAND, MATERIALS, Figure, Preset
+from tissue import DAMPING_BAND, MATERIALS, Preset, SourcedValue
 
 _KPA_PER_PA = 1e-3
 _MM_PER_M = 1e3
@@ -84,12 +84,12 @@ def print_presets(presets: Sequence[Preset]) -> None:
             console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
-def _marked(figure: Figure, scale: float = 1.0) -> str:
+def _marked(figure: SourcedValue, scale: float = 1.0) -> str:
     """Return the number, with a mark if nobody was found to have measured it."""
     return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else _NOT_CONFIRMED}"
 
 
-def _line(name: str, figure: Figure) -> str:
+def _line(name: str, figure: SourcedValue) -> str:
     """Return what is known of a figure, in a line."""
     mark = "" if figure.is_confirmed else _NOT_CONFIRMED
     source = f" [{figure.source}]" if figure.source else ""

@@ -11,11 +11,11 @@ from tissue.contact.self_contact import SelfContact
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
-from tissue.cutting.workspace import Cut, Quality, new_work
+from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.finite_elements import no_solid, room_for_stars, volume_term
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.springs import (
-    POOL_MARGIN,
+    SPRING_POOL_MARGIN,
     Springs,
     bound_frequencies,
     build_rows,
@@ -42,8 +42,8 @@ def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
         sheet=new_sheet(n_nodes, n_tetrahedra),
         path=new_path(n_samples),
         change=new_change(),
-        work=new_work(n_tetrahedra),
-        quality=Quality(snap=0.3, floor=0.0, guard=0.0, crumb=0.0),
+        scratch=new_cut_scratch(n_tetrahedra),
+        limits=SnapLimits(snap=0.3, floor=0.0, guard=0.0, crumb=0.0),
     )
 
 
@@ -51,7 +51,7 @@ def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
     """Write every mass of the body; return the rows of its springs."""
     n = body.n_nodes
     capacity = len(body.rest)
-    springs = no_springs(capacity, 40 * capacity + POOL_MARGIN)
+    springs = no_springs(capacity, 40 * capacity + SPRING_POOL_MARGIN)
     written = build_rows(
         body,
         no_visits(capacity, len(body.tetrahedra)),
@@ -95,8 +95,14 @@ def dense_modes(body: Body, springs: Springs) -> FloatArray:
 def elastic_of(springs: Springs) -> Elastic:
     """Return springs with no tetrahedra."""
     solid = no_solid(volume_term(0.0), 0, 0, room_for_stars(0, 0))
-    has, frequencies = np.array([True, False]), np.zeros(len(springs.first))
-    return Elastic(springs=springs, solid=solid, has=has, frequency_squared=frequencies)
+    frequencies = np.zeros(len(springs.first))
+    return Elastic(
+        springs=springs,
+        solid=solid,
+        has_springs=1,
+        has_tetrahedra=0,
+        frequency_squared=frequencies,
+    )
 
 
 def tool_with(anchors: Anchors, material: Material = Material()) -> BladeState:

@@ -10,7 +10,7 @@ from tissue import BoolArray, FloatArray, TetrahedralMesh
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
 from tissue.elasticity.finite_elements import (
-    Law,
+    EnergyDensity,
     Solid,
     build_stars,
     build_tetrahedra,
@@ -28,7 +28,7 @@ from tissue.mesh.star import LARGEST_STAR, no_visits
 YOUNG_MODULUS = 10e3
 
 
-def law_of(poisson_ratio: float, averaged: bool = True) -> Law:
+def law_of(poisson_ratio: float, averaged: bool = True) -> EnergyDensity:
     """Return the neo-Hookean law of `YOUNG_MODULUS`."""
     return neo_hookean(*lame(poisson_ratio), averaged=averaged)
 
@@ -44,7 +44,7 @@ LAWS = {
     "plain": law_of(0.45, averaged=False),
     "averaged volume": volume_term(20e3),
     "plain volume": volume_term(20e3, averaged=False),
-    "half averaged": Law(mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15),
+    "half averaged": EnergyDensity(mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15),
 }
 
 
@@ -91,14 +91,16 @@ class SolidBody(NamedTuple):
         return x[:n]
 
 
-def solid_of(mesh: TetrahedralMesh, law: Law, fixed: BoolArray | None = None) -> SolidBody:
+def solid_of(
+    mesh: TetrahedralMesh, law: EnergyDensity, fixed: BoolArray | None = None
+) -> SolidBody:
     """Return the body of a mesh as a solid."""
     body = build_body(mesh, None, fixed)
     springs_of(body)
     return built(body, law)
 
 
-def built(body: Body, law: Law) -> SolidBody:
+def built(body: Body, law: EnergyDensity) -> SolidBody:
     """Return the solid of a body that has its masses."""
     n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))

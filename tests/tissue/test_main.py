@@ -7,11 +7,11 @@ import sys
 import pytest
 
 from tissue import block
-from tissue.__main__ import cut_through, main
+from tissue.__main__ import cut_through, run_command
 
 
 def test_a_block_is_cut_into_two_and_every_stage_has_its_time(capsys):
-    assert main(["--cells", "3", "4", "3", "--steps", "200"]) == 0
+    assert run_command(["--cells", "3", "4", "3", "--steps", "200"]) == 0
     out = capsys.readouterr().out
     for stage in ("CD", "GC", "RX", "all"):
         median, high = re.search(rf"^{stage}\b.*?([\d.]+) +([\d.]+)$", out, re.MULTILINE).groups()
@@ -40,7 +40,7 @@ def test_the_cut_area_is_that_of_the_leaning_blade_through_the_block():
 )
 def test_a_wrong_option_is_one_clear_error(wrong, capsys):
     with pytest.raises(SystemExit) as stopped:
-        main(wrong)
+        run_command(wrong)
     assert stopped.value.code == 2
     assert "error:" in capsys.readouterr().err.splitlines()[-1]
 

@@ -31,7 +31,7 @@ from tissue.core.array_types import FloatArray
 from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
-from tissue.mesh.bounding_boxes import Survey, boxes_meet
+from tissue.mesh.bounding_boxes import BodyBounds, boxes_overlap
 from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.point_location import build_grid, list_appended, list_moved, no_grid
@@ -136,7 +136,7 @@ class BladeInteraction:
         moved: Moved | None,
         edge: Edge | None,
         when: float,
-        box: Survey,
+        box: BodyBounds,
     ) -> None:
         """Find the faces of the tissue that the side faces of the blade may touch.
 
@@ -150,7 +150,7 @@ class BladeInteraction:
         """
         if not self._has_sides:
             return
-        if edge is None or not boxes_meet(
+        if edge is None or not boxes_overlap(
             blade_box(self.state.sides, edge, when), (box.low, box.high)
         ):
             release_faces(self.state)
@@ -168,7 +168,7 @@ class BladeInteraction:
         moved: Moved | None,
         edge: Edge,
         when: float,
-        box: Survey,
+        box: BodyBounds,
         slit_reach: float,
     ) -> None:
         """Anchor the samples of the edge that came into the tissue, and free those that left it.

@@ -27,8 +27,7 @@ from tissue.geometry.tetrahedron import (
     interpolate,
     smallest_weight,
 )
-from tissue.mesh.body import INSIDE_TOLERANCE, OUTER, Body, walk
-from tissue.mesh.nonconforming import behind, is_open, n_behind
+from tissue.mesh.body import INSIDE_TOLERANCE, OUTER, Body, behind, is_open, n_behind, walk
 from tissue.mesh.star import Visits
 
 
@@ -77,8 +76,8 @@ def locate(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> 
             closest = t
         for f in range(4):
             link = body.links[t, f]
-            for k in range(n_behind(body.hanging, t, link)):
-                other = behind(body.hanging, t, link, k)
+            for k in range(n_behind(body, t, link)):
+                other = behind(body, t, link, k)
                 if visits.tetrahedra[other] != epoch and n < SEARCH:
                     visits.tetrahedra[other] = epoch
                     queue[n] = other

@@ -29,7 +29,7 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, scale, vec3
 from tissue.material import Material
 from tissue.mesh.body import grown
-from tissue.mesh.surface import OUTWARD
+from tissue.mesh.faces import OUTWARD
 
 SIDE_STIFFNESS = 2.0
 """Stiffness of a side face of the blade, as pressure per depth, over Young's modulus per node size.

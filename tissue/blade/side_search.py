@@ -19,9 +19,8 @@ from tissue.blade.side_contact import (
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
-from tissue.mesh.body import Body
-from tissue.mesh.nonconforming import is_open
-from tissue.mesh.point_location import ENTRIES, LISTED, TetrahedronGrid, cell_along
+from tissue.mesh.body import Body, is_open
+from tissue.mesh.point_location import TetrahedronGrid, cell_along
 from tissue.mesh.star import Visits
 
 LEAST_COSINE = 0.5
@@ -128,7 +127,7 @@ def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, low: Vec3, high
         first, last = cell_along(grid, low[c], c), cell_along(grid, high[c], c)
         are_others = are_others or cells[c] != first or cells[3 + c] != last
         cells[c], cells[3 + c] = first, last
-    n_listed, n_entries = grid.counts[LISTED], grid.counts[ENTRIES]
+    n_listed, n_entries = grid.n_listed, grid.n_entries
     are_others = are_others or sides.n_listed != n_listed or sides.n_entries != n_entries
     sides.n_listed = n_listed
     sides.n_entries = n_entries

@@ -40,7 +40,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
 from tissue.mesh.body import Body, grown
-from tissue.mesh.surface import OUTWARD
+from tissue.mesh.faces import OUTWARD
 
 N_NODES, N_DIRTY, N_UPDATES = 0, 1, 2
 """Places in `Candidates.counts`."""

@@ -13,8 +13,7 @@ import math
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
-from tissue.mesh.body import Body
-from tissue.mesh.nonconforming import is_open
+from tissue.mesh.body import Body, is_open
 
 _FLAT = 0.05
 """Sine of the angle up to which an edge counts as flat. Two such, crossed at their middles, overlap

@@ -8,7 +8,7 @@ from tissue.contact.edge_edge import END
 from tissue.contact.pairs import N_NEAR, Pairs, eight_corners
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.simd import WIDTH, lanes, square_root, store
+from tissue.core.simd import WIDTH, lanes, square_root, store_lanes
 from tissue.core.vec3 import add, cross, dot, sub
 
 LESS = 0.5
@@ -23,7 +23,7 @@ def look_at_points(pairs: Pairs, x: FloatArray, signs: FloatArray) -> None:
         ab, ac = sub(eight_corners(x, pairs, k, 2), a), sub(eight_corners(x, pairs, k, 3), a)
         area = cross(ab, ac)
         height = dot(area, sub(eight_corners(x, pairs, k, 0), a))
-        store(signs, k, height / square_root(dot(area, area)))
+        store_lanes(signs, k, height / square_root(dot(area, area)))
 
 
 @kernel
@@ -43,13 +43,13 @@ def look_at_edges(pairs: Pairs, x: FloatArray, normal: FloatArray, signs: FloatA
         other = add(eight_corners(normal, pairs, k, 2), eight_corners(normal, pairs, k, 3))
         across, ac = cross(ab, cd), sub(c, a)
         towards = dot(across, outward)
-        store(signs, k, towards * dot(across, other))
-        store(signs, n + k, towards * dot(across, ac))
+        store_lanes(signs, k, towards * dot(across, other))
+        store_lanes(signs, n + k, towards * dot(across, ac))
         square = dot(across, across)
         s = dot(cross(ac, cd), across) / square
         t = dot(cross(ac, ab), across) / square
-        store(signs, 2 * n + k, s * (lanes(1.0) - s))
-        store(signs, 3 * n + k, t * (lanes(1.0) - t))
+        store_lanes(signs, 2 * n + k, s * (lanes(1.0) - s))
+        store_lanes(signs, 3 * n + k, t * (lanes(1.0) - t))
 
 
 @kernel

@@ -29,7 +29,7 @@ def cache_directory() -> Path:
 
 
 def is_compiling() -> bool:
-    """Whether kernels are compiled: not where $NUMBA_DISABLE_JIT is 1."""
+    """Return whether kernels are compiled: not where $NUMBA_DISABLE_JIT is 1."""
     return not cast(Any, nb.config).DISABLE_JIT
 
 

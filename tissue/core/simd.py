@@ -167,22 +167,22 @@ def _everywhere(builder: Any, value: Any, kind: Any) -> Any:
     return _shuffled(builder, one, one, [0] * kind.count)
 
 
-def load(array: FloatArray, i: int) -> Lanes:
+def load_lanes(array: FloatArray, i: int) -> Lanes:
     """Return the eight elements of a vector from `i` on."""
     return array[i : i + WIDTH].copy()
 
 
-@_compiled(load, types.Array, types.Integer)
+@_compiled(load_lanes, types.Array, types.Integer)
 def _load(builder: Any, array: _Array, i: Any) -> Any:
     return builder.load(builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
 
 
-def store(array: FloatArray, i: int, values: Lanes) -> None:
+def store_lanes(array: FloatArray, i: int, values: Lanes) -> None:
     """Write eight elements of a vector from `i` on."""
     array[i : i + WIDTH] = values
 
 
-@_compiled(store, types.Array, types.Integer, LANES, result=types.void)
+@_compiled(store_lanes, types.Array, types.Integer, LANES, result=types.void)
 def _store(builder: Any, array: _Array, i: Any, values: Any) -> None:
     builder.store(values, builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
 

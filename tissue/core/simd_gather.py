@@ -90,7 +90,7 @@ def _largest(builder: Any, a: Any) -> Any:
 
 
 def _tree(terms: list[Any], add: Any = operator.add) -> Any:
-    """Sum of eight, or another fold, neighbours first: operations need not wait for each other."""
+    """Return the sum of eight, or another fold: neighbours first, so that no operation waits."""
     while len(terms) > 1:
         terms = [add(a, b) for a, b in zip(terms[::2], terms[1::2], strict=True)]
     return terms[0]

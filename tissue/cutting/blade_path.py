@@ -1,4 +1,4 @@
-"""The path of the cutting edge through the material in one step, and the sheet along it."""
+"""The path of the cutting edge through the material in one step, and the plane of the cut there."""
 
 from typing import NamedTuple
 
@@ -12,30 +12,35 @@ from tissue.geometry.exact_predicates import Lattice, nearest
 from tissue.geometry.tetrahedron import nearest_on_segment, normalised
 
 SAME_WAY = 0.7
-"""Cosine of the angle between path and blade up to which the path tells how the sheet lies."""
+"""Cosine of the angle between the normal of the path and that of the blade's flat; below it the
+blade's is used."""
 
 
 class Path(Arrays):
-    """The way of the edge's samples through the material in one step. n samples."""
+    """Displacements of the n samples of the edge through the body at rest in one step."""
 
     t0: FloatArray
-    """Rest positions at the start [m], shape (n, 3)."""
+    """Rest positions of the samples at the start of the step [m], shape (n, 3)."""
     t1: FloatArray
-    """Rest positions at the end [m], shape (n, 3)."""
+    """Rest positions of the samples at the end of the step [m], shape (n, 3)."""
     lattice_t0: IntArray
+    """`t0` on the lattice, shape (n, 3)."""
     lattice_t1: IntArray
+    """`t1` on the lattice, shape (n, 3)."""
     forward: FloatArray
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
     sideways: FloatArray
     """Unit normal of the blade's flat, in the body at rest: the side +1; shape (1, 3)."""
     seed: IntArray
-    """Tetrahedron at or beside the sample, shape (n,)."""
+    """Tetrahedron at or beside each sample, or -1; shape (n,)."""
     member: BoolArray
-    """Whether the sample is part of the chain at the end, shape (n,)."""
+    """Whether each sample is part of the chain at the end of the step, shape (n,)."""
     known: BoolArray
-    """Whether it was so in the step before, so that its `t1` tells where it was; shape (n,)."""
+    """Whether each sample was part of the chain in the step before, so that its `t1` is where it
+    was
+    then; shape (n,)."""
     linked: BoolArray
-    """Whether sample and next sample span a piece of the sheet, shape (n,)."""
+    """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
     boxes: IntArray
     """Lowest and highest lattice point of the quad from each sample to the next, shape (n, 6)."""
 
@@ -58,19 +63,21 @@ def new_path(n: int) -> Path:
 
 
 class Plane(NamedTuple):
-    """The sheet near a point: a point on it and its unit normal, towards side +1."""
+    """The plane of the sheet near a point."""
 
     point: Vec3
+    """A point in the plane, in the body at rest [m]."""
     normal: Vec3
+    """Unit normal towards side +1."""
 
 
 @kernel
 def plane_at(path: Path, k: int, p: Vec3) -> Plane:
-    """The sheet at the point of segment `k` of the edge that is nearest to `p` [m]."""
+    """Return the plane of the sheet at the point of segment `k` of the edge nearest to `p` [m]."""
     tip = vec3(path.t1, k)
     along = sub(vec3(path.t1, k + 1), tip)
     normal = normalised(cross(vec3(path.forward, k), along))
-    # Where anchors are in disorder the normal of the path means nothing; that of the blade does.
+    # Where samples have slipped past each other the normal of the path is of no use.
     sideways = vec3(path.sideways, 0)
     if dot(normal, sideways) < SAME_WAY:
         normal = sideways
@@ -78,13 +85,14 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
 
 
 class Nearest(NamedTuple):
-    """Where the edge is nearest to a point."""
+    """The point of the edge that is nearest to a given point."""
 
     segment: int
-    """-1 where the edge spans nothing."""
+    """Segment of the edge, -1 where the edge spans nothing."""
     along: float
-    """Foot of the point on the segment's line: 0 at its first sample, 1 at its second. Outside of
-    that the point is beyond the segment's end."""
+    """Foot of the given point on the segment's line: 0 at its first sample, 1 at its second.
+    Outside
+    that range the point is beyond an end of the segment."""
 
 
 @kernel
@@ -96,10 +104,10 @@ def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
         if not path.linked[k]:
             continue
         start = vec3(path.t1, k)
-        way = sub(vec3(path.t1, k + 1), start)
-        squared = dot(way, way)
-        along = dot(sub(p, start), way) / squared if squared > 0.0 else 0.0
-        d = sub(p, axpy(min(1.0, max(0.0, along)), way, start))
+        segment = sub(vec3(path.t1, k + 1), start)
+        squared = dot(segment, segment)
+        along = dot(sub(p, start), segment) / squared if squared > 0.0 else 0.0
+        d = sub(p, axpy(min(1.0, max(0.0, along)), segment, start))
         if dot(d, d) < best:
             best = dot(d, d)
             found = Nearest(k, along)
@@ -108,14 +116,17 @@ def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
 
 @kernel
 def plane_near(path: Path, p: Vec3) -> Plane:
-    """The sheet at the point of the edge that is nearest to `p` [m]."""
+    """Return the plane of the sheet at the point of the edge that is nearest to `p` [m].
+
+    Its normal is zero where the edge spans nothing.
+    """
     segment = nearest_on_edge(path, p).segment
     return plane_at(path, segment, p) if segment >= 0 else Plane(p, Vec3(0.0, 0.0, 0.0))
 
 
 @kernel
 def put_on_lattice(path: Path, lattice: Lattice) -> None:
-    """Round the path to the lattice and box its quads, once for all decisions of the step."""
+    """Round the path to the lattice and write the boxes of its quads, once a step."""
     for k in range(len(path.linked)):
         a = nearest(lattice, vec3(path.t0, k))
         b = nearest(lattice, vec3(path.t1, k))
@@ -139,7 +150,7 @@ def put_on_lattice(path: Path, lattice: Lattice) -> None:
 
 @kernel
 def path_travel(path: Path) -> float:
-    """The longest way of a sample through the material in this step [m]."""
+    """Return the largest displacement of a sample through the material in this step [m]."""
     longest = 0.0
     for k in range(len(path.linked) - 1):
         if path.linked[k]:
@@ -149,9 +160,9 @@ def path_travel(path: Path) -> float:
 
 
 def resampled(rows: FloatArray, spacing: float, most: int) -> FloatArray:
-    """Return polylines, shape (n_rows, n, 3), with equally many points on each piece.
+    """Return polylines of shape (n_rows, n, 3) with more points, as many on a piece in each row.
 
-    Points are at most `spacing` [m] apart in the longest row, but no more than `most`.
+    In the longest row points are at most `spacing` [m] apart, unless that takes more than `most`.
     """
     lengths = np.linalg.norm(np.diff(rows, axis=1), axis=2).max(axis=0)
     n_parts = np.maximum(np.ceil(lengths / spacing).astype(np.int64), 1)

@@ -1,57 +1,56 @@
 """Tetrahedra that bridge the cut: behind the blade, with nodes on both sides of the sheet.
 
-Every edge that the blade crosses gets a node on the sheet, so an edge between the two sides can
-only remain where the sheet turns within an element and a node was seen on the one side first, and
-on the other later. It is looked for when a tetrahedron leaves the list of active ones, and
-resolved.
+Every edge that the blade crosses gets a node on the sheet. An edge between the two sides can only
+remain where the sheet turns within an element, so that a node was on one side of it at first and on
+the other later. Such edges are found when a tetrahedron leaves the list of active ones, and cut.
 """
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, lerp, sub, vec3
 from tissue.cutting.blade_path import Path, Plane, nearest_on_edge, plane_at
-from tissue.cutting.cut_surface import on_sheet, see_side, side_of
+from tissue.cutting.cut_surface import note_side, on_sheet, side_of
 from tissue.cutting.snapping import insert_crossing, snap_distance
 from tissue.cutting.workspace import Cut, flag
 
 
 @kernel
 def resolve_bridges(cut: Cut) -> None:
-    """Resolve the bridges among tetrahedra that were active or changed, and are active no more.
+    """Cut the bridges among tetrahedra that were active or changed and are no longer active.
 
-    These stay in `work.previous`, for a last look at their faces.
+    These tetrahedra stay in `scratch.previous`: `separation` marks their faces once more.
     """
-    work, visits = cut.work, cut.visits
+    scratch, visits = cut.scratch, cut.visits
     visits.epoch += 1
     epoch = visits.epoch
-    for i in range(work.n_active[0]):
-        visits.tetrahedra[work.active[i]] = epoch
-    # `visits` is overwritten by the searches below, so the list is thinned out first.
+    for i in range(scratch.n_active):
+        visits.tetrahedra[scratch.active[i]] = epoch
+    # The searches below overwrite `visits`, so the list is filtered first.
     n = 0
-    for i in range(work.n_previous[0]):
-        if visits.tetrahedra[work.previous[i]] != epoch:
-            work.previous[n] = work.previous[i]
+    for i in range(scratch.n_previous):
+        if visits.tetrahedra[scratch.previous[i]] != epoch:
+            scratch.previous[n] = scratch.previous[i]
             n += 1
-    work.n_previous[0] = n
+    scratch.n_previous = n
     for i in range(n):
-        _resolve(cut, work.previous[i])
+        _resolve(cut, scratch.previous[i])
         if cut.change.is_full != 0:
             return
 
 
 @kernel
 def remember_active(cut: Cut) -> None:
-    """Note the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
-    work, change = cut.work, cut.change
+    """Keep the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
+    scratch, change = cut.scratch, cut.change
     n = 0
-    for i in range(work.n_active[0]):
-        if n < len(work.previous):
-            work.previous[n] = work.active[i]
+    for i in range(scratch.n_active):
+        if n < len(scratch.previous):
+            scratch.previous[n] = scratch.active[i]
             n += 1
     for i in range(change.n_dirty):
-        if n < len(work.previous):
-            work.previous[n] = change.dirty[i]
+        if n < len(scratch.previous):
+            scratch.previous[n] = change.dirty[i]
             n += 1
-    work.n_previous[0] = n
+    scratch.n_previous = n
 
 
 @kernel
@@ -70,7 +69,7 @@ def _resolve(cut: Cut, t: int) -> None:
 
 @kernel
 def _resolve_edge(cut: Cut, a: int, b: int) -> None:
-    """Cut an edge between the two sides, or correct a side that was seen from too far away."""
+    """Cut an edge between the two sides, or correct the side of a node far from the blade."""
     body, sheet = cut.body, cut.sheet
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
@@ -88,7 +87,7 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     if height < snap_distance(cut, wrong):
         flag(cut, wrong)
     else:
-        see_side(sheet, wrong, side, True)
+        note_side(sheet, wrong, side, True)
 
 
 @kernel
@@ -98,7 +97,7 @@ def _height(plane: Plane, p: Vec3) -> float:
 
 @kernel
 def _nearest_segment(path: Path, p: Vec3) -> int:
-    """The segment of the edge nearest to `p` [m]; -1 beyond the tip or the heel: no cut there."""
+    """Return the segment of the edge nearest to `p` [m]; -1 beyond tip or heel: no cut there."""
     near = nearest_on_edge(path, p)
     last = len(path.linked) - 2
     beyond = (near.segment == 0 and near.along <= 0.0) or (

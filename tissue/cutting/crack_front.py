@@ -1,9 +1,8 @@
 """The crack front: the path of an end of the blade through the tissue, as edges of the mesh.
 
-Where the tip passes a face, a node is put there, and successive nodes are joined by edges. Without
-them the sheet inside a tetrahedron that the tip passed through need not be a union of mesh faces:
-it failed for 20 to 50 % of the orders of insertion, and with them for none
-of 35,580.
+Where the tip passes through a face, a node is inserted, and successive nodes are joined by edges.
+Without them the sheet inside a tetrahedron that the tip passed through need not be a union of mesh
+faces: it failed for 20 to 50 % of the orders of insertion, and with them for none of 35,580.
 """
 
 from typing import NamedTuple
@@ -13,67 +12,74 @@ from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.cutting.snapping import insert_in_face
 from tissue.cutting.workspace import Cut
-from tissue.geometry.exact_predicates import Point, pierces, point
+from tissue.geometry.exact_predicates import LatticePoint, lattice_point, pierces
 from tissue.mesh.body import local_index
 from tissue.mesh.star import star
 
 MOST_EVENTS = 32
-"""Faces that an end of the blade can pass in one step. It is moved by less than half an element."""
+"""Faces that an end of the blade can pass through in one step, of less than half an element."""
 
 PARAMETER_GAP = 1e-9
-"""Two events nearer than this share of the step are one."""
+"""Share of the step below which two events count as one."""
 
 OUTSIDE_TOLERANCE = 1e-6
-"""Weight by which a line through an edge or a corner may miss a face by rounding."""
+"""Barycentric weight by which a line through an edge or a corner may miss a face by rounding."""
 
 
 class Event(NamedTuple):
-    """The end of the blade passes a face."""
+    """An end of the blade passes through a face."""
 
     when: float
-    """Fraction of the step; 2 where there is none."""
+    """Fraction of the line segment; 2 where there is no event."""
     a: int
+    """First node of the face."""
     b: int
+    """Second node of the face."""
     c: int
+    """Third node of the face."""
     weights: Vec3
+    """Barycentric weights of the point in the face."""
     half: int
     """The face: 4 * tetrahedron + its local face."""
     outer: bool
     """Whether the face is on the skin or on a cut."""
     leaving: bool
+    """Whether the line leaves the tetrahedron there."""
 
 
-class Way(NamedTuple):
-    """A straight way through the body at rest."""
+class LineSegment(NamedTuple):
+    """A straight line through the body at rest."""
 
-    start: Point
-    stop: Point
+    start: LatticePoint
+    """Its start on the lattice."""
+    stop: LatticePoint
+    """Its end on the lattice."""
     origin: Vec3
-    """Where it starts [m]."""
+    """Its start [m]."""
     direction: Vec3
-    """From start to stop [m]."""
+    """The vector from start to end [m]."""
 
 
 @kernel
 def extend_fronts(cut: Cut) -> None:
-    """Extend the crack front at the tip and at the heel by their way in this step."""
+    """Extend the crack front at the tip and at the heel by their paths in this step."""
     path, front = cut.path, cut.sheet.front
     last = len(path.seed) - 1
     for end in range(2):
         sample = 0 if end == 0 else last
         if path.member[sample]:
-            front[end] = _lay_front(cut, way_of_sample(path, sample), front[end])
+            front[end] = _insert_front(cut, line_of_sample(path, sample), front[end])
         else:
             front[end] = -1
 
 
 @kernel
-def way_of_sample(path: Path, sample: int) -> Way:
-    """The way of a sample of the edge in this step."""
+def line_of_sample(path: Path, sample: int) -> LineSegment:
+    """Return the path of a sample of the edge in this step."""
     origin = vec3(path.t0, sample)
-    return Way(
-        point(path.lattice_t0, sample),
-        point(path.lattice_t1, sample),
+    return LineSegment(
+        lattice_point(path.lattice_t0, sample),
+        lattice_point(path.lattice_t1, sample),
         origin,
         sub(vec3(path.t1, sample), origin),
     )
@@ -81,10 +87,10 @@ def way_of_sample(path: Path, sample: int) -> Way:
 
 @kernel
 def bring_front_to_blade(cut: Cut) -> None:
-    """Lay the crack front along the edge itself, where it rests: the cut opens up to there.
+    """Insert a crack front along the edge itself, where it rests: the cut opens up to there.
 
-    Without, it opens up to the last faces that the edge has left behind, up to an element late.
-    While the edge moves on that is soon made good, and every front that is laid adds nodes.
+    Otherwise the cut opens up to the last faces that the edge has left behind, up to an element
+    short. That matters only while the edge rests, and every front adds nodes.
     """
     path, front = cut.path, cut.sheet.front
     last = len(path.seed) - 1
@@ -94,13 +100,13 @@ def bring_front_to_blade(cut: Cut) -> None:
             node = -1
             continue
         origin = vec3(path.t1, k)
-        way = Way(
-            point(path.lattice_t1, k),
-            point(path.lattice_t1, k + 1),
+        line = LineSegment(
+            lattice_point(path.lattice_t1, k),
+            lattice_point(path.lattice_t1, k + 1),
             origin,
             sub(vec3(path.t1, k + 1), origin),
         )
-        node = _lay_front(cut, way, node)
+        node = _insert_front(cut, line, node)
         if cut.change.is_full != 0:
             return
     if node >= 0 and path.member[last] and front[1] >= 0:
@@ -108,14 +114,14 @@ def bring_front_to_blade(cut: Cut) -> None:
 
 
 @kernel
-def _lay_front(cut: Cut, way: Way, before: int) -> int:
-    """Put a node where the way passes each face, and join them, the first one to node `before`.
+def _insert_front(cut: Cut, line: LineSegment, before: int) -> int:
+    """Insert and join nodes where the line pierces faces, the first one with node `before`.
 
-    Returns the last node; -1 where the way has left the body, or never was in it.
+    Returns the last node; -1 where the line has left the body, or never was in it.
     """
     when = 0.0
     for _ in range(MOST_EVENTS):
-        event = next_event(cut, way, when)
+        event = next_event(cut, line, when)
         if event.when > 1.0:
             return before
         when = event.when + PARAMETER_GAP
@@ -131,21 +137,21 @@ def _lay_front(cut: Cut, way: Way, before: int) -> int:
 
 
 @kernel
-def next_event(cut: Cut, way: Way, after: float) -> Event:
-    """The first face that the way pierces after that fraction of it."""
-    work, change = cut.work, cut.change
+def next_event(cut: Cut, line: LineSegment, after: float) -> Event:
+    """Return the first face that the line pierces after fraction `after` of it."""
+    scratch, change = cut.scratch, cut.change
     best = Event(2.0, 0, 0, 0, Vec3(0.0, 0.0, 0.0), -1, False, False)
-    for i in range(work.n_active[0]):
-        best = _earlier_event(cut, work.active[i], way, after, best)
+    for i in range(scratch.n_active):
+        best = _earlier_event(cut, scratch.active[i], line, after, best)
     for i in range(change.n_dirty):
-        best = _earlier_event(cut, change.dirty[i], way, after, best)
+        best = _earlier_event(cut, change.dirty[i], line, after, best)
     return best
 
 
 @kernel
-def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Event:
+def _earlier_event(cut: Cut, t: int, line: LineSegment, after: float, best: Event) -> Event:
     body = cut.body
-    if _is_beyond(cut, t, way):
+    if _is_beyond(cut, t, line):
         return best
     for f in range(4):
         link = body.links[t, f]
@@ -154,13 +160,13 @@ def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Eve
         a = body.tetrahedra[t, (f + 1) % 4]
         b = body.tetrahedra[t, (f + 2) % 4]
         c = body.tetrahedra[t, (f + 3) % 4]
-        pa = point(body.lattice_rest, a)
-        pb = point(body.lattice_rest, b)
-        pc = point(body.lattice_rest, c)
-        if not pierces(way.start, way.stop, pa, pb, pc):
+        pa = lattice_point(body.lattice_rest, a)
+        pb = lattice_point(body.lattice_rest, b)
+        pc = lattice_point(body.lattice_rest, c)
+        if not pierces(line.start, line.stop, pa, pb, pc):
             continue
-        when, w = _meet_plane(
-            way.origin, way.direction, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
+        when, w = _line_plane_intersection(
+            line.origin, line.direction, vec3(body.rest, a), vec3(body.rest, b), vec3(body.rest, c)
         )
         when = min(max(when, PARAMETER_GAP), 1.0)
         if not after < when < best.when:
@@ -169,18 +175,18 @@ def _earlier_event(cut: Cut, t: int, way: Way, after: float, best: Event) -> Eve
             sub(vec3(body.rest, b), vec3(body.rest, a)), sub(vec3(body.rest, c), vec3(body.rest, a))
         )
         apex = sub(vec3(body.rest, body.tetrahedra[t, f]), vec3(body.rest, a))
-        leaving = dot(normal, way.direction) * dot(normal, apex) < 0.0
+        leaving = dot(normal, line.direction) * dot(normal, apex) < 0.0
         best = Event(when, a, b, c, w, 4 * t + f, link < 0, leaving)
     return best
 
 
 @kernel
-def _is_beyond(cut: Cut, t: int, way: Way) -> bool:
-    """Whether the boxes of a tetrahedron and a way are apart."""
+def _is_beyond(cut: Cut, t: int, line: LineSegment) -> bool:
+    """Return whether the boxes of a tetrahedron and a line are apart."""
     grid, nodes = cut.body.lattice_rest, cut.body.tetrahedra
     for x in range(3):
-        low = min(way.start[x], way.stop[x])
-        high = max(way.start[x], way.stop[x])
+        low = min(line.start[x], line.stop[x])
+        high = max(line.start[x], line.stop[x])
         p = grid[nodes[t, 0], x]
         q = grid[nodes[t, 1], x]
         r = grid[nodes[t, 2], x]
@@ -191,15 +197,17 @@ def _is_beyond(cut: Cut, t: int, way: Way) -> bool:
 
 
 @kernel
-def _meet_plane(origin: Vec3, way: Vec3, a: Vec3, b: Vec3, c: Vec3) -> tuple[float, Vec3]:
-    """Where the line meets the plane of abc: parameter along `way`, and weights of a, b, c."""
+def _line_plane_intersection(
+    origin: Vec3, along: Vec3, a: Vec3, b: Vec3, c: Vec3
+) -> tuple[float, Vec3]:
+    """Return where a line crosses the plane of abc: parameter along it, and weights of a, b, c."""
     normal = cross(sub(b, a), sub(c, a))
-    slope = dot(normal, way)
+    slope = dot(normal, along)
     squared = dot(normal, normal)
     if slope == 0.0 or squared == 0.0:
         return -1.0, Vec3(1.0 / 3.0, 1.0 / 3.0, 1.0 / 3.0)
     when = dot(normal, sub(a, origin)) / slope
-    p = Vec3(origin.x + when * way.x, origin.y + when * way.y, origin.z + when * way.z)
+    p = Vec3(origin.x + when * along.x, origin.y + when * along.y, origin.z + when * along.z)
     return when, Vec3(
         dot(cross(sub(c, b), sub(p, b)), normal) / squared,
         dot(cross(sub(a, c), sub(p, c)), normal) / squared,
@@ -211,7 +219,7 @@ def _meet_plane(origin: Vec3, way: Vec3, a: Vec3, b: Vec3, c: Vec3) -> tuple[flo
 def _join(cut: Cut, start: int, stop: int) -> None:
     """Insert nodes along the segment between two nodes until edges of the mesh join them."""
     body = cut.body
-    around = cut.work.around_too
+    around = cut.scratch.around_too
     a = start
     for _ in range(MOST_EVENTS):
         if a == stop:
@@ -231,7 +239,7 @@ def _join(cut: Cut, start: int, stop: int) -> None:
             p = body.tetrahedra[t, (k + 1) % 4]
             q = body.tetrahedra[t, (k + 2) % 4]
             r = body.tetrahedra[t, (k + 3) % 4]
-            when, w = _meet_plane(
+            when, w = _line_plane_intersection(
                 origin,
                 sub(goal, origin),
                 vec3(body.rest, p),

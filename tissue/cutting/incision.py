@@ -82,7 +82,7 @@ class Incision:
     def open_to_edge(self) -> None:
         """Cut up to the edge itself, which rests or leaves the way that it came."""
         self._detect()
-        self._cut_in_passes(self.scheme.rest)
+        self._cut_in_passes(self.scheme.cut_to_edge)
         self._is_open = True
 
     def open_if_at_rest(self, travel: float, dt: float) -> None:

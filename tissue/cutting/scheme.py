@@ -1,4 +1,4 @@
-"""What a scheme of cutting does for `Tissue`: it brings the path of the blade into the mesh."""
+"""The interface of a scheme of cutting, which brings the path of the blade into the mesh."""
 
 from typing import Protocol
 
@@ -24,14 +24,14 @@ def checked_scheme(name: str) -> str:
 
 
 class Scheme(Protocol):
-    """A way to cut a mesh. It owns the arrays of the current incision, not those of the body.
+    """A method of cutting a mesh. It owns the arrays of the incision, not those of the body.
 
-    A cut step is `detect`, then passes of `cut`, each after `grow` and another `detect`, until one
-    no longer ends for want of room (`change.is_full`).
+    A cut step is `detect` (CD), then `cut` (GC). Where `cut` runs out of room (`change.is_full`),
+    `grow`, `detect` and `cut` follow until one pass is complete.
     """
 
     change: Change
-    """What the last pass did; and the area cut since the body was made."""
+    """What the last pass changed, and the area cut since the body was made."""
 
     @property
     def n_active(self) -> int:
@@ -39,27 +39,27 @@ class Scheme(Protocol):
         ...
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
-        """Find the active tetrahedra, and what the edge crossed on its way along `path`."""
+        """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
         ...
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut what was detected: one pass."""
+        """Cut what was detected, in one pass."""
         ...
 
-    def rest(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut up to the edge itself, which rests: one pass."""
+    def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
+        """Cut up to the edge itself, which rests, in one pass."""
         ...
 
     def end(self, body: Body, visits: Visits, path: Path) -> None:
-        """Cut what is left when the blade has left the incision: one pass."""
+        """Cut what remains when the blade has left the incision, in one pass."""
         ...
 
     def forget(self) -> None:
-        """Forget the incision; the next one is another."""
+        """Forget the incision: what is detected next belongs to another."""
         ...
 
     def statistics(self, body: Body) -> SchemeStatistics | None:
-        """Return counts of what was done so far, if the scheme keeps any."""
+        """Return counts of what was done so far; None where the scheme keeps none."""
         ...
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:

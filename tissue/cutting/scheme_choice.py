@@ -3,7 +3,7 @@
 from tissue.cut_settings import CutSettings
 from tissue.cutting.scheme import Scheme
 from tissue.cutting.stellar_scheme import StellarScheme
-from tissue.cutting.workspace import Quality
+from tissue.cutting.workspace import SnapLimits
 from tissue.mesh.body import Body
 
 
@@ -22,7 +22,7 @@ def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size
 
         return PaperScheme(body, density, node_size)
     volume = body.masses.sum() / density
-    lengths = Quality(
+    lengths = SnapLimits(
         snap=float(cut.snap),
         floor=float(cut.floor * node_size),
         guard=float(cut.guard * node_size),

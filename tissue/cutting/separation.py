@@ -1,7 +1,7 @@
-"""Open the sheet: cut the links across the faces that tile it, and give each lip its own nodes.
+"""Separation: cut the links across the faces on the sheet, and give each lip its own nodes.
 
-A face is cut if its three nodes lie on the sheet and the tetrahedra on its two sides are on
-different sides of the sheet. A node whose tetrahedra then no longer hang together is doubled.
+A face is cut if its three nodes lie on the sheet and its two tetrahedra are on different sides of
+the sheet. A node whose tetrahedra are then no longer connected through faces is doubled.
 """
 
 from tissue.core.jit import kernel
@@ -10,9 +10,9 @@ from tissue.cutting.blade_path import plane_near
 from tissue.cutting.cut_surface import (
     decide_side,
     decided_side,
+    note_side,
     on_sheet,
     put_on_sheet,
-    see_side,
     side_of,
 )
 from tissue.cutting.workspace import Cut
@@ -22,12 +22,12 @@ from tissue.mesh.changes import note_dirty
 from tissue.mesh.star import star
 
 CRUMB_TETRAHEDRA = 16
-"""A closed piece of more tetrahedra than this is never taken for a crumb."""
+"""Tetrahedra that a crumb has at most: a closed piece of more of them is always cut loose."""
 
 
 @kernel
 def open_sheet(cut: Cut) -> None:
-    """Cut the faces that now tile the sheet."""
+    """Cut the faces on the sheet, and double their nodes."""
     _mark(cut)
     _keep_crumbs(cut)
     change = cut.change
@@ -36,23 +36,23 @@ def open_sheet(cut: Cut) -> None:
             change.area += face_area(
                 cut.body.rest, cut.body.tetrahedra, change.faces[i, 0], change.faces[i, 1]
             )
-            _unglue_face(cut, i)
+            _detach_along_face(cut, i)
     for i in range(change.n_flagged):
-        _unglue_fans(cut, change.flagged[i])
+        _detach_fans(cut, change.flagged[i])
 
 
 @kernel
 def close_sheet(cut: Cut) -> None:
-    """Cut what is left to cut along the whole sheet: now the sides of all its nodes are known."""
+    """Cut what remains along the whole sheet: by now the sides of all its nodes are known."""
     sheet = cut.sheet
-    for i in range(sheet.n_nodes[0]):
+    for i in range(sheet.n_nodes):
         _mark_star(cut, sheet.nodes[i])
     open_sheet(cut)
 
 
 @kernel
 def _mark_star(cut: Cut, node: int) -> None:
-    around = cut.work.around_too
+    around = cut.scratch.around_too
     n = star(cut.body, cut.visits, node, cut.body.node_tetrahedron[node], around)
     for i in range(n):
         _mark_around(cut, around[i])
@@ -60,12 +60,12 @@ def _mark_star(cut: Cut, node: int) -> None:
 
 @kernel
 def _mark(cut: Cut) -> None:
-    """Cut every face between the two sides, near the blade, behind it, and where nodes were put."""
-    work, change = cut.work, cut.change
-    for i in range(work.n_active[0]):
-        _mark_around(cut, work.active[i])
-    for i in range(work.n_previous[0]):  # by now the sides of all their nodes have been seen
-        _mark_around(cut, work.previous[i])
+    """Cut every face between the two sides: near the blade, behind it, and at new nodes."""
+    scratch, change = cut.scratch, cut.change
+    for i in range(scratch.n_active):
+        _mark_around(cut, scratch.active[i])
+    for i in range(scratch.n_previous):  # by now the sides of all their nodes are known
+        _mark_around(cut, scratch.previous[i])
     for i in range(change.n_flagged):
         _mark_star(cut, change.flagged[i])
 
@@ -91,7 +91,7 @@ def _mark_around(cut: Cut, t: int) -> None:
         if side * other_side >= 0:
             continue
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
-            continue  # the last link of a tetrahedron holds: it would be a crumb
+            continue  # a tetrahedron keeps its last link: alone it would be a crumb
         if change.n_faces == len(change.faces):
             change.is_full = 1
             return
@@ -126,10 +126,10 @@ def _n_links(body: Body, t: int) -> int:
 
 @kernel
 def tetrahedron_side(cut: Cut, t: int) -> int:
-    """Side of the sheet that tetrahedron `t` is on: +1, -1, or 0 where it is on both.
+    """Return the side of the sheet that tetrahedron `t` is on: +1, -1, or 0 where it is on both.
 
-    What was decided stays. Else the side that its nodes off the sheet were seen on; else where they
-    lie; where all four are on the sheet, where the centroid lies.
+    A decision stays. Otherwise its nodes off the sheet decide: by the side that they were found on,
+    else by their positions. Where all four nodes are on the sheet, the centroid decides.
     """
     decided = decided_side(cut.sheet, t)
     if decided != 0:
@@ -176,8 +176,8 @@ def _geometric_side(p: Vec3, on: Vec3, normal: Vec3) -> int:
 
 @kernel
 def _keep_crumbs(cut: Cut) -> None:
-    """Link small closed pieces that this step made back to the side of larger contact."""
-    change, body, work, visits = cut.change, cut.body, cut.work, cut.visits
+    """Link small closed pieces that this pass made back to the side of larger contact."""
+    change, body, scratch, visits = cut.change, cut.body, cut.scratch, cut.visits
     n_faces = change.n_faces
     first = visits.epoch + 1
     for i in range(n_faces):
@@ -190,20 +190,20 @@ def _keep_crumbs(cut: Cut) -> None:
                 continue
             volume = 0.0
             for m in range(n):
-                volume += tetrahedron_volume(body.rest, body.tetrahedra, work.around[m])
-            if volume <= cut.quality.crumb:
+                volume += tetrahedron_volume(body.rest, body.tetrahedra, scratch.around[m])
+            if volume <= cut.limits.crumb:
                 _relink(cut, n)
-            for m in range(n):  # only what a search from `first` on left is known to be large
-                visits.tetrahedra[work.around[m]] = 0
+            for m in range(n):  # a stamp of `first` or later means: part of a large piece
+                visits.tetrahedra[scratch.around[m]] = 0
 
 
 @kernel
 def _small_piece(cut: Cut, start: int, first: int) -> int:
-    """Collect the connected piece of `start` in `work.around`; 0 if it is not a small one.
+    """Collect the connected piece of `start` in `scratch.around`; return its size, 0 if large.
 
-    What a search since visit `first` has seen belongs to a piece that is not small.
+    Tetrahedra that a search since visit `first` has stamped belong to a large piece.
     """
-    body, visits, piece = cut.body, cut.visits, cut.work.around
+    body, visits, piece = cut.body, cut.visits, cut.scratch.around
     visits.epoch += 1
     epoch = visits.epoch
     if visits.tetrahedra[start] >= first:
@@ -227,9 +227,9 @@ def _small_piece(cut: Cut, start: int, first: int) -> int:
 
 @kernel
 def _relink(cut: Cut, n: int) -> None:
-    """Undo the cut faces between the piece in `work.around` and the side it touches most.
+    """Undo the cut faces between the piece in `scratch.around` and the side it touches most.
 
-    The piece was just collected, so its tetrahedra bear the current visit.
+    The piece was just collected, so its tetrahedra are stamped with the current visit.
     """
     change, body, sheet = cut.change, cut.body, cut.sheet
     epoch = cut.visits.epoch
@@ -257,12 +257,12 @@ def _relink(cut: Cut, n: int) -> None:
             body.links[other, g] = 4 * t + f
             change.faces[row, 1] = -1
     for i in range(n):
-        decide_side(sheet, cut.work.around[i], side)
+        decide_side(sheet, cut.scratch.around[i], side)
 
 
 @kernel
 def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
-    """The tetrahedron beyond cut face `row`, if just one of its two is in the piece; else -1."""
+    """Return the tetrahedron outside the piece at cut face `row`; -1 unless just one is."""
     faces, seen = cut.change.faces, cut.visits.tetrahedra
     if faces[row, 1] < 0:
         return -1
@@ -274,10 +274,10 @@ def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
 
 
 @kernel
-def _unglue_face(cut: Cut, row: int) -> None:
-    """Double the nodes of cut face `row` whose tetrahedra it held together.
+def _detach_along_face(cut: Cut, row: int) -> None:
+    """Double the nodes of cut face `row` whose tetrahedra only it connected.
 
-    Every part of a star that fell apart lies at a face cut in this pass, on one side or the other.
+    Where a star fell apart, each part has a face that was cut in this pass.
     """
     change, body = cut.change, cut.body
     for side in range(0, 4, 2):
@@ -285,31 +285,31 @@ def _unglue_face(cut: Cut, row: int) -> None:
         note_dirty(change, t)
         for k in range(4):
             if k != change.faces[row, side + 1]:
-                _unglue(cut, body.tetrahedra[t, k], t)
+                _detach(cut, body.tetrahedra[t, k], t)
 
 
 @kernel
-def _unglue_fans(cut: Cut, node: int) -> None:
-    """Double a node put into the rim of an old cut, if the tetrahedra around it are apart."""
+def _detach_fans(cut: Cut, node: int) -> None:
+    """Double a node inserted in the rim of an old cut, if the tetrahedra around it are apart."""
     body, change = cut.body, cut.change
     for i in range(change.n_dirty):
         t = change.dirty[i]
         if local_index(body, t, node) >= 0:
-            _unglue(cut, node, t)
+            _detach(cut, node, t)
 
 
 @kernel
-def _unglue(cut: Cut, node: int, t: int) -> None:
-    """Give the part of the star of `node` that holds `t` a copy of it, if it is apart."""
-    body, work, change, visits = cut.body, cut.work, cut.change, cut.visits
-    star(body, visits, node, body.node_tetrahedron[node], work.around)
+def _detach(cut: Cut, node: int, t: int) -> None:
+    """Give the part of the star of `node` that holds `t` a copy of `node`, if it is apart."""
+    body, scratch, change, visits = cut.body, cut.scratch, cut.change, cut.visits
+    star(body, visits, node, body.node_tetrahedron[node], scratch.around)
     if visits.tetrahedra[t] == visits.epoch:
         return
-    n = star(body, visits, node, t, work.around)
+    n = star(body, visits, node, t, scratch.around)
     copy = _copy_node(cut, node)
     for i in range(n):
-        body.tetrahedra[work.around[i], local_index(body, work.around[i], node)] = copy
-        note_dirty(change, work.around[i])
+        body.tetrahedra[scratch.around[i], local_index(body, scratch.around[i], node)] = copy
+        note_dirty(change, scratch.around[i])
     body.node_tetrahedron[copy] = t
 
 
@@ -330,6 +330,6 @@ def _copy_node(cut: Cut, node: int) -> int:
     body.off_path[copy] = body.off_path[node]
     if on_sheet(sheet, node):
         put_on_sheet(sheet, copy, sheet.offset[node])
-    see_side(sheet, copy, side_of(sheet, node), True)
+    note_side(sheet, copy, side_of(sheet, node), True)
     sheet.past_offset[copy] = sheet.past_offset[node]
     return copy

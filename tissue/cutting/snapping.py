@@ -1,7 +1,7 @@
-"""Bring the sheet into the mesh: at each crossing use a node that is there, or insert one.
+"""Snapping: at each crossing of the sheet use a node that is there, or insert one.
 
 The rule is one of distance, not of the fraction along the edge, so that the result does not depend
-on the order of crossings and no thin tetrahedron with four nodes on the sheet arises.
+on the order of crossings and no thin tetrahedron has its four nodes on the sheet.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.cutting.blade_path import SAME_WAY, plane_at
-from tissue.cutting.cut_surface import on_sheet, past_offset, see_side
+from tissue.cutting.cut_surface import note_side, on_sheet, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
     face_split_is_good,
@@ -22,32 +22,32 @@ from tissue.mesh.body import CUT
 from tissue.mesh.star import node_size, star
 
 EXPLAINED = 1.5
-"""A crossing is explained by an on-sheet end that is at most this many times as far from the sheet
-as when it was put there. Smaller: re-tracing a cut adds elements."""
+"""An on-sheet end of an edge explains its crossing if it is at most this many times as far from the
+sheet as when it was put there. With less, the same cut again adds elements."""
 
 EXPLAINED_SHARE = 0.05
-"""... or at most this share of the edge's length away."""
+"""Share of the edge's length within which an on-sheet end explains a crossing in any case."""
 
 
 @kernel
 def snap_distance(cut: Cut, node: int) -> float:
-    """Distance within which a crossing moves to `node` [m].
+    """Return the distance within which a crossing moves to `node` [m].
 
-    A node on an earlier cut may lie further from that sheet than its smaller neighbours let a new
-    one be. It draws crossings from there too, so that the same cut again adds nothing.
+    A node on an earlier cut may lie further from that sheet than its smaller neighbours now allow.
+    It takes crossings from that distance too, so that the same cut again adds nothing.
     """
-    size = node_size(cut.body, cut.visits, node, cut.work.around)
-    distance = max(cut.quality.snap * size, cut.quality.floor)
+    size = node_size(cut.body, cut.visits, node, cut.scratch.around)
+    distance = max(cut.limits.snap * size, cut.limits.floor)
     past = EXPLAINED * past_offset(cut.sheet, node)
-    if past > distance and _is_on_such_a_cut(cut, node):
+    if past > distance and _is_on_parallel_cut(cut, node):
         return past
     return distance
 
 
 @kernel
-def _is_on_such_a_cut(cut: Cut, node: int) -> bool:
-    """Whether the cut through `node` lies as the sheet does: a face of it, or all that is known."""
-    body, around = cut.body, cut.work.around
+def _is_on_parallel_cut(cut: Cut, node: int) -> bool:
+    """Return whether a cut face at `node` is parallel to the sheet, or none is known."""
+    body, around = cut.body, cut.scratch.around
     sideways = vec3(cut.path.sideways, 0)
     n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
     any_face = False
@@ -68,43 +68,43 @@ def _is_on_such_a_cut(cut: Cut, node: int) -> bool:
 
 @kernel
 def sort_crossings(cut: Cut) -> None:
-    """Order the crossings by how near they are to the middle of their edge, then by its nodes.
+    """Sort the crossings by how near they are to the middle of their edge, then by its nodes.
 
-    Best-conditioned first; rounded, so that a turned body is cut in the same order.
+    The best-conditioned come first. Rounded, so that a rotated body is cut in the same order.
     """
-    work = cut.work
-    for i in range(work.n_crossings[0]):
-        work.crossing_at[i, 1] = math.floor(abs(work.crossing_at[i, 0] - 0.5) * 1e7 + 0.5)
+    scratch = cut.scratch
+    for i in range(scratch.n_crossings):
+        scratch.crossing_at[i, 1] = math.floor(abs(scratch.crossing_at[i, 0] - 0.5) * 1e7 + 0.5)
         j = i
-        while j > 0 and _comes_first(cut, i, work.order[j - 1]):
-            work.order[j] = work.order[j - 1]
+        while j > 0 and _comes_first(cut, i, scratch.order[j - 1]):
+            scratch.order[j] = scratch.order[j - 1]
             j -= 1
-        work.order[j] = i
+        scratch.order[j] = i
 
 
 @kernel
 def _comes_first(cut: Cut, i: int, j: int) -> bool:
-    work = cut.work
-    if work.crossing_at[i, 1] != work.crossing_at[j, 1]:
-        return work.crossing_at[i, 1] < work.crossing_at[j, 1]
-    if work.crossing[i, 0] != work.crossing[j, 0]:
-        return work.crossing[i, 0] < work.crossing[j, 0]
-    return work.crossing[i, 1] < work.crossing[j, 1]
+    scratch = cut.scratch
+    if scratch.crossing_at[i, 1] != scratch.crossing_at[j, 1]:
+        return scratch.crossing_at[i, 1] < scratch.crossing_at[j, 1]
+    if scratch.crossing[i, 0] != scratch.crossing[j, 0]:
+        return scratch.crossing[i, 0] < scratch.crossing[j, 0]
+    return scratch.crossing[i, 1] < scratch.crossing[j, 1]
 
 
 @kernel
 def insert_crossings(cut: Cut) -> None:
-    """Give every crossed edge a node on the sheet, and its ends a side."""
+    """Give every crossed edge a node on the sheet, and each of its ends a side."""
     sort_crossings(cut)
-    work = cut.work
-    for i in range(work.n_crossings[0]):
-        row = work.order[i]
+    scratch = cut.scratch
+    for i in range(scratch.n_crossings):
+        row = scratch.order[i]
         insert_crossing(
             cut,
-            work.crossing[row, 0],
-            work.crossing[row, 1],
-            work.crossing[row, 2],
-            work.crossing_at[row, 0],
+            scratch.crossing[row, 0],
+            scratch.crossing[row, 1],
+            scratch.crossing[row, 2],
+            scratch.crossing_at[row, 0],
         )
         if cut.change.is_full != 0:
             return
@@ -112,10 +112,18 @@ def insert_crossings(cut: Cut) -> None:
 
 @kernel
 def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
-    """Handle one crossing of edge ab, at fraction `t` from a, by that segment of the edge."""
+    """Give edge ab a node on the sheet, and its ends a side.
+
+    Args:
+        cut: Read and written.
+        a: First node of the edge.
+        b: Second node.
+        segment: Segment of the cutting edge that crossed it.
+        t: Fraction along ab at which it did.
+    """
     sheet, body = cut.sheet, cut.body
     if on_sheet(sheet, a) and on_sheet(sheet, b):
-        return  # the edge lies in the sheet; on a lip it must stay like its twin on the other
+        return  # the edge lies in the sheet; on a lip it must stay equal to its twin
     pa = vec3(body.rest, a)
     pb = vec3(body.rest, b)
     normal = plane_at(cut.path, segment, lerp(t, pa, pb)).normal
@@ -127,12 +135,12 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
     explained_by_b = on_sheet(sheet, b) and _explained(cut, b, (1.0 - t) * height, length)
     if explained_by_a or explained_by_b:
         if not on_sheet(sheet, a):
-            see_side(sheet, a, side, False)
+            note_side(sheet, a, side, False)
         if not on_sheet(sheet, b):
-            see_side(sheet, b, -side, False)
+            note_side(sheet, b, -side, False)
         return
-    see_side(sheet, a, side, True)
-    see_side(sheet, b, -side, True)
+    note_side(sheet, a, side, True)
+    note_side(sheet, b, -side, True)
     near_a = t * height / snap_distance(cut, a)
     near_b = (1.0 - t) * height / snap_distance(cut, b)
     if min(near_a, near_b) < 1.0 or not edge_split_is_good(cut, a, b, t):
@@ -145,16 +153,24 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
 
 @kernel
 def _explained(cut: Cut, node: int, distance: float, length: float) -> bool:
-    """Whether an on-sheet node, that far from the sheet, explains a crossing of its edge."""
+    """Return whether an on-sheet node, that far from the sheet, explains a crossing of its edge."""
     allowance = max(EXPLAINED_SHARE * length, snap_distance(cut, node))
     return distance <= EXPLAINED * cut.sheet.offset[node] + allowance
 
 
 @kernel
 def insert_in_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
-    """Return a node on the sheet at weights `w` of face abc: a corner, a node on a side, or inside.
+    """Return a node on the sheet in face abc: a corner, a node on a side, or one inside.
 
-    Negative where the arrays must grow first.
+    Args:
+        cut: Read and written.
+        a: First corner.
+        b: Second corner.
+        c: Third corner.
+        w: Barycentric weights of the point; slightly negative ones count as 0.
+
+    Returns:
+        The node; NO_ROOM where the arrays must grow first.
     """
     rest = cut.body.rest
     pa = vec3(rest, a)

@@ -1,8 +1,8 @@
 """Stellar subdivision: insert a node into an edge or a face, and split all tetrahedra around it.
 
-This is the paper's splitEdge and splitFace (section 4.3) without the case table: the whole star is
-split at once, so that no hanging node can arise. A node at positive weights turns a tetrahedron
-into children of positive volume.
+These are the paper's splitEdge and splitFace (section 4.3) without the case table: the whole star
+is split at once, so that no node hangs. A node at positive weights turns a tetrahedron into
+children of positive volume.
 """
 
 from tissue.core.array_types import FloatArray
@@ -18,26 +18,34 @@ from tissue.mesh.star import edge_star
 from tissue.mesh.workspace import PASS_NODES, SPARE_NODES
 
 NO_ROOM = -1
-"""In place of a node: the arrays must grow first."""
+"""Returned in place of a node where the arrays must grow first."""
 
 
 @kernel
 def split_edge(cut: Cut, a: int, b: int, t: float) -> int:
     """Insert a node into edge ab at fraction `t` from a; return the node, or NO_ROOM."""
-    n = edge_star(cut.body, cut.visits, a, b, cut.work.parents)
+    n = edge_star(cut.body, cut.visits, a, b, cut.scratch.parents)
     return _split(cut, n, 2, a, b, -1, Vec3(1.0 - t, t, 0.0))
 
 
 @kernel
 def split_face(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
-    """Insert a node into face abc at barycentric weights `w`; return the node, or NO_ROOM."""
+    """Insert a node into face abc; return the node, or NO_ROOM.
+
+    Args:
+        cut: Read and written.
+        a: First corner.
+        b: Second corner.
+        c: Third corner.
+        w: Barycentric weights of the node.
+    """
     n = _face_star(cut, a, b, c)
     return _split(cut, n, 3, a, b, c, w)
 
 
 @kernel
 def _face_star(cut: Cut, a: int, b: int, c: int) -> int:
-    parents = cut.work.parents
+    parents = cut.scratch.parents
     n = edge_star(cut.body, cut.visits, a, b, parents)
     kept = 0
     for i in range(n):
@@ -49,14 +57,22 @@ def _face_star(cut: Cut, a: int, b: int, c: int) -> int:
 
 @kernel
 def edge_split_is_good(cut: Cut, a: int, b: int, t: float) -> bool:
-    """Whether splitting edge ab at `t` leaves every altitude above the guard."""
-    n = edge_star(cut.body, cut.visits, a, b, cut.work.parents)
+    """Return whether splitting edge ab at `t` leaves every altitude above the guard."""
+    n = edge_star(cut.body, cut.visits, a, b, cut.scratch.parents)
     return _children_are_good(cut, n, 2, a, b, -1, Vec3(1.0 - t, t, 0.0))
 
 
 @kernel
 def face_split_is_good(cut: Cut, a: int, b: int, c: int, w: Vec3) -> bool:
-    """Whether splitting face abc at `w` leaves every altitude above the guard."""
+    """Return whether splitting face abc leaves every altitude above the guard.
+
+    Args:
+        cut: Body and limits.
+        a: First corner.
+        b: Second corner.
+        c: Third corner.
+        w: Barycentric weights of the node to insert.
+    """
     n = _face_star(cut, a, b, c)
     return _children_are_good(cut, n, 3, a, b, c, w)
 
@@ -68,7 +84,7 @@ def _pick(i: int, a: int, b: int, c: int) -> int:
 
 @kernel
 def _mix(values: FloatArray, a: int, b: int, c: int, w: Vec3, x: int) -> float:
-    """Component `x` of a field at weights `w` of nodes a, b and, unless it is -1, c."""
+    """Return component `x` of a field at weights `w` of nodes a, b and, unless it is -1, c."""
     value = w.x * values[a, x] + w.y * values[b, x]
     if c >= 0:
         value += w.z * values[c, x]
@@ -81,26 +97,26 @@ def _children_are_good(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w:
     rest = body.rest
     p = Vec3(_mix(rest, a, b, c, w, 0), _mix(rest, a, b, c, w, 1), _mix(rest, a, b, c, w, 2))
     for i in range(n):
-        t = cut.work.parents[i]
+        t = cut.scratch.parents[i]
         for e in range(n_ends):
             replaced = _pick(e, a, b, c)
             q0 = p if body.tetrahedra[t, 0] == replaced else vec3(rest, body.tetrahedra[t, 0])
             q1 = p if body.tetrahedra[t, 1] == replaced else vec3(rest, body.tetrahedra[t, 1])
             q2 = p if body.tetrahedra[t, 2] == replaced else vec3(rest, body.tetrahedra[t, 2])
             q3 = p if body.tetrahedra[t, 3] == replaced else vec3(rest, body.tetrahedra[t, 3])
-            if smallest_altitude(q0, q1, q2, q3) < cut.quality.guard:
+            if smallest_altitude(q0, q1, q2, q3) < cut.limits.guard:
                 return False
     return True
 
 
 @kernel
 def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> int:
-    """Split the first `n` of `work.parents`, which all hold a, b (and c), at weights `w`.
+    """Split the first `n` of `scratch.parents`, which all hold a, b (and c), at weights `w`.
 
     Child e of a parent is the parent with its end e replaced by the new node. Child 0 takes the
     parent's place, the others are appended.
     """
-    body, work, change = cut.body, cut.work, cut.change
+    body, scratch, change = cut.body, cut.scratch, cut.change
     n_appended = n * (n_ends - 1)
     if (
         n == 0
@@ -112,14 +128,14 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
         return NO_ROOM
     node = _new_node(cut, a, b, c, w)
     for i in range(n):
-        t = work.parents[i]
-        work.place[t] = i
-        work.children[i, 0] = t
+        t = scratch.parents[i]
+        scratch.place[t] = i
+        scratch.children[i, 0] = t
         for e in range(1, n_ends):
-            work.children[i, e] = body.n_tetrahedra
+            scratch.children[i, e] = body.n_tetrahedra
             body.n_tetrahedra += 1
         for f in range(4):
-            work.parent_links[i, f] = body.links[t, f]
+            scratch.parent_links[i, f] = body.links[t, f]
     for i in range(n):
         _make_children(cut, i, n_ends, a, b, c, node)
     for i in range(n):
@@ -152,31 +168,31 @@ def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
 
 @kernel
 def _make_children(cut: Cut, i: int, n_ends: int, a: int, b: int, c: int, node: int) -> None:
-    body, work = cut.body, cut.work
-    parent = work.parents[i]
+    body, scratch = cut.body, cut.scratch
+    parent = scratch.parents[i]
     side = decided_side(cut.sheet, parent)
     # The last child first: child 0 overwrites the parent.
     for back in range(n_ends):
         e = n_ends - 1 - back
-        child = work.children[i, e]
+        child = scratch.children[i, e]
         for k in range(4):
             old = body.tetrahedra[parent, k]
             body.tetrahedra[child, k] = node if old == _pick(e, a, b, c) else old
         decide_side(cut.sheet, child, side)
         note_dirty(cut.change, child)
     for e in range(n_ends):
-        child = work.children[i, e]
+        child = scratch.children[i, e]
         for k in range(4):
             body.node_tetrahedron[body.tetrahedra[child, k]] = child
 
 
 @kernel
 def _link_child(cut: Cut, n: int, i: int, e: int, n_ends: int, a: int, b: int, c: int) -> None:
-    body, work = cut.body, cut.work
-    child = work.children[i, e]
+    body, scratch = cut.body, cut.scratch
+    child = scratch.children[i, e]
     own = _end_at(cut, i, e, n_ends, a, b, c)
     for f in range(4):
-        old = work.parent_links[i, f]
+        old = scratch.parent_links[i, f]
         other_end = -1
         for j in range(n_ends):
             if j != e and _end_at(cut, i, j, n_ends, a, b, c) == f:
@@ -186,15 +202,15 @@ def _link_child(cut: Cut, n: int, i: int, e: int, n_ends: int, a: int, b: int, c
             if old >= 0:
                 body.links[old // 4, old % 4] = 4 * child + f
         elif other_end >= 0:  # between two children of this parent
-            body.links[child, f] = 4 * work.children[i, other_end] + own
+            body.links[child, f] = 4 * scratch.children[i, other_end] + own
         elif old >= 0:  # between children of two parents
-            body.links[child, f] = 4 * work.children[work.place[old // 4], e] + old % 4
+            body.links[child, f] = 4 * scratch.children[scratch.place[old // 4], e] + old % 4
         else:
             body.links[child, f] = old
 
 
 @kernel
 def _end_at(cut: Cut, i: int, e: int, n_ends: int, a: int, b: int, c: int) -> int:
-    """Local place of end `e` in parent `i`: a sibling of child `e` still holds it."""
-    sibling = cut.work.children[i, (e + 1) % n_ends]
+    """Return the local place of end `e` in parent `i`: a sibling of child `e` still holds it."""
+    sibling = cut.scratch.children[i, (e + 1) % n_ends]
     return local_index(cut.body, sibling, _pick(e, a, b, c))

@@ -1,54 +1,55 @@
-"""All that a cut step reads and writes: body, path and sheet, what it changed, and its scratch."""
+"""All that a cut step reads and writes: body, path, sheet, changes and scratch."""
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import dot, sub, vec3
 from tissue.cutting.blade_path import Path, plane_near
-from tissue.cutting.cut_surface import Sheet, on_sheet, put_on_sheet
+from tissue.cutting.cut_surface import CutSheet, on_sheet, put_on_sheet
 from tissue.mesh.body import Body
 from tissue.mesh.changes import CHANGES, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 CROSSINGS = 1 << 12
-"""Edges that one pass can cross."""
+"""Crossed edges that one pass can note."""
 
 HASH_SLOTS = 1 << 15
-"""Slots of the table of edges seen; twice what one pass can meet."""
+"""Slots of the table of edges tested; twice the number that one pass can test."""
 
 
-class Quality(Arrays):
-    """When a node that is there is used in place of a new one.
+class SnapLimits(Arrays):
+    """Distances within which a node that is there is used in place of a new one.
 
-    It trades the path of the cut against the smallest element, hence against the time step. Without
-    the guard one unlucky cut divides the time step by a hundred or more.
+    They trade the path of the cut against the smallest element, hence against the time step.
+    Without the guard one unlucky cut divides the time step by a hundred or more.
     """
 
     snap: float
-    """A crossing nearer to a node than this share of the node's size moves to the node."""
+    """Share of a node's size within which a crossing moves to the node."""
     floor: float
-    """... or nearer than this distance [m]."""
+    """Distance within which a crossing moves to a node, whatever the node's size [m]."""
     guard: float
-    """No split may leave an altitude smaller than this [m]; the nearest node is used instead."""
+    """Least altitude that a split may leave [m]; else the nearest node is used."""
     crumb: float
-    """A closed piece smaller than this [m3], made in one step, stays with its larger neighbour."""
+    """Volume below which a closed piece made in one step stays with its larger neighbour [m3]."""
 
 
-class Work(Arrays):
+class CutScratch(Arrays):
     """Scratch of a cut step."""
 
     active: IntArray
-    """Active tetrahedra: those that the swept edge passes through; shape (CHANGES,)."""
+    """Active tetrahedra, which the swept edge passes through; shape (CHANGES,)."""
     segments: IntArray
-    """First and last segment of the edge that each may meet, shape (CHANGES, 2)."""
-    n_active: IntArray
-    """Shape (1,)."""
+    """First and last segment of the edge that each active tetrahedron may touch, shape (CHANGES,
+    2)."""
+    n_active: IntCell
+    """Number of active tetrahedra."""
     previous: IntArray
     """Tetrahedra that were active or changed in the step before, shape (2 * CHANGES,)."""
-    n_previous: IntArray
-    """Shape (1,)."""
+    n_previous: IntCell
+    """Number of tetrahedra in `previous`."""
     around: IntArray
     """A star, shape (LARGEST_STAR,)."""
     around_too: IntArray
@@ -56,21 +57,22 @@ class Work(Arrays):
     parents: IntArray
     """Tetrahedra being split, shape (LARGEST_STAR,)."""
     parent_links: IntArray
-    """Shape (LARGEST_STAR, 4)."""
+    """Links of each parent before the split, shape (LARGEST_STAR, 4)."""
     children: IntArray
-    """Shape (LARGEST_STAR, 3)."""
+    """Tetrahedra that each parent becomes, shape (LARGEST_STAR, 3)."""
     place: IntArray
-    """Where in `parents` a tetrahedron is, shape (tetrahedron capacity,)."""
+    """Index in `parents` of each tetrahedron that is split, shape (tetrahedron capacity,)."""
     crossing: IntArray
-    """Two nodes and a segment of each crossed edge, shape (CROSSINGS, 3)."""
+    """Two nodes of each crossed edge and the segment that crossed it, shape (CROSSINGS, 3)."""
     crossing_at: FloatArray
-    """Where along the edge, from its first node, and along the segment; shape (CROSSINGS, 2)."""
+    """Fraction along each crossed edge, from its first node, and the rank by which crossings are
+    sorted: how far the fraction is from 1/2; shape (CROSSINGS, 2)."""
     order: IntArray
     """Order in which crossings are handled, shape (CROSSINGS,)."""
-    n_crossings: IntArray
-    """Shape (1,)."""
+    n_crossings: IntCell
+    """Number of crossed edges."""
     hash_keys: IntArray
-    """Edges seen, shape (HASH_SLOTS,)."""
+    """Edges tested, by their two nodes, shape (HASH_SLOTS,)."""
     hash_stamps: IntArray
     """Search that wrote each slot, shape (HASH_SLOTS,)."""
 
@@ -80,21 +82,21 @@ class Cut(Arrays):
 
     body: Body
     visits: Visits
-    sheet: Sheet
+    sheet: CutSheet
     path: Path
     change: Change
-    work: Work
-    quality: Quality
+    scratch: CutScratch
+    limits: SnapLimits
 
 
-def new_work(n_tetrahedra: int) -> Work:
+def new_cut_scratch(n_tetrahedra: int) -> CutScratch:
     """Return scratch for a body with room for that many tetrahedra."""
-    return Work(
+    return CutScratch(
         active=np.zeros(CHANGES, np.int64),
         segments=np.zeros((CHANGES, 2), np.int64),
-        n_active=np.zeros(1, np.int64),
+        n_active=0,
         previous=np.zeros(2 * CHANGES, np.int64),
-        n_previous=np.zeros(1, np.int64),
+        n_previous=0,
         around=np.zeros(LARGEST_STAR, np.int64),
         around_too=np.zeros(LARGEST_STAR, np.int64),
         parents=np.zeros(LARGEST_STAR, np.int64),
@@ -104,7 +106,7 @@ def new_work(n_tetrahedra: int) -> Work:
         crossing=np.zeros((CROSSINGS, 3), np.int64),
         crossing_at=np.zeros((CROSSINGS, 2)),
         order=np.zeros(CROSSINGS, np.int64),
-        n_crossings=np.zeros(1, np.int64),
+        n_crossings=0,
         hash_keys=np.zeros(HASH_SLOTS, np.int64),
         hash_stamps=np.zeros(HASH_SLOTS, np.int64),
     )
@@ -112,7 +114,7 @@ def new_work(n_tetrahedra: int) -> Work:
 
 @kernel
 def flag(cut: Cut, node: int) -> None:
-    """Let `node` lie on the sheet."""
+    """Put `node` on the sheet, and note that."""
     sheet = cut.sheet
     if not on_sheet(sheet, node):
         p = vec3(cut.body.rest, node)

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.elasticity.finite_elements import (
-    Law,
+    EnergyDensity,
     build_stars,
     build_tetrahedra,
     grown_solid,
@@ -46,13 +46,13 @@ class Elasticity:
         self._material = material
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
-        has_springs = material.law == "springs"
         law = _law_of(material)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self.arrays = Elastic(
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
             solid=no_solid(law or volume_term(0.0), *room, room_for_stars(*room)),
-            has=np.array([has_springs, law is not None]),
+            has_springs=int(material.law == "springs"),
+            has_tetrahedra=int(law is not None),
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
@@ -146,7 +146,7 @@ class Elasticity:
             self.arrays = self.arrays.replaced(solid=larger)
 
 
-def _law_of(material: Material) -> Law | None:
+def _law_of(material: Material) -> EnergyDensity | None:
     """Return what the tetrahedra resist; None where the springs do it all."""
     if material.law == "neo_hookean":
         return neo_hookean(material.mu, material.lam)

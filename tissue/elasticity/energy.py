@@ -10,7 +10,7 @@ from tissue.mesh.body import Body
 
 @kernel
 def kinetic_energy(body: Body) -> float:
-    """Of all nodes [J]."""
+    """Return the kinetic energy of all nodes [J]."""
     energy = 0.0
     for node in range(body.n_nodes):
         v = vec3(body.velocities, node)
@@ -20,7 +20,7 @@ def kinetic_energy(body: Body) -> float:
 
 @kernel
 def potential_energy(body: Body, gravity: Vec3) -> float:
-    """Of all nodes in gravity [J]."""
+    """Return the potential energy of all nodes in gravity [J]."""
     energy = 0.0
     for node in range(body.n_nodes):
         energy -= body.masses[node] * dot(gravity, vec3(body.positions, node))
@@ -29,7 +29,7 @@ def potential_energy(body: Body, gravity: Vec3) -> float:
 
 @kernel
 def body_energy(body: Body, elastic: Elastic, gravity: Vec3) -> float:
-    """Elastic, kinetic and potential energy [J]."""
+    """Return the sum of elastic, kinetic and potential energy [J]."""
     stored = elastic_energy(elastic, body) + kinetic_energy(body)
     return stored + potential_energy(body, gravity)
 
@@ -43,7 +43,7 @@ def dissipated_power(
     velocities: FloatArray,
     scratch: FloatArray,
 ) -> float:
-    """What viscosity and drag take at that motion [W]; `scratch` has the shape of positions."""
+    """Return the power that viscosity and drag dissipate at that motion [W]."""
     time = surroundings.retardation_time
     power = 0.0
     for node in range(body.n_nodes):

@@ -18,7 +18,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, aligned, filled
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
@@ -32,7 +32,7 @@ height. Bending locks a little: a bar of four cells deflects 0.68 of theory, not
 VOLUME, PER_VOLUME = 6, 7
 """Places in a row of `Solid.shape`; before them grad products 11, 22, 33, 12, 13, 23."""
 
-POOL_MARGIN = LARGEST_STAR + WIDTH
+STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_stars` asks for a larger pool; more than any one row needs."""
 
 
@@ -40,7 +40,7 @@ LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""
 
 
-class Law(Arrays):
+class EnergyDensity(Arrays):
     """Energy per volume at rest, stable neo-Hookean (Smith, de Goes and Kim 2018).
 
     W = mu/2 (|F|^2 - 3) - mu/2 log(|F|^2 + 1) + lam/2 (J - a)^2
@@ -63,7 +63,7 @@ class Law(Arrays):
 class Solid(Arrays):
     """Every tetrahedron and the star of every node. Rows beyond the body's counts are room."""
 
-    law: Law
+    law: EnergyDensity
     nodes: SlotArray
     """Nodes of each tetrahedron, in blocks of four rows of eight (`node_place`)."""
     shape: FloatArray
@@ -98,8 +98,8 @@ class Solid(Arrays):
     """Scratch of `solid_frequency`, shape (nodes,)."""
     raised: IntArray
     """Scratch of `solid_frequency`, shape (nodes,)."""
-    used: IntArray
-    """Slots of the pool in use, shape (1,)."""
+    used: IntCell
+    """Number of slots of the pool in use."""
     every: IntArray
     """0, 1, 2 ...: the list of all blocks, or of all nodes or tetrahedra."""
     volume: FloatArray
@@ -113,7 +113,7 @@ class Solid(Arrays):
     eight, x, y and z (`corner_place`); the first block is 0."""
 
 
-def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> Law:
+def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensity:
     """Return the law with the small-strain moduli `mu` and `lam` (Lame's) [Pa].
 
     Args:
@@ -126,7 +126,7 @@ def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> Law:
     return _law(4.0 / 3.0 * mu, modulus, a, averaged)
 
 
-def volume_term(modulus: float, *, averaged: bool = True) -> Law:
+def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
     """Return the law that only resists changes of volume, by that modulus [Pa]: beside springs.
 
     Args:
@@ -136,12 +136,12 @@ def volume_term(modulus: float, *, averaged: bool = True) -> Law:
     return _law(0.0, modulus, 1.0, averaged, OWN_SHARE)
 
 
-def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0) -> Law:
+def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0) -> EnergyDensity:
     own = own_share * lam if averaged else lam
-    return Law(mu=mu, lam_of_tetrahedra=own, lam_of_nodes=lam - own, a=a)
+    return EnergyDensity(mu=mu, lam_of_tetrahedra=own, lam_of_nodes=lam - own, a=a)
 
 
-def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
+def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return empty rows for that many nodes and tetrahedra."""
     capacity = WIDTH * n_blocks(n_tetrahedra)
     shape = aligned(8 * capacity)
@@ -164,7 +164,7 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
         ring_nodes=np.zeros(LARGEST_RING, dtype=np.int64),
         listed=np.zeros(n_nodes, dtype=np.int64),
         raised=np.zeros(n_nodes, dtype=np.int64),
-        used=np.zeros(1, dtype=np.int64),
+        used=0,
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=aligned(WIDTH + capacity),
         growth=aligned(WIDTH + capacity),
@@ -176,15 +176,16 @@ def no_solid(law: Law, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool)
-    for name in set(Solid.__annotations__) - {"law", "every"}:
+    for name in set(Solid.__annotations__) - {"law", "every", "used"}:
         old = getattr(solid, name)
         getattr(larger, name)[: len(old)] = old
+    larger.used = solid.used
     return larger
 
 
 def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
     """Return the slots that rows of that many nodes and tetrahedra take, and as many to spare."""
-    return 2 * (4 * n_tetrahedra + WIDTH * n_nodes) + POOL_MARGIN
+    return 2 * (4 * n_tetrahedra + WIDTH * n_nodes) + STAR_POOL_MARGIN
 
 
 @kernel
@@ -232,7 +233,7 @@ def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> 
 
 @kernel
 def rest_normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
-    """6 V grad N of nodes 1, 2 and 3 of a tetrahedron at rest [m2], and V [m3]."""
+    """Return 6 V grad N of nodes 1, 2 and 3 of a tetrahedron at rest [m2], and V [m3]."""
     x0 = vec3(body.rest, body.tetrahedra[t, 0])
     d1 = sub(vec3(body.rest, body.tetrahedra[t, 1]), x0)
     d2 = sub(vec3(body.rest, body.tetrahedra[t, 2]), x0)
@@ -251,7 +252,7 @@ def build_stars(
     tetrahedra around them must be up to date. `around` is scratch of shape (LARGEST_STAR,).
     """
     for i in range(n):
-        if solid.used[0] + POOL_MARGIN > len(solid.corner):
+        if solid.used + STAR_POOL_MARGIN > len(solid.corner):
             return i
         _build_star(solid, body, visits, nodes[i], around)
     return n
@@ -261,9 +262,9 @@ def build_stars(
 def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: IntArray) -> None:
     n = sorted_star(body, visits, node, around)
     if n > solid.room[node]:
-        solid.first[node] = solid.used[0]
+        solid.first[node] = solid.used
         solid.room[node] = filled(n)
-        solid.used[0] += solid.room[node]
+        solid.used += solid.room[node]
     first = solid.first[node]
     solid.count[node] = n
     for slot in range(first + n, first + filled(n)):
@@ -281,12 +282,12 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
 
 
 @kernel
-def tetrahedron_at(solid: Solid, slot: int) -> int:
+def tetrahedron_of_slot(solid: Solid, slot: int) -> int:
     """Return the tetrahedron that a slot of a row names."""
     return solid.around[slot] - WIDTH
 
 
 @kernel
-def corner_at(solid: Solid, slot: int) -> int:
+def corner_of_slot(solid: Solid, slot: int) -> int:
     """Return which of its four nodes the node is."""
     return solid.corner[slot] // (3 * WIDTH) % 4

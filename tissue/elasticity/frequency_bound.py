@@ -25,10 +25,10 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, axpy, norm, scale, store, vec3
 from tissue.elasticity.finite_elements import (
     Solid,
-    corner_at,
+    corner_of_slot,
     node_place,
     rest_normals,
-    tetrahedron_at,
+    tetrahedron_of_slot,
 )
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
 from tissue.mesh.body import Body
@@ -77,7 +77,7 @@ def bound_around(solid: Solid, body: Body, visits: Visits, listed: IntArray, n: 
 
 @kernel
 def _reweighted(solid: Solid, body: Body, node: int) -> bool:
-    """Whether the node got another weight."""
+    """Return whether the node got another weight."""
     if body.fixed[node]:
         return False
     mass = body.masses[node]
@@ -105,7 +105,7 @@ def with_neighbours(solid: Solid, visits: Visits, listed: IntArray, n: int) -> i
     for i in range(n):
         node = listed[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            t = tetrahedron_at(solid, slot)
+            t = tetrahedron_of_slot(solid, slot)
             for k in range(4):
                 n_listed = _list(visits, listed, n_listed, solid.nodes[node_place(t, k)])
     return n_listed
@@ -138,7 +138,7 @@ def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> 
     visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-        t = tetrahedron_at(solid, slot)
+        t = tetrahedron_of_slot(solid, slot)
         n1, n2, n3, _ = rest_normals(body, t)
         n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
         n = _add_to_ring(solid, visits, n, t, 1, n1)
@@ -167,7 +167,7 @@ def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: V
 
 @kernel
 def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
-    """|N_b| / m_b of a node [1/s2]."""
+    """Return |N_b| / m_b of a node, its bound on w^2 [1/s2]."""
     weight = solid.weight[node]
     if weight == 0.0:
         return 0.0
@@ -179,7 +179,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-        t = tetrahedron_at(solid, slot)
+        t = tetrahedron_of_slot(solid, slot)
         n1, n2, n3, volume = rest_normals(body, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
         ratios = (
@@ -188,7 +188,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
             + solid.weight[solid.nodes[node_place(t, 2)]] * norm(n2)
             + solid.weight[solid.nodes[node_place(t, 3)]] * norm(n3)
         )
-        k = corner_at(solid, slot)
+        k = corner_of_slot(solid, slot)
         normal = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
         length = norm(normal)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)

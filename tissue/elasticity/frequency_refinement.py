@@ -65,7 +65,7 @@ def tighten(solid: Solid, body: Body, visits: Visits, n_listed: int, allowed: fl
 
 @kernel
 def _worst(solid: Solid, n_listed: int) -> float:
-    """Highest bound on w^2 of the nodes that are listed [1/s2]."""
+    """Return the highest bound on w^2 of the listed nodes [1/s2]."""
     worst = 0.0
     for i in range(n_listed):
         worst = max(worst, solid.frequency_squared[solid.listed[i]])

@@ -4,10 +4,10 @@ Springs along the edges, tetrahedra as elements of a solid, or both: the law of 
 which. Dampers lie along the edges under either law.
 """
 
-from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
@@ -15,17 +15,16 @@ from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_f
 from tissue.elasticity.springs import Springs, spring_energy
 from tissue.mesh.body import Body
 
-SPRINGS, TETRAHEDRA_TOO = 0, 1
-"""Places in `Elastic.has`."""
-
 
 class Elastic(Arrays):
     """All that forces inside the body follow from."""
 
     springs: Springs
     solid: Solid
-    has: BoolArray
-    """Whether springs pull, and whether tetrahedra do; shape (2,)."""
+    has_springs: IntCell
+    """1 if springs along the edges pull, else 0."""
+    has_tetrahedra: IntCell
+    """1 if tetrahedra resist deformation, else 0."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
 
@@ -44,7 +43,7 @@ class Surroundings(Arrays):
 @kernel
 def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
     """Evaluate all tetrahedra at `positions` [m], for `internal_force`."""
-    if elastic.has[TETRAHEDRA_TOO]:
+    if elastic.has_tetrahedra:
         solid = elastic.solid
         blocks, nodes = n_blocks(body.n_tetrahedra), body.n_nodes
         solid_forces(solid, positions, solid.every, blocks, solid.every, nodes)
@@ -58,17 +57,17 @@ def internal_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Force of the body on one of its nodes, elastic and viscous [N], after `deform`."""
+    """Return the force of the body on one of its nodes, elastic and viscous [N], after `deform`."""
     springs = elastic.springs
     total = point_of(0.0, 0.0, 0.0)
-    if not elastic.has[SPRINGS]:
+    if not elastic.has_springs:
         if retardation_time > 0.0:
             total = damping_force(springs, node, positions, velocities, retardation_time)
     elif retardation_time > 0.0:
         total = elastic_and_damping_force(springs, node, positions, velocities, retardation_time)
     else:
         total = elastic_force(springs, node, positions)
-    if elastic.has[TETRAHEDRA_TOO]:
+    if elastic.has_tetrahedra:
         total = total + solid_force(elastic.solid, node)
     return total
 
@@ -81,7 +80,7 @@ def viscous_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """The viscous part of it [N]; linear in the velocities."""
+    """Return the viscous part of the force on a node [N]; it is linear in the velocities."""
     return damping_force(elastic.springs, node, positions, velocities, retardation_time)
 
 
@@ -91,20 +90,20 @@ def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
     for i in range(n):
         node = nodes[i]
         bound = 0.0
-        if elastic.has[SPRINGS]:
+        if elastic.has_springs:
             bound += elastic.springs.frequency_squared[node]
-        if elastic.has[TETRAHEDRA_TOO]:
+        if elastic.has_tetrahedra:
             bound += elastic.solid.frequency_squared[node]
         elastic.frequency_squared[node] = bound
 
 
 @kernel
 def elastic_energy(elastic: Elastic, body: Body) -> float:
-    """Elastic energy of the body as it is, less that at rest [J]."""
+    """Return the elastic energy of the body as it is, less that at rest [J]."""
     energy = 0.0
-    if elastic.has[SPRINGS]:
+    if elastic.has_springs:
         energy += spring_energy(elastic.springs, body)
-    if elastic.has[TETRAHEDRA_TOO]:
+    if elastic.has_tetrahedra:
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         energy += solid_energy(elastic.solid, body.positions, n_tetrahedra, n_nodes)
     return energy

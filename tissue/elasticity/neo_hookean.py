@@ -17,7 +17,16 @@ import math
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, Point, eight_points, lanes, load, point_of, store
+from tissue.core.simd import (
+    WIDTH,
+    Lanes,
+    Point,
+    eight_points,
+    lanes,
+    load_lanes,
+    point_of,
+    store_lanes,
+)
 from tissue.core.simd_gather import gathered, sum_of_eight, sum_of_eight_points
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, scale, sub, vec3
 from tissue.elasticity.finite_elements import (
@@ -54,7 +63,7 @@ def solid_forces(
 
 @inlined
 def solid_force(solid: Solid, node: int) -> Point:
-    """Force of the tetrahedra around a node on it [N], from `corner_forces`."""
+    """Return the force of the tetrahedra around a node on it [N], from `corner_forces`."""
     total = point_of(0.0, 0.0, 0.0)
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
@@ -64,7 +73,7 @@ def solid_force(solid: Solid, node: int) -> Point:
 
 @kernel
 def has_averaged_volumes(solid: Solid) -> bool:
-    """Whether forces need the first two loops, `volumes` and `pressures`."""
+    """Return whether forces need the first two loops, `volumes` and `pressures`."""
     return solid.law.lam_of_nodes != 0.0
 
 
@@ -74,7 +83,7 @@ def volumes(solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, e
     for i in range(begin, end):
         block = blocks[i]
         d1, d2, d3 = edges(solid, positions, block)
-        store(solid.volume, WIDTH * (1 + block), lanes(1.0 / 6.0) * dot(d1, cross(d2, d3)))
+        store_lanes(solid.volume, WIDTH * (1 + block), lanes(1.0 / 6.0) * dot(d1, cross(d2, d3)))
 
 
 @kernel
@@ -120,14 +129,14 @@ def corner_forces(
 def _store(solid: Solid, block: int, k: int, force: Vec3) -> None:
     """Write the forces on corners `k` of eight tetrahedra."""
     place = corner_place(WIDTH * block, k)
-    store(solid.forces, place, force.x)
-    store(solid.forces, place + WIDTH, force.y)
-    store(solid.forces, place + 2 * WIDTH, force.z)
+    store_lanes(solid.forces, place, force.x)
+    store_lanes(solid.forces, place + WIDTH, force.y)
+    store_lanes(solid.forces, place + 2 * WIDTH, force.z)
 
 
 @inlined
 def edges(solid: Solid, positions: FloatArray, block: int) -> tuple[Vec3, Vec3, Vec3]:
-    """From node 0 to nodes 1, 2 and 3 of eight tetrahedra: each coordinate is `Lanes`."""
+    """Return the edges from node 0 to nodes 1, 2 and 3 of eight tetrahedra, as `Lanes`."""
     x0 = _corners(solid, positions, block, 0)
     return (
         sub(_corners(solid, positions, block, 1), x0),
@@ -144,13 +153,13 @@ def _corners(solid: Solid, positions: FloatArray, block: int, k: int) -> Vec3:
 
 @inlined
 def shape_of(solid: Solid, block: int, which: int) -> Lanes:
-    """A quantity of `Solid.shape` for eight tetrahedra."""
-    return load(solid.shape, WIDTH * (WIDTH * block + which))
+    """Return a quantity of `Solid.shape` for eight tetrahedra."""
+    return load_lanes(solid.shape, WIDTH * (WIDTH * block + which))
 
 
 @inlined
 def _weighted(solid: Solid, block: int, d1: Vec3, d2: Vec3, d3: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """e_i = sum over j of (V grad N_i . grad N_j) d_j [m2]."""
+    """Return e_i = sum over j of (V grad N_i . grad N_j) d_j [m2], for i = 1, 2, 3."""
     k11, k22, k33 = shape_of(solid, block, 0), shape_of(solid, block, 1), shape_of(solid, block, 2)
     k12, k13, k23 = shape_of(solid, block, 3), shape_of(solid, block, 4), shape_of(solid, block, 5)
     return (
@@ -162,7 +171,7 @@ def _weighted(solid: Solid, block: int, d1: Vec3, d2: Vec3, d3: Vec3) -> tuple[V
 
 @inlined
 def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
-    """Sum of the pressures at the four nodes [Pa]."""
+    """Return the sum of the pressures at the four nodes [Pa]."""
     first = 4 * WIDTH * block
     ends = gathered(solid.pressure, solid.nodes, first)
     ends = ends + gathered(solid.pressure, solid.nodes, first + WIDTH)
@@ -172,7 +181,7 @@ def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
 
 @inlined
 def _volume_around(solid: Solid, node: int) -> float:
-    """A quarter of each tetrahedron around the node, as `volumes` left them [m3]."""
+    """Return a quarter of each tetrahedron around the node, as `volumes` left them [m3]."""
     total = 0.0
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
@@ -182,7 +191,7 @@ def _volume_around(solid: Solid, node: int) -> float:
 
 @kernel
 def solid_energy(solid: Solid, positions: FloatArray, n_tetrahedra: int, n_nodes: int) -> float:
-    """Elastic energy of the body at `positions` [m], less that at rest [J]."""
+    """Return the elastic energy of the body at `positions` [m], less that at rest [J]."""
     law = solid.law
     volumes(solid, positions, solid.every, 0, n_blocks(n_tetrahedra))
     at_rest = (1.0 - law.a) ** 2
@@ -202,7 +211,7 @@ def solid_energy(solid: Solid, positions: FloatArray, n_tetrahedra: int, n_nodes
 
 @kernel
 def _gradient_squared(solid: Solid, positions: FloatArray, t: int) -> float:
-    """|F|^2 of a tetrahedron."""
+    """Return |F|^2 of a tetrahedron."""
     x0 = _node(solid, positions, t, 0)
     d1 = sub(_node(solid, positions, t, 1), x0)
     d2 = sub(_node(solid, positions, t, 2), x0)

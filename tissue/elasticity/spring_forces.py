@@ -12,7 +12,7 @@ from tissue.core.simd import (
     eight_points,
     filled,
     lanes,
-    load,
+    load_lanes,
     square_root,
     summed,
     times,
@@ -26,7 +26,7 @@ coincide, from a division by zero."""
 
 @inlined
 def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
-    """Pull of the springs on a node [N]: sum of k (l - l0) along each."""
+    """Return the pull of the springs on a node [N]: the sum of k (l - l0) along each."""
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     fx = fy = fz = lanes(0.0)
     first = springs.first[node]
@@ -34,7 +34,7 @@ def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         length = square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
-        pull = load(springs.stiffness, slot) - load(springs.rest_pull, slot) / length
+        pull = load_lanes(springs.stiffness, slot) - load_lanes(springs.rest_pull, slot) / length
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
     return summed(fx, fy, fz)
 
@@ -47,7 +47,7 @@ def damping_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Force of the dampers along the springs on a node [N]: retardation time times k l'."""
+    """Return the force of the dampers along springs on a node [N]: retardation time times k l'."""
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     fx = fy = fz = lanes(0.0)
@@ -58,7 +58,7 @@ def damping_force(
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)
         approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
         squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
-        pull = load(springs.stiffness, slot) * approach / squared
+        pull = load_lanes(springs.stiffness, slot) * approach / squared
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
     return times(retardation_time, summed(fx, fy, fz))
 
@@ -71,7 +71,7 @@ def elastic_and_damping_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """`elastic_force` and `damping_force` in one go [N]."""
+    """Return the sum of `elastic_force` and `damping_force` in one pass over the row [N]."""
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     time, one = lanes(retardation_time), lanes(1.0)
@@ -83,8 +83,8 @@ def elastic_and_damping_force(
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)
         approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
         inverse = one / square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
-        stiffness = load(springs.stiffness, slot)
-        pull = stiffness - load(springs.rest_pull, slot) * inverse
+        stiffness = load_lanes(springs.stiffness, slot)
+        pull = stiffness - load_lanes(springs.rest_pull, slot) * inverse
         pull = pull + stiffness * (time * approach * inverse * inverse)
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
     return summed(fx, fy, fz)

@@ -15,7 +15,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, filled
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import norm, sub, vec3
 from tissue.geometry.tetrahedron import (
     add_square,
@@ -26,7 +26,7 @@ from tissue.geometry.tetrahedron import (
 from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
-POOL_MARGIN = LARGEST_STAR + WIDTH
+SPRING_POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_rows` asks for a larger pool; more than any one row needs."""
 
 
@@ -49,8 +49,8 @@ class Springs(Arrays):
     """Largest eigenvalue of the stiffness that holds the node in place, per mass [1/s2]."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (capacity,)."""
-    used: IntArray
-    """Slots of the pool in use, shape (1,)."""
+    used: IntCell
+    """Number of slots of the pool in use."""
 
 
 def no_springs(n_nodes: int, pool: int) -> Springs:
@@ -64,7 +64,7 @@ def no_springs(n_nodes: int, pool: int) -> Springs:
         rest_pull=np.zeros(pool),
         stiffness_per_mass=np.zeros(n_nodes),
         frequency_squared=np.zeros(n_nodes),
-        used=np.zeros(1, dtype=np.int64),
+        used=0,
     )
 
 
@@ -94,7 +94,7 @@ def build_rows(
     scratch of shape (LARGEST_STAR,).
     """
     for i in range(n):
-        if springs.used[0] + POOL_MARGIN > len(springs.neighbour):
+        if springs.used + SPRING_POOL_MARGIN > len(springs.neighbour):
             return i
         _build_row(body, visits, springs, nodes[i], density, young_modulus, around)
     return n
@@ -125,9 +125,9 @@ def _build_row(
                 n += 1
     if n > springs.room[node]:
         room = filled(n)
-        springs.first[node] = springs.used[0]
+        springs.first[node] = springs.used
         springs.room[node] = room
-        springs.used[0] += room
+        springs.used += room
     first = springs.first[node]
     for slot in range(first, first + n):
         springs.stiffness[slot] = 0.0
@@ -159,7 +159,7 @@ def _build_row(
 
 @kernel
 def _stiffness_per_mass(body: Body, springs: Springs, node: int) -> float:
-    """Largest eigenvalue of S = sum of k u u^T over the row, per mass of the node [1/s2]."""
+    """Return the largest eigenvalue of S = sum of k u u^T over the row, per mass [1/s2]."""
     here = vec3(body.rest, node)
     stiffness = nothing_symmetric()
     for slot in range(springs.first[node], springs.first[node] + springs.count[node]):
@@ -191,7 +191,7 @@ def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> 
 
 @kernel
 def spring_energy(springs: Springs, body: Body) -> float:
-    """Energy stored in the springs [J]: sum of k (l - l0)^2 / 2, each spring once."""
+    """Return the energy stored in the springs [J]: sum of k (l - l0)^2 / 2, each spring once."""
     energy = 0.0
     for i in range(body.n_nodes):
         here = vec3(body.positions, i)
@@ -206,7 +206,7 @@ def spring_energy(springs: Springs, body: Body) -> float:
 
 @kernel
 def total_volume(body: Body) -> float:
-    """Volume of the body at rest [m3]."""
+    """Return the volume of the body at rest [m3]."""
     volume = 0.0
     for t in range(body.n_tetrahedra):
         volume += tetrahedron_volume(body.rest, body.tetrahedra, t)

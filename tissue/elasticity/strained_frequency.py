@@ -9,7 +9,7 @@ half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the t
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, lanes, store
+from tissue.core.simd import WIDTH, Lanes, lanes, store_lanes
 from tissue.core.simd_gather import gathered, larger, largest
 from tissue.core.vec3 import add, cross, dot
 from tissue.elasticity.finite_elements import VOLUME, Solid
@@ -21,7 +21,7 @@ from tissue.elasticity.neo_hookean import edges, shape_of
 def strained_frequency(
     elastic: Elastic, positions: FloatArray, blocks: IntArray, begin: int, end: int
 ) -> float:
-    """Largest bound on w^2 at `positions` over the tetrahedra in `blocks[begin:end]` [1/s2]."""
+    """Return the largest bound on w^2 at `positions` in `blocks[begin:end]` [1/s2]."""
     nodes = elastic.solid.nodes
     worst = lanes(0.0)
     for i in range(begin, end):
@@ -56,7 +56,7 @@ def strain_frequencies(
     solid = elastic.solid
     for i in range(n_blocks):
         growth = _growth(solid, positions, blocks[i])
-        store(solid.growth, WIDTH * (1 + blocks[i]), growth)
+        store_lanes(solid.growth, WIDTH * (1 + blocks[i]), growth)
     bound_both_frequencies(elastic, nodes, n)
     for i in range(n):
         node = nodes[i]
@@ -70,7 +70,7 @@ def strain_frequencies(
 
 @inlined
 def _growth(solid: Solid, positions: FloatArray, block: int) -> Lanes:
-    """Largest square of a face of each of eight tetrahedra over that at rest, at least 1."""
+    """Return the growth of the square of the face of each of eight tetrahedra that grew most."""
     d1, d2, d3 = edges(solid, positions, block)
     n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
     n0 = add(n1, add(n2, n3))

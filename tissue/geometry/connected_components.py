@@ -28,7 +28,7 @@ def components(n: int, pairs: IntArray) -> tuple[int, IntArray]:
 
 @kernel
 def _root(parent: IntArray, vertex: int) -> int:
-    """Return the root of the set that holds `vertex`, and shorten the way there."""
+    """Return the root of the set that holds `vertex`, and shorten the path to it."""
     while parent[vertex] != vertex:
         parent[vertex] = parent[parent[vertex]]
         vertex = parent[vertex]

@@ -1,10 +1,11 @@
-"""Exact answers to geometric questions: which side of a plane, does a segment pierce a triangle.
+"""Exact geometric predicates: on which side of a plane is a point, does a segment pierce a
+triangle.
 
 Decisions are taken on integer coordinates. A `Lattice` covers the body at rest with 2^18 points
 along its longest side; a determinant of coordinate differences below 2^20 fits an int64, so its
 sign is exact.
-Zero counts as positive, and a line is always asked with its ends in one order, so that all who
-share an edge, a face or a line get the same answer.
+Zero counts as positive, and a line is always tested with its ends in the same order, so that all
+elements that share an edge, a face or a line get the same answer.
 """
 
 from typing import NamedTuple
@@ -21,11 +22,11 @@ LATTICE_POINTS = 1 << 18
 of points that lie outside the body; fewer only make the lattice coarser (0.4 um in 0.1 m)."""
 
 LATTICE_LIMIT = (1 << 19) - 1
-"""Largest coordinate. Points further out (a blade far from the body) are pulled in to it."""
+"""Largest coordinate. Points further out (a blade far from the body) are clamped to it."""
 
 
-class Point(NamedTuple):
-    """A lattice point."""
+class LatticePoint(NamedTuple):
+    """A point of the lattice, by whole numbers."""
 
     x: int
     y: int
@@ -33,7 +34,7 @@ class Point(NamedTuple):
 
 
 class Lattice(Arrays):
-    """Where the lattice lies."""
+    """Origin and spacing of the lattice."""
 
     origin: FloatArray
     """Centre of the body at rest [m], shape (3,)."""
@@ -48,9 +49,9 @@ def lattice_around(positions: FloatArray) -> Lattice:
 
 
 @kernel
-def nearest(lattice: Lattice, p: Vec3) -> Point:
+def nearest(lattice: Lattice, p: Vec3) -> LatticePoint:
     """Return the lattice point nearest to `p` [m]."""
-    return Point(
+    return LatticePoint(
         _round((p.x - lattice.origin[0]) / lattice.spacing),
         _round((p.y - lattice.origin[1]) / lattice.spacing),
         _round((p.z - lattice.origin[2]) / lattice.spacing),
@@ -63,14 +64,14 @@ def _round(value: float) -> int:
 
 
 @kernel
-def point(array: IntArray, i: int) -> Point:
+def lattice_point(array: IntArray, i: int) -> LatticePoint:
     """Return row `i` of an array of lattice points, shape (n, 3)."""
-    return Point(array[i, 0], array[i, 1], array[i, 2])
+    return LatticePoint(array[i, 0], array[i, 1], array[i, 2])
 
 
 @kernel
-def orient3d(a: Point, b: Point, c: Point, d: Point) -> int:
-    """Six times the signed volume of abcd in lattice units, exact; positive if d is above abc."""
+def orient3d(a: LatticePoint, b: LatticePoint, c: LatticePoint, d: LatticePoint) -> int:
+    """Return six times the signed volume of abcd in lattice units, exact; positive: d above abc."""
     ux = b.x - a.x
     uy = b.y - a.y
     uz = b.z - a.z
@@ -84,7 +85,7 @@ def orient3d(a: Point, b: Point, c: Point, d: Point) -> int:
 
 
 @kernel
-def _comes_before(p: Point, q: Point) -> bool:
+def _comes_before(p: LatticePoint, q: LatticePoint) -> bool:
     if p.x != q.x:
         return p.x < q.x
     if p.y != q.y:
@@ -93,19 +94,29 @@ def _comes_before(p: Point, q: Point) -> bool:
 
 
 @kernel
-def _passes_left(a: Point, b: Point, p: Point, q: Point) -> bool:
-    """On which side the line ab passes the directed line pq. Reversing pq reverses the answer."""
+def _passes_left(a: LatticePoint, b: LatticePoint, p: LatticePoint, q: LatticePoint) -> bool:
+    """Return on which side line ab passes the directed line pq; reversing pq reverses it."""
     if _comes_before(p, q):
         return orient3d(a, b, p, q) >= 0
     return not orient3d(a, b, q, p) >= 0
 
 
 @kernel
-def pierces(a: Point, b: Point, p: Point, q: Point, r: Point) -> bool:
-    """Whether segment ab pierces triangle pqr.
+def pierces(
+    a: LatticePoint, b: LatticePoint, p: LatticePoint, q: LatticePoint, r: LatticePoint
+) -> bool:
+    """Return whether segment ab pierces triangle pqr.
 
-    Of two triangles that share an edge, or two segments that share an end, exactly one is pierced
-    where the segment passes through what they share. A flat triangle is never pierced.
+    Where the segment passes through an edge that two triangles share, exactly one of them is
+    pierced; where the end that two segments share lies in the triangle, exactly one of them pierces
+    it. A flat triangle is never pierced.
+
+    Args:
+        a: Start of the segment.
+        b: End of the segment.
+        p: First corner of the triangle.
+        q: Second corner.
+        r: Third corner.
     """
     if (orient3d(p, q, r, a) >= 0) == (orient3d(p, q, r, b) >= 0):
         return False

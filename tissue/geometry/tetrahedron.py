@@ -1,4 +1,5 @@
-"""Measures of tetrahedra: volumes, altitudes, barycentric weights, deformation."""
+"""Geometry of tetrahedra: volumes, altitudes, barycentric weights, nearest points, 3 x 3
+matrices."""
 
 import math
 from typing import NamedTuple
@@ -21,19 +22,22 @@ class Matrix3(NamedTuple):
     """A 3 by 3 matrix by its columns."""
 
     c0: Vec3
+    """First column."""
     c1: Vec3
+    """Second column."""
     c2: Vec3
+    """Third column."""
 
 
 @kernel
 def signed_volume(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> float:
-    """Signed volume of tetrahedron abcd [m3], positive if abc turns left seen from d."""
+    """Return the signed volume of tetrahedron abcd [m3], positive if abc turns left seen from d."""
     return dot(cross(sub(b, a), sub(c, a)), sub(d, a)) / 6.0
 
 
 @kernel
 def tetrahedron_volume(positions: FloatArray, tetrahedra: IntArray, t: int) -> float:
-    """Signed volume of tetrahedron `t` [m3]."""
+    """Return the signed volume of tetrahedron `t` [m3]."""
     return signed_volume(
         vec3(positions, tetrahedra[t, 0]),
         vec3(positions, tetrahedra[t, 1]),
@@ -44,13 +48,13 @@ def tetrahedron_volume(positions: FloatArray, tetrahedra: IntArray, t: int) -> f
 
 @kernel
 def triangle_area(a: Vec3, b: Vec3, c: Vec3) -> float:
-    """Area of triangle abc [m2]."""
+    """Return the area of triangle abc [m2]."""
     return 0.5 * norm(cross(sub(b, a), sub(c, a)))
 
 
 @kernel
 def face_area(positions: FloatArray, tetrahedra: IntArray, t: int, f: int) -> float:
-    """Area of the face of tetrahedron `t` opposite its local node `f` [m2]."""
+    """Return the area of the face of tetrahedron `t` opposite its local node `f` [m2]."""
     return triangle_area(
         vec3(positions, tetrahedra[t, (f + 1) % 4]),
         vec3(positions, tetrahedra[t, (f + 2) % 4]),
@@ -60,7 +64,7 @@ def face_area(positions: FloatArray, tetrahedra: IntArray, t: int, f: int) -> fl
 
 @kernel
 def altitude(apex: Vec3, a: Vec3, b: Vec3, c: Vec3) -> float:
-    """Distance of `apex` from the plane of abc [m]; 0 where abc is a line."""
+    """Return the distance of `apex` from the plane of abc [m]; 0 where abc is a line."""
     normal = cross(sub(b, a), sub(c, a))
     length = norm(normal)
     if length == 0.0:
@@ -70,7 +74,7 @@ def altitude(apex: Vec3, a: Vec3, b: Vec3, c: Vec3) -> float:
 
 @kernel
 def node_altitude(positions: FloatArray, tetrahedra: IntArray, t: int, k: int) -> float:
-    """Altitude of tetrahedron `t` over its local node `k` [m]."""
+    """Return the altitude of tetrahedron `t` over its local node `k` [m]."""
     return altitude(
         vec3(positions, tetrahedra[t, k]),
         vec3(positions, tetrahedra[t, (k + 1) % 4]),
@@ -81,7 +85,7 @@ def node_altitude(positions: FloatArray, tetrahedra: IntArray, t: int, k: int) -
 
 @kernel
 def smallest_altitude(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> float:
-    """The smallest of the four altitudes of a tetrahedron [m]."""
+    """Return the smallest of the four altitudes of a tetrahedron [m]."""
     return min(
         min(altitude(a, b, c, d), altitude(b, a, c, d)),
         min(altitude(c, a, b, d), altitude(d, a, b, c)),
@@ -90,7 +94,17 @@ def smallest_altitude(a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> float:
 
 @kernel
 def barycentric(p: Vec3, a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Weights:
-    """Weights of `p` in tetrahedron abcd; negative where `p` is beyond the opposite face."""
+    """Return the barycentric weights of `p` in tetrahedron abcd.
+
+    A weight is negative where `p` is beyond the face opposite that corner.
+
+    Args:
+        p: The point [m].
+        a: First corner [m].
+        b: Second corner [m].
+        c: Third corner [m].
+        d: Fourth corner [m].
+    """
     volume = signed_volume(a, b, c, d)
     if volume == 0.0:
         return Weights(0.25, 0.25, 0.25, 0.25)
@@ -102,7 +116,7 @@ def barycentric(p: Vec3, a: Vec3, b: Vec3, c: Vec3, d: Vec3) -> Weights:
 
 @kernel
 def barycentric_in(p: Vec3, positions: FloatArray, tetrahedra: IntArray, t: int) -> Weights:
-    """Weights of `p` in tetrahedron `t`."""
+    """Return the barycentric weights of `p` in tetrahedron `t`."""
     return barycentric(
         p,
         vec3(positions, tetrahedra[t, 0]),
@@ -114,13 +128,13 @@ def barycentric_in(p: Vec3, positions: FloatArray, tetrahedra: IntArray, t: int)
 
 @kernel
 def smallest_weight(w: Weights) -> float:
-    """The smallest of four weights: negative outside, 0 on a face."""
+    """Return the smallest of four weights: negative outside, 0 on a face."""
     return min(min(w.a, w.b), min(w.c, w.d))
 
 
 @kernel
 def interpolate(w: Weights, values: FloatArray, tetrahedra: IntArray, t: int) -> Vec3:
-    """The value at weights `w` of a field given at the nodes, shape (n_nodes, 3)."""
+    """Return the value at weights `w` of a field given at the nodes, shape (n_nodes, 3)."""
     a = tetrahedra[t, 0]
     b = tetrahedra[t, 1]
     c = tetrahedra[t, 2]
@@ -134,7 +148,7 @@ def interpolate(w: Weights, values: FloatArray, tetrahedra: IntArray, t: int) ->
 
 @kernel
 def edge_matrix(positions: FloatArray, tetrahedra: IntArray, t: int) -> Matrix3:
-    """Columns b - a, c - a, d - a of tetrahedron `t` [m]."""
+    """Return the matrix with columns b - a, c - a, d - a of tetrahedron `t` [m]."""
     a = vec3(positions, tetrahedra[t, 0])
     return Matrix3(
         sub(vec3(positions, tetrahedra[t, 1]), a),
@@ -145,7 +159,7 @@ def edge_matrix(positions: FloatArray, tetrahedra: IntArray, t: int) -> Matrix3:
 
 @kernel
 def determinant(m: Matrix3) -> float:
-    """Determinant."""
+    """Return the determinant of `m`."""
     return dot(m.c0, cross(m.c1, m.c2))
 
 
@@ -170,7 +184,7 @@ def apply(m: Matrix3, y: Vec3) -> Vec3:
 
 @kernel
 def normalised(a: Vec3) -> Vec3:
-    """Unit vector along `a`; zero stays zero."""
+    """Return the unit vector along `a`; zero stays zero."""
     length = norm(a)
     if length == 0.0 or not math.isfinite(length):
         return Vec3(0.0, 0.0, 0.0)
@@ -179,7 +193,7 @@ def normalised(a: Vec3) -> Vec3:
 
 @kernel
 def nearest_on_segment(a: Vec3, b: Vec3, p: Vec3) -> Vec3:
-    """The point between `a` and `b` nearest to `p`."""
+    """Return the point between `a` and `b` nearest to `p`."""
     along = sub(b, a)
     squared = dot(along, along)
     if squared == 0.0:
@@ -189,7 +203,7 @@ def nearest_on_segment(a: Vec3, b: Vec3, p: Vec3) -> Vec3:
 
 @kernel
 def nearest_on_triangle(p: Vec3, a: Vec3, b: Vec3, c: Vec3) -> Vec3:
-    """The point of triangle abc nearest to `p`, by Voronoi regions (Ericson 2005, 5.1.5)."""
+    """Return the point of triangle abc nearest to `p`, by Voronoi regions (Ericson 2005, 5.1.5)."""
     ab = sub(b, a)
     ac = sub(c, a)
     ap = sub(p, a)
@@ -252,7 +266,7 @@ def add_square(m: Symmetric, c: float, a: Vec3) -> Symmetric:
 
 @kernel
 def largest_eigenvalue(m: Symmetric) -> float:
-    """Largest eigenvalue, from the angle of the characteristic cubic."""
+    """Return the largest eigenvalue, from the angle of the characteristic cubic."""
     xy, xz, yz = m.xy, m.xz, m.yz
     mean = (m.xx + m.yy + m.zz) / 3.0
     xx, yy, zz = m.xx - mean, m.yy - mean, m.zz - mean

@@ -14,7 +14,7 @@ from tissue.blade.forces import apply_blade_forces
 from tissue.contact.resolve import prepare
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
-from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
+from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
 from tissue.integrators.step_context import Increment, StepContext
@@ -64,7 +64,7 @@ class Threads:
 
     def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
         """Evaluate all tetrahedra (see `tissue.elasticity.internal_forces.deform`)."""
-        if not elastic.has[TETRAHEDRA_TOO]:
+        if not elastic.has_tetrahedra:
             return
         solid = elastic.solid
         blocks = n_blocks(body.n_tetrahedra)

@@ -1,8 +1,8 @@
 """Gmsh files (`.msh`) of any supported version: the header, and who reads the rest."""
 
+from tissue.io.byte_reader import ByteReader, shown
 from tissue.io.gmsh_1_and_2 import read_gmsh_1, read_gmsh_2
 from tissue.io.gmsh_4 import read_gmsh_4
-from tissue.io.source import Source, shown
 from tissue.types import TetrahedralMesh
 
 
@@ -14,32 +14,32 @@ def read_gmsh(data: bytes) -> TetrahedralMesh:
     Raises:
         MeshError: The bytes are not such a file, or it holds no tetrahedra.
     """
-    source = Source(data)
-    first = source.line_with_text()
+    reader = ByteReader(data)
+    first = reader.line_with_text()
     if first == "$NOD":
-        return read_gmsh_1(source)
+        return read_gmsh_1(reader)
     if first != "$MeshFormat":
-        source.fail(f"expected $MeshFormat or $NOD, found {shown(first)}: not a Gmsh file", 0)
+        reader.fail(f"expected $MeshFormat or $NOD, found {shown(first)}: not a Gmsh file", 0)
 
-    at = source.at
-    words = source.line().split()
+    at = reader.at
+    words = reader.line().split()
     if len(words) != 3 or words[1] not in ("0", "1"):
-        source.fail(f"expected version, file type (0 or 1), data size; found {words}", at)
+        reader.fail(f"expected version, file type (0 or 1), data size; found {words}", at)
     version, file_type, data_size = words
     if version not in ("2", "2.0", "2.1", "2.2", "4.1"):
-        source.fail(f"expected version 2.0 to 2.2 or 4.1, found {version}: save it as 4.1", at)
+        reader.fail(f"expected version 2.0 to 2.2 or 4.1, found {version}: save it as 4.1", at)
     if data_size != "8":
-        source.fail(f"expected data size 8, found {data_size}", at)
-    byte_order = _byte_order(source) if file_type == "1" else ""
+        reader.fail(f"expected data size 8, found {data_size}", at)
+    byte_order = _byte_order(reader) if file_type == "1" else ""
     read = read_gmsh_4 if version == "4.1" else read_gmsh_2
-    return read(source, byte_order)
+    return read(reader, byte_order)
 
 
-def _byte_order(source: Source) -> str:
+def _byte_order(reader: ByteReader) -> str:
     """Return "<" or ">": binary files hold the number 1 after the header."""
-    at = source.at
-    one = bytes(source.binary(4, "u1", "bytes that hold the number 1"))
+    at = reader.at
+    one = bytes(reader.binary(4, "u1", "bytes that hold the number 1"))
     orders = {b"\x01\x00\x00\x00": "<", b"\x00\x00\x00\x01": ">"}
     if one not in orders:
-        source.fail(f"expected the number 1 in four bytes, found {one.hex(' ')}", at)
+        reader.fail(f"expected the number 1 in four bytes, found {one.hex(' ')}", at)
     return orders[one]

@@ -3,64 +3,66 @@
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.cells import run
-from tissue.io.gmsh_elements import Elements, kind_of
-from tissue.io.source import Source, as_floats, as_ints, count_in, shown
+from tissue.io.byte_reader import ByteReader, as_floats, as_ints, count_in, shown
+from tissue.io.cell_types import uniform_records
+from tissue.io.gmsh_elements import Elements, element_type
 from tissue.types import TetrahedralMesh
 
 
-def read_gmsh_1(source: Source) -> TetrahedralMesh:
+def read_gmsh_1(reader: ByteReader) -> TetrahedralMesh:
     """Read what follows the line "$NOD"."""
-    tags, positions = _nodes_as_text(source, rb"\$ENDNOD", "$ENDNOD")
-    _enter(source, rb"\$ELM", "$ELM")
+    tags, positions = _nodes_as_text(reader, rb"\$ENDNOD", "$ENDNOD")
+    _enter(reader, rb"\$ELM", "$ELM")
     # A record is tag, type, physical region, elementary region, number of nodes, nodes.
-    elements = _elements_as_text(source, rb"\$ENDELM", "$ENDELM", n_before=5, at_size=4)
+    elements = _elements_as_text(reader, rb"\$ENDELM", "$ENDELM", n_before=5, at_size=4)
     return elements.mesh(tags, positions)
 
 
-def read_gmsh_2(source: Source, byte_order: str) -> TetrahedralMesh:
+def read_gmsh_2(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
     """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
-    if b"$ParametricNodes" in source.data:
-        source.fail(
+    if b"$ParametricNodes" in reader.data:
+        reader.fail(
             "expected $Nodes, found $ParametricNodes: save it without parametric coordinates"
         )
-    _enter(source, rb"\$Nodes", "$Nodes")
+    _enter(reader, rb"\$Nodes", "$Nodes")
     if byte_order:
-        tags, positions = _nodes_in_binary(source, byte_order)
+        tags, positions = _nodes_in_binary(reader, byte_order)
     else:
-        tags, positions = _nodes_as_text(source, rb"\$EndNodes", "$EndNodes")
-    _enter(source, rb"\$Elements", "$Elements")
+        tags, positions = _nodes_as_text(reader, rb"\$EndNodes", "$EndNodes")
+    _enter(reader, rb"\$Elements", "$Elements")
     if byte_order:
-        elements = _elements_in_binary(source, byte_order)
+        elements = _elements_in_binary(reader, byte_order)
     else:
         # A record is tag, type, number of further tags, those tags, nodes.
-        elements = _elements_as_text(source, rb"\$EndElements", "$EndElements", 3, at_size=2)
+        elements = _elements_as_text(reader, rb"\$EndElements", "$EndElements", 3, at_size=2)
     return elements.mesh(tags, positions)
 
 
-def _enter(source: Source, pattern: bytes, name: str) -> None:
+def _enter(reader: ByteReader, pattern: bytes, name: str) -> None:
     """Go to the line after the one that says `name`."""
-    source.at = source.find(rb"(?m)^[ \t]*" + pattern + rb"[ \t]*\r?\n", name).end()
+    reader.at = reader.find(rb"(?m)^[ \t]*" + pattern + rb"[ \t]*\r?\n", name).end()
 
 
-def _nodes_as_text(source: Source, pattern: bytes, end_name: str) -> tuple[IntArray, FloatArray]:
+def _nodes_as_text(
+    reader: ByteReader, pattern: bytes, end_name: str
+) -> tuple[IntArray, FloatArray]:
     """Return tags, shape (n_nodes,), and positions, shape (n_nodes, 3)."""
-    at = source.at
-    n_nodes = count_in(source, source.line_with_text(), "nodes", at)
-    end = source.find(pattern, end_name).start()
-    numbers = source.floats(end, "numbers (tag x y z for each node)")
-    source.expect(4 * n_nodes, len(numbers), "numbers (tag x y z for each node)", at)
+    at = reader.at
+    n_nodes = count_in(reader, reader.line_with_text(), "nodes", at)
+    end = reader.find(pattern, end_name).start()
+    numbers = reader.floats(end, "numbers (tag x y z for each node)")
+    reader.expect(4 * n_nodes, len(numbers), "numbers (tag x y z for each node)", at)
     table = numbers.reshape(n_nodes, 4)
     with np.errstate(invalid="ignore"):
         tags = table[:, 0].astype(np.int64)
     wrong = np.flatnonzero(tags != table[:, 0])
     if wrong.size:
-        source.fail(f"expected a whole number as a node's tag, found {table[wrong[0], 0]:g}", at)
+        reader.fail(f"expected a whole number as a node's tag, found {table[wrong[0], 0]:g}", at)
     return tags, table[:, 1:]
 
 
 def _elements_as_text(
-    source: Source, pattern: bytes, end_name: str, n_before: int, at_size: int
+    reader: ByteReader, pattern: bytes, end_name: str, n_before: int, at_size: int
 ) -> Elements:
     """Read elements as records of whole numbers.
 
@@ -72,69 +74,69 @@ def _elements_as_text(
         at_size: Where in the record it says how many there are: of nodes (version 1), of tags
             before the nodes (version 2).
     """
-    at = source.at
-    n_elements = count_in(source, source.line_with_text(), "elements", at)
-    flat = source.ints(source.find(pattern, end_name).start(), "whole numbers")
+    at = reader.at
+    n_elements = count_in(reader, reader.line_with_text(), "elements", at)
+    flat = reader.ints(reader.find(pattern, end_name).start(), "whole numbers")
     elements = Elements()
     start, n_read = 0, 0
     while n_read < n_elements:
         here = f"element {n_read + 1} of {n_elements}"
         if start + n_before > len(flat):
-            source.fail(f"expected {n_elements} elements, found {n_read}", at)
+            reader.fail(f"expected {n_elements} elements, found {n_read}", at)
         number, size = int(flat[start + 1]), int(flat[start + at_size])
-        kind = kind_of(source, number, at)
+        kind = element_type(reader, number, at)
         n_tags = size if at_size == 2 else 0
         if n_tags < 0 or (at_size == 4 and size != kind.n_nodes):
-            source.fail(f"{here} ({kind.name}): its number of tags or nodes is {size}", at)
+            reader.fail(f"{here} ({kind.name}): its number of tags or nodes is {size}", at)
         stride = n_before + n_tags + kind.n_nodes
-        records = run(flat, start, stride, [1, at_size], n_elements - n_read)
+        records = uniform_records(flat, start, stride, [1, at_size], n_elements - n_read)
         if not len(records):
-            source.fail(f"expected {n_elements} elements, found {n_read} and a part of one", at)
+            reader.fail(f"expected {n_elements} elements, found {n_read} and a part of one", at)
         elements.add(number, records[:, stride - kind.n_nodes :])
         start, n_read = start + records.size, n_read + len(records)
     if start != len(flat):
-        source.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
+        reader.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
     return elements
 
 
-def _nodes_in_binary(source: Source, byte_order: str) -> tuple[IntArray, FloatArray]:
+def _nodes_in_binary(reader: ByteReader, byte_order: str) -> tuple[IntArray, FloatArray]:
     """Return tags, shape (n_nodes,), and positions, shape (n_nodes, 3)."""
-    at = source.at
-    n_nodes = count_in(source, source.line(), "nodes", at)
+    at = reader.at
+    n_nodes = count_in(reader, reader.line(), "nodes", at)
     n_bytes = 4 + 3 * 8
-    raw = source.binary(n_nodes * n_bytes, "u1", "bytes of nodes").reshape(n_nodes, n_bytes)
+    raw = reader.binary(n_nodes * n_bytes, "u1", "bytes of nodes").reshape(n_nodes, n_bytes)
     tags = np.ascontiguousarray(raw[:, :4]).view(byte_order + "i4")[:, 0]
     positions = np.ascontiguousarray(raw[:, 4:]).view(byte_order + "f8")
-    _expect_end(source, "$EndNodes")
+    _expect_end(reader, "$EndNodes")
     return as_ints(tags), as_floats(positions)
 
 
-def _elements_in_binary(source: Source, byte_order: str) -> Elements:
+def _elements_in_binary(reader: ByteReader, byte_order: str) -> Elements:
     """Read elements in groups of one type, each with a header of three numbers."""
-    at = source.at
-    n_elements = count_in(source, source.line(), "elements", at)
+    at = reader.at
+    n_elements = count_in(reader, reader.line(), "elements", at)
     elements = Elements()
     n_read = 0
     while n_read < n_elements:
-        header = source.binary(3, byte_order + "i4", "numbers before a group of elements")
+        header = reader.binary(3, byte_order + "i4", "numbers before a group of elements")
         number, n_here, n_tags = (int(entry) for entry in header)
-        kind = kind_of(source, number)
+        kind = element_type(reader, number)
         if not 0 < n_here <= n_elements - n_read or n_tags < 0:
-            source.fail(
+            reader.fail(
                 f"expected at most {n_elements - n_read} elements more, found a group of {n_here} "
                 f"with {n_tags} tags each"
             )
         stride = 1 + n_tags + kind.n_nodes
-        flat = source.binary(n_here * stride, byte_order + "i4", f"numbers of {kind.name}")
+        flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {kind.name}")
         elements.add(number, as_ints(flat).reshape(n_here, stride)[:, stride - kind.n_nodes :])
         n_read += n_here
-    _expect_end(source, "$EndElements")
+    _expect_end(reader, "$EndElements")
     return elements
 
 
-def _expect_end(source: Source, name: str) -> None:
+def _expect_end(reader: ByteReader, name: str) -> None:
     """Fail if what was counted is not what is there."""
-    at = source.at
-    line = source.line_with_text()
+    at = reader.at
+    line = reader.line_with_text()
     if line != name:
-        source.fail(f"expected {name}, found {shown(line)}: is the number before it right?", at)
+        reader.fail(f"expected {name}, found {shown(line)}: is the number before it right?", at)

@@ -5,25 +5,25 @@ from typing import Protocol
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.gmsh_elements import Elements, kind_of
-from tissue.io.source import Source, as_floats, as_ints
+from tissue.io.byte_reader import ByteReader, as_floats, as_ints
+from tissue.io.gmsh_elements import Elements, element_type
 from tissue.types import TetrahedralMesh
 
 LARGEST_EXACT = 2**53
 """Whole numbers up to this are exact in double precision, in which text is read."""
 
 
-def read_gmsh_4(source: Source, byte_order: str) -> TetrahedralMesh:
+def read_gmsh_4(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
     """Read what follows the header; `byte_order` is "<" or ">" in a binary file, else ""."""
-    tags, positions = _nodes(_section(source, "Nodes", byte_order))
-    elements = _elements(_section(source, "Elements", byte_order))
+    tags, positions = _nodes(_section(reader, "Nodes", byte_order))
+    elements = _elements(_section(reader, "Elements", byte_order))
     return elements.mesh(tags, positions)
 
 
 class _Section(Protocol):
     """Numbers of a section in their order, whatever way they are written."""
 
-    source: Source
+    reader: ByteReader
 
     def ints(self, count: int, what: str) -> IntArray:
         """Take C's `int`s."""
@@ -38,26 +38,26 @@ class _Section(Protocol):
         """Fail unless all has been taken."""
 
 
-def _section(source: Source, name: str, byte_order: str) -> _Section:
+def _section(reader: ByteReader, name: str, byte_order: str) -> _Section:
     """Return the numbers of a section."""
-    source.at = source.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
-    return _Binary(source, name, byte_order) if byte_order else _Text(source, name)
+    reader.at = reader.find(rb"(?m)^[ \t]*\$%b[ \t]*\r?\n" % name.encode(), f"${name}").end()
+    return _Binary(reader, name, byte_order) if byte_order else _Text(reader, name)
 
 
 class _Text:
     """Numbers written as text."""
 
-    def __init__(self, source: Source, name: str) -> None:
-        self.source = source
-        self._start = source.at
-        end = source.find(rb"\$End" + name.encode(), f"$End{name}").start()
-        self._numbers = source.floats(end, "numbers")
+    def __init__(self, reader: ByteReader, name: str) -> None:
+        self.reader = reader
+        self._start = reader.at
+        end = reader.find(rb"\$End" + name.encode(), f"$End{name}").start()
+        self._numbers = reader.floats(end, "numbers")
         self._at = 0
 
     def floats(self, count: int, what: str) -> FloatArray:
         left = len(self._numbers) - self._at
         if count > left:
-            self.source.fail(f"expected {count} {what}, found {left} to the end", self._start)
+            self.reader.fail(f"expected {count} {what}, found {left} to the end", self._start)
         self._at += count
         return self._numbers[self._at - count : self._at]
 
@@ -67,7 +67,7 @@ class _Text:
         whole &= np.floor(numbers) == numbers
         if not whole.all():
             wrong = numbers[~whole][0]
-            self.source.fail(f"expected whole {what}, found {wrong:g}", self._start)
+            self.reader.fail(f"expected whole {what}, found {wrong:g}", self._start)
         return numbers.astype(np.int64)
 
     ints = sizes
@@ -75,31 +75,31 @@ class _Text:
     def end(self) -> None:
         left = len(self._numbers) - self._at
         if left:
-            self.source.fail(f"expected the end of the section, found {left} more", self._start)
+            self.reader.fail(f"expected the end of the section, found {left} more", self._start)
 
 
 class _Binary:
     """Numbers as the computer that wrote them holds them."""
 
-    def __init__(self, source: Source, name: str, byte_order: str) -> None:
-        self.source = source
+    def __init__(self, reader: ByteReader, name: str, byte_order: str) -> None:
+        self.reader = reader
         self._name = name
         self._byte_order = byte_order
 
     def ints(self, count: int, what: str) -> IntArray:
-        return as_ints(self.source.binary(count, self._byte_order + "i4", what))
+        return as_ints(self.reader.binary(count, self._byte_order + "i4", what))
 
     def sizes(self, count: int, what: str) -> IntArray:
-        return as_ints(self.source.binary(count, self._byte_order + "u8", what))
+        return as_ints(self.reader.binary(count, self._byte_order + "u8", what))
 
     def floats(self, count: int, what: str) -> FloatArray:
-        return as_floats(self.source.binary(count, self._byte_order + "f8", what))
+        return as_floats(self.reader.binary(count, self._byte_order + "f8", what))
 
     def end(self) -> None:
-        at = self.source.at
-        line = self.source.line_with_text()
+        at = self.reader.at
+        line = self.reader.line_with_text()
         if line != f"$End{self._name}":
-            self.source.fail(f"expected $End{self._name} after what was counted", at)
+            self.reader.fail(f"expected $End{self._name} after what was counted", at)
 
 
 def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:
@@ -110,7 +110,7 @@ def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:
         dimension, _, is_parametric = section.ints(3, "numbers before a block of nodes").tolist()
         (n_here,) = _counts(section, 1, "nodes in a block")
         if is_parametric not in (0, 1) or not 0 <= dimension <= 3:
-            section.source.fail(
+            section.reader.fail(
                 "expected a block of nodes of dimension 0 to 3, parametric 0 or 1; found "
                 f"{dimension} and {is_parametric}"
             )
@@ -121,7 +121,7 @@ def _nodes(section: _Section) -> tuple[IntArray, FloatArray]:
     section.end()
     found = sum(len(block) for block in tags)
     if found != n_nodes:
-        section.source.fail(f"expected {n_nodes} nodes, found {found}")
+        section.reader.fail(f"expected {n_nodes} nodes, found {found}")
     return np.concatenate(tags), np.concatenate(positions)
 
 
@@ -133,14 +133,14 @@ def _elements(section: _Section) -> Elements:
     for _ in range(n_blocks):
         _, _, number = section.ints(3, "numbers before a block of elements").tolist()
         (n_here,) = _counts(section, 1, "elements in a block")
-        kind = kind_of(section.source, number)
+        kind = element_type(section.reader, number)
         width = 1 + kind.n_nodes
         records = section.sizes(n_here * width, f"numbers of {kind.name}").reshape(n_here, width)
         elements.add(number, records[:, 1:])
         found += n_here
     section.end()
     if found != n_elements:
-        section.source.fail(f"expected {n_elements} elements, found {found}")
+        section.reader.fail(f"expected {n_elements} elements, found {found}")
     return elements
 
 
@@ -148,5 +148,5 @@ def _counts(section: _Section, count: int, what: str) -> list[int]:
     """Take numbers of things, which cannot be negative."""
     counts = section.sizes(count, what).tolist()
     if min(counts) < 0:
-        section.source.fail(f"expected the number of {what}, found {min(counts)}")
+        section.reader.fail(f"expected the number of {what}, found {min(counts)}")
     return counts

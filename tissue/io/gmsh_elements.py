@@ -3,47 +3,47 @@
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.cells import Kind, expect_tetrahedra
-from tissue.io.source import Source
+from tissue.io.byte_reader import ByteReader
+from tissue.io.cell_types import CellType, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
 _TETRAHEDRON = 4
 
-_KINDS = {
-    1: Kind("lines", 1, 2),
-    2: Kind("triangles", 2, 3),
-    3: Kind("quadrangles", 2, 4),
-    4: Kind("tetrahedra", 3, 4),
-    5: Kind("hexahedra", 3, 8),
-    6: Kind("prisms", 3, 6),
-    7: Kind("pyramids", 3, 5),
-    8: Kind("lines with 3 nodes", 1, 3),
-    9: Kind("triangles with 6 nodes", 2, 6),
-    10: Kind("quadrangles with 9 nodes", 2, 9),
-    11: Kind("tetrahedra with 10 nodes", 3, 10),
-    12: Kind("hexahedra with 27 nodes", 3, 27),
-    13: Kind("prisms with 18 nodes", 3, 18),
-    14: Kind("pyramids with 14 nodes", 3, 14),
-    15: Kind("points", 0, 1),
-    16: Kind("quadrangles with 8 nodes", 2, 8),
-    17: Kind("hexahedra with 20 nodes", 3, 20),
-    18: Kind("prisms with 15 nodes", 3, 15),
-    19: Kind("pyramids with 13 nodes", 3, 13),
-    20: Kind("triangles with 9 nodes", 2, 9),
-    21: Kind("triangles with 10 nodes", 2, 10),
-    22: Kind("triangles with 12 nodes", 2, 12),
-    23: Kind("triangles with 15 nodes", 2, 15),
-    24: Kind("triangles with 15 nodes", 2, 15),
-    25: Kind("triangles with 21 nodes", 2, 21),
-    26: Kind("lines with 4 nodes", 1, 4),
-    27: Kind("lines with 5 nodes", 1, 5),
-    28: Kind("lines with 6 nodes", 1, 6),
-    29: Kind("tetrahedra with 20 nodes", 3, 20),
-    30: Kind("tetrahedra with 35 nodes", 3, 35),
-    31: Kind("tetrahedra with 56 nodes", 3, 56),
-    92: Kind("hexahedra with 64 nodes", 3, 64),
-    93: Kind("hexahedra with 125 nodes", 3, 125),
+_CELL_TYPES = {
+    1: CellType("lines", 1, 2),
+    2: CellType("triangles", 2, 3),
+    3: CellType("quadrangles", 2, 4),
+    4: CellType("tetrahedra", 3, 4),
+    5: CellType("hexahedra", 3, 8),
+    6: CellType("prisms", 3, 6),
+    7: CellType("pyramids", 3, 5),
+    8: CellType("lines with 3 nodes", 1, 3),
+    9: CellType("triangles with 6 nodes", 2, 6),
+    10: CellType("quadrangles with 9 nodes", 2, 9),
+    11: CellType("tetrahedra with 10 nodes", 3, 10),
+    12: CellType("hexahedra with 27 nodes", 3, 27),
+    13: CellType("prisms with 18 nodes", 3, 18),
+    14: CellType("pyramids with 14 nodes", 3, 14),
+    15: CellType("points", 0, 1),
+    16: CellType("quadrangles with 8 nodes", 2, 8),
+    17: CellType("hexahedra with 20 nodes", 3, 20),
+    18: CellType("prisms with 15 nodes", 3, 15),
+    19: CellType("pyramids with 13 nodes", 3, 13),
+    20: CellType("triangles with 9 nodes", 2, 9),
+    21: CellType("triangles with 10 nodes", 2, 10),
+    22: CellType("triangles with 12 nodes", 2, 12),
+    23: CellType("triangles with 15 nodes", 2, 15),
+    24: CellType("triangles with 15 nodes", 2, 15),
+    25: CellType("triangles with 21 nodes", 2, 21),
+    26: CellType("lines with 4 nodes", 1, 4),
+    27: CellType("lines with 5 nodes", 1, 5),
+    28: CellType("lines with 6 nodes", 1, 6),
+    29: CellType("tetrahedra with 20 nodes", 3, 20),
+    30: CellType("tetrahedra with 35 nodes", 3, 35),
+    31: CellType("tetrahedra with 56 nodes", 3, 56),
+    92: CellType("hexahedra with 64 nodes", 3, 64),
+    93: CellType("hexahedra with 125 nodes", 3, 125),
 }
 
 
@@ -67,7 +67,7 @@ class Elements:
         Raises:
             MeshError: There are no tetrahedra, a tag is there twice, or none has it.
         """
-        expect_tetrahedra(self._counts, _KINDS, _TETRAHEDRON)
+        expect_tetrahedra(self._counts, _CELL_TYPES, _TETRAHEDRON)
         wanted = np.concatenate(self._tetrahedra)
         order = np.argsort(tags, kind="stable")
         in_order = tags[order]
@@ -85,8 +85,8 @@ class Elements:
         return TetrahedralMesh(positions, order[at])
 
 
-def kind_of(source: Source, number: int, at: int | None = None) -> Kind:
+def element_type(reader: ByteReader, number: int, at: int | None = None) -> CellType:
     """Return a kind of element by its number, or fail."""
-    if number not in _KINDS:
-        source.fail(f"expected a type of element that Gmsh knows, found {number}", at)
-    return _KINDS[number]
+    if number not in _CELL_TYPES:
+        reader.fail(f"expected a type of element that Gmsh knows, found {number}", at)
+    return _CELL_TYPES[number]

@@ -6,8 +6,8 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
+from tissue.io.byte_reader import shown
 from tissue.io.gmsh import read_gmsh
-from tissue.io.source import shown
 from tissue.io.vtk_legacy import read_vtk
 from tissue.io.vtu import read_vtu
 from tissue.io.vtu_writer import write_vtu

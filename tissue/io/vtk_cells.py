@@ -3,43 +3,43 @@
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.io.cells import Kind, expect_tetrahedra
+from tissue.io.cell_types import CellType, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 
 _TETRAHEDRON = 10
 
-_KINDS = {
-    0: Kind("empty cells", 0, 0),
-    1: Kind("points", 0, 1),
-    2: Kind("groups of points", 0, 0),
-    3: Kind("lines", 1, 2),
-    4: Kind("polylines", 1, 0),
-    5: Kind("triangles", 2, 3),
-    6: Kind("triangle strips", 2, 0),
-    7: Kind("polygons", 2, 0),
-    8: Kind("pixels", 2, 4),
-    9: Kind("quadrangles", 2, 4),
-    10: Kind("tetrahedra", 3, 4),
-    11: Kind("voxels", 3, 8),
-    12: Kind("hexahedra", 3, 8),
-    13: Kind("wedges", 3, 6),
-    14: Kind("pyramids", 3, 5),
-    21: Kind("lines with 3 nodes", 1, 3),
-    22: Kind("triangles with 6 nodes", 2, 6),
-    23: Kind("quadrangles with 8 nodes", 2, 8),
-    24: Kind("tetrahedra with 10 nodes", 3, 10),
-    25: Kind("hexahedra with 20 nodes", 3, 20),
-    28: Kind("quadrangles with 9 nodes", 2, 9),
-    34: Kind("triangles with 7 nodes", 2, 7),
-    42: Kind("polyhedra", 3, 0),
-    68: Kind("Lagrange curves", 1, 0),
-    69: Kind("Lagrange triangles", 2, 0),
-    70: Kind("Lagrange quadrangles", 2, 0),
-    71: Kind("Lagrange tetrahedra", 3, 0),
-    75: Kind("Bezier curves", 1, 0),
-    76: Kind("Bezier triangles", 2, 0),
-    77: Kind("Bezier quadrangles", 2, 0),
-    78: Kind("Bezier tetrahedra", 3, 0),
+_CELL_TYPES = {
+    0: CellType("empty cells", 0, 0),
+    1: CellType("points", 0, 1),
+    2: CellType("groups of points", 0, 0),
+    3: CellType("lines", 1, 2),
+    4: CellType("polylines", 1, 0),
+    5: CellType("triangles", 2, 3),
+    6: CellType("triangle strips", 2, 0),
+    7: CellType("polygons", 2, 0),
+    8: CellType("pixels", 2, 4),
+    9: CellType("quadrangles", 2, 4),
+    10: CellType("tetrahedra", 3, 4),
+    11: CellType("voxels", 3, 8),
+    12: CellType("hexahedra", 3, 8),
+    13: CellType("wedges", 3, 6),
+    14: CellType("pyramids", 3, 5),
+    21: CellType("lines with 3 nodes", 1, 3),
+    22: CellType("triangles with 6 nodes", 2, 6),
+    23: CellType("quadrangles with 8 nodes", 2, 8),
+    24: CellType("tetrahedra with 10 nodes", 3, 10),
+    25: CellType("hexahedra with 20 nodes", 3, 20),
+    28: CellType("quadrangles with 9 nodes", 2, 9),
+    34: CellType("triangles with 7 nodes", 2, 7),
+    42: CellType("polyhedra", 3, 0),
+    68: CellType("Lagrange curves", 1, 0),
+    69: CellType("Lagrange triangles", 2, 0),
+    70: CellType("Lagrange quadrangles", 2, 0),
+    71: CellType("Lagrange tetrahedra", 3, 0),
+    75: CellType("Bezier curves", 1, 0),
+    76: CellType("Bezier triangles", 2, 0),
+    77: CellType("Bezier quadrangles", 2, 0),
+    78: CellType("Bezier tetrahedra", 3, 0),
 }
 
 
@@ -57,7 +57,7 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
     """
     numbers, counts = np.unique(types, return_counts=True)
     expect_tetrahedra(
-        dict(zip(numbers.tolist(), counts.tolist(), strict=True)), _KINDS, _TETRAHEDRON
+        dict(zip(numbers.tolist(), counts.tolist(), strict=True)), _CELL_TYPES, _TETRAHEDRON
     )
     outside = np.flatnonzero((starts < 0) | (sizes < 0) | (sizes > len(flat) - starts))
     if outside.size:

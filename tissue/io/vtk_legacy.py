@@ -5,8 +5,8 @@ import re
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.cells import run
-from tissue.io.source import Source, as_floats, as_ints, count_in, shown
+from tissue.io.byte_reader import ByteReader, as_floats, as_ints, count_in, shown
+from tissue.io.cell_types import uniform_records
 from tissue.io.vtk_cells import tetrahedra_of
 from tissue.types import TetrahedralMesh
 
@@ -51,7 +51,7 @@ class _Reader:
     """One file, and what has been found in it."""
 
     def __init__(self, data: bytes) -> None:
-        self._source = Source(data)
+        self._reader = ByteReader(data)
         self._is_binary = False
         self._positions: FloatArray | None = None
         self._cells: tuple[IntArray, IntArray, IntArray] | None = None
@@ -67,36 +67,36 @@ class _Reader:
             "FIELD": self._skip_field,
             "METADATA": self._skip_metadata,
         }
-        source = self._source
+        reader = self._reader
         while self._positions is None or self._cells is None or self._types is None:
-            source.skip_blanks()
-            at = source.at
-            words = source.line().split()
+            reader.skip_blanks()
+            at = reader.at
+            words = reader.line().split()
             keyword = words[0].upper() if words else ""
             if keyword not in parts:
                 missing = "POINTS, CELLS and CELL_TYPES"
-                source.fail(f"expected {missing}, found {shown(' '.join(words))}", at)
+                reader.fail(f"expected {missing}, found {shown(' '.join(words))}", at)
             parts[keyword](words, at)
         starts, sizes, flat = self._cells
         if len(self._types) != len(starts):
-            source.fail(f"expected {len(starts)} types of cells, found {len(self._types)}")
+            reader.fail(f"expected {len(starts)} types of cells, found {len(self._types)}")
         return TetrahedralMesh(self._positions, tetrahedra_of(self._types, starts, sizes, flat))
 
     def _header(self) -> None:
-        source = self._source
-        first = source.line()
+        reader = self._reader
+        first = reader.line()
         if not first.lower().startswith("# vtk datafile version"):
-            source.fail(f"expected '# vtk DataFile Version', found {shown(first)}", 0)
-        source.line()  # a title
-        at = source.at
-        encoding = source.line_with_text().upper()
+            reader.fail(f"expected '# vtk DataFile Version', found {shown(first)}", 0)
+        reader.line()  # a title
+        at = reader.at
+        encoding = reader.line_with_text().upper()
         if encoding not in ("ASCII", "BINARY"):
-            source.fail(f"expected ASCII or BINARY, found {shown(encoding)}", at)
+            reader.fail(f"expected ASCII or BINARY, found {shown(encoding)}", at)
         self._is_binary = encoding == "BINARY"
-        at = source.at
-        dataset = source.line_with_text().upper().split()
+        at = reader.at
+        dataset = reader.line_with_text().upper().split()
         if dataset == ["DATASET", "POLYDATA"]:
-            source.fail(
+            reader.fail(
                 "only a surface, no tetrahedra: found DATASET POLYDATA, expected DATASET "
                 "UNSTRUCTURED_GRID. Fill it with tetrahedra first, with Gmsh or fTetWild for "
                 "example",
@@ -104,7 +104,7 @@ class _Reader:
             )
         if dataset != ["DATASET", "UNSTRUCTURED_GRID"]:
             found = shown(" ".join(dataset))
-            source.fail(f"expected DATASET UNSTRUCTURED_GRID, found {found}", at)
+            reader.fail(f"expected DATASET UNSTRUCTURED_GRID, found {found}", at)
 
     def _points(self, words: list[str], at: int) -> None:
         n_nodes, dtype = self._count(words, 1, "points", at), self._dtype(words, 2, at)
@@ -113,9 +113,9 @@ class _Reader:
     def _read_cells(self, words: list[str], at: int) -> None:
         """Read cells in the newer layout, where OFFSETS follows, or in the older one."""
         n_first, n_second = self._count(words, 1, "cells", at), self._count(words, 2, "entries", at)
-        source = self._source
-        source.skip_blanks()
-        if source.data[source.at : source.at + 7].upper() != b"OFFSETS":
+        reader = self._reader
+        reader.skip_blanks()
+        if reader.data[reader.at : reader.at + 7].upper() != b"OFFSETS":
             flat = self._ints(n_second, ">i4", "entries of cells")
             self._cells = (*self._walk(flat, n_first, at), flat)
             return
@@ -129,22 +129,22 @@ class _Reader:
         start, n_read = 0, 0
         while n_read < n_cells:
             size = int(flat[start]) if start < len(flat) else 0
-            records = run(flat, start, 1 + max(size, 0), [0], n_cells - n_read)
+            records = uniform_records(flat, start, 1 + max(size, 0), [0], n_cells - n_read)
             if size < 0 or not len(records):
-                self._source.fail(f"expected {n_cells} cells, found {n_read} and no more", at)
+                self._reader.fail(f"expected {n_cells} cells, found {n_read} and no more", at)
             starts.append(start + 1 + (1 + size) * np.arange(len(records)))
             sizes.append(records[:, 0])
             start, n_read = start + records.size, n_read + len(records)
         if start != len(flat):
-            self._source.fail(f"expected {len(flat)} entries in {n_cells} cells, found {start}", at)
+            self._reader.fail(f"expected {len(flat)} entries in {n_cells} cells, found {start}", at)
         return np.concatenate(starts), np.concatenate(sizes)
 
     def _named_array(self, name: str, count: int) -> IntArray:
-        self._source.skip_blanks()
-        at = self._source.at
-        words = self._source.line().split()
+        self._reader.skip_blanks()
+        at = self._reader.at
+        words = self._reader.line().split()
         if not words or words[0].upper() != name:
-            self._source.fail(f"expected {name}, found {shown(' '.join(words))}", at)
+            self._reader.fail(f"expected {name}, found {shown(' '.join(words))}", at)
         return self._ints(count, self._dtype(words, 1, at), name.lower())
 
     def _cell_types(self, words: list[str], at: int) -> None:
@@ -152,48 +152,48 @@ class _Reader:
         self._types = self._ints(count, ">i4", "types of cells")
 
     def _skip_field(self, words: list[str], at: int) -> None:
-        """Pass by arrays that belong to the whole file, such as a time."""
+        """Skip arrays that belong to the whole file, such as a time."""
         if not self._is_binary:
-            self._source.at = self._next_keyword()
+            self._reader.at = self._next_keyword()
             return
         for _ in range(self._count(words, 2, "arrays", at)):
-            array_at = self._source.at
-            array = self._source.line_with_text().split()
+            array_at = self._reader.at
+            array = self._reader.line_with_text().split()
             n_components = self._count(array, 1, "components", array_at)
             count = n_components * self._count(array, 2, "values", array_at)
-            self._source.binary(count, self._dtype(array, 3, array_at), "values")
+            self._reader.binary(count, self._dtype(array, 3, array_at), "values")
 
     def _skip_metadata(self, words: list[str], at: int) -> None:
-        """Pass by names and units of components, which end at a blank line."""
+        """Skip names and units of components, which end at a blank line."""
         del words, at
-        while self._source.at < len(self._source.data) and self._source.line():
+        while self._reader.at < len(self._reader.data) and self._reader.line():
             pass
 
     def _floats(self, count: int, dtype: str, what: str) -> FloatArray:
         if self._is_binary:
-            return as_floats(self._source.binary(count, dtype, what))
-        at = self._source.at
-        numbers = self._source.floats(self._next_keyword(), what)
-        self._source.expect(count, len(numbers), what, at)
+            return as_floats(self._reader.binary(count, dtype, what))
+        at = self._reader.at
+        numbers = self._reader.floats(self._next_keyword(), what)
+        self._reader.expect(count, len(numbers), what, at)
         return numbers
 
     def _ints(self, count: int, dtype: str, what: str) -> IntArray:
         if self._is_binary:
-            return as_ints(self._source.binary(count, dtype, what))
-        at = self._source.at
-        numbers = self._source.ints(self._next_keyword(), what)
-        self._source.expect(count, len(numbers), what, at)
+            return as_ints(self._reader.binary(count, dtype, what))
+        at = self._reader.at
+        numbers = self._reader.ints(self._next_keyword(), what)
+        self._reader.expect(count, len(numbers), what, at)
         return numbers
 
     def _next_keyword(self) -> int:
-        match = _NEXT_KEYWORD.search(self._source.data, self._source.at)
-        return match.start() if match else len(self._source.data)
+        match = _NEXT_KEYWORD.search(self._reader.data, self._reader.at)
+        return match.start() if match else len(self._reader.data)
 
     def _count(self, words: list[str], k: int, what: str, at: int) -> int:
-        return count_in(self._source, words[k] if k < len(words) else "", what, at)
+        return count_in(self._reader, words[k] if k < len(words) else "", what, at)
 
     def _dtype(self, words: list[str], k: int, at: int) -> str:
         name = words[k].lower() if k < len(words) else ""
         if name not in _DTYPES:
-            self._source.fail(f"expected a type of numbers, found {shown(name)}", at)
+            self._reader.fail(f"expected a type of numbers, found {shown(name)}", at)
         return _DTYPES[name]

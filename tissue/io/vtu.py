@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.io.source import as_floats, as_ints, shown
+from tissue.io.byte_reader import as_floats, as_ints, shown
 from tissue.io.vtk_cells import tetrahedra_of
 from tissue.io.vtu_data import Encoding, decoded
 from tissue.mesh.validation import MeshError

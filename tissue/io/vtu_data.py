@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from tissue.io.source import Source, shown
+from tissue.io.byte_reader import ByteReader, shown
 from tissue.mesh.validation import MeshError
 
 _DTYPES = {
@@ -81,11 +81,11 @@ def decoded(
 
 def _from_text(element: ET.Element, dtype: str, count: int) -> npt.NDArray[np.generic]:
     """Return numbers written as text."""
-    source = Source((element.text or "").encode())
+    reader = ByteReader((element.text or "").encode())
     is_float = dtype.startswith("f")
-    end = len(source.data)
-    values = source.floats(end, "numbers") if is_float else source.ints(end, "whole numbers")
-    source.expect(count, len(values), "numbers", 0)
+    end = len(reader.data)
+    values = reader.floats(end, "numbers") if is_float else reader.ints(end, "whole numbers")
+    reader.expect(count, len(values), "numbers", 0)
     return values
 
 

@@ -1,9 +1,9 @@
 """The arrays of a tetrahedral body, how they grow, and how to walk from tetrahedron to tetrahedron.
 
 Face `f` of a tetrahedron lies opposite its local node `f`. `links[t, f]` names what is behind it:
-4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went;
-or less where faces of two sizes meet (see hanging).
-Nodes and tetrahedra keep their numbers while they live; both are only ever appended.
+4 * neighbour + the neighbour's local face, or OUTER where the body ends, or CUT where a blade went,
+or a number below both where faces of two sizes meet (`tissue.mesh.nonconforming`).
+Nodes and tetrahedra keep their numbers; both are only ever appended.
 """
 
 from typing import NamedTuple
@@ -17,14 +17,7 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import Lattice, lattice_around
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
-from tissue.mesh.nonconforming import (
-    Hanging,
-    behind,
-    grown_hanging,
-    is_open,
-    n_behind,
-    nothing_hanging,
-)
+from tissue.mesh.nonconforming import HANGING, SMALL_FACES, Hanging, grown_hanging, nothing_hanging
 from tissue.types import TetrahedralMesh
 
 OUTER = -1
@@ -33,34 +26,34 @@ CUT = -2
 """Link of a face that a blade made."""
 
 INSIDE_TOLERANCE = 1e-9
-"""A barycentric weight this far below 0 still counts as inside: rounding, not distance."""
+"""How far below 0 a barycentric weight may be for a point that counts as inside: rounding."""
 
 LONGEST_WALK = 128
 """Tetrahedra that `walk` passes through at most. A step of the edge passes through two or three."""
 
 
 class Body(Arrays):
-    """Every node and tetrahedron. Rows beyond their numbers are room to grow."""
+    """Every node and tetrahedron. Rows beyond `n_nodes` and `n_tetrahedra` are room to grow."""
 
     rest: FloatArray
     """Rest positions [m], shape (capacity, 3)."""
     lattice_rest: IntArray
     """Rest positions on the lattice, shape (capacity, 3)."""
     positions: FloatArray
-    """[m], shape (capacity, 3)."""
+    """Positions now [m], shape (capacity, 3)."""
     velocities: FloatArray
-    """[m/s], shape (capacity, 3)."""
+    """Velocities [m/s], shape (capacity, 3)."""
     masses: FloatArray
-    """Lumped [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
+    """Lumped masses [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
     fixed: BoolArray
-    """Nodes that do not move, shape (capacity,)."""
+    """Whether each node is fixed, shape (capacity,)."""
     off_path: FloatArray
-    """How far a cut's node lies from where the blade passed [m], 0 for others; shape (capacity,).
-    Of several cuts through it, the largest."""
+    """Distance of a cut's node from where the blade passed [m], the largest of several cuts; 0 for
+    other nodes; shape (capacity,)."""
     node_tetrahedron: IntArray
-    """One tetrahedron around each node; the others follow through links. Shape (capacity,)."""
+    """One tetrahedron around each node; links lead to the others. Shape (capacity,)."""
     twin: IntArray
-    """Ring of the nodes that were one before a cut doubled it: the next one. Shape (capacity,)."""
+    """Next node in the ring of nodes that were one before cuts doubled it, shape (capacity,)."""
     tetrahedra: IntArray
     """Node indices, shape (capacity, 4)."""
     links: IntArray
@@ -70,7 +63,9 @@ class Body(Arrays):
     n_tetrahedra: IntCell
     """Number of tetrahedra."""
     lattice: Lattice
+    """The lattice of exact decisions."""
     hanging: Hanging
+    """Faces of two sizes that meet; empty unless the paper's scheme cuts."""
 
 
 def build_links(tetrahedra: IntArray) -> IntArray:
@@ -98,7 +93,7 @@ def build_links(tetrahedra: IntArray) -> IntArray:
 def build_body(
     mesh: TetrahedralMesh, positions: FloatArray | None, fixed: BoolArray | None
 ) -> Body:
-    """Return the body of a mesh at rest, its nodes at `positions` [m] (default: at rest)."""
+    """Return the body of a mesh, its nodes at `positions` [m] (default: at rest)."""
     rest = np.ascontiguousarray(mesh.positions, dtype=np.float64)
     tetrahedra = np.ascontiguousarray(mesh.tetrahedra, dtype=np.int64)
     n = len(rest)
@@ -152,6 +147,32 @@ def grown_body(body: Body, n_nodes: int, n_tetrahedra: int) -> Body:
 
 
 @kernel
+def is_open(link: int) -> bool:
+    """Return whether nothing is behind a face with that link: it is on the skin or on a cut."""
+    return HANGING < link < 0
+
+
+@kernel
+def n_behind(body: Body, t: int, link: int) -> int:
+    """Return how many tetrahedra are behind a face of `t` with that link: none, one or six."""
+    if link >= 0:
+        return 1
+    if link > HANGING:
+        return 0
+    return SMALL_FACES if body.hanging.faces[HANGING - link, 0] == t else 1
+
+
+@kernel
+def behind(body: Body, t: int, link: int, i: int) -> int:
+    """Return number `i` of the tetrahedra behind a face of `t` with that link."""
+    if link >= 0:
+        return link // 4
+    row = HANGING - link
+    other: int = body.hanging.faces[row, 1 + i if body.hanging.faces[row, 0] == t else 0]
+    return other
+
+
+@kernel
 def local_index(body: Body, t: int, node: int) -> int:
     """Return which of the four nodes of tetrahedron `t` is `node`, or -1."""
     for k in range(4):
@@ -164,10 +185,11 @@ class Walk(NamedTuple):
     """Where a walk through the body at rest ended."""
 
     tetrahedron: int
+    """The last tetrahedron."""
     inside: bool
     """Whether the point is in that tetrahedron."""
     link: int
-    """Where it is not: OUTER or CUT, what stopped the walk; 0 if it was too long."""
+    """What stopped the walk if the point is not inside: OUTER, CUT, or 0 if it was too long."""
 
 
 @kernel
@@ -183,7 +205,7 @@ def walk(body: Body, p: Vec3, start: int) -> Walk:
         if smallest_weight(w) >= -INSIDE_TOLERANCE:
             return Walk(t, True, 0)
         stopped_by = OUTER
-        way = -1
+        exit_face = -1
         lowest = -INSIDE_TOLERANCE
         for f in range(4):
             weight = w[f]
@@ -191,24 +213,24 @@ def walk(body: Body, p: Vec3, start: int) -> Walk:
                 if not is_open(body.links[t, f]):
                     if weight < lowest:
                         lowest = weight
-                        way = f
+                        exit_face = f
                 elif body.links[t, f] == CUT:
                     stopped_by = CUT
-        if way < 0:
+        if exit_face < 0:
             return Walk(t, False, stopped_by)
-        t = _beyond(body, p, t, body.links[t, way])
+        t = _beyond(body, p, t, body.links[t, exit_face])
     return Walk(t, False, 0)
 
 
 @kernel
 def _beyond(body: Body, p: Vec3, t: int, link: int) -> int:
-    """The tetrahedron behind a face of `t`; of six, the one that `p` [m] is least outside of."""
+    """Return the tetrahedron behind a face; of six, the one that `p` [m] is least outside of."""
     if link >= 0:
         return link // 4
     nearest = -1
     largest = -np.inf
-    for i in range(n_behind(body.hanging, t, link)):
-        other = behind(body.hanging, t, link, i)
+    for i in range(n_behind(body, t, link)):
+        other = behind(body, t, link, i)
         weight = smallest_weight(barycentric_in(p, body.rest, body.tetrahedra, other))
         if weight > largest:
             largest = weight

@@ -1,4 +1,4 @@
-"""What a cut step changed in a mesh, the nodes that it touched, and their highest frequency."""
+"""What a cut step changed in a mesh: nodes put on the sheet, tetrahedra changed, faces cut."""
 
 import numpy as np
 
@@ -9,18 +9,18 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 CHANGES = 1 << 15
-"""Changes that one pass of a cut step can note; see PASS_NODES."""
+"""Changes that one pass of a cut step can note; `PASS_NODES` of cutting keeps within it."""
 
 
 class Change(Arrays):
-    """What one pass of a cut step did."""
+    """What one pass of a cut step changed."""
 
     flagged: IntArray
     """Nodes that came to lie on the sheet, shape (CHANGES,)."""
     dirty: IntArray
-    """Tetrahedra that were split or got another node, shape (CHANGES,); may repeat."""
+    """Tetrahedra that were split or got another node, with repeats; shape (CHANGES,)."""
     faces: IntArray
-    """Faces cut: tetrahedron, face, tetrahedron, face; shape (CHANGES, 4)."""
+    """Faces cut, each as tetrahedron, local face, tetrahedron, local face; shape (CHANGES, 4)."""
     n_flagged: IntCell
     """Number of entries in `flagged`."""
     n_dirty: IntCell
@@ -82,7 +82,7 @@ def touched_nodes(body: Body, change: Change, visits: Visits, out: IntArray) -> 
 
 @kernel
 def largest_frequency(body: Body, frequency_squared: FloatArray, nodes: IntArray, n: int) -> float:
-    """Largest bound on w^2 [1/s2] among the first `n` of `nodes` that can move."""
+    """Return the largest bound on w^2 [1/s2] among the first `n` of `nodes` that can move."""
     largest = 0.0
     for i in range(n):
         if not body.fixed[nodes[i]]:

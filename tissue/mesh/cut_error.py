@@ -1,4 +1,4 @@
-"""What cuts left behind: how far off the blade's path they lie, and the thinnest tetrahedron."""
+"""How far cut faces lie from the blade's path, and the smallest altitude of a tetrahedron."""
 
 from typing import NamedTuple
 
@@ -12,17 +12,18 @@ from tissue.mesh.body import CUT, Body
 
 
 class PathError(NamedTuple):
-    """How far nodes on cut faces lie from where the blade passed."""
+    """Distance of the nodes on cut faces from where the blade passed."""
 
     n_nodes: int
+    """Number of nodes on cut faces."""
     mean: float
-    """[m]."""
+    """Mean distance [m], 0 where there is no cut."""
     largest: float
-    """[m]."""
+    """Largest distance [m]."""
 
 
 def path_error(body: Body) -> PathError:
-    """Return the path error of every cut in the body, in O(its tetrahedra)."""
+    """Return the path error of all cuts in the body, in O(tetrahedra)."""
     return PathError(*_path_error(body, np.zeros(body.n_nodes, dtype=np.bool_)))
 
 
@@ -49,7 +50,7 @@ def _path_error(body: Body, seen: BoolArray) -> tuple[int, float, float]:
 
 @kernel
 def lowest_altitude(body: Body) -> float:
-    """Smallest altitude of all tetrahedra at rest [m]."""
+    """Return the smallest altitude of all tetrahedra at rest [m]."""
     lowest = np.inf
     for t in range(body.n_tetrahedra):
         lowest = min(

@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 
-FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Local nodes of the face opposite each node, counter-clockwise seen from outside; shape (4, 3)."""
 
 
@@ -23,7 +23,7 @@ class SortedFaces(NamedTuple):
 
 def sorted_faces(tetrahedra: IntArray) -> SortedFaces:
     """Sort the faces of `tetrahedra`, shape (n_tets, 4), so that equal ones are neighbours."""
-    nodes = np.sort(tetrahedra[:, FACES].reshape(-1, 3), axis=1)
+    nodes = np.sort(tetrahedra[:, OUTWARD].reshape(-1, 3), axis=1)
     n_nodes = int(tetrahedra.max(initial=-1)) + 1
     first_two = nodes[:, 0] * n_nodes + nodes[:, 1]
     halves = np.lexsort((nodes[:, 2], first_two))
@@ -41,4 +41,4 @@ def boundary_faces(tetrahedra: IntArray) -> IntArray:
     """
     faces = sorted_faces(tetrahedra)
     tets, local = np.divmod(np.sort(faces.halves[faces.starts[faces.counts == 1]]), 4)
-    return np.take_along_axis(tetrahedra[tets], FACES[local], axis=1)
+    return np.take_along_axis(tetrahedra[tets], OUTWARD[local], axis=1)

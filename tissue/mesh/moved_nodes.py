@@ -1,4 +1,4 @@
-"""Which nodes have moved since somebody last asked: all that a search has to look at again."""
+"""The nodes that have moved since a search last asked: only these it has to test again."""
 
 import numpy as np
 
@@ -9,16 +9,16 @@ from tissue.mesh.body import grown
 
 
 class Moved(Arrays):
-    """A list of nodes, each once."""
+    """The nodes that have moved, each once."""
 
     nodes: IntArray
-    """Shape (capacity,)."""
+    """Nodes listed, shape (capacity,)."""
     seen: IntArray
-    """Question before which each was last noted, shape (capacity,)."""
+    """Value of `epoch` when each node was last listed, shape (capacity,)."""
     n_nodes: IntCell
     """Number of nodes listed."""
     epoch: IntCell
-    """Number of the question."""
+    """Number of the list: emptying it begins another."""
 
 
 def none_moved(n_nodes: int) -> Moved:
@@ -34,7 +34,7 @@ def grown_moved(moved: Moved, n_nodes: int) -> Moved:
 
 @kernel
 def note_moved(moved: Moved, nodes: IntArray, n: int) -> None:
-    """Note the first `n` of `nodes`."""
+    """Add the first `n` of `nodes` to the list."""
     for i in range(n):
         if moved.seen[nodes[i]] != moved.epoch:
             moved.seen[nodes[i]] = moved.epoch
@@ -44,6 +44,6 @@ def note_moved(moved: Moved, nodes: IntArray, n: int) -> None:
 
 @kernel
 def forget_moved(moved: Moved) -> None:
-    """Empty the list: the question was answered."""
+    """Empty the list."""
     moved.n_nodes = 0
     moved.epoch += 1

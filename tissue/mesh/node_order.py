@@ -9,10 +9,10 @@ from tissue.types import TetrahedralMesh
 
 
 def renumbered(mesh: TetrahedralMesh) -> tuple[TetrahedralMesh, IntArray]:
-    """Return the same mesh in the order of reverse Cuthill and McKee, and what became of each node.
+    """Return the mesh in the order of reverse Cuthill and McKee, and the new number of each node.
 
-    Node `i` of `mesh` is node `place[i]` of the mesh returned, whose tetrahedra are in the order of
-    their lowest nodes.
+    Node `i` of `mesh` is node `place[i]` of the mesh returned. Tetrahedra are in the order of their
+    lowest nodes.
     """
     n = len(mesh.positions)
     pairs = mesh.tetrahedra[:, [0, 0, 0, 1, 1, 2, 1, 2, 3, 2, 3, 3]]

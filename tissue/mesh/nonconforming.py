@@ -1,10 +1,12 @@
-"""Who is behind a face, and around a node, where one large face meets six small ones.
+"""Nonconforming faces: one large face that meets six small ones, and the hanging nodes between
+them.
 
 The paper's scheme splits a tetrahedron and leaves its neighbour whole: the new nodes on their
-common face hang. Both sides of such a face bear the same link, HANGING or less, which names a row
-of `Hanging.faces`. The tetrahedra around a hanging node share no faces there, so that each node
-keeps a list of the tetrahedra around it. Our own scheme leaves nothing hanging: the arrays are
-empty, and no link is less than CUT.
+common face hang. Both sides of such a face have the same link, HANGING or less, which names a row
+of `Hanging.faces`. The tetrahedra around a hanging node share no faces there, so each node has a
+list of the tetrahedra around it. With our own scheme no node hangs: the arrays are empty, and no
+link is less than CUT. Other modules read these arrays through `is_open`, `n_behind` and `behind` of
+`tissue.mesh.body`, and through `tissue.mesh.star`.
 """
 
 import numpy as np
@@ -14,13 +16,13 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 
 HANGING = -3
-"""Link of a face that meets faces of another size: HANGING - row. OUTER and CUT are more."""
+"""Link of a face that meets faces of another size: HANGING - row. OUTER and CUT are greater."""
 
 SMALL_FACES = 6
 """Small faces that meet a large one."""
 
-END = -1
-"""Of a list."""
+_END = -1
+"""In place of an entry at the end of a list."""
 
 
 class Hanging(Arrays):
@@ -29,13 +31,14 @@ class Hanging(Arrays):
     faces: IntArray
     """The tetrahedron with the large face, then those with the small ones; shape (n_rows, 7)."""
     first: IntArray
-    """Where the list of a node begins: 4 * tetrahedron + local node; shape (node capacity,)."""
+    """First entry of each node's list: 4 * tetrahedron + local node; shape (node capacity,)."""
     next: IntArray
-    """What follows in the list of that local node, shape (4 * tetrahedron capacity,)."""
+    """Next entry of the same list, at the place of each entry; shape (4 * tetrahedron
+    capacity,)."""
 
 
 def nothing_hanging() -> Hanging:
-    """Return empty arrays, for a scheme that leaves nothing hanging."""
+    """Return empty arrays, for a scheme with which no node hangs."""
     return Hanging(
         faces=np.zeros((0, 1 + SMALL_FACES), np.int64),
         first=np.zeros(0, np.int64),
@@ -47,8 +50,8 @@ def may_hang(n_faces: int, n_nodes: int, tetrahedra: IntArray) -> Hanging:
     """Return room for that many faces, and the lists of `tetrahedra`, shape (n_tets, 4)."""
     hanging = Hanging(
         faces=np.full((n_faces, 1 + SMALL_FACES), -1),
-        first=np.full(n_nodes, END),
-        next=np.full(tetrahedra.size, END),
+        first=np.full(n_nodes, _END),
+        next=np.full(tetrahedra.size, _END),
     )
     list_corners(hanging, np.ascontiguousarray(tetrahedra))
     return hanging
@@ -58,35 +61,10 @@ def grown_hanging(hanging: Hanging, n_nodes: int, n_tetrahedra: int) -> Hanging:
     """Return the arrays with room for that many nodes and tetrahedra; empty ones stay empty."""
     if len(hanging.first) == 0:
         return hanging
-    first, following = np.full(n_nodes, END), np.full(4 * n_tetrahedra, END)
+    first, following = np.full(n_nodes, _END), np.full(4 * n_tetrahedra, _END)
     first[: len(hanging.first)] = hanging.first
     following[: len(hanging.next)] = hanging.next
     return hanging.replaced(first=first, next=following)
-
-
-@kernel
-def is_open(link: int) -> bool:
-    """Whether nothing is behind a face: it is on the skin or on a cut."""
-    return HANGING < link < 0
-
-
-@kernel
-def n_behind(hanging: Hanging, t: int, link: int) -> int:
-    """How many tetrahedra are behind a face of `t` that bears `link`: none, one or six."""
-    if link >= 0:
-        return 1
-    if link > HANGING:
-        return 0
-    return SMALL_FACES if hanging.faces[HANGING - link, 0] == t else 1
-
-
-@kernel
-def behind(hanging: Hanging, t: int, link: int, i: int) -> int:
-    """Number `i` of the tetrahedra behind a face of `t` that bears `link`."""
-    if link >= 0:
-        return link // 4
-    row = HANGING - link
-    return hanging.faces[row, 1 + i if hanging.faces[row, 0] == t else 0]
 
 
 @kernel
@@ -107,14 +85,26 @@ def join_list(hanging: Hanging, node: int, t: int, k: int) -> None:
 @kernel
 def leave_list(hanging: Hanging, node: int, t: int) -> None:
     """Note that tetrahedron `t` is no longer around `node`."""
-    before = END
+    before = _END
     corner = hanging.first[node]
-    while corner != END and corner // 4 != t:
+    while corner != _END and corner // 4 != t:
         before = corner
         corner = hanging.next[corner]
-    if corner == END:
+    if corner == _END:
         return
-    if before == END:
+    if before == _END:
         hanging.first[node] = hanging.next[corner]
     else:
         hanging.next[before] = hanging.next[corner]
+
+
+@kernel
+def listed_tetrahedra(hanging: Hanging, node: int, out: IntArray, room: int) -> int:
+    """Write the tetrahedra around `node` to `out`, at most `room`; return how many."""
+    n = 0
+    corner = hanging.first[node]
+    while corner != _END and n < room:
+        out[n] = corner // 4
+        n += 1
+        corner = hanging.next[corner]
+    return n

@@ -1,20 +1,19 @@
-"""The connected pieces of the body: tetrahedra that hang together through faces."""
+"""The connected pieces of the body: tetrahedra that are connected through faces."""
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.geometry.connected_components import components
-from tissue.mesh.body import Body
-from tissue.mesh.nonconforming import behind, n_behind
+from tissue.mesh.body import Body, behind, n_behind
 from tissue.types import Piece, Snapshot
 
 
 @kernel
 def label_pieces(body: Body, piece: IntArray, queue: IntArray) -> int:
-    """Number the pieces from 0 and write each tetrahedron's to `piece`; return how many there are.
+    """Write the number of each tetrahedron's piece, from 0, to `piece`; return how many there are.
 
-    `piece` and `queue` have a place for each tetrahedron.
+    `piece` and `queue`, which is scratch, have an entry for each tetrahedron.
     """
     n_tetrahedra = body.n_tetrahedra
     for t in range(n_tetrahedra):
@@ -31,8 +30,8 @@ def label_pieces(body: Body, piece: IntArray, queue: IntArray) -> int:
             t = queue[i]
             for f in range(4):
                 link = body.links[t, f]
-                for k in range(n_behind(body.hanging, t, link)):
-                    other = behind(body.hanging, t, link, k)
+                for k in range(n_behind(body, t, link)):
+                    other = behind(body, t, link, k)
                     if piece[other] < 0:
                         piece[other] = n_pieces
                         queue[n] = other
@@ -45,8 +44,8 @@ def label_pieces(body: Body, piece: IntArray, queue: IntArray) -> int:
 def piece_of_tetrahedra(body: Snapshot) -> IntArray:
     """Return the piece that each tetrahedron is in, shape (n_tets,), numbered as in `pieces_of`.
 
-    From the nodes alone: the tetrahedra around a node hang together through faces, or the node
-    would have been doubled, so pieces share no node.
+    The nodes suffice: the tetrahedra around a node are connected through faces, or the node would
+    have been doubled, so pieces share no node.
     """
     tetrahedra = body.tetrahedra
     edges = np.stack([np.repeat(tetrahedra[:, 0], 3), tetrahedra[:, 1:].ravel()], axis=1)
@@ -63,7 +62,7 @@ def piece_of_tetrahedra(body: Snapshot) -> IntArray:
 def pieces_of(body: Snapshot) -> tuple[Piece, ...]:
     """Return the connected pieces of a body, the largest at rest first.
 
-    Masses are at the nodes, as in the engine: so are the centre, the momenta and the inertia.
+    Centre, momenta and inertia are those of point masses at the nodes, as in the engine.
     """
     of_tetrahedron = piece_of_tetrahedra(body)
     of_node = np.zeros(len(body.positions), dtype=np.int64)

@@ -1,60 +1,59 @@
-"""A grid of cells that lists the tetrahedra near each: where a point is, without asking them all.
+"""Point location: which tetrahedron holds a point, by a grid of cells that list tetrahedra.
 
-Each tetrahedron is listed in the cells that its box meets, widened by a margin. Where a node has
-gone further than the margin, the tetrahedra around it are listed again where they are now: what is
-listed in vain costs a look, never a wrong answer. So the cost of a step is that of the nodes that
-went far, and of one pass over those that moved to find them.
+Each tetrahedron is listed in the cells that its box overlaps, widened by a margin. Where a node has
+moved further than the margin, the tetrahedra around it are listed again where they are now. Stale
+entries cost a test, never a wrong answer. So the cost of a step is one pass over the nodes that
+moved, and listing the tetrahedra around those that moved far.
 """
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits, star
 
 TETRAHEDRA_PER_CELL = 4.0
-"""Cells are so large that the body fills this many tetrahedra a cell on average. Fewer make long
-lists of cells, more make long lists in each."""
+"""Tetrahedra that a cell holds on average. Fewer make more cells for each tetrahedron, more make
+longer lists in each cell."""
 
 _MOST_CELLS = 1 << 20
 """Cells at most, for a body that fills little of its box."""
 
 ENTRIES_PER_TETRAHEDRON = 16
-"""Room for entries. A tetrahedron meets some eight cells; when the room is used up the grid is
-built anew."""
+"""Room for entries. A tetrahedron overlaps some eight cells; when the room is used up the grid is
+built again."""
 
 LEAST_ENTRIES = 1 << 14
 """Room for entries at least."""
 
-LISTED, ENTRIES = 0, 1
-"""Places in `TetrahedronGrid.counts`."""
-
 
 class TetrahedronGrid(Arrays):
-    """Linked lists of tetrahedra, one a cell."""
+    """Linked lists of tetrahedra, one for each cell."""
 
     origin: FloatArray
     """Lowest corner [m], shape (3,)."""
     spacing: float
     """Edge of a cell [m]."""
     shape: IntArray
-    """Cells along each axis, shape (3,). Those on the rim reach to infinity."""
+    """Number of cells along each axis, shape (3,). Cells on the rim reach to infinity."""
     head: IntArray
     """First entry of each cell's list, -1 if it is empty; shape (n_cells,)."""
     following: IntArray
     """The next entry of the same list, -1 at its end; shape (room,)."""
     entry: IntArray
     """Tetrahedron of each entry, shape (room,)."""
-    counts: IntArray
-    """How many tetrahedra are listed, and how many entries there are; shape (2,)."""
+    n_listed: IntCell
+    """Number of tetrahedra listed: 0 to `n_listed` - 1."""
+    n_entries: IntCell
+    """Number of entries in all lists."""
     listed_at: FloatArray
-    """Where the nodes were when they were listed last [m], shape (node capacity, 3)."""
+    """Where each node was when its tetrahedra were listed last [m], shape (node capacity, 3)."""
     margin: float
-    """By how much the boxes are widened [m]."""
+    """Distance by which the boxes of tetrahedra are widened [m]."""
 
 
 def no_grid() -> TetrahedronGrid:
@@ -66,7 +65,8 @@ def no_grid() -> TetrahedronGrid:
         head=np.full(1, -1, np.int64),
         following=np.zeros(0, np.int64),
         entry=np.zeros(0, np.int64),
-        counts=np.zeros(2, np.int64),
+        n_listed=0,
+        n_entries=0,
         listed_at=np.zeros((0, 3)),
         margin=0.0,
     )
@@ -89,7 +89,8 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
             head=np.full(int(shape.prod()), -1, np.int64),
             following=np.empty(room, np.int64),
             entry=np.empty(room, np.int64),
-            counts=np.zeros(2, np.int64),
+            n_listed=0,
+            n_entries=0,
             listed_at=positions.copy(),
             margin=margin,
         )
@@ -101,15 +102,15 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
 @kernel
 def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> bool:
     """List the tetrahedra that were appended since the last call; return whether there was room."""
-    while grid.counts[LISTED] < body.n_tetrahedra:
-        t = grid.counts[LISTED]
+    while grid.n_listed < body.n_tetrahedra:
+        t = grid.n_listed
         for k in range(4):
             node = body.tetrahedra[t, k]
             for c in range(3):
                 grid.listed_at[node, c] = positions[node, c]
         if not _list_tetrahedron(body, positions, grid, t):
             return False
-        grid.counts[LISTED] += 1
+        grid.n_listed += 1
     return True
 
 
@@ -122,10 +123,15 @@ def list_moved(
     n_nodes: int,
     around: IntArray,
 ) -> bool:
-    """List the tetrahedra around nodes that went far again; return whether there was room.
+    """List the tetrahedra around nodes that moved far again; return whether there was room.
 
-    The first `n_nodes` of `nodes` are all that moved since the last call. `around` is scratch of
-    shape (LARGEST_STAR,).
+    Args:
+        body: The body now.
+        visits: For searches.
+        grid: Written.
+        nodes: Nodes, of which the first `n_nodes` are all that moved since the last call.
+        n_nodes: How many these are.
+        around: Scratch, shape (LARGEST_STAR,).
     """
     x = body.positions
     limit = grid.margin * grid.margin
@@ -150,14 +156,14 @@ def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, 
     x0, x1 = _cell_range(body, positions, grid, t, 0)
     y0, y1 = _cell_range(body, positions, grid, t, 1)
     z0, z1 = _cell_range(body, positions, grid, t, 2)
-    if grid.counts[ENTRIES] + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
+    if grid.n_entries + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
         return False
     for i in range(x0, x1 + 1):
         for j in range(y0, y1 + 1):
             for k in range(z0, z1 + 1):
                 cell = (i * grid.shape[1] + j) * grid.shape[2] + k
-                at = grid.counts[ENTRIES]
-                grid.counts[ENTRIES] += 1
+                at = grid.n_entries
+                grid.n_entries += 1
                 grid.entry[at] = t
                 grid.following[at] = grid.head[cell]
                 grid.head[cell] = at
@@ -166,7 +172,7 @@ def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, 
 
 @kernel
 def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, float]:
-    """Least and greatest coordinate along axis `c` of tetrahedron `t` [m]."""
+    """Return the least and the greatest coordinate of tetrahedron `t` along axis `c` [m]."""
     p = positions[body.tetrahedra[t, 0], c]
     q = positions[body.tetrahedra[t, 1], c]
     r = positions[body.tetrahedra[t, 2], c]
@@ -178,23 +184,24 @@ def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, f
 def _cell_range(
     body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int, c: int
 ) -> tuple[int, int]:
-    """First and last cell along axis `c` that the widened box of tetrahedron `t` meets."""
+    """Return the first and last cell along axis `c` that the widened box of `t` overlaps."""
     low, high = _extent(body, positions, t, c)
     return cell_along(grid, low - grid.margin, c), cell_along(grid, high + grid.margin, c)
 
 
 @kernel
 def cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
-    """The cell along axis `c` that holds a coordinate [m]."""
+    """Return the cell along axis `c` that holds a coordinate [m]."""
     cell = (coordinate - grid.origin[c]) / grid.spacing
     return int(min(max(cell, 0.0), grid.shape[c] - 1.0))
 
 
 @kernel
 def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: Vec3) -> int:
-    """The tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
+    """Return the tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
 
-    It is the one of the lowest number, so that a point on a face is always found in the same one.
+    Of several it is the one with the lowest number, so that a point on a face is always found in
+    the same one.
     """
     i = cell_along(grid, p.x, 0)
     j = cell_along(grid, p.y, 1)
@@ -217,7 +224,15 @@ def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: 
 def tetrahedron_in_box(
     body: Body, grid: TetrahedronGrid, positions: FloatArray, low: Vec3, high: Vec3
 ) -> int:
-    """A tetrahedron whose box meets that from `low` to `high` [m]; -1 if none does."""
+    """Return a tetrahedron whose box overlaps a given box; -1 if none does.
+
+    Args:
+        body: The body.
+        grid: Its grid.
+        positions: Positions of the nodes [m], shape (node capacity, 3).
+        low: Lowest corner of the given box [m].
+        high: Highest corner [m].
+    """
     for i in range(cell_along(grid, low.x, 0), cell_along(grid, high.x, 0) + 1):
         for j in range(cell_along(grid, low.y, 1), cell_along(grid, high.y, 1) + 1):
             for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):

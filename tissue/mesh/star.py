@@ -1,4 +1,4 @@
-"""The tetrahedra around a node, found through links: each star hangs together through faces."""
+"""The star of a node or an edge: the tetrahedra around it, which are connected through faces."""
 
 import numpy as np
 
@@ -7,23 +7,23 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.geometry.tetrahedron import node_altitude
 from tissue.mesh.body import Body, local_index
-from tissue.mesh.nonconforming import END
+from tissue.mesh.nonconforming import listed_tetrahedra
 
 LARGEST_STAR = 4096
-"""Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at the worst."""
+"""Tetrahedra around one node at most. Ordinary meshes have 24 on average and 60 at most."""
 
 
 class Visits(Arrays):
-    """Which tetrahedra and nodes a search has seen. A new epoch forgets all, without clearing."""
+    """Tetrahedra and nodes that a search has visited. A new epoch forgets all, without clearing."""
 
     epoch: IntCell
     """Number of the current search."""
     tetrahedra: IntArray
-    """Search that saw each tetrahedron last, shape (capacity,)."""
+    """Search that visited each tetrahedron last, shape (capacity,)."""
     nodes: IntArray
-    """Search that saw each node last, shape (capacity,)."""
+    """Search that visited each node last, shape (capacity,)."""
     place: IntArray
-    """Where in a list of that search a node is, shape (capacity,)."""
+    """Index of each node in a list of that search, shape (capacity,)."""
 
 
 def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
@@ -38,10 +38,17 @@ def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
 
 @kernel
 def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> int:
-    """Write the tetrahedra around `node` that hang together with `start` to `out`; return how many.
+    """Write the tetrahedra around `node` that are connected to `start` to `out`; return how many.
 
-    They come in breadth-first order, `start` first. Where nodes may hang they are those of the list
-    of `node`.
+    They come in breadth-first order, `start` first. Where nodes may hang, the list of `node` is
+    written instead.
+
+    Args:
+        body: The body.
+        visits: For the search.
+        node: The node.
+        start: A tetrahedron around it.
+        out: Written, shape (LARGEST_STAR,).
     """
     visits.epoch += 1
     epoch = visits.epoch
@@ -70,13 +77,9 @@ def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> in
 
 @kernel
 def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
-    n = 0
-    corner = body.hanging.first[node]
-    while corner != END and n < LARGEST_STAR:
-        out[n] = corner // 4
-        visits.tetrahedra[out[n]] = visits.epoch
-        n += 1
-        corner = body.hanging.next[corner]
+    n = listed_tetrahedra(body.hanging, node, out, LARGEST_STAR)
+    for i in range(n):
+        visits.tetrahedra[out[i]] = visits.epoch
     return n
 
 
@@ -84,8 +87,15 @@ def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
 def edge_star(body: Body, visits: Visits, a: int, b: int, out: IntArray) -> int:
     """Write the tetrahedra around edge ab to `out`; return how many.
 
-    They are the part of the star of `a` that holds `b`: around the rim of a cut an edge can have
-    two fans of tetrahedra, which rotating about the edge would not find.
+    They are the part of the star of `a` that holds `b`: at the rim of a cut an edge can have two
+    fans of tetrahedra, which a walk around the edge would not find.
+
+    Args:
+        body: The body.
+        visits: For the search.
+        a: First node of the edge.
+        b: Second node.
+        out: Written, shape (LARGEST_STAR,).
     """
     n = star(body, visits, a, body.node_tetrahedron[a], out)
     kept = 0
@@ -98,7 +108,7 @@ def edge_star(body: Body, visits: Visits, a: int, b: int, out: IntArray) -> int:
 
 @kernel
 def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
-    """Smallest altitude from `node` over the tetrahedra around it, at rest [m]."""
+    """Return the smallest altitude from `node` over the tetrahedra around it, at rest [m]."""
     n = star(body, visits, node, body.node_tetrahedron[node], out)
     size = np.inf
     for i in range(n):
@@ -111,7 +121,7 @@ def node_size(body: Body, visits: Visits, node: int, out: IntArray) -> float:
 
 @kernel
 def mean_node_size(body: Body, visits: Visits, out: IntArray) -> float:
-    """Mean over all nodes of `node_size` [m]."""
+    """Return the mean over all nodes of `node_size` [m]."""
     total = 0.0
     for node in range(body.n_nodes):
         total += node_size(body, visits, node, out)

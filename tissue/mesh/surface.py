@@ -4,19 +4,20 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, IntArray
 from tissue.core.jit import kernel
-from tissue.mesh.body import CUT, Body
-from tissue.mesh.nonconforming import is_open
+from tissue.mesh.body import CUT, Body, is_open
+from tissue.mesh.faces import OUTWARD
 from tissue.types import Surface
-
-OUTWARD = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-"""Nodes of each face of a tetrahedron, counter-clockwise seen from outside."""
 
 
 @kernel
 def boundary_triangles(
     body: Body, triangles: IntArray, is_cut: BoolArray, outward: IntArray
 ) -> int:
-    """Write the triangles without a neighbour; return how many. Room: 4 a tetrahedron."""
+    """Write the triangles without a neighbour; return how many.
+
+    `triangles`, shape (room, 3), and `is_cut`, shape (room,), have room for four a tetrahedron;
+    `outward` is OUTWARD.
+    """
     n = 0
     for t in range(body.n_tetrahedra):
         for f in range(4):

@@ -8,7 +8,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.geometry.connected_components import components
-from tissue.mesh.faces import FACES, SortedFaces, sorted_faces
+from tissue.mesh.faces import OUTWARD, SortedFaces, sorted_faces
 from tissue.types import TetrahedralMesh
 
 _logger = logging.getLogger("tissue")
@@ -21,16 +21,16 @@ USUAL_EXTENT = 1.0
 """A body larger than this [m] may well be in millimetres; no organ and no blade is that long."""
 
 FLAT_QUALITY = 1e-4
-"""Below this quality a tetrahedron counts as flat: it has no inside that a computer can tell.
+"""Quality below which a tetrahedron counts as flat: rounding hides on which side its nodes are.
 
 A tetrahedron whose nodes lie in a plane but for single precision has 1e-7; a cell of a grid that
 is 200 times as wide as high still has 4e-3.
 """
 SLIVER_QUALITY = 1e-2
-"""Below this quality a tetrahedron works, but forces short time steps and poor cuts."""
+"""Quality below which a tetrahedron forces short time steps and poor cuts."""
 
 N_NAMED = 5
-"""How many elements an error names."""
+"""Elements that an error names at most."""
 
 
 class MeshError(ValueError):
@@ -38,35 +38,35 @@ class MeshError(ValueError):
 
 
 class CheckedMesh(NamedTuple):
-    """A mesh that is sound, and what had to be done for that."""
+    """A mesh that is sound, and what was repaired in it."""
 
     mesh: TetrahedralMesh
     """Signed volumes are positive, every node is used, tetrahedra around it share faces."""
     origin: IntArray
-    """Which node of the mesh as given each node was, shape (n_nodes,)."""
+    """Node of the given mesh that each node was, shape (n_nodes,)."""
     warnings: tuple[str, ...]
     """What was repaired, and what is doubtful."""
 
 
 def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
-    """Refuse a broken mesh, repair a harmless fault, and warn of what looks odd.
+    """Refuse a broken mesh, repair harmless faults, and warn of doubtful ones.
 
-    Repaired, with a warning: unused nodes (dropped), tetrahedra that all turn right (turned), and
-    nodes or edges where tetrahedra meet that share no face there (the node is split). Doubtful,
-    with a warning: several pieces, slivers, a body over a metre. Warnings go to the logger
-    "tissue" too.
+    Repaired, with a warning: unused nodes (dropped), tetrahedra that are all inverted (reordered),
+    and nodes or edges at which tetrahedra meet that share no face there (the node is split).
+    Doubtful, with a warning: several pieces, slivers, a body over a metre. Warnings go to the
+    logger "tissue" too.
 
-    Some tetrahedra inverted and others not is an error, for it is rarely a slip in the order of
-    nodes but mostly a body folded over itself, which turning the tetrahedron round would hide.
+    A mesh in which only some tetrahedra are inverted is refused: mostly the body is folded over
+    itself, and to reorder the nodes of those tetrahedra would hide that.
 
     Args:
         mesh: The mesh as it comes; other integer and floating point types are converted.
-        name: What to call it in messages, for example the name of its file.
+        name: Its name in messages, for example that of its file.
 
     Raises:
         MeshError: No tetrahedra; an index out of range; NaN or infinity; a body larger than
-            `MAX_EXTENT` or smaller than `MIN_EXTENT`; a tetrahedron that names a node twice, is
-            there twice, is flat, or is inverted while others are not; a face with three
+            `MAX_EXTENT` or smaller than `MIN_EXTENT`; a tetrahedron that names a node twice,
+            occurs twice, is flat, or is inverted while others are not; a face with three
             tetrahedra, or with two on the same side.
     """
     try:
@@ -81,11 +81,10 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
 def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
     """Refuse a mesh that is broken, or that `checked` would have to repair.
 
-    For those who are given a mesh together with something that is counted by its nodes, and
-    therefore must not change it.
+    For callers that also have data for each node of the mesh, and therefore must not change it.
 
     Raises:
-        MeshError: See `checked`.
+        MeshError: `checked` would refuse the mesh or repair it.
     """
     try:
         result = _checked(mesh)
@@ -103,7 +102,7 @@ def expect_sound(mesh: TetrahedralMesh, name: str = "mesh") -> None:
 
 
 def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
-    """See `checked`: one question after the other, each relying on those before."""
+    """Return what `checked` returns: one check after another, each relying on those before."""
     warnings: list[str] = []
     positions, tetrahedra = _as_arrays(mesh)
     _refuse_wrong_indices(tetrahedra, len(positions))
@@ -141,7 +140,7 @@ def _as_arrays(mesh: TetrahedralMesh) -> tuple[FloatArray, IntArray]:
 
 
 def _refuse_wrong_indices(tetrahedra: IntArray, n_nodes: int) -> None:
-    """Every tetrahedron names four different nodes that exist."""
+    """Refuse tetrahedra that do not name four different nodes that exist."""
     wrong = (tetrahedra < 0) | (tetrahedra >= n_nodes)
     if wrong.any():
         tets = np.flatnonzero(wrong.any(axis=1))
@@ -158,7 +157,7 @@ def _refuse_wrong_indices(tetrahedra: IntArray, n_nodes: int) -> None:
 
 
 def _refuse_not_finite(positions: FloatArray) -> None:
-    """Every coordinate is a number."""
+    """Refuse coordinates that are NaN or infinite."""
     wrong = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if wrong.size:
         raise MeshError(
@@ -170,7 +169,7 @@ def _refuse_not_finite(positions: FloatArray) -> None:
 def _without_unused(
     positions: FloatArray, tetrahedra: IntArray, warnings: list[str]
 ) -> tuple[FloatArray, IntArray, IntArray]:
-    """Drop nodes that no tetrahedron names; return what is left, and which nodes it was."""
+    """Drop nodes that no tetrahedron names; return the rest, and the old number of each node."""
     used = np.zeros(len(positions), dtype=bool)
     used[tetrahedra] = True
     kept = np.flatnonzero(used)
@@ -184,7 +183,7 @@ def _without_unused(
 
 
 def _refuse_wrong_extent(positions: FloatArray, warnings: list[str]) -> None:
-    """The body is of a size that makes sense in metres."""
+    """Refuse a body of a size that makes no sense in metres."""
     with np.errstate(over="ignore"):
         extent = float(np.ptp(positions, axis=0).max())
     if extent > MAX_EXTENT:
@@ -201,7 +200,7 @@ def _refuse_wrong_extent(positions: FloatArray, warnings: list[str]) -> None:
 
 
 def _refuse_repeated(tetrahedra: IntArray) -> None:
-    """No tetrahedron is there twice."""
+    """Refuse a mesh in which a tetrahedron occurs twice."""
     in_order = np.sort(tetrahedra, axis=1)
     order = np.lexsort(in_order.T)
     equal = (in_order[order[1:]] == in_order[order[:-1]]).all(axis=1)
@@ -233,7 +232,7 @@ def quality(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
 
 
 def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> None:
-    """Every tetrahedron has an inside."""
+    """Refuse flat tetrahedra, and warn of slivers."""
     shape = np.abs(quality(positions, tetrahedra))
     worst = np.argsort(shape, kind="stable")[:N_NAMED]
     flat = worst[shape[worst] < FLAT_QUALITY]
@@ -254,7 +253,7 @@ def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
 
 
 def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> IntArray:
-    """Return the tetrahedra with positive volumes, if they all turn the same way."""
+    """Return the tetrahedra with positive volumes, if all have the same orientation."""
     inverted = signed_volumes(positions, tetrahedra) < 0.0
     if inverted.all():
         warnings.append(
@@ -262,7 +261,7 @@ def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
         )
         return tetrahedra[:, [0, 1, 3, 2]]
     if inverted.any():
-        # Where most are inverted, the few others are the odd ones for whoever looks for the fault.
+        # Where most are inverted, the few others are named: they are the fault.
         most = inverted.mean() > 0.5
         odd = np.flatnonzero(inverted != most)
         kind = "not inverted while the others are" if most else "inverted"
@@ -274,7 +273,7 @@ def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
 
 
 def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:
-    """Every face belongs to one tetrahedron, or to two on its two sides."""
+    """Refuse faces of three or more tetrahedra, or of two on the same side."""
     crowded = np.flatnonzero(faces.counts > 2)
     if crowded.size:
         start = faces.starts[crowded[0]]
@@ -296,33 +295,33 @@ def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:
 
 def _face(tetrahedra: IntArray, half: int) -> list[int]:
     """Return the nodes of a face in order."""
-    return sorted(tetrahedra[half // 4, FACES[half % 4]].tolist())
+    return sorted(tetrahedra[half // 4, OUTWARD[half % 4]].tolist())
 
 
 def _is_even(tetrahedra: IntArray, halves: IntArray) -> BoolArray:
-    """Whether sorting the face's nodes takes an even number of swaps, for each face."""
-    a, b, c = np.take_along_axis(tetrahedra[halves // 4], FACES[halves % 4], axis=1).T
+    """Return whether sorting the face's nodes takes an even number of swaps, for each face."""
+    a, b, c = np.take_along_axis(tetrahedra[halves // 4], OUTWARD[halves % 4], axis=1).T
     return (a < b) ^ (b < c) ^ (a < c)
 
 
 def _with_stars_joined(
     tetrahedra: IntArray, pairs: IntArray, n_nodes: int, warnings: list[str]
 ) -> tuple[IntArray, IntArray]:
-    """Split each node whose tetrahedra do not hang together through faces that hold it.
+    """Split each node whose tetrahedra are not connected through faces at the node.
 
     Args:
         tetrahedra: Node indices, shape (n_tets, 4).
         pairs: Faces that lie on each other, as 4 * tetrahedron + local face, shape (n_pairs, 2).
         n_nodes: Number of nodes.
-        warnings: Where to say what was done.
+        warnings: What was done is appended.
 
     Returns:
-        The tetrahedra, with new nodes from `n_nodes` on, and of which node each new one is a copy.
+        The tetrahedra, with new nodes from `n_nodes` on, and the node that each new one copies.
     """
     # A corner is a tetrahedron's share of a node, numbered 4 * tetrahedron + local node. Corners
     # of one node are joined where their tetrahedra share a face that holds the node.
     tets, local = np.divmod(pairs, 4)
-    corners = 4 * tets[:, :, None] + FACES[local]
+    corners = 4 * tets[:, :, None] + OUTWARD[local]
     nodes = tetrahedra.ravel()[corners]
     corners = np.take_along_axis(corners, np.argsort(nodes, axis=2), axis=2)
     n_stars, star = components(tetrahedra.size, corners.transpose(0, 2, 1).reshape(-1, 2))
@@ -346,7 +345,7 @@ def _with_stars_joined(
 
 
 def _count_pieces(n_tets: int, neighbours: IntArray, warnings: list[str]) -> None:
-    """Warn of a body in pieces."""
+    """Warn of a body in several pieces."""
     n_pieces, piece = components(n_tets, neighbours)
     if n_pieces > 1:
         sizes = np.sort(np.bincount(piece))[::-1]

@@ -260,5 +260,5 @@ def _pyramid(apex: _Vertex, base: list[_Vertex]) -> list[tuple[_Vertex, ...]]:
 
 
 def _is_long(i: int, j: int) -> bool:
-    """Whether two nodes of a lattice tetrahedron are joined by a long edge."""
+    """Return whether two nodes of a lattice tetrahedron are joined by a long edge."""
     return i ^ 1 == j

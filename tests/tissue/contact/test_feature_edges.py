@@ -6,7 +6,7 @@ import pytest
 from tissue import TetrahedralMesh, block
 from tissue.contact.feature_edges import across, is_ridge
 from tissue.mesh.body import OUTER, build_body
-from tissue.mesh.surface import OUTWARD
+from tissue.mesh.faces import OUTWARD
 
 pytestmark = pytest.mark.kernel
 

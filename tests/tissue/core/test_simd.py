@@ -9,13 +9,13 @@ from tissue.core.jit import kernel
 from tissue.core.simd import (
     eight_points,
     lanes,
-    load,
+    load_lanes,
     point,
     point_of,
     room_for_points,
     spread,
     square_root,
-    store,
+    store_lanes,
     store_point,
     summed,
     times,
@@ -32,9 +32,9 @@ OF = np.array([3, 1, 4, 1, 5, 9, 2, 6, 5, 3], dtype=np.int32)
 
 
 def arithmetic(values, out):
-    a, b = load(values, 0), load(values, 8)
-    store(out, 0, (a + b) * lanes(3.0))
-    store(out, 8, (a - b) / square_root(b))
+    a, b = load_lanes(values, 0), load_lanes(values, 8)
+    store_lanes(out, 0, (a + b) * lanes(3.0))
+    store_lanes(out, 8, (a - b) / square_root(b))
 
 
 def of_points(points, of, out):
@@ -45,9 +45,9 @@ def of_points(points, of, out):
 
 def spread_out(points, out):
     x, y, z = spread(point(points, 2))
-    store(out, 0, x)
-    store(out, 8, y)
-    store(out, 16, z)
+    store_lanes(out, 0, x)
+    store_lanes(out, 8, y)
+    store_lanes(out, 16, z)
 
 
 def test_a_spread_point_has_its_coordinates_in_all_lanes():

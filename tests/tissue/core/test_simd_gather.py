@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue.core.jit import kernel
-from tissue.core.simd import load, store, store_point
+from tissue.core.simd import load_lanes, store_lanes, store_point
 from tissue.core.simd_gather import gathered, larger, largest, sum_of_eight, sum_of_eight_points
 
 pytestmark = pytest.mark.kernel
@@ -14,7 +14,7 @@ OF = np.array([3, 1, 24, 1, 5, 9, 22, 6, 5, 3], dtype=np.int32)
 
 
 def gather(values, of, out, points):
-    store(out, 0, gathered(values, of, 1))
+    store_lanes(out, 0, gathered(values, of, 1))
     out[8] = sum_of_eight(values, of, 2)
     store_point(points, 0, sum_of_eight_points(values, of, 1))
 
@@ -32,8 +32,8 @@ def test_values_and_points_are_gathered_and_summed_up():
 
 
 def compare(values, out):
-    store(out, 0, larger(load(values, 0), load(values, 8)))
-    out[8] = largest(load(values, 16))
+    store_lanes(out, 0, larger(load_lanes(values, 0), load_lanes(values, 8)))
+    out[8] = largest(load_lanes(values, 16))
 
 
 def test_the_larger_of_two_and_the_largest_of_eight():

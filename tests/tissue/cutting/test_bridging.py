@@ -7,7 +7,7 @@ from tests import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
 from tissue.cutting.bridging import remember_active, resolve_bridges
-from tissue.cutting.cut_surface import on_sheet, see_side, side_of
+from tissue.cutting.cut_surface import note_side, on_sheet, side_of
 from tissue.mesh.changes import note_dirty
 
 pytestmark = pytest.mark.kernel
@@ -24,17 +24,17 @@ def corner(x: float, low: float = -1.0):
     path.member[:] = True
     path.linked[0] = True
     put_on_lattice(path, cut.body.lattice)
-    cut.work.active[0] = 0
-    cut.work.n_active[0] = 1
+    cut.scratch.active[0] = 0
+    cut.scratch.n_active = 1
     remember_active(cut)
-    cut.work.n_active[0] = 0
+    cut.scratch.n_active = 0
     return cut
 
 
 def test_an_edge_between_both_sides_is_cut_where_the_sheet_passes():
     cut = corner(0.5)
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 5
     np.testing.assert_allclose(cut.body.rest[4], [0.5, 0.0, 0.0])
@@ -43,8 +43,8 @@ def test_an_edge_between_both_sides_is_cut_where_the_sheet_passes():
 
 def test_a_node_that_was_seen_on_the_wrong_side_from_afar_is_put_right():
     cut = corner(-0.5)  # the whole tetrahedron is on side +1
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
     assert side_of(cut.sheet, 0) == 1
@@ -52,8 +52,8 @@ def test_a_node_that_was_seen_on_the_wrong_side_from_afar_is_put_right():
 
 def test_a_node_seen_on_the_wrong_side_that_is_near_the_sheet_lies_on_it():
     cut = corner(-0.05)
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
     assert on_sheet(cut.sheet, 0)
@@ -61,24 +61,24 @@ def test_a_node_seen_on_the_wrong_side_that_is_near_the_sheet_lies_on_it():
 
 def test_a_tetrahedron_beyond_the_tip_is_no_bridge():
     cut = corner(0.5, low=1.5)
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
 
 
 def test_a_tetrahedron_that_is_still_active_waits():
     cut = corner(0.5)
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
-    cut.work.n_active[0] = 1
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
+    cut.scratch.n_active = 1
     resolve_bridges(cut)
     assert cut.body.n_nodes == 4
 
 
 def test_changed_tetrahedra_are_remembered_beside_the_active_ones():
     cut = corner(0.5)
-    cut.work.n_active[0] = 1
+    cut.scratch.n_active = 1
     note_dirty(cut.change, 0)
     remember_active(cut)
-    assert cut.work.n_previous[0] == 2
+    assert cut.scratch.n_previous == 2

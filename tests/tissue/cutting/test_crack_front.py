@@ -8,8 +8,8 @@ import pytest
 from tests import bodies, soundness
 from tests.tissue.kernels_of import cut_of
 from tissue.cutting.blade_path import put_on_lattice
+from tissue.cutting.collision_detection import find_active_tetrahedra
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
-from tissue.cutting.crossings import find_active_tetrahedra
 from tissue.cutting.cut_surface import on_sheet
 
 pytestmark = [
@@ -24,7 +24,7 @@ X, DEPTH = 0.37, 0.41
 def swept(y0: float, y1: float, low: float = DEPTH):
     """Return a unit cube in which an upright edge at X went from y0 to y1, its tip at `low`."""
     cut = cut_of(bodies.jittered(3, 2, size=1.0), n_samples=5)
-    cut = cut.replaced(quality=cut.quality.replaced(snap=0.1))
+    cut = cut.replaced(limits=cut.limits.replaced(snap=0.1))
     path = cut.path
     heights = np.linspace(low, 1.2, 5)
     for array, y in ((path.t0, y0), (path.t1, y1)):

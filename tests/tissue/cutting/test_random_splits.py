@@ -47,18 +47,18 @@ def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: Floa
         b = body.tetrahedra[t, (k + 1) % 4]
         c = body.tetrahedra[t, (k + 2) % 4]
         s = 0.2 + 0.6 * which[i, 2]
-        before[i], _ = volume_around(cut, a, b, cut.work.around)
+        before[i], _ = volume_around(cut, a, b, cut.scratch.around)
         if which[i, 3] < 0.5:
             node = split_edge(cut, a, b, s)
-            first, least_a = volume_around(cut, a, node, cut.work.around)
-            second, least_b = volume_around(cut, node, b, cut.work.around)
+            first, least_a = volume_around(cut, a, node, cut.scratch.around)
+            second, least_b = volume_around(cut, node, b, cut.scratch.around)
             after[i] = first + second
             least = min(least, min(least_a, least_b))
         else:  # a face split keeps edge ab; what was around it is now around it, or around c
             face_before = 0.0
-            n = edge_star(body, cut.visits, a, b, cut.work.around)
+            n = edge_star(body, cut.visits, a, b, cut.scratch.around)
             for j in range(n):
-                tetrahedron = cut.work.around[j]
+                tetrahedron = cut.scratch.around[j]
                 for m in range(4):
                     if body.tetrahedra[tetrahedron, m] == c:
                         face_before += tetrahedron_volume(body.rest, body.tetrahedra, tetrahedron)
@@ -66,7 +66,7 @@ def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: Floa
             node = split_face(cut, a, b, c, Vec3(w, 0.5 - 0.5 * w, 0.5 - 0.5 * w))
             total = 0.0
             for end in (a, b, c):
-                v, smallest = volume_around(cut, node, end, cut.work.around)
+                v, smallest = volume_around(cut, node, end, cut.scratch.around)
                 total += v
                 least = min(least, smallest)
             before[i] = face_before

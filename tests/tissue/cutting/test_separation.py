@@ -7,7 +7,7 @@ from tests import bodies, naive, soundness
 from tests.tissue.kernels_of import cut_of
 from tissue import block
 from tissue.cutting.blade_path import put_on_lattice
-from tissue.cutting.cut_surface import decide_side, see_side
+from tissue.cutting.cut_surface import decide_side, note_side
 from tissue.cutting.separation import open_sheet, tetrahedron_side
 from tissue.cutting.workspace import flag
 from tissue.mesh.body import CUT
@@ -110,7 +110,7 @@ def test_the_last_face_of_a_tetrahedron_holds():
 
 def test_a_piece_smaller_than_a_crumb_stays_with_the_body():
     cut = two_halves()
-    cut = cut.replaced(quality=cut.quality.replaced(crumb=0.51))
+    cut = cut.replaced(limits=cut.limits.replaced(crumb=0.51))
     open_sheet(cut)
     assert soundness.n_pieces(mesh_of(cut)) == 1
     assert cut.body.n_nodes == 12
@@ -144,14 +144,14 @@ def test_a_side_that_was_decided_stays():
 def test_a_side_that_a_node_was_seen_on_outweighs_where_it_lies():
     cut = one_tetrahedron(0, 2, 3)
     assert tetrahedron_side(cut, 0) == 1  # node 1 is at x = 1
-    see_side(cut.sheet, 1, -1, True)
+    note_side(cut.sheet, 1, -1, True)
     assert tetrahedron_side(cut, 0) == -1
 
 
 def test_a_tetrahedron_seen_on_both_sides_is_on_neither_yet():
     cut = one_tetrahedron(2, 3)
-    see_side(cut.sheet, 0, -1, True)
-    see_side(cut.sheet, 1, 1, True)
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
     assert tetrahedron_side(cut, 0) == 0
 
 

@@ -28,7 +28,7 @@ def corner(x: float, **quality):
     path.member[:] = True
     path.linked[0] = True
     put_on_lattice(path, cut.body.lattice)
-    return cut.replaced(quality=cut.quality.replaced(**quality))
+    return cut.replaced(limits=cut.limits.replaced(**quality))
 
 
 def test_an_edge_crossed_in_its_middle_gets_a_node_there():
@@ -118,9 +118,9 @@ def test_a_point_in_a_face_uses_its_corner_splits_its_side_or_itself(weights, pl
 
 def test_crossings_are_handled_from_the_middle_of_their_edges_outwards():
     cut = corner(0.5)
-    work = cut.work
-    work.n_crossings[0] = 4
-    work.crossing[:4, :2] = [[5, 6], [1, 9], [1, 3], [0, 1]]
-    work.crossing_at[:4, 0] = [0.9, 0.4, 0.6, 0.5]
+    scratch = cut.scratch
+    scratch.n_crossings = 4
+    scratch.crossing[:4, :2] = [[5, 6], [1, 9], [1, 3], [0, 1]]
+    scratch.crossing_at[:4, 0] = [0.9, 0.4, 0.6, 0.5]
     sort_crossings(cut)
-    assert work.order[:4].tolist() == [3, 2, 1, 0]
+    assert scratch.order[:4].tolist() == [3, 2, 1, 0]

@@ -144,7 +144,7 @@ def test_a_new_node_is_fixed_only_between_fixed_nodes():
 
 def test_a_split_that_would_leave_a_flat_tetrahedron_is_not_good():
     cut = cut_of(bodies.unit_tetrahedron())
-    guarded = cut.replaced(quality=cut.quality.replaced(guard=0.1))
+    guarded = cut.replaced(limits=cut.limits.replaced(guard=0.1))
     assert edge_split_is_good(guarded, 0, 1, 0.5)
     assert not edge_split_is_good(guarded, 0, 1, 0.05)
     assert face_split_is_good(guarded, 0, 1, 2, Vec3(1 / 3, 1 / 3, 1 / 3))

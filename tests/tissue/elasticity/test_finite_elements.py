@@ -10,17 +10,17 @@ from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
 from tissue import block
 from tissue.core.simd import WIDTH
 from tissue.elasticity.finite_elements import (
-    POOL_MARGIN,
+    STAR_POOL_MARGIN,
     VOLUME,
     build_stars,
     build_tetrahedra,
-    corner_at,
+    corner_of_slot,
     grown_solid,
     neo_hookean,
     no_solid,
     room_for_stars,
     shape_place,
-    tetrahedron_at,
+    tetrahedron_of_slot,
     volume_term,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
@@ -41,7 +41,7 @@ def corners(solid, node):
     """Return the corners that the node is, as (tetrahedron, which of its four), in order."""
     first = int(solid.first[node])
     slots = range(first, first + int(solid.count[node]))
-    return [(tetrahedron_at(solid, slot), corner_at(solid, slot)) for slot in slots]
+    return [(tetrahedron_of_slot(solid, slot), corner_of_slot(solid, slot)) for slot in slots]
 
 
 def test_a_row_names_each_tetrahedron_around_the_node_in_order(mesh):
@@ -106,7 +106,7 @@ def test_no_room_for_a_row_is_said_and_nothing_is_lost():
     body, n = whole.body, whole.body.n_nodes
     room = (n, body.n_tetrahedra)
     visits, around = no_visits(*room), np.zeros(LARGEST_STAR, dtype=np.int64)
-    tight = no_solid(law_of(0.45), *room, POOL_MARGIN + 40)
+    tight = no_solid(law_of(0.45), *room, STAR_POOL_MARGIN + 40)
     build_tetrahedra(tight, body, tight.every, room[1])
     done = build_stars(tight, body, visits, tight.every, n, around)
     assert 0 < done < n

@@ -14,7 +14,7 @@ from tests.tissue.kernels_of import (
 )
 from tissue import block
 from tissue.elasticity.springs import (
-    POOL_MARGIN,
+    SPRING_POOL_MARGIN,
     build_rows,
     grown_springs,
     no_springs,
@@ -153,10 +153,10 @@ def test_no_room_for_a_row_is_said_and_nothing_is_lost():
     n = len(mesh.positions)
     arguments = (DENSITY, YOUNG_MODULUS, np.zeros(LARGEST_STAR, dtype=np.int64))
     visits = no_visits(n, len(mesh.tetrahedra))
-    tight = no_springs(n, POOL_MARGIN + 20)
+    tight = no_springs(n, SPRING_POOL_MARGIN + 20)
     done = build_rows(body, visits, tight, np.arange(n), n, *arguments)
     assert 0 < done < n
-    larger = grown_springs(tight, n, 4 * POOL_MARGIN)
+    larger = grown_springs(tight, n, 4 * SPRING_POOL_MARGIN)
     rest = np.arange(done, n)
     assert build_rows(body, visits, larger, rest, n - done, *arguments) == n - done
     at_once = springs_of(build_body(mesh, None, None))

@@ -32,7 +32,8 @@ def elastic_of(solid):
     return Elastic(
         springs=no_springs(n, 0),
         solid=solid.solid,
-        has=np.array([False, True]),
+        has_springs=0,
+        has_tetrahedra=1,
         frequency_squared=solid.solid.frequency_squared.copy(),
     )
 

@@ -10,7 +10,7 @@ from tissue.core.vec3 import Vec3
 from tissue.geometry.exact_predicates import (
     LATTICE_LIMIT,
     LATTICE_POINTS,
-    Point,
+    LatticePoint,
     lattice_around,
     nearest,
     orient3d,
@@ -19,19 +19,19 @@ from tissue.geometry.exact_predicates import (
 
 pytestmark = pytest.mark.kernel
 
-A, B = Point(1, 1, -5), Point(1, 1, 5)
-P, Q, R = Point(0, 0, 0), Point(4, 0, 0), Point(0, 4, 0)
+A, B = LatticePoint(1, 1, -5), LatticePoint(1, 1, 5)
+P, Q, R = LatticePoint(0, 0, 0), LatticePoint(4, 0, 0), LatticePoint(0, 4, 0)
 
 
 def points(random, n, reach=LATTICE_POINTS // 2):
     """Return `n` lattice points of a body."""
-    return [Point(*row) for row in random.integers(-reach, reach, (n, 3)).tolist()]
+    return [LatticePoint(*row) for row in random.integers(-reach, reach, (n, 3)).tolist()]
 
 
 def test_a_point_above_a_left_turn_is_positive():
-    assert orient3d(P, Q, R, Point(0, 0, 1)) == 16
-    assert orient3d(P, Q, R, Point(0, 0, -1)) == -16
-    assert orient3d(P, Q, R, Point(7, -3, 0)) == 0
+    assert orient3d(P, Q, R, LatticePoint(0, 0, 1)) == 16
+    assert orient3d(P, Q, R, LatticePoint(0, 0, -1)) == -16
+    assert orient3d(P, Q, R, LatticePoint(7, -3, 0)) == 0
 
 
 def test_sides_are_exact_for_points_next_to_the_plane():
@@ -40,11 +40,13 @@ def test_sides_are_exact_for_points_next_to_the_plane():
         a, b, c = points(random, 3, LATTICE_POINTS // 8)
         i, j = random.integers(-2, 3, 2).tolist()
         on_plane = [p + i * (q - p) + j * (r - p) for p, q, r in zip(a, b, c, strict=True)]
-        d = Point(*(x + int(e) for x, e in zip(on_plane, random.integers(-1, 2, 3), strict=True)))
+        d = LatticePoint(
+            *(x + int(e) for x, e in zip(on_plane, random.integers(-1, 2, 3), strict=True))
+        )
         assert orient3d(a, b, c, d) == naive.determinant(a, b, c, d)
 
 
-def adversarial(random: np.random.Generator) -> list[Point]:
+def adversarial(random: np.random.Generator) -> list[LatticePoint]:
     """Return four points that nearly, or just, lie in one plane, on one line or in one point."""
     reach = LATTICE_LIMIT // 8
     a, u, v = random.integers(-reach, reach + 1, (3, 3))
@@ -53,7 +55,7 @@ def adversarial(random: np.random.Generator) -> list[Point]:
     i, j = random.integers(-3, 4, 2)
     off = random.integers(-1, 2, 3) * (random.random() < 0.7)
     four = [a, a + u, a + v, a + i * u + j * v + off]
-    return [Point(*p.clip(-LATTICE_LIMIT, LATTICE_LIMIT).tolist()) for p in four]
+    return [LatticePoint(*p.clip(-LATTICE_LIMIT, LATTICE_LIMIT).tolist()) for p in four]
 
 
 def test_sides_are_exact_in_10000_cases_made_to_fail():
@@ -69,15 +71,15 @@ def test_sides_are_exact_in_10000_cases_made_to_fail():
 
 def test_no_points_of_the_lattice_overflow():
     ends = (-LATTICE_LIMIT, LATTICE_LIMIT)
-    corners = [Point(*corner) for corner in itertools.product(ends, repeat=3)]
+    corners = [LatticePoint(*corner) for corner in itertools.product(ends, repeat=3)]
     for four in itertools.permutations(corners, 4):
         assert orient3d(*four) == naive.determinant(*four)
 
 
 def test_a_segment_through_a_triangle_pierces_it():
     assert pierces(A, B, P, Q, R)
-    assert not pierces(A, Point(1, 1, -1), P, Q, R)
-    assert not pierces(Point(3, 3, -5), Point(3, 3, 5), P, Q, R)
+    assert not pierces(A, LatticePoint(1, 1, -1), P, Q, R)
+    assert not pierces(LatticePoint(3, 3, -5), LatticePoint(3, 3, 5), P, Q, R)
 
 
 def test_piercing_agrees_with_exact_fractions():
@@ -104,7 +106,7 @@ def test_the_order_of_nodes_and_ends_does_not_matter():
 
 
 def test_turning_a_triangle_round_its_nodes_does_not_matter_even_for_ties():
-    small = [Point(*p) for p in itertools.product(range(2), repeat=3)]
+    small = [LatticePoint(*p) for p in itertools.product(range(2), repeat=3)]
     for a, b, p, q, r in itertools.permutations(small, 5):
         assert pierces(a, b, p, q, r) == pierces(a, b, q, r, p) == pierces(a, b, r, p, q)
 
@@ -118,7 +120,7 @@ def test_of_two_triangles_exactly_one_is_pierced_through_their_common_edge():
         a, b = middle - 2 * way, middle + 3 * way
         if naive.determinant(a, b, p, r) * naive.determinant(a, b, p, s) >= 0:
             continue  # a fold: the segment touches it, or passes it by
-        a, b, p, q, r, s = (Point(*x.tolist()) for x in (a, b, p, q, r, s))
+        a, b, p, q, r, s = (LatticePoint(*x.tolist()) for x in (a, b, p, q, r, s))
         assert naive.determinant(a, b, p, q) == 0
         assert pierces(a, b, p, q, r) != pierces(a, b, q, p, s)
         n += 1
@@ -128,8 +130,8 @@ def test_of_two_segments_exactly_one_pierces_the_triangle_they_meet_on():
     random = np.random.default_rng(5)
     for _ in range(2000):
         p, u, v, a, c = random.integers(-1000, 1001, (5, 3))
-        triangle = [Point(*x.tolist()) for x in (p, p + 5 * u, p + 5 * v)]
-        a, b, c = (Point(*x.tolist()) for x in (a, p + u + 2 * v, c))
+        triangle = [LatticePoint(*x.tolist()) for x in (p, p + 5 * u, p + 5 * v)]
+        a, b, c = (LatticePoint(*x.tolist()) for x in (a, p + u + 2 * v, c))
         if naive.determinant(*triangle, a) * naive.determinant(*triangle, c) < 0:
             assert pierces(a, b, *triangle) != pierces(b, c, *triangle)
 
@@ -139,28 +141,38 @@ def test_a_flat_triangle_is_never_pierced():
     for _ in range(500):
         a, b, p, step = random.integers(-1000, 1001, (4, 3))
         i, j = random.integers(-3, 4, 2)
-        flat = (Point(*x.tolist()) for x in (p, p + i * step, p + j * step))
-        assert not pierces(Point(*a.tolist()), Point(*b.tolist()), *flat)
+        flat = (LatticePoint(*x.tolist()) for x in (p, p + i * step, p + j * step))
+        assert not pierces(LatticePoint(*a.tolist()), LatticePoint(*b.tolist()), *flat)
 
 
 def test_nothing_slips_between_the_triangles_of_an_edge_that_advances():
     """Wherever a line meets what an edge sweeps, exactly one triangle of its quads is pierced."""
-    tips = [Point(0, 0, 0), Point(4, 1, 0), Point(6, 0, 0), Point(12, 0, 0)]
-    heels = [Point(0, 8, 0), Point(2, 8, 0), Point(8, 8, 0), Point(12, 8, 0)]
+    tips = [
+        LatticePoint(0, 0, 0),
+        LatticePoint(4, 1, 0),
+        LatticePoint(6, 0, 0),
+        LatticePoint(12, 0, 0),
+    ]
+    heels = [
+        LatticePoint(0, 8, 0),
+        LatticePoint(2, 8, 0),
+        LatticePoint(8, 8, 0),
+        LatticePoint(12, 8, 0),
+    ]
     triangles = []
     for t0, t1, h0, h1 in zip(tips, tips[1:], heels, heels[1:], strict=False):
         triangles += [(t0, t1, h1), (t0, h1, h0)]
     for x, y in itertools.product(range(1, 12), range(2, 8)):
         for lean in itertools.product((-3, 0, 1), repeat=2):
-            below = Point(x - lean[0], y - lean[1], -1)
-            above = Point(x + lean[0], y + lean[1], 1)
+            below = LatticePoint(x - lean[0], y - lean[1], -1)
+            above = LatticePoint(x + lean[0], y + lean[1], 1)
             assert sum(pierces(below, above, *triangle) for triangle in triangles) == 1
 
 
 def test_the_lattice_covers_the_body_from_its_centre():
     lattice = lattice_around(np.array([[0.0, 0.0, 0.0], [0.1, 0.02, 0.04]]))
-    assert nearest(lattice, Vec3(0.05, 0.01, 0.02)) == Point(0, 0, 0)
-    assert nearest(lattice, Vec3(0.1, 0.01, 0.02)) == Point(LATTICE_POINTS // 2, 0, 0)
+    assert nearest(lattice, Vec3(0.05, 0.01, 0.02)) == LatticePoint(0, 0, 0)
+    assert nearest(lattice, Vec3(0.1, 0.01, 0.02)) == LatticePoint(LATTICE_POINTS // 2, 0, 0)
 
 
 def test_a_blade_far_from_the_body_is_pulled_in_to_the_lattice():

@@ -5,11 +5,10 @@ import pytest
 
 from tests import bodies, naive
 from tissue import block
-from tissue.mesh.body import build_body
+from tissue.mesh.body import build_body, is_open
 from tissue.mesh.nonconforming import (
     HANGING,
     grown_hanging,
-    is_open,
     join_list,
     leave_list,
     may_hang,

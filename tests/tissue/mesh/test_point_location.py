@@ -8,7 +8,7 @@ from tests.tissue.kernels_of import cut_of
 from tissue.core.vec3 import Vec3
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
-from tissue.mesh.bounding_boxes import survey
+from tissue.mesh.bounding_boxes import body_bounds
 from tissue.mesh.point_location import (
     build_grid,
     list_appended,
@@ -69,7 +69,7 @@ def test_points_are_found_when_nodes_that_went_far_are_listed_again(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
     n = cut.body.n_nodes
     cut.body.positions[:n] += [0.3, -0.2, 0.1]
-    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.work.around)
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
     expect_found(cut.body, cells, seed=2)
 
 
@@ -96,7 +96,7 @@ def test_a_box_beside_the_body_meets_no_tetrahedron_and_one_across_it_does(cut):
 
 def test_the_body_reaches_from_its_lowest_to_its_highest_node(cut):
     cut.body.positions[7] = [-3.0, 0.5, 4.0]
-    seen = survey(cut.body)
+    seen = body_bounds(cut.body)
     assert seen.is_finite
     assert seen.low == (-3.0, 0.0, 0.0)
     assert seen.high == (1.0, 1.0, 4.0)
@@ -105,4 +105,4 @@ def test_the_body_reaches_from_its_lowest_to_its_highest_node(cut):
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_node_that_is_nowhere_is_seen(cut, value):
     cut.body.positions[7, 1] = value
-    assert not survey(cut.body).is_finite
+    assert not body_bounds(cut.body).is_finite

@@ -1,9 +1,10 @@
 """The lookup table of section 4.1: for each cut-edge code, the actions that open the presplit.
 
-Entries for one code of each case are written out in the notation of Figure 7; turning and mirroring
-them gives the others, 37 in all. An edge's node is referenced twice: AB1 by corner A, AB2 by B. A
+Entries for one code of each case are written out in the notation of Figure 7; rotating and
+reflecting them gives the others, 37 in all. An edge's node is referenced twice: AB1 by corner A,
+AB2 by B. A
 face's node is referenced three times; as printed, ABC1 belongs to corner B, ABC2 to C, ABC3 to A.
-While a node is one, its references are the same, and reference 2 is written for any of them.
+Where a node is not doubled its references are equal, and reference 2 stands for any of them.
 """
 
 import itertools
@@ -56,10 +57,10 @@ REPRESENTATIVES = {
 
 
 class Action(NamedTuple):
-    """An operator and what it works on."""
+    """An operator and its operands."""
 
     operator: str
-    """splitEdge, splitFace or insertFace."""
+    """Name of the operator: splitEdge, splitFace or insertFace."""
     operands: tuple[str, ...]
     """An edge; a reference to a face's node; or the references at the corners of a cut face."""
 
@@ -72,7 +73,7 @@ class _Entry(NamedTuple):
 
     code: int
     case: str
-    """A to E."""
+    """Name of the case, A to E."""
     actions: tuple[Action, ...]
 
 
@@ -115,7 +116,7 @@ def _table() -> dict[int, _Entry]:
     for case, text in REPRESENTATIVES.items():
         actions = _read(text)
         split_faces = {a.operands[0][:-1] for a in actions if a.operator == "splitFace"}
-        for turned in itertools.permutations(CORNERS):  # rotations, and mirrorings of them
+        for turned in itertools.permutations(CORNERS):  # rotations and reflections
             onto = dict(zip(CORNERS, turned, strict=True))
             entry = tuple(_turned(action, split_faces, onto) for action in actions)
             code = code_of(*(a.operands[0] for a in entry if a.operator == "splitEdge"))
@@ -128,12 +129,12 @@ TABLE = _table()
 
 
 class Lookup(NamedTuple):
-    """The table as arrays over all 64 codes, for kernels."""
+    """The lookup table as arrays over all 64 codes, for kernels."""
 
     case: IntArray
-    """Place in CASES, or -1 for a code that is not in the table; shape (64,)."""
+    """Index in CASES, or -1 for a code that is not in the table; shape (64,)."""
     opened: IntArray
-    """Bit i: whether triangle i of the presplit is opened; shape (64,)."""
+    """Triangles of the presplit that each code opens: bit i for triangle i; shape (64,)."""
     detached: IntArray
     """Corner that gets a node of its own in each face, or -1; shape (64, 4)."""
     of_centre: IntArray
@@ -141,7 +142,7 @@ class Lookup(NamedTuple):
 
 
 def lookup() -> Lookup:
-    """Return the table as arrays."""
+    """Return the lookup table as arrays."""
     case = np.full(N_CODES, -1)
     opened = np.zeros(N_CODES, dtype=np.int64)
     detached = np.full((N_CODES, 4), -1)
@@ -161,7 +162,7 @@ def lookup() -> Lookup:
 
 
 def triangle_of(action: Action) -> int:
-    """Return which of the presplit's ten triangles an insertFace covers, from one side."""
+    """Return which of the presplit's ten triangles an insertFace covers on one side."""
     edges = [operand[:-1] for operand in action.operands if len(operand) == 3]
     if edges:
         return edge_named(edges[0])

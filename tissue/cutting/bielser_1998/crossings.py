@@ -1,12 +1,12 @@
-"""What the blade met: edges it crossed, faces that its ends passed, tetrahedra it left.
+"""Records of what the blade crossed: edges, faces that its ends passed, tetrahedra it has left.
 
-Paper, section 3, on top of what `tissue.cutting.crossings` and `tissue.cutting.crack_front` find
-for any scheme.
+Paper, section 3, on top of what `tissue.cutting.collision_detection` and
+`tissue.cutting.crack_front` find for any scheme.
 """
 
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.mesh_records import (
     NO_NODE,
     NOT_CUT,
@@ -17,40 +17,40 @@ from tissue.cutting.bielser_1998.mesh_records import (
     reference_at_face,
 )
 from tissue.cutting.blade_path import Path
-from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, next_event, way_of_sample
+from tissue.cutting.crack_front import MOST_EVENTS, PARAMETER_GAP, line_of_sample, next_event
 from tissue.cutting.workspace import Cut
 from tissue.mesh.body import Body
 
 
 class Waiting(Arrays):
-    """Tetrahedra that the blade has met and, for all that is known, not left."""
+    """Tetrahedra of which the blade has cut an edge and that it has not left yet."""
 
     tetrahedra: IntArray
-    """The list, shape (n_tets,)."""
-    n: IntArray
-    """How many they are, shape (1,)."""
+    """The waiting tetrahedra, shape (n_tets,)."""
+    n_listed: IntCell
+    """Number of tetrahedra in the list."""
     is_listed: IntArray
     """Whether a tetrahedron is in the list, shape (n_tets,)."""
 
 
 @kernel
 def record_crossings(cut: Cut, records: Records) -> int:
-    """Record the edges that were crossed; return how many were of split tetrahedra.
+    """Record the crossed edges of the initial mesh; return how many others were crossed.
 
-    Those are left alone: "each tetrahedron can only be processed once" (section 6). An edge that is
+    Others are ignored: "each tetrahedron can only be processed once" (section 6). An edge that is
     crossed a second time in one incision has both ends on one side again, and is not cut: a blade
-    that goes along an edge trembles from one side of it to the other.
+    that moves along an edge trembles from one side of it to the other.
     """
-    work = cut.work
+    scratch = cut.scratch
     n_ignored = 0
-    for i in range(work.n_crossings[0]):
-        e = edge_between(records, work.crossing[i, 0], work.crossing[i, 1])
+    for i in range(scratch.n_crossings):
+        e = edge_between(records, scratch.crossing[i, 0], scratch.crossing[i, 1])
         if e < 0:
             n_ignored += 1
         elif records.crossed_at[e] == NOT_CUT:
-            records.crossed_at[e] = work.crossing_at[i, 0]
-            records.crossed_in[e] = records.incision[0]
-        elif records.crossed_in[e] == records.incision[0] and records.edge_nodes[e, 0] == NO_NODE:
+            records.crossed_at[e] = scratch.crossing_at[i, 0]
+            records.crossed_in[e] = records.incision
+        elif records.crossed_in[e] == records.incision and records.edge_nodes[e, 0] == NO_NODE:
             records.crossed_at[e] = NOT_CUT
     return n_ignored
 
@@ -67,10 +67,10 @@ def record_tips(cut: Cut, records: Records) -> None:
 
 @kernel
 def _record_tip(cut: Cut, records: Records, sample: int) -> None:
-    way = way_of_sample(cut.path, sample)
+    line = line_of_sample(cut.path, sample)
     when = 0.0
     for _ in range(MOST_EVENTS):
-        event = next_event(cut, way, when)
+        event = next_event(cut, line, when)
         if event.when > 1.0:
             return
         when = event.when + PARAMETER_GAP
@@ -87,19 +87,19 @@ def _record_tip(cut: Cut, records: Records, sample: int) -> None:
 
 @kernel
 def list_waiting(cut: Cut, records: Records, waiting: Waiting) -> None:
-    """List the tetrahedra of which the blade has cut an edge."""
-    work = cut.work
-    for i in range(work.n_active[0]):
-        t = work.active[i]
+    """Add the active tetrahedra of which the blade has cut an edge to the waiting ones."""
+    scratch = cut.scratch
+    for i in range(scratch.n_active):
+        t = scratch.active[i]
         if is_whole(records, t) and waiting.is_listed[t] == 0 and cut_edge_code(records, t) != 0:
             waiting.is_listed[t] = 1
-            waiting.tetrahedra[waiting.n[0]] = t
-            waiting.n[0] += 1
+            waiting.tetrahedra[waiting.n_listed] = t
+            waiting.n_listed += 1
 
 
 @kernel
 def has_left(body: Body, path: Path, t: int, reach: float) -> bool:
-    """Whether the edge, where it is now, is farther than `reach` [m] from the box of `t`."""
+    """Return whether the edge, where it is now, is farther than `reach` [m] from the box of `t`."""
     grid = body.lattice_rest
     margin = int(reach / body.lattice.spacing)
     a = body.tetrahedra[t, 0]

@@ -15,14 +15,16 @@ FACES = ((1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2))
 """Corners of each face. Face k lies opposite corner k, as everywhere in `tissue`."""
 
 N_CODES = 64
+"""Number of codes: 6 bits."""
 
 WHOLE, TIP, FULL = 0, 1, 2
-"""State of a face: not cut; cut up to a point inside it, where the tip passed; cut across. The
-state with the tip through it and no edge cut (3, pierced) has no edge code of its own."""
+"""State of a face: not cut; cut up to a point inside it, where the tip passed through; cut across.
+A
+face that the tip pierced and of which no edge is cut (state 3 of the paper) has no edge code."""
 
 
 def code_of(*edges: str) -> int:
-    """Return the code of the edges with these names, such as "AB" and "BC"."""
+    """Return the code of the edges with these names, for example "AB" and "BC"."""
     code = 0
     for name in edges:
         code |= 1 << bit_of(edge_named(name))
@@ -47,15 +49,16 @@ def bit_of(edge: int) -> int:
 
 
 @kernel
-def is_cut(code: int, edge: int) -> bool:
-    """Whether that edge is cut."""
+def is_edge_cut(code: int, edge: int) -> bool:
+    """Return whether an edge is cut, by the code of its tetrahedron."""
     return (code >> bit_of(edge)) & 1 == 1
 
 
 def face_state(code: int, face: int) -> int:
-    """Return WHOLE, TIP or FULL: as many as there are cut edges.
+    """Return WHOLE, TIP or FULL: the number of cut edges of the face.
 
-    Where the blade has left the tetrahedron the edges alone tell the states of the faces: a plane
-    crosses no or two edges of a face, and one of the two stays uncut where the tip passed between.
+    Where the blade has left the tetrahedron, the cut edges determine the states of the faces: a
+    plane crosses none or two edges of a face, and where the tip passed through the face one of the
+    two stays uncut.
     """
-    return sum(is_cut(code, e) for e, ends in enumerate(EDGES) if face not in ends)
+    return sum(is_edge_cut(code, e) for e, ends in enumerate(EDGES) if face not in ends)

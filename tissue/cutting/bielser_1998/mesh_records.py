@@ -1,14 +1,14 @@
-"""What the paper's scheme keeps of the initial mesh: which edges are cut, and where its nodes are.
+"""Records of the initial mesh: which edges are cut, and the nodes on edges and in faces.
 
 Only tetrahedra of the initial mesh are cut, each once. An edge has one record, shared by all
-tetrahedra around it, and a face one, shared by two: so do both sides of a face agree on its nodes.
+tetrahedra around it, and a face one, shared by two: so both sides of a face agree on its nodes.
 """
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.cutting.bielser_1998.case_table import LOOKUP
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, bit_of
 from tissue.cutting.bielser_1998.template_1_to_17 import PRESPLIT
@@ -17,8 +17,9 @@ from tissue.mesh.faces import sorted_faces
 from tissue.mesh.nonconforming import may_hang
 
 NOT_CUT = -1.0
-"""In place of where an edge is cut."""
+"""In place of the fraction at which an edge is cut."""
 NO_NODE = -1
+"""In place of a node that does not exist."""
 WHOLE_STILL = -1
 """In place of a tetrahedron's first appended child."""
 
@@ -27,11 +28,11 @@ class Records(Arrays):
     """Records of the initial mesh. n_tets, n_edges and n_faces are its own."""
 
     tetrahedra: IntArray
-    """Nodes A, B, C, D of each, shape (n_tets, 4)."""
+    """Nodes A, B, C, D of each tetrahedron, shape (n_tets, 4)."""
     links: IntArray
-    """What is behind each face, as `Body.links` was; shape (n_tets, 4)."""
+    """What is behind each face, as `Body.links` before the first cut; shape (n_tets, 4)."""
     first_child: IntArray
-    """First appended child, or WHOLE_STILL; child 0 takes the place of its parent; (n_tets,)."""
+    """First appended child, or WHOLE_STILL; child 0 replaces its parent; shape (n_tets,)."""
     edges_of: IntArray
     """The edges AB BC BD AC CD AD of each tetrahedron, shape (n_tets, 6)."""
     faces_of: IntArray
@@ -43,20 +44,19 @@ class Records(Arrays):
     faces: IntArray
     """Corners of each face, ascending, shape (n_faces, 3)."""
     crossed_at: FloatArray
-    """Where the blade crossed each edge, as a fraction from its first end, or NOT_CUT; (n_edges,).
-    """
+    """Fraction from its first end at which the blade crossed each edge, or NOT_CUT; (n_edges,)."""
     crossed_in: IntArray
-    """Number of the incision in which it did, shape (n_edges,)."""
-    incision: IntArray
-    """Number of the current incision, shape (1,)."""
+    """Incision in which the blade crossed each edge, shape (n_edges,)."""
+    incision: IntCell
+    """Number of the current incision, from 1."""
     edge_nodes: IntArray
     """The references to each edge's node, one for each end, or NO_NODE; shape (n_edges, 2)."""
     edge_held: IntArray
     """Whether a split tetrahedron holds the edge's node together, shape (n_edges,)."""
     tip_weights: FloatArray
-    """Where the tip passed through each face: weights of its corners, or 0; (n_faces, 3)."""
+    """Weights of the corners of each face where the tip passed through it, or 0; (n_faces, 3)."""
     face_weights: FloatArray
-    """Where each face's node is, shape (n_faces, 3)."""
+    """Weights of the corners of each face at its node, shape (n_faces, 3)."""
     face_nodes: IntArray
     """The references to each face's node, one for each corner, or NO_NODE; shape (n_faces, 3)."""
     face_held: IntArray
@@ -64,7 +64,7 @@ class Records(Arrays):
 
 
 class Table(Arrays):
-    """The generic split and the lookup table; see `Presplit` and `Lookup`."""
+    """The generic split and the lookup table: the fields of `Presplit`, `Lookup` and two more."""
 
     children: IntArray
     part: IntArray
@@ -83,7 +83,7 @@ class Table(Arrays):
 
 
 def with_room_to_hang(body: Body) -> Body:
-    """Return a whole body whose faces and nodes may come to hang."""
+    """Return an uncut body with room for hanging nodes."""
     n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     tetrahedra = body.tetrahedra[:n_tetrahedra]
     n_faces = len(sorted_faces(tetrahedra).starts)
@@ -91,7 +91,7 @@ def with_room_to_hang(body: Body) -> Body:
 
 
 def records_of(body: Body) -> Records:
-    """Return the records of a body that is whole."""
+    """Return the records of an uncut body."""
     n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     tetrahedra = body.tetrahedra[:n_tetrahedra].copy()
     ends = np.sort(tetrahedra[:, EDGES].reshape(-1, 2), axis=1)
@@ -112,7 +112,7 @@ def records_of(body: Body) -> Records:
         faces=np.ascontiguousarray(faces),
         crossed_at=np.full(len(edges), NOT_CUT),
         crossed_in=np.zeros(len(edges), np.int64),
-        incision=np.ones(1, np.int64),
+        incision=1,
         edge_nodes=np.full((len(edges), 2), NO_NODE),
         edge_held=np.zeros(len(edges), np.int64),
         tip_weights=np.zeros((len(faces), 3)),
@@ -134,13 +134,13 @@ def table() -> Table:
 
 @kernel
 def is_whole(records: Records, t: int) -> bool:
-    """Whether `t` is a tetrahedron of the initial mesh that is not split."""
+    """Return whether `t` is a tetrahedron of the initial mesh that is not split."""
     return t < len(records.first_child) and records.first_child[t] == WHOLE_STILL
 
 
 @kernel
 def cut_edge_code(records: Records, t: int) -> int:
-    """The cut-edge code of an initial tetrahedron."""
+    """Return the cut-edge code of an initial tetrahedron."""
     code = 0
     for e in range(6):
         if records.crossed_at[records.edges_of[t, e]] != NOT_CUT:
@@ -150,13 +150,13 @@ def cut_edge_code(records: Records, t: int) -> int:
 
 @kernel
 def child_of(records: Records, t: int, c: int) -> int:
-    """Child `c` of the initial tetrahedron `t`, which is split."""
+    """Return child `c` of the initial tetrahedron `t`, which is split."""
     return t if c == 0 else records.first_child[t] + c - 1
 
 
 @kernel
 def edge_between(records: Records, a: int, b: int) -> int:
-    """The edge of the initial mesh from node `a` to a higher node `b`, or -1."""
+    """Return the edge of the initial mesh from node `a` to a higher node `b`, or -1."""
     if a + 1 >= len(records.first_edge):
         return -1
     for e in range(records.first_edge[a], records.first_edge[a + 1]):
@@ -167,13 +167,13 @@ def edge_between(records: Records, a: int, b: int) -> int:
 
 @kernel
 def reference_at_edge(records: Records, e: int, node: int) -> int:
-    """Which reference to the node of edge `e` its end `node` has."""
+    """Return which reference to the node of edge `e` its end `node` has."""
     return 0 if records.edges[e, 0] == node else 1
 
 
 @kernel
 def reference_at_face(records: Records, face: int, node: int) -> int:
-    """Which reference to the node of a face its corner `node` has."""
+    """Return which reference to the node of a face its corner `node` has."""
     if records.faces[face, 0] == node:
         return 0
     return 1 if records.faces[face, 1] == node else 2

@@ -1,15 +1,15 @@
-"""Where the nodes of a split tetrahedron are: at the intersections, held off where parts get thin.
+"""Where the nodes of a split tetrahedron are: at the intersections, moved where parts get thin.
 
 Paper, section 4.2: "the correct geometry of a cut surface is computed by replacing the indicated
-edge and face midpoints by the current intersection points". The blade meets a cut edge in a point,
-and a face that the tip passed through in another. A face that is cut across it meets in a line,
-whose middle is taken.
+edge and face midpoints by the current intersection points". The blade crosses a cut edge in a
+point, and a face that the tip passed through in another. It crosses a face that is cut across in a
+line, whose middle is taken.
 
-Whatever the points, the cores and the parts along edges have positive volumes: they are products of
-positive weights. The centre has not. With the exact points of a planar cut its four nodes are in
-one plane in cases B and E, and where the tip passes near an edge it can be inverted (7.7 % of
-random points). Hence two guards: `LIFT`, and nodes are drawn to
-the centroids where it is not enough (`_guard`).
+Wherever the points are, the cores and the parts along edges have positive volumes, which are
+products of positive weights. The centre need not. With the exact points of a planar cut its four
+nodes are in one plane in cases B and E, and where the tip passes near an edge it can be inverted
+(7.7 % of random points). Hence two guards: `LIFT`, and where it is not enough, nodes are moved
+towards the centroids (`_guard`).
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3
-from tissue.cutting.bielser_1998.cut_edge_code import is_cut
+from tissue.cutting.bielser_1998.cut_edge_code import is_edge_cut
 from tissue.cutting.bielser_1998.mesh_records import (
     NO_NODE,
     NOT_CUT,
@@ -26,45 +26,51 @@ from tissue.cutting.bielser_1998.mesh_records import (
     Table,
     reference_at_face,
 )
-from tissue.cutting.bielser_1998.template_1_to_17 import CENTRE_CHILD, EDGE_NODE, FACE_NODE, N_NODES
+from tissue.cutting.bielser_1998.template_1_to_17 import (
+    CENTRE_CHILD,
+    EDGE_NODE,
+    FACE_NODE,
+    N_LOCAL_NODES,
+)
 from tissue.geometry.tetrahedron import signed_volume
 
-MARGIN = 0.2
-"""No node is nearer to an end of its edge than this share of the edge; and none that the tip made
-nearer to a side of its face than half of it, per altitude, which is where nodes of faces cut across
-are at the nearest. Nearer nodes make light, stiff springs: through an organ the highest frequency
+EDGE_MARGIN = 0.2
+"""Least distance of a node from an end of its edge, as a share of the edge. Nodes that the tip made
+are at least half that share of the altitude away from the sides of their face, as nodes of faces
+cut across are. Nearer nodes make light, stiff springs: through an organ the highest frequency
 grew 9 to 10 times with 0.1, 6 to 9 times with 0.2, and 1.5 to 1.9 times with our own scheme."""
 
 LIFT = 0.05
-"""Share of the way to the middle of the two corners that a cut leaves together, by which the node
-of a face that is cut across is moved off the cut. Both neighbours of the face see the same two
-corners, so they agree. The centre of cases B and E, else flat, gets 0.5 to 1 % of the volume."""
+"""Share of the distance to the middle of the two corners that a cut leaves together, by which the
+node of a face that is cut across is moved off the cut. Both neighbours of the face have the same
+two corners, so they agree. The centre of cases B and E, else flat, gets 0.5 to 1 % of the
+volume."""
 
 LEAST_CENTRE = 1e-3
-"""Volume of the centre over that of its tetrahedron below which face nodes are drawn to the
-centroids, where it is 1/27. A tetrahedron this flat says nothing of where a point in it is."""
+"""Volume of the centre over that of its tetrahedron below which face nodes are moved towards the
+centroids, where it is 1/27. In a flatter tetrahedron no point can be located."""
 
 DRAWS = 8
-"""Parts in which the way of a face node to the centroid is tried."""
+"""Steps in which a face node is moved to the centroid."""
 
 
 class Placing(Arrays):
-    """Scratch: the nodes of one tetrahedron."""
+    """Scratch: where the nodes of one tetrahedron are."""
 
     weights: FloatArray
     """Barycentric weights in the tetrahedron, shape (14, 4)."""
     wanted: FloatArray
     """Weights that the face nodes would have without the guard, shape (4, 4)."""
     is_placed: IntArray
-    """Whether the neighbour was split before and placed the face's node, shape (4,)."""
+    """Whether the neighbour was split before and placed each face's node, shape (4,)."""
     is_own: IntArray
-    """Whether the tetrahedron needs a node of its own in a face all the same, shape (4,)."""
+    """Whether the tetrahedron nevertheless needs a node of its own in each face, shape (4,)."""
 
 
 def new_placing() -> Placing:
-    """Return scratch."""
+    """Return scratch for one tetrahedron."""
     return Placing(
-        weights=np.zeros((N_NODES, 4)),
+        weights=np.zeros((N_LOCAL_NODES, 4)),
         wanted=np.zeros((4, 4)),
         is_placed=np.zeros(4, np.int64),
         is_own=np.zeros(4, np.int64),
@@ -73,7 +79,15 @@ def new_placing() -> Placing:
 
 @kernel
 def place_nodes(records: Records, table: Table, placing: Placing, t: int, code: int) -> bool:
-    """Write the weights of the 14 nodes of tetrahedron `t`; return whether the guard moved any."""
+    """Write the weights of the 14 nodes of a tetrahedron; return whether the guard moved any.
+
+    Args:
+        records: Cut edges and the nodes that neighbours placed.
+        table: The generic split and the lookup table.
+        placing: Written.
+        t: The tetrahedron.
+        code: Its cut-edge code.
+    """
     weights = placing.weights
     for node in range(len(weights)):
         for i in range(4):
@@ -95,7 +109,7 @@ def _place_edge_node(records: Records, table: Table, weights: FloatArray, t: int
     at = 0.5
     # An edge whose node was made before the blade came keeps it where it is.
     if records.crossed_at[edge] != NOT_CUT and records.edge_held[edge] == 0:
-        at = min(max(records.crossed_at[edge], MARGIN), 1.0 - MARGIN)
+        at = min(max(records.crossed_at[edge], EDGE_MARGIN), 1.0 - EDGE_MARGIN)
     if records.edges[edge, 0] != records.tetrahedra[t, i]:
         at = 1.0 - at
     weights[EDGE_NODE + e, i] = 1.0 - at
@@ -125,7 +139,7 @@ def _place_face_node(
 
 @kernel
 def _place_on_cut(table: Table, weights: FloatArray, k: int, code: int, detached: int) -> None:
-    """Middle of the line in which the blade meets face `k`, lifted."""
+    """Put the node in the middle of the line in which the blade meets face `k`, lifted."""
     node = FACE_NODE + k
     for e in range(6):
         if _is_cut_at(table, code, e, k):
@@ -141,7 +155,7 @@ def _place_on_cut(table: Table, weights: FloatArray, k: int, code: int, detached
 def _place_at_tip(
     records: Records, table: Table, weights: FloatArray, t: int, k: int, code: int
 ) -> None:
-    """Where the tip passed; the centroid in a face that is not cut, or that no tip met."""
+    """Put the node where the tip passed; in a face not cut or met by no tip, at the centroid."""
     _from_record(records, table, records.tip_weights, weights, t, k)
     node = FACE_NODE + k
     total = 0.0
@@ -153,15 +167,17 @@ def _place_at_tip(
     for c in range(3):
         corner = table.face_corners[k, c]
         if is_at_cut and total > 0.0:
-            weights[node, corner] = 0.5 * MARGIN + (1.0 - 1.5 * MARGIN) * weights[node, corner]
+            weights[node, corner] = (
+                0.5 * EDGE_MARGIN + (1.0 - 1.5 * EDGE_MARGIN) * weights[node, corner]
+            )
         else:
             weights[node, corner] = 1.0 / 3.0
 
 
 @kernel
 def _is_cut_at(table: Table, code: int, e: int, k: int) -> bool:
-    """Whether edge `e` is cut and belongs to face `k`."""
-    return is_cut(code, e) and k != table.edge_ends[e, 0] and k != table.edge_ends[e, 1]
+    """Return whether edge `e` is cut and belongs to face `k`."""
+    return is_edge_cut(code, e) and k != table.edge_ends[e, 0] and k != table.edge_ends[e, 1]
 
 
 @kernel
@@ -177,10 +193,12 @@ def _from_record(
 
 @kernel
 def _guard(table: Table, placing: Placing) -> bool:
-    """Draw face nodes to the centroids until the centre is not flat; return whether that was so.
+    """Move face nodes towards the centroids until the centre is not flat; return whether any moved.
 
-    First those that are free to move, together, as little as it takes. Where that is not enough,
-    a node that the neighbour has placed already is replaced by one of our own, which then hangs.
+    First the nodes that are free to move, together, as little as it takes. Where that is not
+    enough, a node that the neighbour has placed is replaced by one for this tetrahedron alone,
+    which
+    then hangs.
     """
     if centre_volume(table, placing.weights) >= LEAST_CENTRE:
         return False
@@ -220,7 +238,7 @@ def _draw(table: Table, placing: Placing, k: int, share: float) -> None:
 
 @kernel
 def centre_volume(table: Table, weights: FloatArray) -> float:
-    """Volume of the centre over that of its tetrahedron, negative where it is inverted."""
+    """Return the volume of the centre over that of its tetrahedron; negative if inverted."""
     return 6.0 * signed_volume(
         _in_unit_tetrahedron(weights, table.children[CENTRE_CHILD, 0]),
         _in_unit_tetrahedron(weights, table.children[CENTRE_CHILD, 1]),

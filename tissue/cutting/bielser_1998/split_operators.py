@@ -1,14 +1,14 @@
-"""splitEdge and splitFace: the nodes of a presplit tetrahedron and the references to them.
+"""The operators splitEdge and splitFace: nodes of a presplit tetrahedron and references to them.
 
-Paper, section 4.3. A node is made when the first tetrahedron at its edge or face is split, and the
-others take it over. At first all references point to it. splitEdge lets the reference of one end of
-a cut edge point to a second node; splitFace does so for one corner of a face that is cut across.
+Paper, section 4.3. A node is made when the first tetrahedron at its edge or face is split; the
+others use the same. At first all references point to it. splitEdge makes the reference of one end
+of a cut edge point to a second node; splitFace does so for one corner of a face that is cut across.
 Neither does anything where a tetrahedron that was split before holds the node together.
 """
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import vec3
-from tissue.cutting.bielser_1998.cut_edge_code import is_cut
+from tissue.cutting.bielser_1998.cut_edge_code import is_edge_cut
 from tissue.cutting.bielser_1998.mesh_records import NO_NODE, reference_at_edge, reference_at_face
 from tissue.cutting.bielser_1998.template_1_to_17 import CENTRE, EDGE_NODE, FACE_NODE
 from tissue.cutting.bielser_1998.workspace import Split
@@ -21,8 +21,8 @@ def refer_to_nodes(s: Split, t: int, code: int) -> None:
     """Write the node that each part of tetrahedron `t` refers to, making those that are missing.
 
     Args:
-        s: Gets the new nodes, and the references.
-        t: An initial tetrahedron, whose nodes have been placed.
+        s: The new nodes and the references are written.
+        t: An initial tetrahedron whose nodes have been placed.
         code: Its cut-edge code.
     """
     for i in range(4):
@@ -44,7 +44,7 @@ def _split_edge(s: Split, t: int, code: int, e: int) -> None:
     edge = records.edges_of[t, e]
     if nodes[edge, 0] == NO_NODE:
         nodes[edge, 0] = nodes[edge, 1] = _new_node(s, t, EDGE_NODE + e)
-    if not is_cut(code, e):
+    if not is_edge_cut(code, e):
         records.edge_held[edge] = 1
     elif nodes[edge, 0] == nodes[edge, 1] and records.edge_held[edge] == 0:
         nodes[edge, 1] = _copy_node(s.body, nodes[edge, 0])
@@ -92,7 +92,7 @@ def _make_own_node(s: Split, t: int, code: int, k: int) -> None:
 
 @kernel
 def _new_node(s: Split, t: int, local: int) -> int:
-    """Append a node where the field of tetrahedron `t` puts it; it has no mass yet."""
+    """Append a node, interpolated in tetrahedron `t`; it has no mass yet."""
     body, corners = s.body, s.records.tetrahedra
     node = _append_node(body)
     fixed = True

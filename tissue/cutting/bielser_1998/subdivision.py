@@ -5,7 +5,7 @@ from tissue.cutting.bielser_1998.mesh_records import Records, child_of, is_whole
 from tissue.cutting.bielser_1998.node_placement import place_nodes
 from tissue.cutting.bielser_1998.split_operators import refer_to_nodes
 from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN
-from tissue.cutting.bielser_1998.workspace import N_GUARDED, N_OF_CASE, N_OWN, Split
+from tissue.cutting.bielser_1998.workspace import Split
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.body import CUT, OUTER
 from tissue.mesh.changes import note_dirty
@@ -17,7 +17,7 @@ MOST_NEW_NODES = 20
 
 @kernel
 def split_tetrahedron(s: Split, t: int, code: int) -> bool:
-    """Split the initial tetrahedron `t` by its code; whether there was room."""
+    """Split the initial tetrahedron `t` by its code; return whether there was room."""
     body, records, change = s.body, s.records, s.change
     if body.n_nodes + MOST_NEW_NODES > len(body.rest) or body.n_tetrahedra + N_CHILDREN - 1 > len(
         body.tetrahedra
@@ -25,11 +25,11 @@ def split_tetrahedron(s: Split, t: int, code: int) -> bool:
         change.is_full = 1
         return False
     if place_nodes(records, s.table, s.placing, t, code):
-        s.tally[N_GUARDED] += 1
+        s.counts.n_guarded += 1
     for k in range(4):
-        s.tally[N_OWN] += s.placing.is_own[k]
+        s.counts.n_own += s.placing.is_own[k]
     refer_to_nodes(s, t, code)
-    s.tally[N_OF_CASE + s.table.case[code]] += 1
+    s.counts.n_of_case[s.table.case[code]] += 1
     volume = tetrahedron_volume(body.rest, body.tetrahedra, t)
     for i in range(4):
         corner = records.tetrahedra[t, i]
@@ -62,9 +62,10 @@ def _make_child(s: Split, t: int, c: int) -> None:
 
 @kernel
 def _add_mass(s: Split, t: int, local: int, node: int, mass: float) -> None:
-    """Let `mass` [kg], which moved as the field of tetrahedron `t` does there, be part of `node`.
+    """Add `mass` [kg] of tetrahedron `t` to `node`, with the velocity interpolated in `t`.
 
-    A node that a neighbour made moves by itself since: the two join like clay, and keep momentum.
+    A node that a neighbour made earlier has moved by itself since: the collision is inelastic, and
+    momentum is kept.
     """
     body = s.body
     total = body.masses[node] + mass
@@ -100,8 +101,8 @@ def _link_inside(s: Split, t: int, c: int, code: int) -> None:
 def _link_outside(s: Split, t: int, k: int) -> None:
     """Link the six small faces in face `k` of `t` to what is behind it.
 
-    To the skin, to the six of a neighbour that is split too, or all to the one of a neighbour that
-    is whole: then the nodes on its edges and in its middle hang.
+    That is the skin, the six small faces of a neighbour that is split, or the one face of a
+    neighbour that is whole: then the nodes on its edges and in its middle hang.
     """
     body, records, table = s.body, s.records, s.table
     behind = records.links[t, k]
@@ -132,7 +133,7 @@ def _link_outside(s: Split, t: int, k: int) -> None:
 
 @kernel
 def _mate(s: Split, t: int, i: int, j: int, other: int, k: int) -> tuple[int, int]:
-    """The child of `other` along the edge from corner `i` to `j` of `t`, and its face in face k."""
+    """Return the child of `other` along the edge from corner i to j of `t`, and its outer face."""
     records, table = s.records, s.table
     i_too = _corner_of(records, other, records.tetrahedra[t, i])
     j_too = _corner_of(records, other, records.tetrahedra[t, j])

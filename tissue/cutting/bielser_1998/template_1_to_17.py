@@ -5,8 +5,8 @@ tetrahedra make five parts: the one of a corner holds the corner's core and thre
 the edges that leave it; the fifth is the centre.
 
     core of A        (A, node of ABC, node of ABD, node of ACD)       four of them
-    A's part of AB   (A, node of AB, node of ABC, node of ABD)        twelve
-    centre           (nodes of ABC, ABD, ACD, BCD)                    one
+    A's part of AB   (A, node of AB, node of ABC, node of ABD)        twelve of them
+    centre           (nodes of ABC, ABD, ACD, BCD)                    one of them
 
 Two parts touch in one triangle, of ten: I(AB), node of AB and nodes of the two faces at AB, between
 the corners A and B; J(A), the nodes of the three faces at A, between corner A and the centre.
@@ -20,37 +20,40 @@ from tissue.core.array_types import IntArray
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES
 
 N_CHILDREN = 17
-N_NODES = 14
+"""Tetrahedra that one becomes."""
+N_LOCAL_NODES = 14
+"""Nodes of the split: corners, one on each edge, one in each face."""
 EDGE_NODE, FACE_NODE = 4, 10
 """Local numbers of the first edge node and the first face node; the corners are 0 to 3."""
 
 CENTRE = 4
 """The part that belongs to no corner."""
 CENTRE_CHILD = 16
+"""The child that is the centre."""
 
-N_TRIANGLES = 10
-"""I of the six edges in the order of the code's bits, then J of the four corners."""
 FIRST_J = 6
+"""Number of the first triangle J. Before it come those I, in the order of the code's bits."""
 
 SUB_FACES = 6
 """Triangles into which each face of the tetrahedron falls."""
 
 
 class Presplit(NamedTuple):
-    """The split by local numbers. Faces of children lie opposite their node, as everywhere."""
+    """The split by local numbers. Face f of a child lies opposite its node f, as everywhere."""
 
     children: IntArray
-    """Local nodes of each, of positive volume where that of ABCD is; shape (17, 4)."""
+    """Local nodes of each child, of positive volume where ABCD has one; shape (17, 4)."""
     part: IntArray
-    """Corner that each belongs to, or CENTRE; shape (17,)."""
+    """Corner that each child belongs to, or CENTRE; shape (17,)."""
     inner: IntArray
-    """What is behind a face inside: 4 * child + its face; -1 on a face of ABCD. Shape (17, 4)."""
+    """What is behind each face of each child: 4 * child + its face, or -1 on a face of ABCD; shape
+    (17, 4)."""
     triangle: IntArray
-    """Which of the ten triangles between parts a face is, or -1; shape (17, 4)."""
+    """Which of the ten triangles between parts each face is, or -1; shape (17, 4)."""
     along: IntArray
     """Child of corner i along the edge to corner j, -1 for i = j; shape (4, 4)."""
     outer: IntArray
-    """Which face of a child lies on face k of ABCD, or -1; shape (17, 4)."""
+    """Which face of each child lies on face k of ABCD, or -1; shape (17, 4)."""
 
 
 def _edge_node(i: int, j: int) -> int:
@@ -77,7 +80,7 @@ def _children() -> tuple[list[list[int]], list[int], IntArray]:
 
 def generic_weights() -> np.ndarray:
     """Return the barycentric weights of the nodes at midpoints and centroids, shape (14, 4)."""
-    weights = np.zeros((N_NODES, 4))
+    weights = np.zeros((N_LOCAL_NODES, 4))
     weights[:4] = np.eye(4)
     for e, ends in enumerate(EDGES):
         weights[EDGE_NODE + e, list(ends)] = 1.0 / 2.0
@@ -102,7 +105,7 @@ def _triangle_between(nodes: frozenset[int], one: int, other: int) -> int:
 
 
 def presplit() -> Presplit:
-    """Return the split, with what follows from its nodes."""
+    """Return the split, with all that follows from its nodes."""
     listed, parts, along = _children()
     children = _turned_positive(listed)
     owners: dict[frozenset[int], list[int]] = {}

@@ -1,20 +1,36 @@
 """All that the split of a tetrahedron reads and writes."""
 
+import numpy as np
+
 from tissue.core.array_types import IntArray
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
+from tissue.cutting.bielser_1998.case_table import CASES
 from tissue.cutting.bielser_1998.mesh_records import Records, Table
 from tissue.cutting.bielser_1998.node_placement import Placing
 from tissue.mesh.body import Body
 from tissue.mesh.changes import Change
 
-N_OF_CASE, N_GUARDED, N_OWN = 0, 5, 6
-"""Places in `Split.tally`: split tetrahedra of cases A to E, those whose nodes the guard moved, and
-face nodes that it made for one tetrahedron alone."""
-N_TALLIES = 7
+
+class SplitCounts(Arrays):
+    """Counts of what the scheme did since the body was made."""
+
+    n_of_case: IntArray
+    """Split tetrahedra of each case, A to E; shape (5,)."""
+    n_guarded: IntCell
+    """Split tetrahedra whose face nodes the guard moved."""
+    n_own: IntCell
+    """Face nodes that the guard made for one tetrahedron alone."""
+    n_ignored: IntCell
+    """Crossings with edges of tetrahedra that were split already."""
+
+
+def no_counts() -> SplitCounts:
+    """Return counts of nothing done so far."""
+    return SplitCounts(n_of_case=np.zeros(len(CASES), np.int64), n_guarded=0, n_own=0, n_ignored=0)
 
 
 class Split(Arrays):
-    """What a split reads and writes."""
+    """All that the split of a tetrahedron reads and writes."""
 
     body: Body
     records: Records
@@ -23,7 +39,6 @@ class Split(Arrays):
     placing: Placing
     references: IntArray
     """Scratch: global node of each local node, for each part; shape (5, 14)."""
-    tally: IntArray
-    """Counts since the body was made, shape (N_TALLIES,)."""
+    counts: SplitCounts
     density: float
-    """[kg/m3]."""
+    """Density of the tissue [kg/m3]."""

@@ -30,13 +30,13 @@ from tissue.core.simd import (
     eight_points,
     filled,
     lanes,
-    load,
+    load_lanes,
     point,
     point_of,
     room_for_points,
     spread,
     square_root,
-    store,
+    store_lanes,
     store_point,
     summed,
     times,
@@ -220,12 +220,12 @@ def _look(body: Body, springs: Springs, trails: Trails, node: int) -> None:
         at = N_SEEN * (slot - first)
         x, y, z = eight_points(trails.origins, springs.neighbour, slot)
         u, v, w = eight_points(body.velocities, springs.neighbour, slot)
-        store(seen, at, x)
-        store(seen, at + WIDTH, y)
-        store(seen, at + 2 * WIDTH, z)
-        store(seen, at + 3 * WIDTH, u)
-        store(seen, at + 4 * WIDTH, v)
-        store(seen, at + 5 * WIDTH, w)
+        store_lanes(seen, at, x)
+        store_lanes(seen, at + WIDTH, y)
+        store_lanes(seen, at + 2 * WIDTH, z)
+        store_lanes(seen, at + 3 * WIDTH, u)
+        store_lanes(seen, at + 4 * WIDTH, v)
+        store_lanes(seen, at + 5 * WIDTH, w)
 
 
 @inlined
@@ -251,25 +251,27 @@ def _force(
     for slot in range(first, first + filled(springs.count[node]), WIDTH):
         at = N_SEEN * (slot - first)
         du, dv, dw = (
-            load(seen, at + 3 * WIDTH),
-            load(seen, at + 4 * WIDTH),
-            load(seen, at + 5 * WIDTH),
+            load_lanes(seen, at + 3 * WIDTH),
+            load_lanes(seen, at + 4 * WIDTH),
+            load_lanes(seen, at + 5 * WIDTH),
         )
-        dx = load(seen, at) + clock * du - x
-        dy = load(seen, at + WIDTH) + clock * dv - y
-        dz = load(seen, at + 2 * WIDTH) + clock * dw - z
+        dx = load_lanes(seen, at) + clock * du - x
+        dy = load_lanes(seen, at + WIDTH) + clock * dv - y
+        dz = load_lanes(seen, at + 2 * WIDTH) + clock * dw - z
         approach = (du - u) * dx + (dv - v) * dy + (dw - w) * dz
         squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
         per_squared = one / squared  # beside the root, not after it: nodes are moved one by one
-        stiffness = load(springs.stiffness, slot)
+        stiffness = load_lanes(springs.stiffness, slot)
         viscous = stiffness * per_squared
-        elastic = stiffness - load(springs.rest_pull, slot) * per_squared * square_root(squared)
+        elastic = stiffness - load_lanes(springs.rest_pull, slot) * per_squared * square_root(
+            squared
+        )
         along = elastic + time * approach * viscous
         fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
-        store(seen, at + 6 * WIDTH, dx)
-        store(seen, at + 7 * WIDTH, dy)
-        store(seen, at + 8 * WIDTH, dz)
-        store(seen, at + 9 * WIDTH, viscous)
+        store_lanes(seen, at + 6 * WIDTH, dx)
+        store_lanes(seen, at + 7 * WIDTH, dy)
+        store_lanes(seen, at + 8 * WIDTH, dz)
+        store_lanes(seen, at + 9 * WIDTH, viscous)
     return summed(fx, fy, fz)
 
 
@@ -284,11 +286,11 @@ def _resistance(springs: Springs, trails: Trails, node: int, speed: Point) -> Po
     fx = fy = fz = lanes(0.0)
     for at in range(0, N_SEEN * filled(springs.count[node]), N_SEEN * WIDTH):
         dx, dy, dz = (
-            load(seen, at + 6 * WIDTH),
-            load(seen, at + 7 * WIDTH),
-            load(seen, at + 8 * WIDTH),
+            load_lanes(seen, at + 6 * WIDTH),
+            load_lanes(seen, at + 7 * WIDTH),
+            load_lanes(seen, at + 8 * WIDTH),
         )
-        along = load(seen, at + 9 * WIDTH) * (u * dx + v * dy + w * dz)
+        along = load_lanes(seen, at + 9 * WIDTH) * (u * dx + v * dy + w * dz)
         fx, fy, fz = fx + along * dx, fy + along * dy, fz + along * dz
     return summed(fx, fy, fz)
 

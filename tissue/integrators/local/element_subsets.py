@@ -10,8 +10,8 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH
 from tissue.core.structs import Arrays, IntCell
-from tissue.elasticity.finite_elements import Solid, n_blocks, tetrahedron_at
-from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
+from tissue.elasticity.finite_elements import Solid, n_blocks, tetrahedron_of_slot
+from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.node_rings import Rings
 
@@ -61,7 +61,7 @@ def new_patch(n_nodes: int, n_tetrahedra: int) -> Patch:
 @kernel
 def reach_of(elastic: Elastic) -> int:
     """Number of edges over which the motion of a node changes the force on another."""
-    averaged = elastic.has[TETRAHEDRA_TOO] and has_averaged_volumes(elastic.solid)
+    averaged = elastic.has_tetrahedra and has_averaged_volumes(elastic.solid)
     return 2 if averaged else 1
 
 
@@ -77,7 +77,7 @@ def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, feelin
         feeling: Up to which of these rings forces are needed around the nodes.
     """
     patch.n_volumes = patch.n_pressures = patch.n_forces = 0
-    if not elastic.has[TETRAHEDRA_TOO]:
+    if not elastic.has_tetrahedra:
         return
     solid = elastic.solid
     patch.n_forces = _blocks_around(patch, solid, rings, feeling, patch.forces)
@@ -101,7 +101,7 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
             break
         first = solid.first[node]
         for slot in range(first, first + solid.count[node]):
-            block = tetrahedron_at(solid, slot) // WIDTH
+            block = tetrahedron_of_slot(solid, slot) // WIDTH
             if patch.seen[block] != patch.epoch:
                 patch.seen[block] = patch.epoch
                 out[n] = block
@@ -112,7 +112,7 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
 @kernel
 def deform_patch(patch: Patch, elastic: Elastic, positions: FloatArray) -> None:
     """Evaluate the tetrahedra of a patch at `positions` [m], for `internal_force`."""
-    if elastic.has[TETRAHEDRA_TOO]:
+    if elastic.has_tetrahedra:
         solid = elastic.solid
         if has_averaged_volumes(solid):
             volumes(solid, positions, patch.volumes, 0, patch.n_volumes)

@@ -9,7 +9,7 @@ from tissue.blade.forces import add_blade_frequency
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
-from tissue.elasticity.internal_forces import TETRAHEDRA_TOO, Elastic
+from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.springs import Springs
 from tissue.integrators.focus import find_held
 from tissue.integrators.local.chebyshev import substep_limits
@@ -184,7 +184,7 @@ def find_listed_patch(patch: Patch, elastic: Elastic, activity: Activity, around
 
     One ring beyond them takes part: what sleeps there has a pressure that they feel.
     """
-    if not elastic.has[TETRAHEDRA_TOO]:
+    if not elastic.has_tetrahedra:
         return
     begin_search(around)
     for k in range(activity.n_listed):

@@ -3,7 +3,6 @@
 from tissue.contact.resolve import note_positions, prepare
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.elasticity.elasticity import Elasticity
-from tissue.elasticity.internal_forces import TETRAHEDRA_TOO
 from tissue.elasticity.strained_frequency import strain_frequencies
 from tissue.integrators.local.chebyshev import chebyshev
 from tissue.integrators.local.element_subsets import new_patch
@@ -148,7 +147,7 @@ class LocalStepper:
     def _strain(self, system: System) -> None:
         """Raise the bounds of the listed nodes where tetrahedra are stretched."""
         elastic = system.elasticity.arrays
-        if elastic.has[TETRAHEDRA_TOO]:
+        if elastic.has_tetrahedra:
             self._update_listed(system)
             patch, nodes = self._listed, self._activity.listed
             blocks = (patch.forces, patch.n_forces)

@@ -21,7 +21,7 @@ from tissue.cutting.bielser_1998.cut_edge_code import (
     WHOLE,
     code_of,
     face_state,
-    is_cut,
+    is_edge_cut,
 )
 from tissue.cutting.bielser_1998.template_1_to_17 import EDGE_NODE, FACE_NODE, N_CHILDREN, PRESPLIT
 
@@ -118,7 +118,7 @@ def test_each_case_has_one_signature(code):
 def test_nodes_are_split_where_what_is_around_them_falls_apart(code):
     """The actions, against connected components: copies of a node are the groups at it."""
     for e in range(6):
-        assert len(groups_at(EDGE_NODE + e, code)) == (2 if is_cut(code, e) else 1)
+        assert len(groups_at(EDGE_NODE + e, code)) == (2 if is_edge_cut(code, e) else 1)
     for k in range(4):
         at_node = groups_at(FACE_NODE + k, code)
         detached = int(LOOKUP.detached[code, k])

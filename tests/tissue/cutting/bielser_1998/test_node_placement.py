@@ -8,9 +8,9 @@ from tests.tissue.cutting.bielser_1998.splits import splits_of
 from tissue.cutting.bielser_1998.case_table import TABLE
 from tissue.cutting.bielser_1998.cut_edge_code import EDGES, FACES, code_of
 from tissue.cutting.bielser_1998.node_placement import (
+    EDGE_MARGIN,
     LEAST_CENTRE,
     LIFT,
-    MARGIN,
     centre_volume,
     place_nodes,
 )
@@ -96,14 +96,14 @@ def test_the_node_of_a_face_cut_across_is_in_the_middle_of_the_cut_but_for_the_l
 
 def test_the_node_of_a_face_with_the_tip_in_it_is_where_the_tip_passed():
     placing, _ = placed({(0, 1): 0.5}, tips={3: (0.5, 0.2, 0.3)})
-    off_the_sides = 0.5 * MARGIN + (1.0 - 1.5 * MARGIN) * np.array([0.5, 0.2, 0.3])
+    off_the_sides = 0.5 * EDGE_MARGIN + (1.0 - 1.5 * EDGE_MARGIN) * np.array([0.5, 0.2, 0.3])
     assert placing.weights[FACE_NODE + 3] == pytest.approx([*off_the_sides, 0.0])
 
 
 def test_no_node_comes_near_an_end_of_its_edge():
     placing, _ = placed({(0, 1): 1e-9, (0, 2): 1.0 - 1e-9, (0, 3): 0.5})
-    assert placing.weights[EDGE_NODE, :2] == pytest.approx([1.0 - MARGIN, MARGIN])
-    assert placing.weights[EDGE_NODE + 3, [0, 2]] == pytest.approx([MARGIN, 1.0 - MARGIN])
+    assert placing.weights[EDGE_NODE, :2] == pytest.approx([1.0 - EDGE_MARGIN, EDGE_MARGIN])
+    assert placing.weights[EDGE_NODE + 3, [0, 2]] == pytest.approx([EDGE_MARGIN, 1.0 - EDGE_MARGIN])
     assert volumes(placing.weights).min() > 1e-3
 
 

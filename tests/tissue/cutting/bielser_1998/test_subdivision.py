@@ -10,10 +10,10 @@ from tissue.blade.blade_state import SEARCH
 from tissue.blade.return_mapping import locate
 from tissue.core.vec3 import Vec3
 from tissue.cutting.bielser_1998.case_table import TABLE
-from tissue.cutting.bielser_1998.cut_edge_code import EDGES, is_cut
+from tissue.cutting.bielser_1998.cut_edge_code import EDGES, is_edge_cut
 from tissue.cutting.bielser_1998.subdivision import split_tetrahedron
-from tissue.mesh.body import OUTER
-from tissue.mesh.nonconforming import HANGING, behind, n_behind
+from tissue.mesh.body import OUTER, behind, n_behind
+from tissue.mesh.nonconforming import HANGING
 from tissue.mesh.pieces import label_pieces
 from tissue.mesh.star import no_visits
 
@@ -32,7 +32,7 @@ def split_one(code, mesh=None, at=0.4):
     """Return a tetrahedron split by that code."""
     splits = splits_of(mesh or bodies.unit_tetrahedron())
     for e, (a, b) in enumerate(EDGES):
-        if is_cut(code, e):
+        if is_edge_cut(code, e):
             splits.cross(*splits.tetrahedra[0, [a, b]].tolist(), at)
     assert splits.split(0) == code
     return splits
@@ -65,7 +65,7 @@ def test_mass_and_momentum_are_kept(code):
     drifting(splits)
     before = splits.momentum
     for e, ends in enumerate(EDGES):
-        if is_cut(code, e):
+        if is_edge_cut(code, e):
             splits.cross(*ends, 0.3)
     splits.split(0)
     assert splits.body.masses.sum() == pytest.approx(DENSITY / 6.0, rel=1e-13)
@@ -103,12 +103,12 @@ def test_a_neighbour_that_stays_whole_has_six_small_faces_behind_its_large_one()
     body = splits.body
     link = int(body.links[1, 0])
     assert link <= HANGING
-    small = [behind(body.hanging, 1, link, i) for i in range(n_behind(body.hanging, 1, link))]
+    small = [behind(body, 1, link, i) for i in range(n_behind(body, 1, link))]
     assert len(set(small)) == 6
     for t in small:
         face = list(body.links[t]).index(link)
-        assert n_behind(body.hanging, t, link) == 1
-        assert behind(body.hanging, t, link, 0) == 1
+        assert n_behind(body, t, link) == 1
+        assert behind(body, t, link, 0) == 1
         on_plane = np.delete(body.tetrahedra[t], face)
         assert body.rest[on_plane].sum(axis=1) == pytest.approx(1.0)
     statistics = splits.scheme.statistics(body)

@@ -12,7 +12,7 @@ from tissue.cutting.bielser_1998.template_1_to_17 import (
     FACE_NODE,
     FIRST_J,
     N_CHILDREN,
-    N_NODES,
+    N_LOCAL_NODES,
     PRESPLIT,
     generic_weights,
 )
@@ -29,7 +29,7 @@ def parts_at(node):
 
 def test_it_has_17_tetrahedra_of_14_nodes():
     assert PRESPLIT.children.shape == (17, 4)
-    assert set(PRESPLIT.children.ravel()) == set(range(N_NODES)) == set(range(14))
+    assert set(PRESPLIT.children.ravel()) == set(range(N_LOCAL_NODES)) == set(range(14))
 
 
 def test_there_are_22_triangles_inside_and_6_in_each_of_the_four_faces():
@@ -50,7 +50,7 @@ def test_cores_are_2_27ths_parts_along_edges_an_18th_and_the_centre_a_27th():
 def test_edge_nodes_are_referenced_by_two_corners_and_face_nodes_by_three_and_the_centre():
     for node in range(EDGE_NODE, FACE_NODE):
         assert len(parts_at(node)) == 2
-    for node in range(FACE_NODE, N_NODES):
+    for node in range(FACE_NODE, N_LOCAL_NODES):
         assert len(parts_at(node) - {CENTRE}) == 3
         assert CENTRE in parts_at(node)
 

@@ -9,7 +9,7 @@ from tests import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import block
 from tissue.cutting.blade_path import path_travel, put_on_lattice
-from tissue.cutting.crossings import find_active_tetrahedra, find_crossings
+from tissue.cutting.collision_detection import find_active_tetrahedra, find_crossings
 
 pytestmark = [
     pytest.mark.kernel,
@@ -48,10 +48,11 @@ def swept(mesh, x, y, z, n_samples=4):
 
 def crossed(cut):
     """Return the edges that were found to be crossed, and where along them."""
-    work = cut.work
-    rows = range(int(work.n_crossings[0]))
+    scratch = cut.scratch
+    rows = range(scratch.n_crossings)
     return {
-        (int(work.crossing[i, 0]), int(work.crossing[i, 1])): work.crossing_at[i, 0] for i in rows
+        (int(scratch.crossing[i, 0]), int(scratch.crossing[i, 1])): scratch.crossing_at[i, 0]
+        for i in rows
     }
 
 
@@ -97,7 +98,7 @@ def test_two_steps_cross_what_one_long_step_crosses(mesh):
 
 def test_no_tetrahedron_with_a_crossed_edge_is_missing_from_the_active_ones(mesh):
     cut = swept(mesh, 0.0137, (0.0021, 0.0277), (-0.001, 0.031))
-    active = set(cut.work.active[: cut.work.n_active[0]].tolist())
+    active = set(cut.scratch.active[: cut.scratch.n_active].tolist())
     for t, nodes in enumerate(mesh.tetrahedra.tolist()):
         edges = set(itertools.combinations(sorted(nodes), 2))
         if edges & crossed(cut).keys():

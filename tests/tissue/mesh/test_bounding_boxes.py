@@ -4,7 +4,7 @@ import pytest
 from tests.tissue.kernels_of import grown_body
 from tissue import BladeSegment, BladeSweep, Material, TetrahedralMesh, Tissue, block
 from tissue.mesh.body import build_body
-from tissue.mesh.chunks import chunk_nodes, chunks_of
+from tissue.mesh.bounding_boxes import chunk_nodes, chunks_of
 
 pytestmark = pytest.mark.kernel
 

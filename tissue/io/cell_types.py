@@ -9,7 +9,7 @@ from tissue.core.array_types import IntArray
 from tissue.mesh.validation import MeshError
 
 
-class Kind(NamedTuple):
+class CellType(NamedTuple):
     """A kind of cell."""
 
     name: str
@@ -20,7 +20,7 @@ class Kind(NamedTuple):
 
 
 def expect_tetrahedra(
-    counts: Mapping[int, int], kinds: Mapping[int, Kind], tetrahedron: int
+    counts: Mapping[int, int], kinds: Mapping[int, CellType], tetrahedron: int
 ) -> None:
     """Make sure that there are tetrahedra; points, lines and triangles beside them are ignored.
 
@@ -32,7 +32,9 @@ def expect_tetrahedra(
     Raises:
         MeshError: There are none, or there are other volumes, which would leave holes.
     """
-    named = {number: kinds.get(number, Kind(f"cells of type {number}", 3, 0)) for number in counts}
+    named = {
+        number: kinds.get(number, CellType(f"cells of type {number}", 3, 0)) for number in counts
+    }
     found = ", ".join(f"{counts[number]} {named[number].name}" for number in sorted(counts))
     volumes = [n for n in counts if named[n].dimension == 3 and n != tetrahedron]
     if volumes:
@@ -50,7 +52,9 @@ def expect_tetrahedra(
     raise MeshError(f"there are no tetrahedra; found {found or 'no cells'}")
 
 
-def run(flat: IntArray, start: int, stride: int, columns: list[int], most: int) -> IntArray:
+def uniform_records(
+    flat: IntArray, start: int, stride: int, columns: list[int], most: int
+) -> IntArray:
     """Return the records from `start` on that agree with the first in `columns`.
 
     Files list cells one by one, each with its kind and size; nearly always the next is like this.

@@ -1,7 +1,7 @@
-"""Collision detection: the active tetrahedra, and the edges of theirs that the blade crosses.
+"""Collision detection (CD): the active tetrahedra, and the edges that the blade crosses.
 
-Paper, section 3. The list of active tetrahedra is found anew in each step from the tetrahedra that
-hold the anchors, through faces: the cost is that of the tetrahedra along the blade.
+Paper, section 3. In each step the active tetrahedra are found again from those that hold the
+anchors, through faces: the cost is proportional to the number of tetrahedra along the blade.
 """
 
 from tissue.core.jit import kernel
@@ -9,58 +9,57 @@ from tissue.core.vec3 import cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.cutting.cut_surface import on_sheet
 from tissue.cutting.workspace import Cut
-from tissue.geometry.exact_predicates import orient3d, pierces, point
-from tissue.mesh.body import CUT
-from tissue.mesh.nonconforming import behind, n_behind
+from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
+from tissue.mesh.body import CUT, behind, n_behind
 
 
 @kernel
 def find_active_tetrahedra(cut: Cut) -> None:
-    """Find the tetrahedra whose box at rest meets the box of a swept piece of the edge.
+    """Find the tetrahedra whose box at rest overlaps the box of a swept segment of the edge.
 
-    They are searched through faces: from those that hold a sample, from those that were active or
-    changed in the step before, and from one lip of an earlier cut to the other.
+    The search goes through faces: from the tetrahedra that hold a sample, from those that were
+    active or changed in the step before, and from one lip of an earlier cut to the other.
     """
-    body, path, work, visits = cut.body, cut.path, cut.work, cut.visits
+    body, path, scratch, visits = cut.body, cut.path, cut.scratch, cut.visits
     visits.epoch += 1
     epoch = visits.epoch
-    work.n_active[0] = 0
+    scratch.n_active = 0
     for k in range(len(path.seed)):
         if path.seed[k] >= 0:
             _visit(cut, path.seed[k], epoch, True)
-    for i in range(work.n_previous[0]):
-        _visit(cut, work.previous[i], epoch, False)
+    for i in range(scratch.n_previous):
+        _visit(cut, scratch.previous[i], epoch, False)
     i = 0
-    while i < work.n_active[0]:
-        t = work.active[i]
+    while i < scratch.n_active:
+        t = scratch.active[i]
         i += 1
         for f in range(4):
             link = body.links[t, f]
-            for k in range(n_behind(body.hanging, t, link)):
-                _visit(cut, behind(body.hanging, t, link, k), epoch, False)
+            for k in range(n_behind(body, t, link)):
+                _visit(cut, behind(body, t, link, k), epoch, False)
             if link == CUT:
                 _visit_other_lip(cut, t, f, epoch)
 
 
 @kernel
 def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
-    """Let tetrahedron `t` be active if it meets the swept edge, or holds a sample of it."""
-    work, visits = cut.work, cut.visits
-    n = work.n_active[0]
-    if visits.tetrahedra[t] == epoch or n == len(work.active):
+    """Add tetrahedron `t` to the active ones if it may touch the swept edge or holds a sample."""
+    scratch, visits = cut.scratch, cut.visits
+    n = scratch.n_active
+    if visits.tetrahedra[t] == epoch or n == len(scratch.active):
         return
     visits.tetrahedra[t] = epoch
     if _note_segments(cut, t, n) or is_seed:
-        work.active[n] = t
-        work.n_active[0] = n + 1
+        scratch.active[n] = t
+        scratch.n_active = n + 1
 
 
 @kernel
 def _visit_other_lip(cut: Cut, t: int, f: int, epoch: int) -> None:
     """Visit the tetrahedra that touched cut face `f` of `t` from the other side.
 
-    They are the stars of the twins of its nodes. Those on the current sheet are left out: the lips
-    of the current incision still hang together ahead of the blade.
+    They are the stars of the twins of its nodes. Twins on the current sheet are skipped: ahead of
+    the blade the lips of the current incision are still connected.
     """
     body, visits = cut.body, cut.visits
     for k in range(4):
@@ -79,7 +78,7 @@ def _visit_other_lip(cut: Cut, t: int, f: int, epoch: int) -> None:
 @kernel
 def _visit_star(cut: Cut, node: int, epoch: int) -> None:
     """Visit the tetrahedra around `node`."""
-    body, around = cut.body, cut.work.around
+    body, around = cut.body, cut.scratch.around
     around[0] = body.node_tetrahedron[node]
     n = 1
     i = 0
@@ -101,8 +100,8 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
 
 @kernel
 def _note_segments(cut: Cut, t: int, n: int) -> bool:
-    """Note which segments' boxes meet that of tetrahedron `t`; return whether any does."""
-    body, path, segments = cut.body, cut.path, cut.work.segments
+    """Note which segments' boxes overlap that of tetrahedron `t`; return whether any does."""
+    body, path, segments = cut.body, cut.path, cut.scratch.segments
     grid = body.lattice_rest
     a = body.tetrahedra[t, 0]
     b = body.tetrahedra[t, 1]
@@ -134,16 +133,16 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
 
 @kernel
 def find_crossings(cut: Cut) -> None:
-    """Find the edges of active tetrahedra that the swept edge crosses, each asked once."""
-    body, work, visits = cut.body, cut.work, cut.visits
+    """Find the edges of active tetrahedra that the swept edge crosses, each tested once."""
+    body, scratch, visits = cut.body, cut.scratch, cut.visits
     visits.epoch += 1
     epoch = visits.epoch
-    mask = len(work.hash_keys) - 1
-    work.n_crossings[0] = 0
-    for i in range(work.n_active[0]):
-        if work.segments[i, 0] < 0:
+    mask = len(scratch.hash_keys) - 1
+    scratch.n_crossings = 0
+    for i in range(scratch.n_active):
+        if scratch.segments[i, 0] < 0:
             continue
-        t = work.active[i]
+        t = scratch.active[i]
         for p in range(3):
             for q in range(p + 1, 4):
                 a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
@@ -151,20 +150,20 @@ def find_crossings(cut: Cut) -> None:
                 key = (a << 32) | b
                 # Fibonacci hashing: 2^64 / golden ratio, as a signed number.
                 slot = ((key * -7046029254386353131) >> 40) & mask
-                while work.hash_stamps[slot] == epoch and work.hash_keys[slot] != key:
+                while scratch.hash_stamps[slot] == epoch and scratch.hash_keys[slot] != key:
                     slot = (slot + 1) & mask
-                if work.hash_stamps[slot] != epoch:
-                    work.hash_stamps[slot] = epoch
-                    work.hash_keys[slot] = key
-                    # Another tetrahedron around the edge may see more segments, but those that
-                    # meet the edge itself are seen by all of them.
-                    _cross_edge(cut, a, b, work.segments[i, 0], work.segments[i, 1])
+                if scratch.hash_stamps[slot] != epoch:
+                    scratch.hash_stamps[slot] = epoch
+                    scratch.hash_keys[slot] = key
+                    # Another tetrahedron around the edge may list more segments, but those that
+                    # can cross the edge itself are listed by all of them.
+                    _cross_edge(cut, a, b, scratch.segments[i, 0], scratch.segments[i, 1])
 
 
 @kernel
 def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
-    """Note where segments `first` to `last`, swept, cross edge ab."""
-    body, path, work = cut.body, cut.path, cut.work
+    """Note where one of segments `first` to `last`, swept, crosses edge ab."""
+    body, path, scratch = cut.body, cut.path, cut.scratch
     grid = body.lattice_rest
     low_x = min(grid[a, 0], grid[b, 0])
     low_y = min(grid[a, 1], grid[b, 1])
@@ -180,43 +179,52 @@ def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
             continue
         if boxes[k, 3] < low_x or boxes[k, 4] < low_y or boxes[k, 5] < low_z:
             continue
-        at = _crossed_at(path, cut, a, b, k)
-        n = work.n_crossings[0]
-        if at >= 0.0 and n < len(work.crossing):
-            work.crossing[n, 0] = a
-            work.crossing[n, 1] = b
-            work.crossing[n, 2] = k
-            work.crossing_at[n, 0] = at
-            work.n_crossings[0] = n + 1
+        at = _crossing_of_quad(path, cut, a, b, k)
+        n = scratch.n_crossings
+        if at >= 0.0 and n < len(scratch.crossing):
+            scratch.crossing[n, 0] = a
+            scratch.crossing[n, 1] = b
+            scratch.crossing[n, 2] = k
+            scratch.crossing_at[n, 0] = at
+            scratch.n_crossings = n + 1
             return
 
 
 @kernel
-def _crossed_at(path: Path, cut: Cut, a: int, b: int, k: int) -> float:
-    """Where along ab the quad that segment `k` sweeps is pierced, as a fraction, or -1."""
-    pa = point(cut.body.lattice_rest, a)
-    pb = point(cut.body.lattice_rest, b)
-    tip_t0 = point(path.lattice_t0, k)
-    heel_t0 = point(path.lattice_t0, k + 1)
-    tip_t1 = point(path.lattice_t1, k)
-    heel_t1 = point(path.lattice_t1, k + 1)
+def _crossing_of_quad(path: Path, cut: Cut, a: int, b: int, k: int) -> float:
+    """Return the fraction along ab at which it pierces the quad that segment `k` sweeps, or -1."""
+    pa = lattice_point(cut.body.lattice_rest, a)
+    pb = lattice_point(cut.body.lattice_rest, b)
+    tip_t0 = lattice_point(path.lattice_t0, k)
+    heel_t0 = lattice_point(path.lattice_t0, k + 1)
+    tip_t1 = lattice_point(path.lattice_t1, k)
+    heel_t1 = lattice_point(path.lattice_t1, k + 1)
     if pierces(pa, pb, tip_t0, tip_t1, heel_t1):
         va = orient3d(tip_t0, tip_t1, heel_t1, pa)
         vb = orient3d(tip_t0, tip_t1, heel_t1, pb)
-        return _fraction(cut, a, b, k, True, float(va) / (float(va) - float(vb)))
+        return _crossing_fraction(cut, a, b, k, True, float(va) / (float(va) - float(vb)))
     if pierces(pa, pb, tip_t0, heel_t1, heel_t0):
         va = orient3d(tip_t0, heel_t1, heel_t0, pa)
         vb = orient3d(tip_t0, heel_t1, heel_t0, pb)
-        return _fraction(cut, a, b, k, False, float(va) / (float(va) - float(vb)))
+        return _crossing_fraction(cut, a, b, k, False, float(va) / (float(va) - float(vb)))
     return -1.0
 
 
 @kernel
-def _fraction(cut: Cut, a: int, b: int, k: int, ahead: bool, on_lattice: float) -> float:
-    """Where along ab it meets the plane of a triangle that segment `k` sweeps, unrounded.
+def _crossing_fraction(cut: Cut, a: int, b: int, k: int, ahead: bool, on_lattice: float) -> float:
+    """Return the unrounded fraction along ab at which a triangle that segment `k` sweeps cuts it.
 
-    The lattice decides that it does; where the point is, it would tell to a few millionths of the
-    body only. Where a plane nearly holds the edge, `on_lattice` is as good as any answer.
+    The lattice decides whether it does. The point itself is computed from unrounded positions,
+    since
+    the lattice resolves a few millionths of the body only.
+
+    Args:
+        cut: Body and path.
+        a: First node of the edge.
+        b: Second node.
+        k: Segment of the cutting edge.
+        ahead: Which of the two triangles of the quad: tip and heel at t1, or heel at t0 and t1.
+        on_lattice: The fraction on the lattice, used where the edge nearly lies in the plane.
     """
     body, path = cut.body, cut.path
     tip = vec3(path.t0, k)

@@ -14,7 +14,7 @@ MAX_SHOWN = 40
 """An error quotes this many characters of what it found."""
 
 
-class Source:
+class ByteReader:
     """A file in memory, and how far it has been read."""
 
     def __init__(self, data: bytes) -> None:
@@ -102,16 +102,16 @@ class Source:
         self.fail(f"expected {what}, found text that is not numbers")
 
 
-def count_in(source: Source, text: str, what: str, at: int | None = None) -> int:
+def count_in(reader: ByteReader, text: str, what: str, at: int | None = None) -> int:
     """Read a number of things, which cannot be negative, nor more than the file has bytes."""
     try:
         count = int(text)
     except ValueError:
-        source.fail(f"expected the number of {what}, found {shown(text)}", at)
-    if not 0 <= count <= len(source.data):
-        source.fail(
+        reader.fail(f"expected the number of {what}, found {shown(text)}", at)
+    if not 0 <= count <= len(reader.data):
+        reader.fail(
             f"expected the number of {what}, found {count}, which a file of "
-            f"{len(source.data)} bytes cannot hold",
+            f"{len(reader.data)} bytes cannot hold",
             at,
         )
     return count
