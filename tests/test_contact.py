@@ -5,8 +5,8 @@ import pytest
 
 from tests import bodies, strokes
 from tissue import Material, Snapshot, TetrahedralMesh, Tissue, block
-from tissue.contact.resolve import prepare
-from tissue.contact.state import CHANGED, IS_STALE
+from tissue.contact.resolve import note_all_positions
+from tissue.contact.state import FACES_CHANGED
 from tissue.elasticity.internal_forces import elastic_energy
 from tissue.mesh.faces import OUTWARD
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
@@ -191,7 +191,7 @@ def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
     assert len(lips) > 20
 
 
-def test_before_the_first_cut_contact_has_nothing_to_look_at():
+def test_before_the_first_cut_contact_has_nothing_to_test():
     mesh = block((4, 4, 4), (0.04,) * 3)
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
     assert not tissue._system.contact.is_awake
@@ -356,24 +356,24 @@ def test_before_a_step_contact_gives_nothing_to_what_it_presses():
     """What it gave along the normals of the step before fed corners of lips that turn with them."""
     tissue = lying()
     contact, body = tissue._system.contact.arrays, tissue._body
-    assert (contact.contacts.impulse[: contact.contacts.count[0]] > 0.0).sum() > 5
+    assert (contact.contacts.impulse[: contact.contacts.n_contacts] > 0.0).sum() > 5
     before = tissue.snapshot()
-    prepare(contact, body)
+    note_all_positions(contact, body)
     np.testing.assert_array_equal(tissue.snapshot().velocities, before.velocities)
     np.testing.assert_array_equal(tissue.snapshot().positions, before.positions)
 
 
-def test_contacts_of_faces_that_changed_are_sought_anew_and_the_others_last():
+def test_contacts_of_faces_that_changed_are_found_again_and_the_others_last():
     tissue = lying()
     contact = tissue._system.contact.arrays
     contacts, faces = contact.contacts, contact.faces
-    of = {tuple(contacts.node[k]): contacts.face[k].tolist() for k in range(contacts.count[0])}
+    of = {tuple(contacts.node[k]): contacts.face[k].tolist() for k in range(contacts.n_contacts)}
     changed = {face for sides in list(of.values())[:4] for face in sides}
     faces.generation[list(changed)] += 1
-    contact.state[IS_STALE] = CHANGED
+    contact.stale = FACES_CHANGED
     tissue.step(None, strokes.DT)
     n_changed = n_lasting = 0
-    for k in range(contacts.count[0]):
+    for k in range(contacts.n_contacts):
         sides = of.get(tuple(contacts.node[k]))
         if sides is not None and changed & set(sides):
             assert contacts.last_impulse[k] == 0.0
@@ -396,11 +396,11 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
     return tissue.snapshot()
 
 
-def test_to_look_at_every_pair_of_the_body_in_every_step_changes_no_bit(monkeypatch):
-    """With an endless margin all are paired, and where any motion is little all pairs are near."""
+def test_testing_every_pair_of_the_body_in_every_step_changes_no_bit(monkeypatch):
+    """With an endless margin all are paired, and where no node is fast all pairs are near."""
     frugal = cut_and_dropped(150)
-    monkeypatch.setattr("tissue.contact.self_contact.MARGIN", 1e3)
-    monkeypatch.setattr("tissue.contact.self_contact.LITTLE", 1e3)
+    monkeypatch.setattr("tissue.contact.self_contact.PAIR_MARGIN", 1e3)
+    monkeypatch.setattr("tissue.contact.self_contact.FAST_MOVE", 1e3)
     for one, other in zip(frugal, cut_and_dropped(150), strict=True):
         np.testing.assert_array_equal(one, other)
 

@@ -7,8 +7,8 @@ import numpy as np
 from scalpel_sim.bench.blocks import block_mesh, held
 from scalpel_sim.bench.traffic import Traffic, traffic
 from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
-from tissue.contact.resolve import prepare, resolve
-from tissue.contact.state import ANEW, IS_STALE, N_TOUCHING
+from tissue.contact.resolve import note_all_positions, resolve
+from tissue.contact.state import REBUILD
 from tissue.core.jit import kernel
 from tissue.elasticity.finite_elements import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper
@@ -147,19 +147,19 @@ class Touching:
     @property
     def n_contacts(self) -> int:
         """Contacts that press."""
-        return int(self._tissue._system.contact.arrays.totals[N_TOUCHING])
+        return self._tissue._system.contact.arrays.n_pressing
 
     def searches(self, n: int) -> None:
         """Look for all pairs that may touch, as where faces have moved by the margin."""
         for _ in range(n):
-            self._tissue._system.contact.arrays.state[IS_STALE] = ANEW
+            self._tissue._system.contact.arrays.stale = REBUILD
             self.checks(1)
 
     def checks(self, n: int) -> None:
         """Look at the pairs that were found, and keep them apart, as in every Runge-Kutta step."""
         contact, body = self._tissue._system.contact.arrays, self._tissue._body
         for _ in range(n):
-            prepare(contact, body)
+            note_all_positions(contact, body)
             resolve(contact, body, DT)
 
 

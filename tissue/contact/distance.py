@@ -1,4 +1,4 @@
-"""How far apart nodes and triangles, and edges, are.
+"""Distances of a node from a triangle, and of an edge from an edge.
 
 Source: Ericson (2005), Real-Time Collision Detection, sections 5.1.5 and 5.1.9.
 """
@@ -13,7 +13,7 @@ from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub
 
 @kernel
 def distance_to_triangle(at: Corners) -> float:
-    """Distance of p from the triangle abc [m]."""
+    """Return the distance of p from the triangle abc [m]."""
     ab, ac, ap = sub(at.b, at.a), sub(at.c, at.a), sub(at.p, at.a)
     area = cross(ab, ac)
     square = dot(area, area)
@@ -27,22 +27,22 @@ def distance_to_triangle(at: Corners) -> float:
 
 
 @inlined
-def _to_segment(from_a: Vec3, way: Vec3) -> float:
-    """Squared distance of a point from a segment: both as vectors from the segment's start."""
-    length = dot(way, way)
-    at = dot(from_a, way)
+def _to_segment(from_a: Vec3, along: Vec3) -> float:
+    """Return the squared distance of a point from a segment [m2], both given from its start."""
+    length = dot(along, along)
+    at = dot(from_a, along)
     if at <= 0.0 or length == 0.0:
         return dot(from_a, from_a)
     if at >= length:
-        rest = sub(from_a, way)
+        rest = sub(from_a, along)
         return dot(rest, rest)
-    rest = axpy(-at / length, way, from_a)
+    rest = axpy(-at / length, along, from_a)
     return dot(rest, rest)
 
 
 @kernel
 def distance_of_edges(at: Edges) -> float:
-    """Distance of the segments ab and cd [m]."""
+    """Return the distance of the segments ab and cd [m]."""
     u, v, r = sub(at.b, at.a), sub(at.d, at.c), sub(at.a, at.c)
     uu, vv, uv = dot(u, u), dot(v, v), dot(u, v)
     ur, vr = dot(u, r), dot(v, r)

@@ -5,15 +5,14 @@ from typing import NamedTuple
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
-NEARLY_PARALLEL = 1e-3
-"""Sine of the angle between edges below which they have no crossing to speak of. Their nodes meet
-the triangles beside them instead."""
+_NEARLY_PARALLEL = 1e-3
+"""Sine of the angle between edges below which they count as parallel and have no crossing. Their
+nodes meet the triangles beside them instead."""
 
-END = 1e-3
+EDGE_END = 1e-3
 """Share of an edge at each end that is left to the node there, which meets triangles."""
 
-
-_SAME_WAY = 0.5
+_SAME_SIDE = 0.5
 """Cosine between the normals of two edges above which they cannot face each other. Contact needs
 a direction within a right angle of one normal and of the other's opposite: between edges of one lip
 that is one along the lip."""
@@ -26,9 +25,9 @@ class EdgeEdge(NamedTuple):
     normal: Vec3
     """Unit vector from the second to the first, as they should lie."""
     s: float
-    """Where along the first edge."""
+    """Where along the first edge, as a fraction."""
     t: float
-    """Where along the second."""
+    """Where along the second edge, as a fraction."""
 
 
 class Edges(NamedTuple):
@@ -48,9 +47,11 @@ class Crossing(NamedTuple):
     normal: Vec3
     """Unit vector across both."""
     gap: float
-    """From the second to the first along it [m]."""
+    """Distance from the second to the first along the normal [m]."""
     s: float
+    """Where along the first line, as a fraction of its edge."""
     t: float
+    """Where along the second line, as a fraction of its edge."""
 
 
 @kernel
@@ -60,7 +61,7 @@ def crossing_of(at: Edges) -> Crossing:
     v = sub(at.d, at.c)
     n = cross(u, v)
     square = dot(n, n)
-    if square <= NEARLY_PARALLEL * NEARLY_PARALLEL * dot(u, u) * dot(v, v):
+    if square <= _NEARLY_PARALLEL * _NEARLY_PARALLEL * dot(u, u) * dot(v, v):
         return Crossing(False, n, 0.0, 0.0, 0.0)
     w = sub(at.c, at.a)
     s = dot(cross(w, v), n) / square
@@ -70,11 +71,16 @@ def crossing_of(at: Edges) -> Crossing:
 
 
 @inlined
-def do_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
-    """Whether the lines ab and cd face each other and overlap: the first thing to look at.
+def lines_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
+    """Whether the lines ab and cd face each other and overlap: the cheapest test, done first.
 
-    Signs alone: cross(ab, cd) leads along one edge's normal and against the other's, and along it
-    the edges lie the wrong way round. No branches, for nobody could foretell them.
+    By signs alone: cross(ab, cd) points along one edge's normal and against the other's, and along
+    it the edges lie in the wrong order. No branches, for none could be predicted.
+
+    Args:
+        at: The edges at the end of the step.
+        outward: Normal out of the body at ab; any length.
+        other_outward: Normal out of the body at cd; any length.
     """
     normal = cross(sub(at.b, at.a), sub(at.d, at.c))
     towards = dot(normal, outward)
@@ -86,53 +92,53 @@ def do_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
 
 
 @kernel
-def face_the_same_way(outward: Vec3, other_outward: Vec3) -> bool:
-    """Whether two edges cannot face each other; see `_SAME_WAY`."""
+def face_the_same_side(outward: Vec3, other_outward: Vec3) -> bool:
+    """Whether the normals of two edges show that they cannot face each other, see `_SAME_SIDE`."""
     same = dot(outward, other_outward)
     squares = dot(outward, outward) * dot(other_outward, other_outward)
-    return same > 0.0 and same * same > _SAME_WAY * _SAME_WAY * squares
+    return same > 0.0 and same * same > _SAME_SIDE * _SAME_SIDE * squares
 
 
 @kernel
 def edge_edge(
-    t0: Edges, t1: Edges, outward: Vec3, other_outward: Vec3, slack: float, nothing_yet: float
+    t0: Edges, t1: Edges, outward: Vec3, other_outward: Vec3, residual: float, tolerance: float
 ) -> EdgeEdge:
-    """Tell whether ab went through cd, from outside to inside, between t0 and t1.
+    """Test whether ab went through cd, from outside to inside, between t0 and t1.
 
     They did if they now overlap and did not before, at the same places and along the same normal.
     What overlapped then has always done so: two edges of one body on either side of it.
 
     Args:
-        t0: Before the step.
-        t1: After it.
-        outward: Out of the body at ab; any length.
-        other_outward: The same at cd.
-        slack: How deep they may have been at t0 [m]: where they could not be pushed apart.
-        nothing_yet: Depth that is none [m].
+        t0: Edges before the step.
+        t1: Edges after the step.
+        outward: Normal out of the body at ab; any length.
+        other_outward: Normal out of the body at cd; any length.
+        residual: How deep they may have been at t0 [m]: where they could not be pushed apart.
+        tolerance: Depth that counts as none [m].
     """
     outside = EdgeEdge(False, outward, 0.0, 0.0)
-    if not do_overlap(t1, outward, other_outward):
+    if not lines_overlap(t1, outward, other_outward):
         return outside
     now = crossing_of(t1)
-    way = 1.0 if dot(now.normal, other_outward) > 0.0 else -1.0
+    sign = 1.0 if dot(now.normal, other_outward) > 0.0 else -1.0
     if not (now.is_one and is_inner(now.s) and is_inner(now.t)):
         return outside
-    depth = -way * now.gap
-    if not depth > nothing_yet:
+    depth = -sign * now.gap
+    if not depth > tolerance:
         return outside
-    normal = scale(way, now.normal)
-    if not dot(normal, between(t0, now.s, now.t)) >= -slack:
+    normal = scale(sign, now.normal)
+    if not dot(normal, separation(t0, now.s, now.t)) >= -residual:
         return outside
     return EdgeEdge(True, normal, now.s, now.t)
 
 
 @kernel
-def between(at: Edges, s: float, t: float) -> Vec3:
-    """Vector from a point of the second edge to one of the first [m]."""
+def separation(at: Edges, s: float, t: float) -> Vec3:
+    """Return the vector from a point of the second edge to a point of the first [m]."""
     return sub(lerp(s, at.a, at.b), lerp(t, at.c, at.d))
 
 
 @kernel
 def is_inner(s: float) -> bool:
     """Whether a place along an edge is not at its ends."""
-    return END <= s <= 1.0 - END
+    return EDGE_END <= s <= 1.0 - EDGE_END

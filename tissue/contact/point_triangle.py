@@ -1,8 +1,9 @@
 """Whether a node went through a triangle during a step, and where it now is under it."""
 
+import math
 from typing import NamedTuple
 
-from tissue.core.jit import inlined, kernel
+from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, scale, sub
 
 RIM = 0.01
@@ -19,7 +20,7 @@ class PointTriangle(NamedTuple):
     b: float
     """Weight of the triangle's second corner at the point under the node."""
     c: float
-    """Weight of its third corner."""
+    """Weight of the triangle's third corner at the point under the node."""
 
 
 class Corners(NamedTuple):
@@ -32,8 +33,15 @@ class Corners(NamedTuple):
 
 
 @kernel
+def rim_width(a: Vec3, b: Vec3, c: Vec3) -> float:
+    """Return how far outside a triangle a node may be that still meets it, at most [m]."""
+    ab, ac = sub(b, a), sub(c, a)
+    return RIM * (math.sqrt(dot(ab, ab)) + math.sqrt(dot(ac, ac)))
+
+
+@kernel
 def weights_below(at: Corners, area: Vec3) -> tuple[float, float]:
-    """Weights of b and c at the point of the triangle's plane under p; `area` is its normal."""
+    """Return the weights of b and c at the point of the plane under p; `area` is its normal."""
     square = dot(area, area)
     d = sub(at.p, at.a)
     b = dot(cross(d, sub(at.c, at.a)), area) / square
@@ -41,23 +49,23 @@ def weights_below(at: Corners, area: Vec3) -> tuple[float, float]:
     return b, c
 
 
-class Below(NamedTuple):
-    """The point of a triangle's plane under p."""
+class PlanePoint(NamedTuple):
+    """The point of a triangle's plane under a node."""
 
     b: float
-    """Weight of the triangle's second corner."""
+    """Weight of the triangle's second corner at the point under the node."""
     c: float
-    """Weight of its third corner."""
+    """Weight of the triangle's third corner at the point under the node."""
     normal: Vec3
     """Unit vector outwards."""
 
 
 @kernel
-def under(at: Corners) -> Below:
-    """Find the point of the triangle's plane under p."""
+def project_to_plane(at: Corners) -> PlanePoint:
+    """Return the point of the triangle's plane under p."""
     area = cross(sub(at.b, at.a), sub(at.c, at.a))
     b, c = weights_below(at, area)
-    return Below(b, c, scale(1.0 / norm(area), area))
+    return PlanePoint(b, c, scale(1.0 / norm(area), area))
 
 
 @kernel
@@ -66,25 +74,19 @@ def is_within(b: float, c: float) -> bool:
     return b >= -RIM and c >= -RIM and b + c <= 1.0 + RIM
 
 
-@inlined
-def is_under(at: Corners) -> bool:
-    """Whether p is on the inner side of the triangle's plane: the first thing to look at."""
-    return dot(cross(sub(at.b, at.a), sub(at.c, at.a)), sub(at.p, at.a)) < 0.0
-
-
 @kernel
-def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -> PointTriangle:
-    """Tell whether p went through abc, from outside to inside, between t0 and t1.
+def point_triangle(t0: Corners, t1: Corners, residual: float, tolerance: float) -> PointTriangle:
+    """Test whether p went through abc, from outside to inside, between t0 and t1.
 
     It did if it was above the triangle's plane and is now under the triangle; or if it went through
     and out again beside it. A node that was under the plane before went round the triangle, or is
-    one of the same body that lies behind a corner or in a thin wedge: it is left alone.
+    one of the same body that lies behind a corner or in a thin wedge: that is no contact.
 
     Args:
-        t0: Before the step.
-        t1: After it.
-        slack: How far inside p may have been at t0 [m]: where it could not be pushed out.
-        nothing_yet: Depth that is none [m].
+        t0: Node and triangle before the step.
+        t1: Node and triangle after the step.
+        residual: How far inside p may have been at t0 [m]: where it could not be pushed out.
+        tolerance: Depth that counts as none [m].
     """
     outside = PointTriangle(False, t1.p, 0.0, 0.0)
     area = cross(sub(t1.b, t1.a), sub(t1.c, t1.a))
@@ -93,13 +95,13 @@ def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -
         return outside
     double_area = norm(area)
     depth = -height / double_area
-    if not depth > nothing_yet:
+    if not depth > tolerance:
         return outside
     b, c = weights_below(t1, area)
     before = cross(sub(t0.b, t0.a), sub(t0.c, t0.a))
     gap = dot(before, sub(t0.p, t0.a)) / norm(before)
     if is_within(b, c):
-        if not gap >= -slack:
+        if not gap >= -residual:
             return outside
     elif not gap > 0.0:
         return outside
@@ -120,7 +122,7 @@ def point_triangle(t0: Corners, t1: Corners, slack: float, nothing_yet: float) -
 
 @kernel
 def into_triangle(b: float, c: float) -> tuple[float, float]:
-    """Weights of a point of the triangle near one outside."""
+    """Return the weights of a point of the triangle near a point outside."""
     a = max(1.0 - b - c, 0.0)
     b = max(b, 0.0)
     c = max(c, 0.0)

@@ -1,12 +1,12 @@
-"""`SelfContact`: owns the arrays of contact, and says when there is anything to look for.
+"""`SelfContact`: owns the arrays of contact, and knows when there is anything to search.
 
 Lips of a cut, pieces, and the floor: no node goes through a triangle, no edge through an edge.
-Before the first face is cut, in a body of one piece without a floor, it costs nothing.
+Before the first face is cut, in a body of one piece without a floor, contact costs nothing.
 
-What is found is what went through between two Runge-Kutta steps, from outside to inside. So nodes
-of one body that lie close under a triangle of it are never mistaken for contact, at any speed
-nothing passes unseen as long as it moves less than its own element in a step, and what overlaps
-from the start is left alone rather than torn apart.
+A contact is what went through, from outside to inside, between two Runge-Kutta steps. So nodes of
+one body that lie close under a triangle of it are never mistaken for contact, nothing passes
+unseen at any speed as long as it moves less than its own element in a step, and what overlaps from
+the start is left alone rather than torn apart.
 """
 
 from typing import Any
@@ -16,60 +16,48 @@ import numpy as np
 from tissue.contact.candidates import Candidates, grown_candidates, new_candidates
 from tissue.contact.constraints import Contacts, grown_contacts, new_contacts
 from tissue.contact.faces import (
-    WITH_SKIN,
     collect_faces,
     count_faces,
     grown_faces,
-    in_pieces,
     new_faces,
-    renew_faces,
+    update_changed_faces,
+    with_pieces,
     with_room,
 )
-from tissue.contact.motion_bounds import grown_motion, new_motion
-from tissue.contact.pairs import new_hits
-from tissue.contact.state import (
-    ANEW,
-    CHANGED,
-    FLOOR_IMPULSE,
-    IS_AWAKE,
-    IS_STALE,
-    N_STATES,
-    N_TOTALS,
-    N_TOUCHING,
-    PENETRATION,
-    PRESSURE_IMPULSE,
-    ContactState,
-)
+from tissue.contact.hits import new_hits
+from tissue.contact.motion_bounds import grown_motion_bounds, new_motion_bounds
+from tissue.contact.state import FACES_CHANGED, REBUILD, UP_TO_DATE, ContactState
 from tissue.core.simd import aligned, room_for_points
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import Change
 from tissue.mesh.pieces import label_pieces
 from tissue.types import BodyContacts
 
-MARGIN = 0.25
-"""How far apart candidates may be, per mean node size. Larger: more pairs, each to be looked at now
-and then; smaller: nodes are sought anew more often."""
+PAIR_MARGIN = 0.25
+"""Distance up to which faces are paired, per mean node size. Larger: more pairs, each to be tested
+now and then; smaller: nodes must be paired again more often."""
 
-LITTLE = 1.0 / 64.0
-"""How far a node moves in a Runge-Kutta step at most that is not restless, in margins. Larger: all
-pairs are looked at more often; smaller: more nodes are asked one by one."""
+FAST_MOVE = 1.0 / 64.0
+"""Displacement in a Runge-Kutta step above which a node is fast, in margins. Larger: all pairs are
+tested more often; smaller: more nodes are tested one by one."""
 
-TOUCH = 1e-4
-"""Distance that is none, and correction at which sweeps end, per mean node size: a third of a
-micrometre in an organ. Smaller: where lips of one cut lie node on node, each node presses on all
-triangles around the other, which say the same, and all sweeps are always done; at 1e-6 a body with
-3,000 contacts had 5,000, for less than shows. Larger: nodes that are pressed tremble."""
+_TOLERANCE = 1e-4
+"""Distance that counts as none, and correction at which Gauss-Seidel ends, per mean node size: a
+third of a micrometre in an organ. Smaller: where lips of one cut lie node on node, each node
+presses on all triangles around the other, which say the same, and all iterations are always done;
+at 1e-6 a body with 3,000 contacts had 5,000, for less than shows. Larger: nodes that are pressed
+tremble."""
 
-_SLACK = 0.01
-"""How deep a node may be left in what it touches, and be found again by the triangle beside as it
-slides there, per mean node size. Larger: what was always so is taken for contact, where lips are
+_LARGEST_RESIDUAL = 0.01
+"""Depth, per mean node size, up to which a node that could not be pushed out is found again by the
+triangle beside as it slides there. Larger: what was always so is taken for contact, where lips are
 thin; smaller: a node that is pinched between two faces is lost."""
 
-RECOVERY = 1.0
+_RECOVERY = 1.0
 """Speed at which an overlap is undone that was there before a Runge-Kutta step, in mean node sizes
-a second. It is work on the springs behind that nobody paid for, and a node that is pinched between
-two faces goes to and fro at about this speed without end. Where nothing is undone, what overlaps
-does so for good."""
+a second. It is work on the springs behind that nothing accounts for, and a node that is pinched
+between two faces moves to and fro at about this speed without end. Where nothing is undone, what
+overlaps does so for good."""
 
 CAPACITY = 256
 """Faces that there is room for at first."""
@@ -89,8 +77,8 @@ class SelfContact:
     """Contact of one body with itself and with the floor.
 
     Args:
-        body: At its start.
-        node_size: Its mean node size [m].
+        body: Body at its start.
+        node_size: Mean node size of the body [m].
         friction: Coefficient of friction.
         floor: Height of the floor [m], or None.
     """
@@ -101,83 +89,92 @@ class SelfContact:
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         self._capacity = CAPACITY
         self._cell = float(node_size)
-        recovery = float(RECOVERY * node_size)
+        recovery = float(_RECOVERY * node_size)
         candidates = new_candidates(n_nodes, CAPACITY, self._cell)
         self.arrays = ContactState(
+            is_awake=floor is not None,
+            stale=UP_TO_DATE,
+            is_pending=0,
+            has_begun=0,
+            step=0,
+            tested_at=0,
+            n_pressing=0,
+            pressure_impulse=0.0,
+            penetration=0.0,
+            floor_impulse=np.zeros(3),
             faces=new_faces(n_tetrahedra),
             candidates=candidates,
-            motion=new_motion(n_nodes, float(LITTLE * MARGIN * node_size)),
+            motion=new_motion_bounds(n_nodes, float(FAST_MOVE * PAIR_MARGIN * node_size)),
             contacts=new_contacts(n_nodes, self._n_contacts(n_nodes), recovery),
             normal=room_for_points(n_nodes),
             **_scratch(candidates),
-            looked=np.zeros(1, np.int64),
             start=np.zeros((n_nodes, 3)),
             depth=np.zeros(n_nodes),
-            depth_epoch=np.zeros(n_nodes, np.int64),
-            tangled=np.zeros(n_nodes, np.int64),
-            state=np.zeros(N_STATES, np.int64),
-            totals=np.zeros(N_TOTALS),
+            depth_step=np.zeros(n_nodes, np.int64),
+            inverted_step=np.zeros(n_nodes, np.int64),
             friction=float(friction),
             floor=-np.inf if floor is None else float(floor),
-            margin=float(MARGIN * node_size),
-            slack=float(_SLACK * node_size),
-            touch=float(TOUCH * node_size),
+            margin=float(PAIR_MARGIN * node_size),
+            largest_residual=float(_LARGEST_RESIDUAL * node_size),
+            tolerance=float(_TOLERANCE * node_size),
         )
-        self.arrays.state[IS_AWAKE] = floor is not None
-        self.look_for_pieces(body)
+        self._find_pieces(body)
 
     @property
     def is_awake(self) -> bool:
         """Whether there is anything that could touch."""
-        return bool(self.arrays.state[IS_AWAKE])
+        return bool(self.arrays.is_awake)
 
     def begin(self) -> None:
-        """Begin to count anew."""
-        self.arrays.totals[:] = 0.0
+        """Clear the totals."""
+        arrays = self.arrays
+        arrays.floor_impulse[:] = 0.0
+        arrays.pressure_impulse = 0.0
+        arrays.penetration = 0.0
+        arrays.n_pressing = 0
 
     def touch(self, dt: float) -> BodyContacts:
-        """Return what was counted, over the time `dt` [s]."""
-        totals = self.arrays.totals
+        """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
+        arrays = self.arrays
         per_second = 1.0 / dt if dt > 0.0 else 0.0
         return BodyContacts(
-            n_contacts=int(totals[N_TOUCHING]),
-            penetration=float(totals[PENETRATION]),
-            force=float(totals[PRESSURE_IMPULSE] * per_second),
-            force_of_floor=totals[FLOOR_IMPULSE : FLOOR_IMPULSE + 3] * per_second,
+            n_contacts=arrays.n_pressing,
+            penetration=arrays.penetration,
+            force=arrays.pressure_impulse * per_second,
+            force_of_floor=arrays.floor_impulse * per_second,
         )
 
     def mesh_changed(self, body: Body, change: Change) -> None:
-        """Take in the faces that a pass of a cut made.
+        """Add the faces that a pass of a cut made.
 
         The lips of the first incision do not touch before it ends: the blade is between them.
         """
-        state, faces = self.arrays.state, self.arrays.faces
-        faces = with_room(faces, 4 * int(change.n_dirty))
-        renew_faces(faces, body, change)
-        if faces is not self.arrays.faces:
-            self.arrays = self.arrays.replaced(faces=faces)
-        state[IS_STALE] = max(int(state[IS_STALE]), CHANGED)
+        arrays = self.arrays
+        faces = with_room(arrays.faces, 4 * change.n_dirty)
+        update_changed_faces(faces, body, change)
+        arrays.stale = max(arrays.stale, FACES_CHANGED)
+        if faces is not arrays.faces:
+            self.arrays = arrays.replaced(faces=faces)
 
     def incision_ended(self, body: Body) -> None:
-        """Let its lips touch; and where the body is in pieces now, their skin too."""
-        self.arrays.state[IS_AWAKE] |= self.arrays.faces.counts[0] > 0
-        self.look_for_pieces(body)
+        """Let the lips of the incision touch; where the body is in pieces now, their skin too."""
+        self.arrays.is_awake |= self.arrays.faces.n_places > 0
+        self._find_pieces(body)
 
-    def look_for_pieces(self, body: Body) -> None:
-        """Find out whether the body is in pieces; its skin may touch then, too."""
+    def _find_pieces(self, body: Body) -> None:
+        """Find out whether the body is in pieces; their skin may touch then, too."""
         faces = self.arrays.faces
         n_tetrahedra = body.n_tetrahedra
         piece, queue = np.empty((2, n_tetrahedra), np.int64)
         n_pieces = label_pieces(body, piece, queue)
         if n_pieces == 1:
             return
-        faces = in_pieces(faces, piece, n_pieces)
-        if not faces.counts[WITH_SKIN]:
+        faces = with_pieces(faces, piece, n_pieces)
+        if not faces.has_skin:
             faces = with_room(faces, count_faces(body, True))
-            faces.counts[WITH_SKIN] = 1
+            faces.has_skin = 1
             collect_faces(faces, body)
-        self.arrays = self.arrays.replaced(faces=faces)
-        self.arrays.state[[IS_AWAKE, IS_STALE]] = 1, ANEW
+        self.arrays = self.arrays.replaced(faces=faces, is_awake=1, stale=REBUILD)
 
     def make_room(self) -> None:
         """Double the room for what may touch."""
@@ -191,13 +188,13 @@ class SelfContact:
         )
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Make room for that many nodes and tetrahedra."""
+        """Make room for a body of `n_nodes` and `n_tetrahedra`."""
         arrays = self.arrays
-        of_nodes = ("start", "depth", "depth_epoch", "tangled", "normal")
+        of_nodes = ("start", "depth", "depth_step", "inverted_step", "normal")
         self.arrays = arrays.replaced(
             faces=grown_faces(arrays.faces, n_tetrahedra),
             candidates=grown_candidates(arrays.candidates, n_nodes),
-            motion=grown_motion(arrays.motion, n_nodes),
+            motion=grown_motion_bounds(arrays.motion, n_nodes),
             contacts=self._larger_contacts(n_nodes),
             **{name: grown(getattr(arrays, name), n_nodes) for name in of_nodes},
         )
@@ -206,5 +203,5 @@ class SelfContact:
         return grown_contacts(self.arrays.contacts, n_nodes, self._n_contacts(n_nodes))
 
     def _n_contacts(self, n_nodes: int) -> int:
-        """Return how many there is room for, every node on the floor among them."""
+        """Return how many contacts there is room for, every node on the floor among them."""
         return 16 * self._capacity + n_nodes

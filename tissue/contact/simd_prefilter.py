@@ -1,24 +1,24 @@
-"""First look at near pairs, eight at a time: which of them may have gone through each other.
+"""Prefilter of near pairs, eight at a time: which may have gone through each other.
 
-Signs of a few products tell it for most. They are held a little less tightly than by the second
-look, at one pair, so that rounding makes no difference.
+The signs of a few products decide for most pairs. The bounds are a little wider than in the test of
+one pair (`narrow_phase`), so that rounding makes no difference.
 """
 
-from tissue.contact.edge_edge import END
-from tissue.contact.pairs import N_NEAR, Pairs, eight_corners
+from tissue.contact.edge_edge import EDGE_END
+from tissue.contact.pairs import Pairs, eight_corners
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, square_root, store_lanes
 from tissue.core.vec3 import add, cross, dot, sub
 
-LESS = 0.5
-"""By how much less tightly, as a share of each bound."""
+_WIDER = 0.5
+"""Bounds of the prefilter as a share of those of the test."""
 
 
 @kernel
-def look_at_points(pairs: Pairs, x: FloatArray, signs: FloatArray) -> None:
+def prefilter_points(pairs: Pairs, x: FloatArray, signs: FloatArray) -> None:
     """Write how high nodes are above the planes of near triangles [m], to the first of `signs`."""
-    for k in range(0, pairs.counts[N_NEAR], WIDTH):
+    for k in range(0, pairs.n_near, WIDTH):
         a = eight_corners(x, pairs, k, 1)
         ab, ac = sub(eight_corners(x, pairs, k, 2), a), sub(eight_corners(x, pairs, k, 3), a)
         area = cross(ab, ac)
@@ -27,16 +27,23 @@ def look_at_points(pairs: Pairs, x: FloatArray, signs: FloatArray) -> None:
 
 
 @kernel
-def may_be_under(signs: FloatArray, k: int, touch: float) -> bool:
-    """Whether near pair `k` may be a node that went through a triangle, by `look_at_points`."""
-    return signs[k] < -LESS * touch
+def may_be_under(signs: FloatArray, k: int, tolerance: float) -> bool:
+    """Whether near pair `k` may be a node that went through a triangle, by `prefilter_points`."""
+    return bool(signs[k] < -_WIDER * tolerance)
 
 
 @kernel
-def look_at_edges(pairs: Pairs, x: FloatArray, normal: FloatArray, signs: FloatArray) -> None:
-    """Write for near pairs of edges what `do_overlap` and `is_inner` look at, to four rows."""
+def prefilter_edges(pairs: Pairs, x: FloatArray, normal: FloatArray, signs: FloatArray) -> None:
+    """Write for near pairs of edges what `lines_overlap` and `is_inner` test, to four rows.
+
+    Args:
+        pairs: Near pairs come first.
+        x: Where the nodes are [m], with room as of `room_for_points`.
+        normal: Outward normals of the nodes [m2], with the same room.
+        signs: Written, shape (4 * capacity of pairs,).
+    """
     n = len(signs) // 4
-    for k in range(0, pairs.counts[N_NEAR], WIDTH):
+    for k in range(0, pairs.n_near, WIDTH):
         a, c = eight_corners(x, pairs, k, 0), eight_corners(x, pairs, k, 2)
         ab, cd = sub(eight_corners(x, pairs, k, 1), a), sub(eight_corners(x, pairs, k, 3), c)
         outward = add(eight_corners(normal, pairs, k, 0), eight_corners(normal, pairs, k, 1))
@@ -54,7 +61,7 @@ def look_at_edges(pairs: Pairs, x: FloatArray, normal: FloatArray, signs: FloatA
 
 @kernel
 def may_be_crossed(signs: FloatArray, k: int) -> bool:
-    """Whether near pair `k` may be edges that went through each other, by `look_at_edges`."""
-    n, inner = len(signs) // 4, LESS * END
+    """Whether near pair `k` may be edges that went through each other, by `prefilter_edges`."""
+    n, inner = len(signs) // 4, _WIDER * EDGE_END
     faces_it, overlaps = signs[k] < 0.0, signs[n + k] < 0.0
-    return faces_it & overlaps & (signs[2 * n + k] > inner) & (signs[3 * n + k] > inner)
+    return bool(faces_it & overlaps & (signs[2 * n + k] > inner) & (signs[3 * n + k] > inner))

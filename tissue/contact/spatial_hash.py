@@ -1,6 +1,6 @@
-"""Boxes by the cells of a uniform grid that they reach into, in a hash table of linked lists.
+"""Boxes by the cells of a uniform grid that they overlap, in a hash table of linked lists.
 
-Boxes are put in and taken out one by one, so that only those that changed cost anything.
+Boxes are inserted and removed one by one, so that only those that changed cost time.
 
 Source: Teschner et al. (2003), Optimized spatial hashing for collision detection.
 """
@@ -11,42 +11,35 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.hash_table import hash_of
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
-from tissue.core.vec3 import Vec3
+from tissue.core.structs import Arrays, IntCell
+from tissue.geometry.aabb import Aabb, box_at, overlap
 
-_MOST_CELLS = 8
-"""Cells along an axis that a box is put into at most. A larger one is looked at by every search:
+_LONGEST = 8
+"""Cells along an axis that a box is inserted into at most. A longer box is tested by every search:
 an element that is stretched so far is rare, and one of 100 cells would fill a million of them."""
-
-N_ENTRIES, _FREE = 0, 1
-"""Places in `Grid.state`."""
 
 
 class Grid(Arrays):
-    """The table."""
+    """The table of cells."""
 
+    n_entries: IntCell
+    """Number of entries that were ever in use."""
+    free: IntCell
+    """First of the free entries, which are linked by `next`; -1 if there is none."""
     first: IntArray
-    """First entry of each bucket, or -1: a power of two of them, and last that of large boxes."""
+    """First entry of each bucket, or -1: a power of two of them, and last that of long boxes."""
     item: IntArray
-    """The box of each entry, shape (capacity,)."""
+    """Box of each entry, shape (capacity,)."""
     next: IntArray
-    """The next entry of the same bucket, or -1; shape (capacity,)."""
-    state: IntArray
-    """How many entries were ever in use, and the first of those that are free; shape (2,)."""
+    """Next entry of the same bucket, or -1; shape (capacity,)."""
     size: float
     """Edge of a cell [m]."""
 
 
-class Box(NamedTuple):
-    """An axis-aligned box."""
-
-    low: Vec3
-    high: Vec3
-
-
 class _Cells(NamedTuple):
-    """The cells from one to another."""
+    """The cells from a lowest to a highest."""
 
     i: int
     j: int
@@ -59,25 +52,27 @@ class _Cells(NamedTuple):
 def new_grid(n_buckets: int, n_entries: int, size: float) -> Grid:
     """Return an empty table; `n_buckets` is a power of two, `size` the edge of a cell [m]."""
     return Grid(
+        n_entries=0,
+        free=-1,
         first=np.full(n_buckets + 1, -1, np.int64),
         item=np.zeros(n_entries, np.int64),
         next=np.zeros(n_entries, np.int64),
-        state=np.array([0, -1], np.int64),
         size=size,
     )
 
 
 @kernel
 def clear_grid(grid: Grid) -> None:
-    """Take out all."""
+    """Remove all boxes."""
     for bucket in range(len(grid.first)):
         grid.first[bucket] = -1
-    grid.state[N_ENTRIES] = 0
-    grid.state[_FREE] = -1
+    grid.n_entries = 0
+    grid.free = -1
 
 
 @kernel
-def _cells_of(grid: Grid, box: Box) -> _Cells:
+def _cells_of(grid: Grid, box: Aabb) -> _Cells:
+    """Return the cells that a box overlaps."""
     per_metre = 1.0 / grid.size
     return _Cells(
         math.floor(box.low.x * per_metre),
@@ -90,43 +85,46 @@ def _cells_of(grid: Grid, box: Box) -> _Cells:
 
 
 @kernel
-def _is_large(cells: _Cells) -> bool:
+def _are_long(cells: _Cells) -> bool:
+    """Whether cells are too many along an axis for a box to be inserted into each."""
     return (
-        cells.i_last - cells.i >= _MOST_CELLS
-        or cells.j_last - cells.j >= _MOST_CELLS
-        or cells.k_last - cells.k >= _MOST_CELLS
+        cells.i_last - cells.i >= _LONGEST
+        or cells.j_last - cells.j >= _LONGEST
+        or cells.k_last - cells.k >= _LONGEST
     )
 
 
 @kernel
 def _bucket_of(grid: Grid, i: int, j: int, k: int) -> int:
-    return (i * 73856093 ^ j * 19349663 ^ k * 83492791) & (len(grid.first) - 2)
+    """Return the bucket of a cell."""
+    return hash_of(i, j, k, 0) & (len(grid.first) - 2)
 
 
 @kernel
-def put(grid: Grid, item: int, box: Box) -> bool:
-    """Put a box in; return False if there is no room."""
+def insert_box(grid: Grid, item: int, box: Aabb) -> bool:
+    """Insert a box; return False if there is no room."""
     cells = _cells_of(grid, box)
-    if _is_large(cells):
-        return _put(grid, item, len(grid.first) - 1)
+    if _are_long(cells):
+        return _insert(grid, item, len(grid.first) - 1)
     for i in range(cells.i, cells.i_last + 1):
         for j in range(cells.j, cells.j_last + 1):
             for k in range(cells.k, cells.k_last + 1):
-                if not _put(grid, item, _bucket_of(grid, i, j, k)):
+                if not _insert(grid, item, _bucket_of(grid, i, j, k)):
                     return False
     return True
 
 
 @kernel
-def _put(grid: Grid, item: int, bucket: int) -> bool:
-    entry = grid.state[_FREE]
+def _insert(grid: Grid, item: int, bucket: int) -> bool:
+    """Insert a box into a bucket; return False if there is no room."""
+    entry = grid.free
     if entry >= 0:
-        grid.state[_FREE] = grid.next[entry]
+        grid.free = grid.next[entry]
     else:
-        entry = grid.state[N_ENTRIES]
+        entry = grid.n_entries
         if entry == len(grid.item):
             return False
-        grid.state[N_ENTRIES] += 1
+        grid.n_entries += 1
     grid.item[entry] = item
     grid.next[entry] = grid.first[bucket]
     grid.first[bucket] = entry
@@ -134,21 +132,21 @@ def _put(grid: Grid, item: int, bucket: int) -> bool:
 
 
 @kernel
-def take(grid: Grid, item: int, box: Box) -> None:
-    """Take a box out; `box` is what it was put in with."""
+def remove_box(grid: Grid, item: int, box: Aabb) -> None:
+    """Remove a box; `box` is as it was when it was inserted."""
     cells = _cells_of(grid, box)
-    if _is_large(cells):
-        _take(grid, item, len(grid.first) - 1)
+    if _are_long(cells):
+        _remove(grid, item, len(grid.first) - 1)
         return
     for i in range(cells.i, cells.i_last + 1):
         for j in range(cells.j, cells.j_last + 1):
             for k in range(cells.k, cells.k_last + 1):
-                _take(grid, item, _bucket_of(grid, i, j, k))
+                _remove(grid, item, _bucket_of(grid, i, j, k))
 
 
 @kernel
-def _take(grid: Grid, item: int, bucket: int) -> None:
-    """Take one entry of the box out of a bucket."""
+def _remove(grid: Grid, item: int, bucket: int) -> None:
+    """Remove one entry of a box from a bucket."""
     before = -1
     entry = grid.first[bucket]
     while entry >= 0 and grid.item[entry] != item:
@@ -160,80 +158,68 @@ def _take(grid: Grid, item: int, bucket: int) -> None:
         grid.first[bucket] = grid.next[entry]
     else:
         grid.next[before] = grid.next[entry]
-    grid.next[entry] = grid.state[_FREE]
-    grid.state[_FREE] = entry
+    grid.next[entry] = grid.free
+    grid.free = entry
 
 
 class Search(Arrays):
-    """What a search found, and how it tells what it has seen."""
+    """What a search found, and which boxes it has seen."""
 
+    number: IntCell
+    """Number of the current search."""
     found: IntArray
-    """Boxes, shape (capacity,)."""
+    """Boxes found, shape (capacity,)."""
     stamp: IntArray
-    """The search that found each box last, shape (capacity,)."""
-    number: IntArray
-    """Of the current search, shape (1,)."""
+    """Number of the search that found each box last, shape (capacity,)."""
 
 
 def new_search(n_items: int) -> Search:
-    """Return no finds, with room for all of that many boxes."""
-    return Search(
-        found=np.zeros(n_items, np.int64),
-        stamp=np.zeros(n_items, np.int64),
-        number=np.zeros(1, np.int64),
-    )
+    """Return a search that found nothing, with room for `n_items` boxes."""
+    return Search(number=0, found=np.zeros(n_items, np.int64), stamp=np.zeros(n_items, np.int64))
 
 
 @kernel
-def boxes_near(grid: Grid, search: Search, low: FloatArray, high: FloatArray, box: Box) -> int:
+def find_overlaps(grid: Grid, search: Search, low: FloatArray, high: FloatArray, box: Aabb) -> int:
     """Write the boxes that overlap `box` to `search.found`, each once; return how many there are.
 
     Args:
         grid: The table.
         search: Written.
         low: Lowest corner of each box [m], shape (n_items, 3).
-        high: Highest corner.
-        box: Where to look.
+        high: Highest corner of each box [m], shape (n_items, 3).
+        box: Where to search.
     """
-    search.number[0] += 1
-    n = _look(grid, search, low, high, box, len(grid.first) - 1, 0)
+    search.number += 1
+    n = _search_bucket(grid, search, low, high, box, len(grid.first) - 1, 0)
     cells = _cells_of(grid, box)
-    if _is_large(cells):
+    if _are_long(cells):
         for bucket in range(len(grid.first) - 1):
-            n = _look(grid, search, low, high, box, bucket, n)
+            n = _search_bucket(grid, search, low, high, box, bucket, n)
         return n
     for i in range(cells.i, cells.i_last + 1):
         for j in range(cells.j, cells.j_last + 1):
             for k in range(cells.k, cells.k_last + 1):
-                n = _look(grid, search, low, high, box, _bucket_of(grid, i, j, k), n)
+                n = _search_bucket(grid, search, low, high, box, _bucket_of(grid, i, j, k), n)
     return n
 
 
 @kernel
-def _look(
+def _search_bucket(
     grid: Grid,
     search: Search,
     low: FloatArray,
     high: FloatArray,
-    box: Box,
+    box: Aabb,
     bucket: int,
     n: int,
 ) -> int:
-    """Go through one bucket; `n` boxes were found before, return how many now."""
-    number = search.number[0]
+    """Test the boxes of one bucket; `n` were found before, return how many are now."""
+    number = search.number
     entry = grid.first[bucket]
     while entry >= 0:
         item = grid.item[entry]
         entry = grid.next[entry]
-        if (
-            low[item, 0] <= box.high.x
-            and box.low.x <= high[item, 0]
-            and low[item, 1] <= box.high.y
-            and box.low.y <= high[item, 1]
-            and low[item, 2] <= box.high.z
-            and box.low.z <= high[item, 2]
-            and search.stamp[item] != number
-        ):
+        if overlap(box_at(low, high, item), box) and search.stamp[item] != number:
             search.stamp[item] = number
             search.found[n] = item
             n += 1

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue.blade.forces import edge_energy
-from tissue.contact.resolve import prepare
+from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.energy import body_energy, dissipated_power
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
@@ -38,7 +38,7 @@ class Audited:
         for i in range(n):
             at = increment.begin + i * share
             if contact.is_awake:
-                prepare(contact.arrays, body)
+                note_all_positions(contact.arrays, body)
             if i == 0 or contact.is_awake:
                 self._power_now = self._power_of(system, body.velocities)
             self._step(system, increment, at, share)

@@ -16,8 +16,7 @@ Elastic forces are evaluated three times a step, damping four times.
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_blade_forces, apply_slip
-from tissue.contact.resolve import prepare, resolve
-from tissue.contact.state import IS_AWAKE, IS_PENDING
+from tissue.contact.resolve import note_all_positions, resolve
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
@@ -46,18 +45,18 @@ def runge_kutta_steps(
     """
     body, contact, external = context.body, context.contact, context.stages.external
     share = (end - begin) / n
-    is_awake = contact.state[IS_AWAKE] == 1
+    is_awake = contact.is_awake == 1
     for i in range(first, n):
         at = begin + i * share
-        if contact.state[IS_PENDING] == 0:
+        if contact.is_pending == 0:
             if is_awake:
-                prepare(contact, body)
+                note_all_positions(contact, body)
             runge_kutta_nystroem(context, edge, dt, at, share)
         if is_awake:
-            contact.state[IS_PENDING] = 1
+            contact.is_pending = 1
             if not resolve(contact, body, share * dt):
                 return i
-            contact.state[IS_PENDING] = 0
+            contact.is_pending = 0
         now, seconds = at + share, share * dt
         apply_slip(context.blade, body, context.visits, edge, external, now, seconds)
     return n

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from tissue.blade.forces import apply_blade_forces
-from tissue.contact.resolve import prepare
+from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
@@ -40,7 +40,7 @@ class Threads:
         for i in range(n):
             at = increment.begin + i * share
             if system.contact.is_awake:
-                prepare(system.contact.arrays, system.body)
+                note_all_positions(system.contact.arrays, system.body)
             self._step(system.context, increment, at, share)
             end_step(system, increment, share * increment.dt, at + share)
 

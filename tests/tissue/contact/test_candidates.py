@@ -1,4 +1,4 @@
-"""The broad phase leaves out nothing that is near, and seeks anew what moved or changed alone."""
+"""The broad phase omits nothing that is near, and pairs again only what moved or changed."""
 
 import itertools
 
@@ -7,19 +7,19 @@ import pytest
 
 from tests import bodies, naive
 from tissue import TetrahedralMesh, block
-from tissue.contact.candidates import N_DIRTY, is_dead_edge, is_dead_point, new_candidates
-from tissue.contact.candidates import renew_candidates as renew
+from tissue.contact.candidate_update import update_candidates
+from tissue.contact.candidates import is_stale_edge, is_stale_point, new_candidates
 from tissue.contact.faces import (
-    WITH_SKIN,
     collect_faces,
     count_faces,
-    in_pieces,
     new_faces,
+    with_pieces,
     with_room,
 )
-from tissue.contact.motion_bounds import new_motion
+from tissue.contact.motion_bounds import new_motion_bounds
 from tissue.contact.pairs import nodes_of_pair
 from tissue.mesh.body import CUT, build_body
+from tissue.mesh.faces import OUTWARD
 
 pytestmark = pytest.mark.kernel
 
@@ -42,22 +42,22 @@ class Broad:
     def __init__(self, mesh, first=24, capacity=256):
         self.body = build_body(mesh, None, None)
         faces = with_room(new_faces(len(mesh.tetrahedra)), count_faces(self.body, True))
-        faces.counts[WITH_SKIN] = 1
+        faces.has_skin = 1
         piece = (np.arange(len(mesh.tetrahedra)) >= first).astype(np.int64)
-        self.faces = in_pieces(faces, piece, 2)
+        self.faces = with_pieces(faces, piece, 2)
         collect_faces(self.faces, self.body)
         n = len(mesh.positions)
-        self.found, self.motion = new_candidates(n, capacity, CELL), new_motion(n, 1e-4)
+        self.found, self.motion = new_candidates(n, capacity, CELL), new_motion_bounds(n, 1e-4)
 
-    def renew(self, has_changed=True):
+    def update(self, has_changed=True):
         body = self.body
         rest = (self.faces, body, body.positions.copy(), 0.0, has_changed, MARGIN)
-        return renew(self.found, self.motion, *rest)
+        return update_candidates(self.found, self.motion, *rest)
 
     def pairs(self, name):
         pairs = getattr(self.found, name)
-        is_dead = is_dead_point if name == "point_triangle" else is_dead_edge
-        rows = range(pairs.counts[1])
+        is_dead = is_stale_point if name == "point_triangle" else is_stale_edge
+        rows = range(pairs.n_pairs)
         alive = [
             tuple(int(node) for node in nodes_of_pair(pairs, k))
             for k in rows
@@ -67,7 +67,7 @@ class Broad:
         return set(alive)
 
     def near(self, reach):
-        """Return the pairs of the two pieces that are within reach [m], by looking at all."""
+        """Return the pairs of the two pieces that are within reach [m], by testing all."""
         x, triangles = self.body.positions, self.triangles()
         of = {node: triangle[-1] for triangle in triangles for node in triangle[:3]}
         points = {
@@ -83,10 +83,9 @@ class Broad:
         }
 
     def triangles(self):
-        rows = [face for face in self.faces.face[: self.faces.counts[0]].tolist() if face >= 0]
-        outward = self.found.outward
+        rows = [face for face in self.faces.face[: self.faces.n_places].tolist() if face >= 0]
         return [
-            (*self.body.tetrahedra[r // 4][outward[r % 4]].tolist(), int(self.faces.piece[r // 4]))
+            (*self.body.tetrahedra[r // 4][OUTWARD[r % 4]].tolist(), int(self.faces.piece[r // 4]))
             for r in rows
         ]
 
@@ -113,14 +112,14 @@ def expect_complete(broad, reach=MARGIN):
 @pytest.mark.parametrize("height", [0.0101, 0.012, 0.0135])
 def test_what_is_near_is_paired_once(height):
     broad = Broad(two_bodies([0.008, 0.007, height]))
-    assert broad.renew()
+    assert broad.update()
     n_points, n_edges = expect_complete(broad)
     assert n_points > 0 and n_edges > 0
 
 
 def test_what_is_far_is_not():
     broad = Broad(two_bodies([0.008, 0.007, 0.0101]))
-    broad.renew()
+    broad.update()
     x = broad.body.positions
     for node, *corners in broad.pairs("point_triangle"):
         assert naive.distance_to_triangle(x[node], x[corners]) <= 1.1 * MARGIN
@@ -130,47 +129,47 @@ def test_what_is_far_is_not():
 
 def test_skin_that_is_far_from_every_other_piece_is_left_out():
     broad = Broad(two_bodies([0.0, 0.0, 0.1]))
-    broad.renew()
+    broad.update()
     assert not broad.found.node.any() and not broad.pairs("edge_edge")
 
 
 def test_too_little_room_is_said():
-    assert not Broad(two_bodies([0.008, 0.007, 0.0105]), capacity=4).renew()
+    assert not Broad(two_bodies([0.008, 0.007, 0.0105]), capacity=4).update()
 
 
-def test_a_node_is_sought_anew_when_it_has_moved_by_half_the_margin_and_not_before():
+def test_a_node_is_paired_again_when_it_has_moved_by_half_the_margin_and_not_before():
     broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
-    broad.renew()
+    broad.update()
     moved = len(broad.body.positions) - 1
-    for way, n_faces in ((0.49 * MARGIN, 0), (0.02 * MARGIN, 3)):
-        broad.body.positions[moved, 0] += way
-        broad.found.counts[N_DIRTY] = 0
-        broad.renew(has_changed=False)
-        assert broad.found.counts[N_DIRTY] == n_faces
+    for displacement, n_faces in ((0.49 * MARGIN, 0), (0.02 * MARGIN, 3)):
+        broad.body.positions[moved, 0] += displacement
+        broad.found.n_dirty = 0
+        broad.update(has_changed=False)
+        assert broad.found.n_dirty == n_faces
 
 
 def test_pairs_stay_complete_while_a_piece_travels_over_another():
-    """It is within half the margin of where it was sought: pairs are complete to the rest."""
+    """A node is within half the margin of its reference: pairs are complete to the other half."""
     broad = Broad(two_bodies([-0.01, 0.007, 0.0112]))
     for i in range(40):
-        broad.renew(has_changed=False)
+        broad.update(has_changed=False)
         if i % 5 == 0:
             expect_complete(broad, 0.5 * MARGIN)
         broad.body.positions[-4:, 0] += 0.2 * MARGIN
-        broad.found.way[0] += 0.2 * MARGIN
+        broad.found.path_since_check += 0.2 * MARGIN
 
 
-def test_faces_that_a_cut_makes_are_sought_and_those_that_go_are_forgotten():
-    """The second piece's tetrahedron goes from the list and comes back, as one that is split."""
+def test_faces_that_a_cut_makes_are_paired_and_faces_that_go_are_dropped():
+    """The second piece's tetrahedron leaves the list and comes back, as one that is split."""
     broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
-    broad.renew()
+    broad.update()
     complete = expect_complete(broad)
     body, last = broad.body, len(broad.body.tetrahedra) - 1
     body.links[last] = 0
     collect_faces(broad.faces, body)
-    broad.renew()
+    broad.update()
     assert not any(max(pair) >= len(body.positions) - 4 for pair in broad.pairs("point_triangle"))
     body.links[last] = CUT
     collect_faces(broad.faces, body)
-    broad.renew()
+    broad.update()
     assert expect_complete(broad) == complete

@@ -20,9 +20,9 @@ def edges(height, upper=UPPER):
     return Edges(*(Vec3(*row.tolist()) for row in rows))
 
 
-def met(height_t0, height_t1, outward=DOWN, other_outward=UP, slack=0.0, upper=UPPER):
+def met(height_t0, height_t1, outward=DOWN, other_outward=UP, residual=0.0, upper=UPPER):
     return edge_edge(
-        edges(height_t0, upper), edges(height_t1, upper), outward, other_outward, slack, 1e-9
+        edges(height_t0, upper), edges(height_t1, upper), outward, other_outward, residual, 1e-9
     )
 
 

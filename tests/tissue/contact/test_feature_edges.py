@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue import TetrahedralMesh, block
-from tissue.contact.feature_edges import across, is_ridge
+from tissue.contact.feature_edges import face_across, is_ridge
 from tissue.mesh.body import OUTER, build_body
 from tissue.mesh.faces import OUTWARD
 
@@ -33,7 +33,7 @@ def test_beyond_an_edge_is_the_other_face_that_has_it():
     edges = boundary_edges(body)
     for t, f, k, a, b in edges:
         (beyond,) = ((u, g, m) for u, g, m, c, d in edges if (c, d) == (b, a))
-        face, tip = across(body, t, f, k, OUTWARD)
+        face, tip = face_across(body, t, f, k)
         assert face == 4 * beyond[0] + beyond[1]
         assert tip == body.tetrahedra[beyond[0], OUTWARD[beyond[1], (beyond[2] + 2) % 3]]
 
@@ -44,7 +44,7 @@ def test_of_a_block_only_the_edges_of_the_box_are_ridges():
     for t, f, k, a, b in boundary_edges(body):
         ends = body.rest[[a, b]]
         n_sides = sum((ends[:, x] == side).all() for x in range(3) for side in (0.0, size[x]))
-        assert is_ridge(body, t, f, k, OUTWARD) == (n_sides == 2)
+        assert is_ridge(body, t, f, k) == (n_sides == 2)
 
 
 def test_the_inner_edge_of_an_l_is_a_valley_and_no_ridge():
@@ -54,10 +54,10 @@ def test_the_inner_edge_of_an_l_is_a_valley_and_no_ridge():
     for t, f, k, a, b in boundary_edges(body):
         ends = body.rest[[a, b]]
         if (ends[:, [0, 2]] == 0.01).all():
-            assert not is_ridge(body, t, f, k, OUTWARD)
+            assert not is_ridge(body, t, f, k)
             inner += 1
         elif (ends[:, [0, 2]] == 0.0).all():
-            assert is_ridge(body, t, f, k, OUTWARD)
+            assert is_ridge(body, t, f, k)
             outer += 1
     assert inner == 2 and outer == 2
 
@@ -69,4 +69,4 @@ def test_the_edge_of_a_blade_like_wedge_is_a_ridge():
     body = build_body(TetrahedralMesh(0.01 * wedge, np.array([[0, 1, 2, 3]])), None, None)
     edges = [row for row in boundary_edges(body) if {row[3], row[4]} == {0, 1}]
     assert len(edges) == 2
-    assert all(is_ridge(body, t, f, k, OUTWARD) for t, f, k, _, _ in edges)
+    assert all(is_ridge(body, t, f, k) for t, f, k, _, _ in edges)

@@ -7,44 +7,39 @@ from tissue import block
 from tissue.contact.distance import distance_of_edges
 from tissue.contact.edge_edge import Edges
 from tissue.contact.motion_bounds import (
-    N_NEW,
-    STEP,
     can_touch,
     horizon,
-    is_restless,
+    is_fast,
     measure_motion,
-    new_motion,
+    new_motion_bounds,
     note_distance,
-    wake_restless,
+    wake_fast_pairs,
 )
 from tissue.contact.pairs import (
-    add_hit,
     add_pair,
     drop_pair,
     make_far,
     make_near,
-    new_hits,
     new_pairs,
     nodes_of_pair,
-    sort_hits,
 )
 from tissue.core.vec3 import vec3
 from tissue.mesh.body import build_body
 
 pytestmark = pytest.mark.kernel
 
-TOUCH = 1e-9
-LITTLE = 1e-4
+TOLERANCE = 1e-9
+FAST_MOVE = 1e-4
 
 
 class Wandering:
-    """Nodes that go about in a box, and pairs of edges between them."""
+    """Nodes that move about in a box, and pairs of edges between them."""
 
     def __init__(self, seed, fast):
         self.random = np.random.default_rng(seed)
         self.body = build_body(block((2, 1, 1), (0.001, 0.0005, 0.0005)), None, None)
         self.n = len(self.body.positions)
-        self.pairs, self.motion = new_pairs(8), new_motion(self.n, LITTLE)
+        self.pairs, self.motion = new_pairs(8), new_motion_bounds(self.n, FAST_MOVE)
         self.speeds = np.where(np.arange(self.n) < fast, 3e-4, 2e-5)
         self.motion.seen[:] = self.body.positions
         for _ in range(8):
@@ -55,11 +50,11 @@ class Wandering:
         start = self.body.positions.copy()
         step = self.random.normal(size=(self.n, 3)) * self.speeds[:, None]
         self.body.positions += step - 0.01 * (self.body.positions - self.body.rest)
-        self.motion.number[STEP] += 1
+        self.motion.step += 1
         nodes = np.arange(self.n)
         measure_motion(self.motion, self.body, start, nodes, self.n)
-        if self.motion.number[N_NEW]:
-            wake_restless(self.motion, self.pairs)
+        if self.motion.n_newly_fast:
+            wake_fast_pairs(self.motion, self.pairs)
         return np.linalg.norm(self.body.positions - start, axis=1)
 
     def distance(self, k):
@@ -75,12 +70,12 @@ def test_no_pair_sleeps_through_what_may_have_gone_through(seed, fast):
     n_slept = n_met = 0
     for _ in range(400):
         moved = wandering.go()
-        until = horizon(motion, TOUCH)
+        until = horizon(motion, TOLERANCE)
         for k in range(8):
             a, b, c, d = nodes_of_pair(pairs, k)
             apart = wandering.distance(k)
             may_have_met = apart <= max(moved[a], moved[b]) + max(moved[c], moved[d])
-            if pairs.wake[k] <= until and can_touch(motion, pairs, k, TOUCH):
+            if pairs.wake[k] <= until and can_touch(motion, pairs, k, TOLERANCE):
                 note_distance(motion, pairs, k, apart)
             else:
                 assert not may_have_met
@@ -89,11 +84,11 @@ def test_no_pair_sleeps_through_what_may_have_gone_through(seed, fast):
     assert n_slept > 100 and n_met > 0
 
 
-def test_a_node_that_moves_much_is_restless_for_a_while_and_its_pairs_go_by_its_way():
+def test_a_node_that_moves_much_is_fast_for_a_while_and_its_pairs_go_by_its_path():
     wandering = Wandering(0, 1)
     wandering.go()
-    assert is_restless(wandering.motion, 0) and not is_restless(wandering.motion, 1)
-    assert wandering.motion.whole[0] < LITTLE
+    assert is_fast(wandering.motion, 0) and not is_fast(wandering.motion, 1)
+    assert wandering.motion.slow_path < FAST_MOVE
     with_it = (wandering.pairs.node.reshape(4, -1) == 0).any(axis=0)
     for k in range(8):
         note_distance(wandering.motion, wandering.pairs, k, 1.0)
@@ -101,7 +96,7 @@ def test_a_node_that_moves_much_is_restless_for_a_while_and_its_pairs_go_by_its_
     wandering.speeds[:] = 0.0
     for _ in range(70):
         wandering.go()
-    assert not is_restless(wandering.motion, 0)
+    assert not is_fast(wandering.motion, 0)
 
 
 def test_pairs_are_dropped_and_made_near_and_far_and_none_is_lost():
@@ -114,17 +109,6 @@ def test_pairs_are_dropped_and_made_near_and_far_and_none_is_lost():
     assert sorted(pairs.node[:2].tolist()) == [3, 4]
     make_far(pairs, 0)
     drop_pair(pairs, 0)
-    left = pairs.node[: pairs.counts[1]].tolist()
-    assert pairs.counts.tolist() == [0, 4] and len(set(left)) == 4
+    left = pairs.node[: pairs.n_pairs].tolist()
+    assert (pairs.n_near, pairs.n_pairs) == (0, 4) and len(set(left)) == 4
     assert pairs.item[:4, 0].tolist() == pairs.generation[:4].tolist() == left
-
-
-def test_hits_come_in_the_order_of_their_nodes():
-    random = np.random.default_rng(0)
-    rows = [tuple(row) for row in random.integers(0, 6, (100, 4)).tolist()]
-    hits = new_hits(100)
-    for row in rows:
-        add_hit(hits, row, row[0], row[3])
-    sort_hits(hits)
-    assert [tuple(row) for row in hits.node.tolist()] == sorted(rows)
-    np.testing.assert_array_equal(hits.face, hits.node[:, [0, 3]])

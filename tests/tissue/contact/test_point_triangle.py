@@ -17,8 +17,8 @@ def corners(p, triangle=TRIANGLE):
     return Corners(*(Vec3(*map(float, row)) for row in [p, *triangle]))
 
 
-def met(p_t0, p_t1, slack=0.0, triangle_t1=TRIANGLE):
-    return point_triangle(corners(p_t0), corners(p_t1, triangle_t1), slack, 1e-9)
+def met(p_t0, p_t1, residual=0.0, triangle_t1=TRIANGLE):
+    return point_triangle(corners(p_t0), corners(p_t1, triangle_t1), residual, 1e-9)
 
 
 def test_a_node_that_comes_from_above_and_is_now_below_went_through():
@@ -46,7 +46,7 @@ def test_any_other_node_did_not(p_t0, p_t1):
 
 def test_a_node_left_below_is_found_again_within_its_slack():
     assert not met([0.2, 0.3, -0.01], [0.2, 0.3, -0.01]).is_through
-    assert met([0.2, 0.3, -0.01], [0.2, 0.3, -0.01], slack=0.02).is_through
+    assert met([0.2, 0.3, -0.01], [0.2, 0.3, -0.01], residual=0.02).is_through
 
 
 def test_a_node_that_goes_through_and_out_at_the_side_is_held_at_the_rim():

@@ -1,16 +1,16 @@
-"""The look at eight pairs passes over none that the look at one would find."""
+"""The test of eight pairs at once omits none that the test of one would find."""
 
 import numpy as np
 import pytest
 
-from tissue.contact.edge_edge import Edges, crossing_of, do_overlap, is_inner
+from tissue.contact.edge_edge import Edges, crossing_of, is_inner, lines_overlap
 from tissue.contact.pairs import add_pair, make_near, new_pairs, nodes_of_pair
-from tissue.contact.point_triangle import Corners, under
+from tissue.contact.point_triangle import Corners, project_to_plane
 from tissue.contact.simd_prefilter import (
-    look_at_edges,
-    look_at_points,
     may_be_crossed,
     may_be_under,
+    prefilter_edges,
+    prefilter_points,
 )
 from tissue.core.simd import aligned, room_for_points
 from tissue.core.vec3 import Vec3, add, dot, sub, vec3
@@ -18,7 +18,7 @@ from tissue.core.vec3 import Vec3, add, dot, sub, vec3
 pytestmark = [pytest.mark.kernel, pytest.mark.filterwarnings("ignore:invalid value")]
 
 N_NODES, N_PAIRS = 30, 203
-TOUCH = 1e-3
+TOLERANCE = 1e-3
 
 
 def near_pairs(seed):
@@ -41,42 +41,42 @@ def ends(x, pairs, k):
 @pytest.mark.parametrize("seed", range(3))
 def test_nodes_that_are_under_a_triangle_by_more_than_nothing_may_be(seed):
     x, _, pairs, signs = near_pairs(seed)
-    look_at_points(pairs, x, signs)
+    prefilter_points(pairs, x, signs)
     n_under = 0
     for k in range(N_PAIRS):
         at = Corners(*ends(x, pairs, k))
-        height = dot(under(at).normal, sub(at.p, at.a))
+        height = dot(project_to_plane(at).normal, sub(at.p, at.a))
         assert signs[k] == pytest.approx(height, rel=1e-9)
-        assert may_be_under(signs, k, TOUCH) or not height < -TOUCH
-        n_under += may_be_under(signs, k, TOUCH)
+        assert may_be_under(signs, k, TOLERANCE) or not height < -TOLERANCE
+        n_under += may_be_under(signs, k, TOLERANCE)
     assert 50 < n_under < 150
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_edges_that_overlap_may_be(seed):
     x, normal, pairs, signs = near_pairs(seed)
-    look_at_edges(pairs, x, normal, signs)
+    prefilter_edges(pairs, x, normal, signs)
     n_crossed = 0
     for k in range(N_PAIRS):
         at = Edges(*ends(x, pairs, k))
         a, b, c, d = ends(normal, pairs, k)
         outward, other = add(a, b), add(c, d)
         now = crossing_of(at)
-        is_one = do_overlap(at, outward, other) and is_inner(now.s) and is_inner(now.t)
+        is_one = lines_overlap(at, outward, other) and is_inner(now.s) and is_inner(now.t)
         assert may_be_crossed(signs, k) == is_one
         n_crossed += is_one
     assert n_crossed > 2
 
 
-def test_flat_triangles_and_parallel_edges_are_passed_over():
+def test_flat_triangles_and_parallel_edges_are_omitted():
     x, normal = room_for_points(4), room_for_points(4)
     x[:] = [[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]
     pairs, signs = new_pairs(8), aligned(32)
     add_pair(pairs, (0, 1, 2, 3), 0, 0, 0)
     make_near(pairs, 0)
-    look_at_points(pairs, x, signs)
-    assert not may_be_under(signs, 0, TOUCH)
+    prefilter_points(pairs, x, signs)
+    assert not may_be_under(signs, 0, TOLERANCE)
     x[:] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]
     normal[:] = Vec3(0.0, 0.0, 1.0)
-    look_at_edges(pairs, x, normal, signs)
+    prefilter_edges(pairs, x, normal, signs)
     assert not may_be_crossed(signs, 0)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tissue.blade.forces import frequency_with_blade
-from tissue.contact.resolve import prepare
+from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.focus import find_held, find_rings
@@ -69,7 +69,7 @@ class HierarchicalStepper:
         self._find_rings(system)
         n, every = self._divide(system, increment.span)
         if contact.is_awake:
-            prepare(contact.arrays, body)
+            note_all_positions(contact.arrays, body)
         times = (increment.dt, increment.begin, increment.end)
         frame = Frame(*times, n, options.rings, self._is_far_frozen)
         rings, trails = self._rings, self._trails

@@ -131,7 +131,7 @@ def wake_pulled(
 @kernel
 def wake_touching(activity: Activity, body: Body, springs: Springs, contacts: Contacts) -> None:
     """Wake every node of a contact."""
-    for k in range(contacts.count[0]):
+    for k in range(contacts.n_contacts):
         for q in range(4):
             wake(activity, body, springs, contacts.node[k, q])
 

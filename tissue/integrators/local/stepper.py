@@ -1,6 +1,6 @@
 """The integrator of local time stepping: its arrays, and which nodes are awake."""
 
-from tissue.contact.resolve import note_positions, prepare
+from tissue.contact.resolve import note_all_positions, note_positions
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.strained_frequency import strain_frequencies
@@ -174,7 +174,7 @@ class LocalStepper:
                 moved = self._moved
                 note_positions(contact.arrays, body, moved.nodes, moved.n_nodes)
         else:
-            prepare(contact.arrays, body)
+            note_all_positions(contact.arrays, body)
             self._is_prepared = True
         self._has_new_nodes = False
 
