@@ -1,4 +1,4 @@
-"""Carries blade segments to the tissue and the wrench back. Knows neither arm nor MuJoCo.
+"""Carries blade poses to a tissue and wrenches back, for any arm; independent of MuJoCo.
 
 The public names are those that `__init__.pyi` lists. Each is loaded when it is first used, so that
 `import bridge` alone loads no compiler.

@@ -1,29 +1,57 @@
 from .bridge import Bridge as Bridge
+from .collision.arm_geoms import SIZES_PER_SHAPE as SIZES_PER_SHAPE
+from .collision.arm_geoms import ArmGeom as ArmGeom
+from .collision.arm_geoms import GeomShape as GeomShape
+from .collision.collisions import Collisions as Collisions
 from .collision.fixtures import Fixture as Fixture
 from .collision.fixtures import FixtureBox as FixtureBox
 from .collision.fixtures import FixtureMesh as FixtureMesh
+from .counters import Counters as Counters
+from .coupling.coupling import MAX_PLAUSIBLE_FORCE as MAX_PLAUSIBLE_FORCE
+from .coupling.coupling import MAX_PLAUSIBLE_TORQUE as MAX_PLAUSIBLE_TORQUE
 from .coupling.coupling import CouplingError as CouplingError
 from .coupling.limits import DeviceLimits as DeviceLimits
+from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
+from .coupling.passivity import PassivityCounters as PassivityCounters
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
 from .frames import TissueFrame as TissueFrame
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
+from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
+from .tcp.address import DEFAULT_HOST as DEFAULT_HOST
+from .tcp.address import DEFAULT_PORT as DEFAULT_PORT
 from .tcp.client import TcpLink as TcpLink
+from .tcp.keys import chosen_key as chosen_key
+from .tcp.keys import write_new_key as write_new_key
 from .tcp.server import serve as serve
 
 __all__ = [
+    "ArmGeom",
     "Bridge",
+    "Collisions",
+    "Counters",
     "CouplingError",
+    "DEFAULT_HOST",
+    "DEFAULT_PORT",
     "DeviceLimits",
     "Fixture",
     "FixtureBox",
     "FixtureMesh",
+    "GeomShape",
     "InProcessLink",
     "LinkError",
+    "MAX_FRAMES_PER_ANSWER",
+    "MAX_PLAUSIBLE_FORCE",
+    "MAX_PLAUSIBLE_TORQUE",
+    "PassivityCounters",
+    "SIZES_PER_SHAPE",
     "TcpLink",
+    "TissueDescription",
     "TissueFrame",
     "TissueLink",
     "VirtualCoupling",
+    "chosen_key",
     "serve",
+    "write_new_key",
 ]

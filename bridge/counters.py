@@ -1,4 +1,4 @@
-"""What a bridge counts: frames, and everything that came between the tissue and the arm."""
+"""The counters of a bridge: frames, answers, and every change of the tissue's wrench."""
 
 from typing import Any, NamedTuple
 
@@ -6,34 +6,34 @@ from bridge.coupling.passivity import PassivityCounters
 
 
 class Counters(NamedTuple):
-    """What happened since the start, in frames of the arm."""
+    """Counts since the start, in frames of the arm. `summary.json` has them under these names."""
 
     frames: int
     """Calls of `Bridge.step`."""
     answers: int
-    """Steps of the tissue: as many, or one in every few frames."""
+    """Answers of the tissue: one per frame, or one in every few."""
     rejected: int
-    """Steps in which the broad phase saw that the blade could not touch the tissue."""
+    """Queries in which the broad phase found that the blade could not touch the tissue."""
     force_limited: int
-    """The force was above the device's limit."""
+    """Frames in which the force was above the device's limit."""
     torque_limited: int
-    """The torque was above the device's limit."""
+    """Frames in which the torque was above the device's limit."""
     slew_limited: int
-    """The force changed faster than the device can."""
+    """Frames in which the force changed faster than the device can."""
     not_finite: int
-    """The tissue answered with a NaN or an infinity."""
+    """Frames in which the wrench had a NaN or an infinity."""
     absurd: int
-    """The tissue answered with a wrench that only a simulation that blows up gives."""
+    """Frames in which the wrench was implausible, as of a simulation that diverges."""
     silent: int
-    """The tissue had not answered for 10 ms or more."""
+    """Frames in which the tissue had not answered for 10 ms or more."""
     faded: int
-    """Less than the tissue's wrench was felt: it was silent for too long, or is just back."""
+    """Frames in which less than the full wrench was felt, during or after a silence."""
     passivity: PassivityCounters
-    """The energy that went in and out at the arm's blade, and what was damped of it."""
+    """Energy that went in and out at the arm's blade, and the part that was dissipated."""
     impulse_written_off: float
-    """What the tissue felt and the arm did not when contacts ended [N s]: see `ImpulseDebt`. Zero
-    where the tissue is asked in each frame."""
+    """Impulse of the tissue that the arm had not felt when contacts ended [N s]; zero where the
+    tissue is asked in each frame. See `ImpulseCompensation`."""
 
     def as_numbers(self) -> dict[str, Any]:
-        """Return them by name, for a report."""
+        """Return the counts by name, for a report."""
         return self._asdict() | {"passivity": self.passivity._asdict()}

@@ -1,4 +1,7 @@
-"""World frame to tissue frame and back: the only file where a vector changes frame."""
+"""World frame to tissue frame and back, and a wrench about another point.
+
+No other module of the package changes the frame of a vector.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -11,24 +14,24 @@ from tissue import BladeSegment, FloatArray, Wrench
 
 @dataclass(frozen=True, eq=False)
 class TissueFrame:
-    """Where the tissue lies in the world: x_world = rotation @ x_tissue + origin. Fixed for a run.
+    """Pose of the tissue in the world: x_world = rotation @ x_tissue + origin. Fixed for a run.
 
     Raises:
-        ValueError: the rotation is not one (orthonormal, determinant +1), or a number is not
-            finite.
+        ValueError: the rotation is not orthonormal with determinant +1, or a number is not finite.
     """
 
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
-    """The tissue's axes in the world as columns, shape (3, 3)."""
+    """Axes of the tissue in the world as columns, shape (3, 3)."""
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """The tissue's origin in the world [m], shape (3,)."""
-    _is_turned: bool = field(init=False, repr=False, default=True)
-    """Whether the rotation does anything: it mostly does not, and is left out of the 1 kHz then."""
+    """Origin of the tissue in the world [m], shape (3,)."""
+    _is_rotated: bool = field(init=False, repr=False, default=True)
+    """Whether the rotation differs from the identity. Mostly it does not, and the products are
+    skipped."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotation(self.rotation, "the tissue's rotation"))
         object.__setattr__(self, "origin", finite(self.origin, (3,), "the tissue's origin"))
-        object.__setattr__(self, "_is_turned", bool((self.rotation != np.eye(3)).any()))
+        object.__setattr__(self, "_is_rotated", bool((self.rotation != np.eye(3)).any()))
         self.rotation.setflags(write=False)
         self.origin.setflags(write=False)
 
@@ -41,19 +44,16 @@ class TissueFrame:
         return self.vectors_to_world(points) + self.origin
 
     def vectors_to_tissue(self, vectors: FloatArray) -> FloatArray:
-        """Return world vectors (directions, forces, velocities) in the tissue frame, (..., 3)."""
-        return vectors @ self.rotation if self._is_turned else vectors.copy()
+        """Return world vectors (direction, force, velocity) in the tissue frame, shape (..., 3)."""
+        return vectors @ self.rotation if self._is_rotated else vectors.copy()
 
     def vectors_to_world(self, vectors: FloatArray) -> FloatArray:
         """Return vectors of the tissue frame in the world, shape (..., 3)."""
-        return vectors @ self.rotation.T if self._is_turned else vectors.copy()
+        return vectors @ self.rotation.T if self._is_rotated else vectors.copy()
 
     def matrix_to_world(self, matrix: FloatArray) -> FloatArray:
-        """Return a matrix that maps vectors of the tissue frame, such as a stiffness, in the world.
-
-        Shape (3, 3).
-        """
-        return self.rotation @ matrix @ self.rotation.T if self._is_turned else matrix.copy()
+        """Return a matrix of the tissue frame, such as a stiffness, in the world, shape (3, 3)."""
+        return self.rotation @ matrix @ self.rotation.T if self._is_rotated else matrix.copy()
 
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
@@ -72,7 +72,7 @@ class TissueFrame:
         )
 
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
-        """Return a wrench of the tissue frame in the world; its point is the same point."""
+        """Return a wrench of the tissue frame in the world, about the same point."""
         return Wrench(
             self.vectors_to_world(wrench.force),
             self.vectors_to_world(wrench.torque),
@@ -80,7 +80,7 @@ class TissueFrame:
         )
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
-        """Return a fixture that stands in the world in the tissue frame."""
+        """Return a fixture given in the world in the tissue frame."""
         if isinstance(fixture, FixtureBox):
             return replace(
                 fixture,
@@ -88,3 +88,11 @@ class TissueFrame:
                 rotation=self.rotation.T @ fixture.rotation,
             )
         return replace(fixture, positions=self.points_to_tissue(fixture.positions))
+
+
+def wrench_about(wrench: Wrench, point: FloatArray) -> FloatArray:
+    """Return force [N] and torque about a point [N m] of a wrench, shape (6,)."""
+    x, y, z = (wrench.point - point).tolist()
+    fx, fy, fz = wrench.force.tolist()
+    tx, ty, tz = wrench.torque.tolist()
+    return np.array((fx, fy, fz, tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx))

@@ -1,8 +1,8 @@
-"""How a sweep reaches the tissue. The arm side cannot tell one link from another."""
+"""How a blade sweep reaches the tissue. The arm side cannot tell one link from another."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 
 from tissue import (
     BladeShape,
@@ -21,33 +21,36 @@ if TYPE_CHECKING:  # the side without the tissue starts without its compiler
 
 
 class LinkError(ConnectionError):
-    """The tissue cannot be reached, does not answer, or answers what nobody can read."""
+    """The tissue cannot be reached, does not answer, or its answer cannot be read."""
 
 
 class TissueDescription(NamedTuple):
     """What the arm side must know of a body that it does not hold."""
 
     scene: str
-    """What was built, as the command line names it."""
+    """Scene that was built, as the command line names it."""
     material: Material
+    """Material of the body."""
     bounds: FloatArray
     """Lowest and highest corner now [m], shape (2, 3)."""
     n_tetrahedra: int
+    """Number of tetrahedra now."""
     n_nodes: int
+    """Number of nodes now."""
     blade: BladeShape | None = None
-    """The body of the blade that cuts it; None for the paper's blade, a line."""
+    """Shape of the blade that cuts the body; None for the paper's blade, a line."""
     floor: float | None = None
     """Height of the floor that pieces land on [m]; None for no floor."""
 
 
 class TissueLink(Protocol):
-    """A tissue that is here, or in another process."""
+    """A tissue in this process or in another one."""
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Let the tissue live through `dt` [s] while the blade does `sweep` (None: no blade near).
+        """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near).
 
         Raises:
             LinkError: the tissue is in another process and did not answer.
@@ -57,30 +60,35 @@ class TissueLink(Protocol):
         """Return the whole state of the body."""
 
     def chunks(self) -> Chunks:
-        """Return boxes that together hold the body, and how fast its nodes are now."""
+        """Return boxes that together hold the body, and the speed of its fastest node."""
 
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
 
     def n_pieces(self) -> int:
-        """Return the number of connected pieces; `tissue.mesh.pieces.pieces_of` tells more."""
+        """Return the number of connected pieces."""
 
     def quality(self) -> CutReport:
-        """Return the path error of the cuts so far, and what they did to elements and time step."""
+        """Return the path error of the cuts so far, and their effect on elements and time step."""
 
     def close(self) -> None:
-        """Let go of the tissue."""
+        """Release the tissue, and the connection if there is one."""
 
 
 class InProcessLink:
-    """A tissue in this process: a call is a call."""
+    """A link to a tissue in this process.
+
+    Args:
+        tissue: The tissue.
+        scene: Its name, as the command line gives it; for reports only.
+    """
 
     def __init__(self, tissue: Tissue, scene: str = "") -> None:
         self._tissue = tissue
         self._scene = scene
 
     def describe(self) -> TissueDescription:
-        """See `TissueLink.describe`."""
+        """Return what the arm side must know of the body now."""
         return TissueDescription(
             self._scene,
             self._tissue.material,
@@ -92,28 +100,52 @@ class InProcessLink:
         )
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """See `TissueLink.step`."""
+        """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near)."""
         return self._tissue.step(sweep, dt)
 
     def snapshot(self) -> Snapshot:
-        """See `TissueLink.snapshot`."""
+        """Return the whole state of the body."""
         return self._tissue.snapshot()
 
     def chunks(self) -> Chunks:
-        """See `TissueLink.chunks`."""
+        """Return boxes that together hold the body, and the speed of its fastest node."""
         return self._tissue.chunks()
 
     def surface(self) -> Surface:
-        """See `TissueLink.surface`."""
+        """Return the boundary triangles, for a picture."""
         return self._tissue.surface()
 
     def n_pieces(self) -> int:
-        """See `TissueLink.n_pieces`."""
+        """Return the number of connected pieces."""
         return self._tissue.n_pieces()
 
     def quality(self) -> CutReport:
-        """See `TissueLink.quality`."""
+        """Return the path error of the cuts so far, and their effect on elements and time step."""
         return self._tissue.cut_report()
 
     def close(self) -> None:
-        """See `TissueLink.close`."""
+        """Do nothing: the tissue belongs to the caller."""
+
+
+def link_to(tissue: Tissue | TissueLink) -> TissueLink:
+    """Return a link to a tissue: the argument itself if it is one already.
+
+    Raises:
+        TypeError: the argument is neither a tissue nor a link.
+    """
+    if _is_link(tissue):
+        return tissue
+    from tissue import Tissue  # loads the compiler, as the caller has done to make a tissue
+
+    if isinstance(tissue, Tissue):
+        return InProcessLink(tissue)
+    found = tissue.__name__ if isinstance(tissue, type) else type(tissue).__name__
+    raise TypeError(
+        f"a bridge needs a tissue.Tissue, or a link to one such as bridge.TcpLink; got {found}"
+        + (", the class and not an object of it" if isinstance(tissue, type) else "")
+    )
+
+
+def _is_link(candidate: object) -> TypeGuard[TissueLink]:
+    """Return whether an object has the methods of a link. A `Tissue` does not describe itself."""
+    return not isinstance(candidate, type) and hasattr(candidate, "describe")

@@ -1,4 +1,4 @@
-"""Poses of a blade: which there can be, how two of them differ, and where a motion carries one."""
+"""Poses of a blade: their check, the motion between two of them, and a pose moved by a motion."""
 
 import math
 
@@ -7,21 +7,21 @@ import numpy as np
 from tissue import BladeSegment, FloatArray
 
 _SHORTEST_EDGE = 1e-6
-"""[m]. A shorter cutting edge has no direction that a swept box could be aligned with."""
+"""Shortest cutting edge [m]: a shorter one has no direction to align a swept box with."""
 
-LARGEST_COSINE = 0.99
-"""Of the angle between `forward` and the edge. `forward` should be across the edge (0); nearer than
-eight degrees to it, the plane of the blade is a matter of rounding."""
+_LARGEST_COSINE = 0.99
+"""Largest cosine of the angle between `forward` and the edge. `forward` should be across the edge
+(0); at less than eight degrees the plane of the blade is ill-conditioned."""
 
 _UNIT_TOLERANCE = 1e-6
-"""How far the length of `forward` may be from 1: what single precision leaves."""
+"""Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
 
 def check_pose(segment: BladeSegment) -> None:
-    """Refuse what no arm in its senses sends.
+    """Check that a pose is finite and has a plane.
 
     Raises:
-        ValueError: the pose is not finite, or has no plane.
+        ValueError: the pose is not finite, or its edge and `forward` span no plane.
     """
     tx, ty, tz = segment.tip.tolist()
     hx, hy, hz = segment.heel.tolist()
@@ -35,7 +35,7 @@ def check_pose(segment: BladeSegment) -> None:
     if abs(forward_length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
     cosine = abs(ex * fx + ey * fy + ez * fz) / length
-    if cosine > LARGEST_COSINE:
+    if cosine > _LARGEST_COSINE:
         raise ValueError(
             f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
             "degrees apart"
@@ -43,14 +43,14 @@ def check_pose(segment: BladeSegment) -> None:
 
 
 def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
-    """Return how a blade moved: translation of the tip [m] and rotation vector [rad], shape (6,).
+    """Return the translation of the tip [m] and the rotation vector [rad] of a blade, shape (6,).
 
-    The rotation is the one that carries edge and flat from the one pose to the other; by less than
-    half a turn.
+    The rotation carries edge and flat of the first pose to those of the second, by less than half
+    a turn.
     """
     a, b = _axes(before), _axes(after)
-    # The sum over the three axes of a x b is twice the sine, along the axis of rotation; that of
-    # a . b is one more than twice the cosine.
+    # Over the three axes, the sum of a x b is the axis of rotation times twice the sine, and the
+    # sum of a . b is one plus twice the cosine.
     sx = sy = sz = trace = 0.0
     for (ax, ay, az), (bx, by, bz) in zip(a, b, strict=True):
         sx += ay * bz - az * by
@@ -65,7 +65,8 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
-    """Return the pose to which `motion` leads: translation of the tip, and rotation about it."""
+    """Return a pose after a motion: translation of the tip [m] and rotation about it [rad],
+    (6,)."""
     tip = segment.tip + by[:3]
     angle = math.hypot(*by[3:].tolist())
     if angle == 0.0:
@@ -85,7 +86,7 @@ def half_length(segment: BladeSegment) -> float:
 
 
 def _rotation(vector: FloatArray, angle: float) -> FloatArray:
-    """Return the matrix of a rotation vector of that length (Rodrigues), shape (3, 3)."""
+    """Return the matrix of a rotation vector with this angle [rad] (Rodrigues), shape (3, 3)."""
     x, y, z = (vector / angle).tolist()
     s, c = math.sin(angle), math.cos(angle)
     d = 1.0 - c

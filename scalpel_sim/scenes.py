@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from bridge import TissueLink, VirtualCoupling
-from bridge.coupling.local_model import MOST_FRAMES_PER_ANSWER
+from bridge import MAX_FRAMES_PER_ANSWER, TissueLink, VirtualCoupling
 from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.strokes.planning import STROKES
@@ -146,10 +145,10 @@ class Scene:
                 f"{self.relaxation} and {self.threads}; leave it away, or them"
             )
         self.virtual_coupling()
-        if not 1 <= self.tissue_every <= MOST_FRAMES_PER_ANSWER:
+        if not 1 <= self.tissue_every <= MAX_FRAMES_PER_ANSWER:
             raise UsageError(
                 f"the tissue is to be asked every {self.tissue_every} frames; it must be 1 to "
-                f"{MOST_FRAMES_PER_ANSWER}"
+                f"{MAX_FRAMES_PER_ANSWER}"
             )
         if not -0.5 <= self.stretch <= 1.0:
             raise UsageError(f"stretch is {self.stretch}; it is a fraction from -0.5 to 1")

@@ -1,1 +1,1 @@
-"""What the blade and the arm meet: the tissue, fixtures, and the arm itself (python-fcl)."""
+"""Collision detection for the blade and the arm: with tissue, fixtures and each other (FCL)."""

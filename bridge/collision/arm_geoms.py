@@ -1,4 +1,4 @@
-"""What an arm is made of, for the collision library: its links, the handle, the blade's body."""
+"""The collision shapes of an arm: those of its bodies, of the handle and of the blade."""
 
 import math
 from dataclasses import dataclass
@@ -9,60 +9,64 @@ import numpy as np
 
 from tissue import FloatArray
 
-Kind = Literal["box", "sphere", "capsule", "cylinder"]
+GeomShape = Literal["box", "sphere", "capsule", "cylinder"]
 
-N_SIZES = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2}
-"""How many numbers say how large each is."""
+SIZES_PER_SHAPE = {"box": 3, "sphere": 1, "capsule": 2, "cylinder": 2}
+"""Number of sizes of each shape."""
 
 
 @dataclass(frozen=True)
-class Part:
-    """A rigid body of one simple shape, centred on its own origin.
+class ArmGeom:
+    """A rigid body of one simple shape, centred on its own origin: a geom in MuJoCo's words.
 
     Raises:
-        ValueError: there is no such shape, or a size is missing or not positive.
+        ValueError: the shape is unknown, or a size is missing or not positive.
     """
 
     name: str
-    kind: Kind
+    """Name of the geom, in reports."""
+    shape: GeomShape
+    """Shape of the geom."""
     sizes: tuple[float, ...]
-    """[m], as MuJoCo has them: half the lengths of a box; the radius of a sphere; radius, and half
-    the length along z without the caps, of a capsule or cylinder."""
+    """Sizes [m], in MuJoCo's order: half the lengths of a box; the radius of a sphere; the radius
+    and half the length along z, without the caps, of a capsule or cylinder."""
     is_instrument: bool = False
-    """Whether it is the blade or what holds it, which must not meet the arm either."""
-    may_meet_instrument: bool = True
-    """Whether it is news that the instrument meets it: not of the links next to it, which do."""
-    may_meet_fixtures: bool = True
-    """Whether it is news that it meets a fixture: not of what stands on one."""
+    """Whether the geom belongs to the blade or its handle, which must not touch the arm either."""
+    checked_against_instrument: bool = True
+    """Whether a collision with the instrument is reported: False next to it, where geoms always
+    overlap."""
+    checked_against_fixtures: bool = True
+    """Whether a collision with a fixture is reported: False for a geom that stands on one."""
 
     def __post_init__(self) -> None:
-        if self.kind not in get_args(Kind):
+        if self.shape not in get_args(GeomShape):
             raise ValueError(
-                f"part {self.name!r} is a {self.kind!r}; wanted one of {', '.join(get_args(Kind))}"
+                f"geom {self.name!r} is a {self.shape!r}; wanted one of "
+                f"{', '.join(get_args(GeomShape))}"
             )
-        if len(self.sizes) != N_SIZES[self.kind] or not all(
+        if len(self.sizes) != SIZES_PER_SHAPE[self.shape] or not all(
             math.isfinite(size) and size > 0.0 for size in self.sizes
         ):
             raise ValueError(
-                f"part {self.name!r} has the sizes {self.sizes} m; a {self.kind} has "
-                f"{N_SIZES[self.kind]}, all positive"
+                f"geom {self.name!r} has the sizes {self.sizes} m; a {self.shape} has "
+                f"{SIZES_PER_SHAPE[self.shape]}, all positive"
             )
 
     @property
     def half_extents(self) -> FloatArray:
-        """Of the box around it, along its own axes [m], shape (3,)."""
-        if self.kind == "box":
+        """Half the size of the geom's bounding box along its own axes [m], shape (3,)."""
+        if self.shape == "box":
             return np.array(self.sizes)
         radius = self.sizes[0]
         half_length = self.sizes[1] if len(self.sizes) > 1 else 0.0
-        caps = 0.0 if self.kind == "cylinder" else radius
+        caps = 0.0 if self.shape == "cylinder" else radius
         return np.array([radius, radius, half_length + caps])
 
     def geometry(self) -> fcl.CollisionGeometry:
         """Return a new geometry of the collision library."""
-        if self.kind == "box":
+        if self.shape == "box":
             return fcl.Box(*(2.0 * size for size in self.sizes))
-        if self.kind == "sphere":
+        if self.shape == "sphere":
             return fcl.Sphere(self.sizes[0])
-        shape = fcl.Capsule if self.kind == "capsule" else fcl.Cylinder
-        return shape(self.sizes[0], 2.0 * self.sizes[1])
+        make = fcl.Capsule if self.shape == "capsule" else fcl.Cylinder
+        return make(self.sizes[0], 2.0 * self.sizes[1])

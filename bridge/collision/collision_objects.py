@@ -1,17 +1,17 @@
-"""Objects of the collision library (python-fcl), and the ways of using it that do not crash it.
+"""Objects of the collision library (python-fcl), used only in ways that are safe.
 
-None of these is called anywhere, for each was seen to end the process or to answer wrongly:
+The package avoids each of these, because it was seen to end the process or to answer wrongly:
 
-- `continuousCollide` with a mesh: it crashes, or reports no hit for a pass through. A fast body is
-  a box around its whole way instead.
-- `beginModel` on a mesh that is built, and a query on one that is not: they crash. A mesh is built
-  once, here.
-- `distance` to a mesh: it is positive where the two overlap.
-- a callback that raises: the exception is printed and lost.
-- `clear` of a manager, and registering an object twice: the manager keeps both.
-- a manager of many objects, asked with a long one that is turned: no crash, but it holds what is
-  turned by the ball around it, and looks at all that the ball meets.
-- a pose that is not finite: it is taken silently. Poses are checked where they come in.
+- `continuousCollide` with a mesh crashes, or reports no hit for a pass through it. A fast body is
+  represented by a box around its whole path instead.
+- `beginModel` on a mesh that is built, and a query on one that is not, crash. A mesh is built once,
+  here.
+- `distance` to a mesh is positive where the two overlap.
+- An exception raised in a callback is printed and lost.
+- After `clear` of a manager, or when an object is registered twice, the manager keeps both.
+- A manager of many objects is slow for a long rotated one: it bounds that by a sphere, and tests
+  all objects that the sphere overlaps.
+- A pose that is not finite is accepted silently. Poses are checked where they come in.
 """
 
 import fcl
@@ -21,16 +21,16 @@ from bridge.collision.swept_box import SweptBox
 
 
 class MovableBox:
-    """A collision object that changes its place and size."""
+    """A box of the collision library whose pose and size can change."""
 
     def __init__(self) -> None:
         self.geometry = fcl.Box(1.0, 1.0, 1.0)
         self.object = fcl.CollisionObject(self.geometry, fcl.Transform())
 
     def place(self, box: SweptBox) -> None:
-        """Give the object this size and pose.
+        """Set size and pose.
 
-        The size alone would leave the old bounding volume in use; the order is part of the recipe.
+        The order matters: the size alone would leave the old bounding volume in use.
         """
         self.geometry.side = box.size
         self.geometry.computeLocalAABB()
@@ -38,37 +38,37 @@ class MovableBox:
 
 
 class Obstacles:
-    """Named objects in one collision manager, and which of them another object meets.
+    """Named objects in one collision manager.
 
     Args:
-        objects: Names, and the objects. A contact names only its geometry, so each object must have
-            its own. They are kept here, because the library holds bare pointers.
+        objects: Geometry and object by name. A contact identifies only its geometry, so each object
+            must have its own. They are kept here, because the library holds bare pointers.
     """
 
     def __init__(self, objects: dict[str, tuple[fcl.CollisionGeometry, fcl.CollisionObject]]):
         self._objects = objects
         self._manager = fcl.DynamicAABBTreeCollisionManager()
-        self._manager.registerObjects([thing for _, thing in objects.values()])
+        self._manager.registerObjects([obstacle for _, obstacle in objects.values()])
         self._manager.setup()
 
-    def met_by(self, other: fcl.CollisionObject) -> tuple[str, ...]:
-        """Return the names of those that meet an object which is not one of them, in order."""
+    def colliding_with(self, other: fcl.CollisionObject) -> tuple[str, ...]:
+        """Return the names of the obstacles that collide with another object, in order."""
         if not self._objects:
             return ()
-        met: set[int] = set()
-        self._manager.collide(other, met, _collect)
-        if not met:
+        found: set[int] = set()
+        self._manager.collide(other, found, _collect)
+        if not found:
             return ()
-        return tuple(name for name, (shape, _) in self._objects.items() if id(shape) in met)
+        return tuple(name for name, (shape, _) in self._objects.items() if id(shape) in found)
 
 
-def meet(one: fcl.CollisionObject, other: fcl.CollisionObject) -> bool:
-    """Whether two objects meet, by their exact shapes."""
+def are_colliding(one: fcl.CollisionObject, other: fcl.CollisionObject) -> bool:
+    """Return whether two objects collide, by their exact shapes."""
     return bool(fcl.collide(one, other, _ONE_CONTACT, fcl.CollisionResult()))
 
 
 def fixture_object(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.CollisionObject]:
-    """Return a geometry of its own, and the object."""
+    """Return a new geometry for a fixture, and the object with its pose."""
     geometry, pose = _geometry(fixture)
     return geometry, fcl.CollisionObject(geometry, pose)
 
@@ -76,10 +76,10 @@ def fixture_object(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.Collisi
 def fixture_objects(
     fixtures: list[Fixture],
 ) -> dict[str, tuple[fcl.CollisionGeometry, fcl.CollisionObject]]:
-    """Return the objects of fixtures by name.
+    """Return the geometries and objects of fixtures by name.
 
     Raises:
-        ValueError: two have one name.
+        ValueError: two fixtures have one name.
     """
     objects = {}
     for fixture in fixtures:
@@ -102,14 +102,14 @@ def _geometry(fixture: Fixture) -> tuple[fcl.CollisionGeometry, fcl.Transform]:
 _ONE_CONTACT = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
 
 
-def _collect(one: fcl.CollisionObject, other: fcl.CollisionObject, met: set[int]) -> bool:
-    """Add the geometries of two objects that meet to `met`, and go on.
+def _collect(one: fcl.CollisionObject, other: fcl.CollisionObject, found: set[int]) -> bool:
+    """Add the geometries of two objects to `found` if they collide; return False to continue.
 
-    One contact for each pair: with one list for all pairs, the triangles of a fixture could fill it
-    before the others' turn.
+    One contact is requested per pair: in one list for all pairs, the triangles of a fixture could
+    take all places before the other pairs are tested.
     """
     result = fcl.CollisionResult()
     if fcl.collide(one, other, _ONE_CONTACT, result):
-        met.add(id(result.contacts[0].o1))
-        met.add(id(result.contacts[0].o2))
+        found.add(id(result.contacts[0].o1))
+        found.add(id(result.contacts[0].o2))
     return False

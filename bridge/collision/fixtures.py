@@ -1,4 +1,4 @@
-"""What stands around the tissue and must not meet the blade: the table, clamps, retractors."""
+"""Fixtures: rigid obstacles around the tissue such as the table, clamps and retractors."""
 
 from dataclasses import dataclass, field
 
@@ -13,17 +13,18 @@ class FixtureBox:
     """A solid box.
 
     Raises:
-        ValueError: a shape is wrong, a number is not finite, the box is flat, or its rotation is
-            none. (The collision library takes all of these silently.)
+        ValueError: an array has a wrong shape, a number is not finite, the box is flat, or its
+            rotation is not one. (The collision library accepts all of these silently.)
     """
 
     name: str
+    """Name of the fixture, in reports."""
     size: FloatArray
-    """Whole lengths of its edges [m], shape (3,)."""
+    """Lengths of the edges [m], shape (3,)."""
     centre: FloatArray
-    """[m], shape (3,)."""
+    """Centre of the box [m], shape (3,)."""
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
-    """Its axes as columns, shape (3, 3)."""
+    """Axes of the box as columns, shape (3, 3)."""
 
     def __post_init__(self) -> None:
         whose = f"fixture {self.name!r}"
@@ -37,18 +38,20 @@ class FixtureBox:
 
 @dataclass(frozen=True, eq=False)
 class FixtureMesh:
-    """A triangulated surface. Only the surface can be met, not what it encloses.
+    """A triangulated surface. Only the surface collides, not the volume that it encloses.
 
     Raises:
-        ValueError: a shape is wrong, a number is not finite, there is no triangle, or one names a
-            vertex that is not there. (In the collision library that would end the process.)
+        ValueError: an array has a wrong shape, a number is not finite, there is no triangle, or
+            one refers to a vertex that does not exist. (In the collision library that would end
+            the process.)
     """
 
     name: str
+    """Name of the fixture, in reports."""
     positions: FloatArray
-    """[m], shape (n_vertices, 3)."""
+    """Positions of the vertices [m], shape (n_vertices, 3)."""
     triangles: IntArray
-    """Vertex indices, shape (n_triangles, 3)."""
+    """Vertex indices of the triangles, shape (n_triangles, 3)."""
 
     def __post_init__(self) -> None:
         whose = f"fixture {self.name!r}"
@@ -64,8 +67,8 @@ class FixtureMesh:
             )
         if triangles.min() < 0 or triangles.max() >= len(positions):
             raise ValueError(
-                f"the triangles of {whose} name vertices {triangles.min()} to {triangles.max()}, "
-                f"but its vertices are 0 to {len(positions) - 1}"
+                f"the triangles of {whose} refer to vertices {triangles.min()} to "
+                f"{triangles.max()}, but its vertices are 0 to {len(positions) - 1}"
             )
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "triangles", triangles.astype(np.int64))

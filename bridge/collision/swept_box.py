@@ -1,4 +1,4 @@
-"""Boxes that hold something during a whole step, so that nothing fast slips through between two."""
+"""Boxes around the whole motion of a body in a step, so that a fast one cannot tunnel through."""
 
 import math
 from typing import NamedTuple
@@ -8,26 +8,26 @@ import numpy as np
 from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray
 
 TOUCHING_MARGIN = 1e-6
-"""[m], added to every side of a box. Two boxes that only touch are apart for the collision library,
-and a box without thickness has no inside. A micrometre is a million times the rounding of
-coordinates of a metre, and a thousandth of the smallest tetrahedron that anyone cuts."""
+"""Length added to every side of a box [m]. Two boxes that only touch are apart for the collision
+library, and a box without thickness has no inside. A micrometre is far above the rounding of
+coordinates of a metre, and far below the size of a tetrahedron that is cut."""
 
 
 class SweptBox(NamedTuple):
-    """A box around something at the start and at the end of a step, and all between."""
+    """A box around a body during a whole step."""
 
     centre: FloatArray
-    """[m], shape (3,)."""
+    """Centre of the box [m], shape (3,)."""
     size: FloatArray
-    """Whole lengths of its edges [m], shape (3,)."""
+    """Lengths of the edges [m], shape (3,)."""
     axes: FloatArray
-    """Unit vectors as columns, shape (3, 3)."""
+    """Axes of the box: unit vectors as columns, shape (3, 3)."""
 
 
 def box_around(points: FloatArray, axes: FloatArray, margin: float = 0.0) -> SweptBox:
-    """Return the box with these axes around points of shape (n, 3), larger by `margin` [m].
+    """Return the box with given axes around points of shape (n, 3), larger by `margin` [m].
 
-    A box is convex: it holds every point that moves from one of them to another on a straight line.
+    A box is convex: it holds every point that moves between two of them on a straight line.
     """
     along = points @ axes
     low, high = along.min(axis=0), along.max(axis=0)
@@ -37,15 +37,15 @@ def box_around(points: FloatArray, axes: FloatArray, margin: float = 0.0) -> Swe
 
 
 def swept_blade(sweep: BladeSweep, shape: BladeShape | None = None) -> SweptBox:
-    """Return the box aligned with the edge at t1 that holds the blade during the whole step.
+    """Return the box, aligned with the edge at t1, that holds the blade during the whole step.
 
-    The ends of the edge move on straight lines, as in the tissue. The body behind the edge turns on
-    the way: none of its points is farther from where it would be without that than its distance
-    from the edge times the change of the axes, and none is ever farther from the edge.
+    The ends of the edge move on straight lines, as in the tissue. The blade behind the edge also
+    rotates, which displaces a point by at most its distance from the edge times the change of the
+    axes; its distance from the edge stays the same.
 
     Args:
         sweep: Motion of the edge.
-        shape: The body behind it; None for the edge alone.
+        shape: Shape of the blade behind the edge; None for the edge alone.
     """
     axes = edge_axes(sweep.t1)
     ends = np.array((sweep.t0.tip, sweep.t0.heel, sweep.t1.tip, sweep.t1.heel))

@@ -1,2 +1,1 @@
-"""What the arm feels of the tissue: between its answers, within limits, without energy from
-nothing."""
+"""The force that the arm feels: between the tissue's answers, within limits, and passive."""

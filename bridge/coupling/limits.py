@@ -1,4 +1,4 @@
-"""What a haptic device can exert, and a wrench that is cut down to it with its direction kept."""
+"""The limits of a haptic device, and the factor that brings a vector within one of them."""
 
 import math
 from dataclasses import dataclass, fields
@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from tissue import FloatArray
 
 _ROUNDING = 1e-15
-"""By which fraction to stay below a limit, so that rounding never carries a force above it."""
+"""Relative distance to keep below a limit, so that rounding never carries a force above it."""
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,11 @@ class DeviceLimits:
     """
 
     force: float = math.inf
-    """[N]."""
+    """Largest force [N]."""
     torque: float = math.inf
-    """About the wrench's point [N m]."""
+    """Largest torque about the wrench's point [N m]."""
     slew: float = math.inf
-    """How fast the force may change [N/s]."""
+    """Largest rate of change of the force [N/s]."""
 
     def __post_init__(self) -> None:
         for limit in fields(self):
@@ -31,16 +31,16 @@ class DeviceLimits:
                 raise ValueError(f"the limit of {limit.name} is {value}; it must be positive")
 
     def allow(self, wrench: FloatArray) -> bool:
-        """Return whether force and torque are within their limits, shape (6,)."""
+        """Return whether force and torque of a wrench, shape (6,), are within their limits."""
         fx, fy, fz, tx, ty, tz = wrench.tolist()
         return math.hypot(fx, fy, fz) <= self.force and math.hypot(tx, ty, tz) <= self.torque
 
 
-def size_of(vector: FloatArray) -> float:
+def magnitude(vector: FloatArray) -> float:
     """Return the length of a vector, shape (3,)."""
     return math.hypot(*vector.tolist())
 
 
-def factor_within(limit: float, size: float) -> float:
-    """Return by what to multiply something of this size to keep it within its limit."""
+def factor_to_limit(limit: float, size: float) -> float:
+    """Return the factor that brings a quantity of this magnitude within its limit; 1 if it is."""
     return limit / size * (1.0 - _ROUNDING) if size > limit else 1.0

@@ -1,4 +1,4 @@
-"""A question to the tissue and its answer: waited for, or awaited while the arm goes on."""
+"""A query to the tissue and its answer, waited for or taken when it is there."""
 
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -11,41 +11,43 @@ from bridge.poses import motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
 
 _LONGEST_STEP = 0.5
-"""[s]. A tissue that was silent for longer has lost the rest of the time: it would otherwise come
-ever later, by the time that making up for it takes."""
+"""Longest step that a tissue is asked for [s]. The rest of a longer silence is lost: to make up for
+it would take ever longer."""
 
 
-class Leg(NamedTuple):
-    """A part of the way of the blade, and how long it took."""
+class TimedSweep(NamedTuple):
+    """A part of the blade's path and its duration."""
 
     sweep: BladeSweep | None
-    """None: no blade near."""
+    """Motion of the blade; None if it is nowhere near the tissue."""
     seconds: float
+    """Duration [s]."""
 
 
-class Answer(NamedTuple):
-    """What the tissue did with what it was asked."""
+class TissueAnswer(NamedTuple):
+    """The tissue's answer to a query."""
 
     result: StepResult
+    """Result of the last step, with wrench, times and counts of all steps of the query."""
     pose: BladeSegment
-    """To which the blade came in it."""
+    """Pose of the blade at the end."""
     seconds: float
-    """Which it lasted."""
-    last_leg: Wrench
-    """On the mean over the last leg; its point is the tip at the end."""
-    sweep: BladeSweep | None
-    """What the blade did in that; None: no blade near."""
+    """Duration of the query [s]."""
+    last_wrench: Wrench
+    """Mean wrench over the last part of the path; its point is the tip at the end."""
+    last_sweep: BladeSweep | None
+    """Last part of the path; None if the blade was nowhere near."""
 
     @property
-    def middle(self) -> BladeSegment:
-        """Where the blade was in the middle of the last leg."""
-        if self.sweep is None:
+    def middle_pose(self) -> BladeSegment:
+        """Pose of the blade in the middle of the last part of the path."""
+        if self.last_sweep is None:
             return self.pose
-        return moved(self.sweep.t0, 0.5 * motion(*self.sweep))
+        return moved(self.last_sweep.t0, 0.5 * motion(*self.last_sweep))
 
 
-class Inquiry:
-    """Asks the tissue to live up to now, once at a time.
+class Query:
+    """Asks the tissue to advance to the present, one request at a time.
 
     Args:
         link: The tissue.
@@ -57,45 +59,51 @@ class Inquiry:
     def __init__(self, link: TissueLink, waits: bool) -> None:
         self._link = link
         self._thread = None if waits else ThreadPoolExecutor(1, thread_name_prefix="tissue")
-        self._asked: Future[Answer] | None = None
-        self._answer: Answer | None = None
+        self._future: Future[TissueAnswer] | None = None
+        self._answer: TissueAnswer | None = None
 
     @property
-    def is_open(self) -> bool:
+    def is_pending(self) -> bool:
         """Whether an answer has not been taken yet."""
-        return self._asked is not None or self._answer is not None
+        return self._future is not None or self._answer is not None
 
-    def ask(self, legs: Sequence[Leg], pose: BladeSegment) -> None:
-        """Ask for the steps of a way at whose end the blade is at `pose`.
+    def ask(self, path: Sequence[TimedSweep], pose: BladeSegment) -> None:
+        """Ask for the steps along a path.
+
+        Args:
+            path: Parts of the blade's path since the last query, in order.
+            pose: Pose of the blade at its end.
 
         Raises:
             LinkError: the tissue is in another process, and did not answer.
         """
         if self._thread is None:
-            self._answer = self._step(legs, pose)
+            self._answer = self._step(path, pose)
         else:
-            self._asked = self._thread.submit(self._step, legs, pose)
+            self._future = self._thread.submit(self._step, path, pose)
 
-    def answer(self) -> Answer | None:
-        """Return the answer, once; None where there is none yet.
+    def take_answer(self) -> TissueAnswer | None:
+        """Return the answer, once; None if there is none yet.
 
         Raises:
             LinkError: the tissue is in another process, and did not answer.
         """
-        if self._asked is not None and self._asked.done():
-            self._answer, self._asked = self._asked.result(), None
+        if self._future is not None and self._future.done():
+            self._answer, self._future = self._future.result(), None
         answer, self._answer = self._answer, None
         return answer
 
-    def _step(self, legs: Sequence[Leg], pose: BladeSegment) -> Answer:
-        results = [self._link.step(leg.sweep, min(leg.seconds, _LONGEST_STEP)) for leg in legs]
-        seconds = [leg.seconds for leg in legs]
-        last_leg = results[-1].wrench
-        return Answer(_together(results, seconds), pose, sum(seconds), last_leg, legs[-1].sweep)
+    def _step(self, path: Sequence[TimedSweep], pose: BladeSegment) -> TissueAnswer:
+        results = [self._link.step(part.sweep, min(part.seconds, _LONGEST_STEP)) for part in path]
+        seconds = [part.seconds for part in path]
+        last_wrench = results[-1].wrench
+        return TissueAnswer(
+            _combined(results, seconds), pose, sum(seconds), last_wrench, path[-1].sweep
+        )
 
 
-def _together(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:
-    """Return the last result with the wrench, the times and the counts of all steps."""
+def _combined(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:
+    """Return the last result, with the mean wrench and summed times and counts of all steps."""
     last = results[-1]
     if len(results) == 1:
         return last

@@ -1,31 +1,32 @@
-"""How much of the tissue's wrench an arm may feel, by how long the tissue has been silent."""
+"""How much of the tissue's wrench an arm may feel while the tissue does not answer."""
 
 import logging
 
 _log = logging.getLogger(__name__)
 
 WARN_AFTER = 0.010
-"""[s] of silence: ten periods of a haptic device. Longer than a busy machine's usual hiccup."""
+"""Silence [s] after which a warning is logged: ten periods of a haptic device, and longer than the
+usual delays of a busy machine."""
 
 DECAY_AFTER = 0.050
-"""[s] of silence, after which the wrench fades. Until then what the tissue last said, and its
-stiffness there, is a fair guess: a hand moves by a few millimetres in that time."""
+"""Silence [s] after which the wrench fades. Until then the tissue's last answer and its stiffness
+are a fair estimate: a hand moves by a few millimetres in that time."""
 
 ZERO_AFTER = 0.500
-"""[s] of silence, after which nothing is felt: nobody knows any more what is at the blade. The
-same time after which the driver of a surgical robot (AMBF) takes its commander for gone."""
+"""Silence [s] after which nothing is felt, because the state at the blade is unknown. AMBF, a
+driver for surgical robots, waits as long before it considers its commander lost."""
 
 RAMP = 0.1
-"""[s] in which a wrench comes back whole. A hand that is pushed by surprise takes about as long to
-answer; a wrench that returned at once would throw it."""
+"""Time [s] in which a wrench returns from zero to its full value. A hand that is pushed by surprise
+takes about as long to react; a wrench that returned at once would throw it."""
 
 
 class Watchdog:
-    """A factor between 0 and 1 for what the arm feels: down with silence, and up again by a ramp.
+    """A factor between 0 and 1 for the wrench that the arm feels.
 
-    A device that holds the last force of a tissue that has died pushes for ever. So the wrench
-    fades between `DECAY_AFTER` and `ZERO_AFTER`, linearly, and when answers come again it returns
-    in `RAMP`.
+    A device that holds the last force of a tissue that has stopped would push for ever. So the
+    factor falls linearly between `DECAY_AFTER` and `ZERO_AFTER` of silence, and rises over `RAMP`
+    when answers come again.
     """
 
     def __init__(self) -> None:
@@ -34,7 +35,7 @@ class Watchdog:
         self.n_silent = 0
         """Frames in which the tissue had been silent for `WARN_AFTER` or more."""
         self.n_faded = 0
-        """Frames in which less than the whole wrench was felt, by fading or by the ramp."""
+        """Frames in which less than the full wrench was felt, by fading or by the ramp."""
 
     def gain(self, silence: float, dt: float) -> float:
         """Return the factor for the next `dt` [s].
@@ -47,8 +48,8 @@ class Watchdog:
             self.n_silent += 1
             if not self._is_silent:
                 _log.warning(
-                    "the tissue has been silent for %.0f ms: what the arm feels is its last "
-                    "answer, and fades from %.0f ms on",
+                    "the tissue has not answered for %.0f ms: the arm feels its last answer, which "
+                    "fades after %.0f ms",
                     1e3 * silence,
                     1e3 * DECAY_AFTER,
                 )
@@ -58,6 +59,6 @@ class Watchdog:
         self.n_faded += self._gain < 1.0
         return self._gain
 
-    def let_go(self) -> None:
-        """Feel nothing now, and return by the ramp."""
+    def reset(self) -> None:
+        """Set the factor to zero; it rises again over `RAMP`."""
         self._gain = 0.0

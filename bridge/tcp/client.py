@@ -1,4 +1,4 @@
-"""A tissue in another process: the client's end of the TCP link."""
+"""The client's end of the TCP link to a tissue in another process."""
 
 import contextlib
 import socket
@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from bridge.link import LinkError, TissueDescription
 from bridge.tcp.address import is_loopback, parse_address
+from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.channel import Channel
 from bridge.tcp.messages.body import (
     PIECES_BYTES,
@@ -27,33 +28,33 @@ from bridge.tcp.messages.text import (
     unpack_description,
     unpack_error,
 )
-from bridge.tcp.seal import NONCE_BYTES, direction_keys, new_nonce
-from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, Kind, MessageError
+from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
 from tissue import BladeSweep, Chunks, CutReport, Snapshot, StepResult, Surface
 
-Value = TypeVar("Value")
+_Value = TypeVar("_Value")
 
 CONNECT_SECONDS = 5.0
-"""How long to wait for a connection [s]. On loopback it is there at once or not at all."""
+"""Longest wait for a connection [s]. On loopback it is there at once or not at all."""
 ANSWER_SECONDS = 60.0
-"""How long to wait for an answer [s]. A step takes a millisecond, but the first steps of a freshly
+"""Longest wait for an answer [s]. A step takes a millisecond, but the first steps of a newly
 installed server compile."""
 
 
 class TcpLink:
-    """A tissue that `bridge.tcp.server.serve` holds. Not to be shared between threads.
+    """A link to a tissue that `serve` holds. Not to be shared between threads.
 
-    When the tissue refuses a request, the link stays; when the connection fails, it is closed.
+    When the tissue refuses a request, the link stays open; when the connection fails, it is closed.
 
     Args:
-        address: "HOST:PORT".
-        timeout: How long to wait for an answer [s].
-        key: What both sides have (`keys.read_key`); None for a server on this machine without one.
+        address: Address of the server, "HOST:PORT".
+        timeout: Longest wait for an answer [s].
+        key: Key that both sides share (`keys.read_key`); None for a server on this machine without
+            a key.
 
     Raises:
-        ValueError: the address is malformed, or another machine's, and there is no key.
-        LinkError: nobody listens there, another client holds the tissue, or the other side has
-            another key, or is not a tissue of this version.
+        ValueError: the address is malformed, or of another machine and there is no key.
+        LinkError: there is no server at the address, another client holds the tissue, or the server
+            has another key or another version of the protocol.
     """
 
     def __init__(
@@ -66,71 +67,85 @@ class TcpLink:
         self._socket: socket.socket | None = _connect(address, timeout, has_key=key is not None)
         try:
             if key is not None:
-                self._prove(key)
+                self._authenticate(key)
             self.describe()
         except LinkError:
             self.close()
             raise
 
     def describe(self) -> TissueDescription:
-        """See `TissueLink.describe`."""
-        description = self._ask(Kind.HELLO, b"", LARGEST_DESCRIPTION, unpack_description)
+        """Return what the arm side must know of the body now."""
+        description = self._ask(MessageKind.HELLO, b"", LARGEST_DESCRIPTION, unpack_description)
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
         return description
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """See `TissueLink.step`."""
-        result = self._ask(Kind.STEP, pack_step(sweep, dt), LARGEST_RESULT, unpack_result)
+        """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near).
+
+        Raises:
+            LinkError: the tissue refuses the request, or did not answer.
+        """
+        result = self._ask(MessageKind.STEP, pack_step(sweep, dt), LARGEST_RESULT, unpack_result)
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
     def snapshot(self) -> Snapshot:
-        """See `TissueLink.snapshot`."""
+        """Return the whole state of the body."""
         limit = snapshot_bytes(self._n_nodes, self._n_tetrahedra)
-        return self._ask(Kind.SNAPSHOT, b"", limit, unpack_snapshot)
+        return self._ask(MessageKind.SNAPSHOT, b"", limit, unpack_snapshot)
 
     def chunks(self) -> Chunks:
-        """See `TissueLink.chunks`."""
-        return self._ask(Kind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
+        """Return boxes that together hold the body, and the speed of its fastest node."""
+        return self._ask(MessageKind.CHUNKS, b"", LARGEST_CHUNKS, unpack_chunks)
 
     def surface(self) -> Surface:
-        """See `TissueLink.surface`."""
+        """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
-        return self._ask(Kind.SURFACE, b"", limit, unpack_surface)
+        return self._ask(MessageKind.SURFACE, b"", limit, unpack_surface)
 
     def n_pieces(self) -> int:
-        """See `TissueLink.n_pieces`."""
-        return self._ask(Kind.PIECES, b"", PIECES_BYTES, unpack_pieces)
+        """Return the number of connected pieces."""
+        return self._ask(MessageKind.PIECES, b"", PIECES_BYTES, unpack_pieces)
 
     def quality(self) -> CutReport:
-        """See `TissueLink.quality`."""
-        return self._ask(Kind.QUALITY, b"", QUALITY_BYTES, unpack_quality)
+        """Return the path error of the cuts so far, and their effect on elements and time step."""
+        return self._ask(MessageKind.QUALITY, b"", QUALITY_BYTES, unpack_quality)
 
     def close(self) -> None:
-        """See `TissueLink.close`."""
+        """Close the connection."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
-    def _prove(self, key: bytes) -> None:
-        """Draw a nonce, hear the server's, and seal all that follows.
+    def _authenticate(self, key: bytes) -> None:
+        """Exchange nonces with the server, and authenticate all messages that follow.
 
-        The server proves itself too: its next reply would not open if it had another key.
+        The server is authenticated too: without the key, the tag of its next reply would be wrong.
         """
         mine = new_nonce()
-        theirs = self._ask(Kind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=Kind.CHALLENGE)
+        theirs = self._ask(
+            MessageKind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=MessageKind.CHALLENGE
+        )
         keys = direction_keys(key, mine, theirs)
-        self._channel.seal(keys.to_server, keys.to_client, plain_error_may_come=True)
+        self._channel.authenticate(keys.to_server, keys.to_client, plain_error_may_come=True)
 
     def _ask(
         self,
-        kind: Kind,
+        kind: MessageKind,
         payload: bytes,
         limit: int,
-        unpack: Callable[[bytes], Value],
-        reply_kind: Kind | None = None,
-    ) -> Value:
-        """Send a request and return what its reply of at most `limit` bytes says."""
+        unpack: Callable[[bytes], _Value],
+        reply_kind: MessageKind | None = None,
+    ) -> _Value:
+        """Send a request and return the content of its reply.
+
+        Args:
+            kind: Kind of the request.
+            payload: Content of the request.
+            limit: Largest content of the reply [byte].
+            unpack: Function from the content of the reply to the value to return.
+            reply_kind: Kind of the reply; None for that of the request.
+        """
         if self._socket is None:
             raise LinkError(f"the link to the tissue at {self._address} is closed")
         sequence = self._sequence
@@ -139,7 +154,7 @@ class TcpLink:
             for message in self._channel.pack(kind, sequence, payload):
                 self._socket.sendall(message)
             answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket)
-            if answer.kind == Kind.ERROR:
+            if answer.kind == MessageKind.ERROR:
                 error = unpack_error(answer.payload)
             elif answer.kind != (reply_kind or kind):
                 raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
@@ -156,7 +171,7 @@ class TcpLink:
         raise LinkError(f"the tissue at {self._address} refused: {error}")
 
     def _answer_to(self, sequence: int, limit: int, connection: socket.socket) -> Frame:
-        """Return the reply to the request of this number; drop replies to earlier ones."""
+        """Return the reply to the request with this number; drop replies to earlier requests."""
         deadline = time.monotonic() + self._timeout
         limit = min(limit, LARGEST_REPLY)
         parts: list[bytes] = []
@@ -164,15 +179,13 @@ class TcpLink:
         while True:
             frame = self._channel.take()
             if frame is None:
-                if (
-                    time.monotonic() > deadline
-                ):  # each read has its own limit; this is for a trickle
+                if time.monotonic() > deadline:  # for a slow trickle: a read has its own limit
                     raise TimeoutError
                 data = connection.recv(READ_BYTES)
                 if not data:
-                    raise ConnectionResetError("the other side has gone")
+                    raise ConnectionResetError("the other side has closed it")
                 self._channel.feed(data)
-            elif frame.sequence == sequence:  # else of a request that Ctrl-C interrupted
+            elif frame.sequence == sequence:  # others answer a request that Ctrl-C interrupted
                 n_bytes += len(frame.payload)
                 if n_bytes > limit:
                     raise MessageError(f"a reply of {n_bytes} bytes; at most {limit} are allowed")
@@ -193,8 +206,8 @@ def _connect(address: str, timeout: float, *, has_key: bool) -> socket.socket:
     """Return a connection that sends small messages at once.
 
     Raises:
-        ValueError: the address is malformed, or another machine's, and there is no key.
-        LinkError: nobody can be reached there.
+        ValueError: the address is malformed, or of another machine and there is no key.
+        LinkError: no server can be reached there.
     """
     host, port = parse_address(address)
     seconds = min(timeout, CONNECT_SECONDS)
@@ -202,12 +215,12 @@ def _connect(address: str, timeout: float, *, has_key: bool) -> socket.socket:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
         if not has_key and not all(is_loopback(where) for *_, where in found):
             raise ValueError(
-                f"{address} is another machine, and that takes a key: give the one that its "
-                "server has with --key FILE, or reach it through an SSH tunnel"
+                f"{address} is another machine, and that takes a key: give the key of its server "
+                "with --key FILE, or connect through an SSH tunnel"
             )
         connection = _first_that_answers([where for *_, where in found], seconds)
     except TimeoutError as cause:
-        raise LinkError(f"nobody answers at {address} within {seconds:g} s") from cause
+        raise LinkError(f"no server answers at {address} within {seconds:g} s") from cause
     except ConnectionRefusedError as cause:
         raise LinkError(
             f"no tissue is served at {address}; start one there with: scalpel-sim serve"
@@ -220,7 +233,7 @@ def _connect(address: str, timeout: float, *, has_key: bool) -> socket.socket:
 
 
 def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
-    """Return a connection to one of the addresses of a host; raise what the last one gave."""
+    """Return a connection to one of the addresses of a host; raise the error of the last one."""
     for where in addresses[:-1]:
         with contextlib.suppress(OSError):
             return socket.create_connection(where[:2], seconds)

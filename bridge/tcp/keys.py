@@ -1,4 +1,4 @@
-"""The secret that both sides of a link share: where it is kept, and what is not taken for one."""
+"""The secret key that both sides of a link share: where it is kept, and how it is checked."""
 
 import binascii
 import os
@@ -7,21 +7,22 @@ import stat
 from pathlib import Path
 
 KEY_VARIABLE = "SCALPEL_SIM_KEY"
-"""Environment variable that holds a key, where no file is named."""
+"""Environment variable that holds a key, if no file is given."""
 NEW_KEY_BYTES = 32
-"""[byte]. As long as the digest of the seals: a longer one would be no harder to guess."""
-FEWEST_KEY_BYTES = 16
-"""[byte]. 128 bits: what somebody who recorded a handshake cannot find by trying. A pass phrase
-could be found, so a key is hexadecimal, and nobody is tempted."""
+"""Length of a new key [byte]: that of a SHA-256 digest. A longer key would be no harder to
+guess."""
+MIN_KEY_BYTES = 16
+"""Length of the shortest key [byte]: 128 bits cannot be found by trying from a recorded handshake.
+A pass phrase could be, so keys are hexadecimal to discourage one."""
 LARGEST_KEY_FILE = 1 << 12
-"""[byte]. A key is a line."""
+"""Largest file that is read for a key [byte]. A key is one line."""
 
 
 def chosen_key(path: Path | None) -> bytes | None:
     """Return the key in a file, else the one in the environment, else None.
 
     Raises:
-        ValueError: what is there is no key, or others can read the file.
+        ValueError: file or variable hold no key, or other users can read the file.
     """
     if path is not None:
         return read_key(path)
@@ -33,7 +34,7 @@ def read_key(path: Path) -> bytes:
     """Return the key in a file.
 
     Raises:
-        ValueError: it cannot be read, holds no key, or others can read it.
+        ValueError: the file cannot be read, holds no key, or other users can read it.
     """
     try:
         with path.open("rb") as file:
@@ -46,29 +47,29 @@ def read_key(path: Path) -> bytes:
         ) from cause
     if os.name == "posix" and mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise ValueError(
-            f"the key file {path} is open to other users of this machine; close it first: "
+            f"the key file {path} is open to other users of this machine; restrict it first: "
             f"chmod 600 {path}"
         )
     return _key_in(content.decode("ascii", "replace"), str(path))
 
 
 def write_new_key(path: Path) -> None:
-    """Write a new random key to a file that does not exist yet, and that only its owner can read.
+    """Write a new random key to a new file that only its owner can read.
 
     Raises:
         ValueError: the file exists.
-        OSError: it cannot be written.
+        OSError: the file cannot be written.
     """
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError as cause:
-        raise ValueError(f"{path} exists already; a key is never written over") from cause
+        raise ValueError(f"{path} exists already, and a key is never overwritten") from cause
     with os.fdopen(descriptor, "w", encoding="ascii") as file:
         file.write(secrets.token_hex(NEW_KEY_BYTES) + "\n")
 
 
 def _key_in(text: str, where: str) -> bytes:
-    """Return the key that a text is. The text itself is not for an error message."""
+    """Return the key in a text. An error message must not show the text itself."""
     try:
         key = binascii.unhexlify(text.strip())
     except ValueError as cause:
@@ -76,9 +77,9 @@ def _key_in(text: str, where: str) -> bytes:
             f"{where} holds no key: wanted hexadecimal digits, as `scalpel-sim key FILE` writes "
             "them"
         ) from cause
-    if len(key) < FEWEST_KEY_BYTES:
+    if len(key) < MIN_KEY_BYTES:
         raise ValueError(
-            f"the key in {where} has {len(key)} bytes; wanted {FEWEST_KEY_BYTES} at least, as "
+            f"the key in {where} has {len(key)} bytes; wanted at least {MIN_KEY_BYTES}, as "
             "`scalpel-sim key FILE` writes them"
         )
     return key

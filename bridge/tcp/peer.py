@@ -1,29 +1,29 @@
-"""Somebody who is connected to a server: a socket, and how far the conversation has come."""
+"""The server's connection to one peer: its socket, its deadline, and its last request."""
 
 import contextlib
 import socket
 import time
 from collections.abc import Iterable
 
+from bridge.tcp.authentication import NONCE_BYTES, TAG_BYTES
 from bridge.tcp.channel import Channel
-from bridge.tcp.seal import NONCE_BYTES, SEAL_BYTES
 from bridge.tcp.wire import LARGEST_FRAME, Frame, MessageError
 
 HANDSHAKE_SECONDS = 2.0
-"""How long somebody may be connected without having taken the place [s]."""
+"""Longest time from a connection to the end of its handshake [s]."""
 FRAME_SECONDS = 2.0
-"""How long the rest of a message may take once it has begun [s]. On loopback: microseconds."""
+"""Longest time from the first to the last byte of a message [s]. On loopback: microseconds."""
 SEND_SECONDS = 10.0
-"""How long somebody may take to read a reply, all its parts [s]. The largest is a gibibyte."""
-HANDSHAKE_BYTES = NONCE_BYTES + SEAL_BYTES
-"""Largest payload of somebody who has not taken the place [byte]: strangers get no memory."""
+"""Longest time for a peer to read a reply, all its parts [s]. The largest is a gibibyte."""
+HANDSHAKE_BYTES = NONCE_BYTES + TAG_BYTES
+"""Largest payload before the end of the handshake [byte]: unknown peers get no memory."""
 
 
 class Peer:
-    """A connection to one client, or to one who wants to be it.
+    """A connection to the client, or to a peer that wants to become it.
 
     Args:
-        connection: Just accepted.
+        connection: Socket, just accepted.
         name: "HOST:PORT" of the other end.
     """
 
@@ -36,44 +36,45 @@ class Peer:
         self.sequence = -1
         """Number of the last request."""
         self.deadline: float | None = time.monotonic() + HANDSHAKE_SECONDS
-        """When to stop waiting for it [s on the monotonic clock]; None while nothing is due."""
-        self._is_seated = False
+        """Time at which the server stops waiting [s on the monotonic clock]; None if nothing is
+        due."""
+        self._is_client = False
 
-    def take_seat(self) -> None:
-        """Let it make requests from now on."""
-        self._is_seated = True
-        self.channel.accept(LARGEST_FRAME)
+    def become_client(self) -> None:
+        """End the handshake: accept requests from now on."""
+        self._is_client = True
+        self.channel.limit_payload(LARGEST_FRAME)
         self.deadline = None
 
     def take(self) -> Frame | None:
-        """Return the next request, or None when it has not come completely.
+        """Return the next request, or None if it is incomplete.
 
-        From a message's first byte to its last there is a deadline. The handshake has one for all
-        of it, so that nobody can stay by talking.
+        From the first byte of a message to its last there is a deadline. The whole handshake has
+        one, so that a peer cannot stay connected by sending.
 
         Raises:
-            MessageError: it cannot be read, or its seal is wrong.
+            MessageError: the request cannot be read, or its authentication tag is wrong.
         """
         frame = self.channel.take()
-        if self._is_seated:
+        if self._is_client:
             if frame is not None or not self.channel.is_within_a_frame:
                 self.deadline = None
             elif self.deadline is None:
                 self.deadline = time.monotonic() + FRAME_SECONDS
         return frame
 
-    def check_newer(self, sequence: int) -> None:
-        """Take note of a request's number. Numbers wrap; a gap is no harm.
+    def check_sequence(self, sequence: int) -> None:
+        """Record the number of a request. Numbers wrap; gaps are allowed.
 
         Raises:
-            MessageError: it is not newer than the last one.
+            MessageError: the number is not newer than the last one.
         """
         if not 0 < (sequence - self.sequence) % (1 << 32) < 1 << 31:
             raise MessageError(f"request {sequence} came after request {self.sequence}")
         self.sequence = sequence
 
     def send(self, frames: Iterable[bytes]) -> None:
-        """Send all of it, and wait for a slow reader, but not for ever.
+        """Send all frames. A slow reader is waited for until `SEND_SECONDS` have passed.
 
         Raises:
             OSError: the other end is gone, or reads too slowly.
@@ -91,10 +92,10 @@ class Peer:
             self.socket.sendall(memoryview(frame)[n_sent:])
             self.socket.setblocking(False)
 
-    def close(self, last_words: bytes = b"") -> None:
-        """Hang up, after a last frame if that goes without waiting."""
+    def close(self, final_frame: bytes = b"") -> None:
+        """Close the connection, after a final frame if that can be sent without waiting."""
         with contextlib.suppress(OSError):
-            if last_words:
-                self.socket.send(last_words)
+            if final_frame:
+                self.socket.send(final_frame)
             self.socket.shutdown(socket.SHUT_WR)
         self.socket.close()

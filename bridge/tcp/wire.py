@@ -1,14 +1,14 @@
-"""Frames of bytes between two processes; docs/wire.md tells the whole protocol.
+"""Frames of bytes between two processes; docs/wire.md describes the whole protocol.
 
 A frame is a header of 24 bytes and a payload, little-endian:
 
     magic      4 bytes   b"SCUT"
-    version    uint16    VERSION; both sides must speak the same
-    kind       uint16    Kind, and MORE where another part of the same message follows
-    sequence   uint32    a request's number, counted from 0; its reply carries the same
-    length     uint32    of the payload, at most LARGEST_FRAME
+    version    uint16    PROTOCOL_VERSION; the same on both sides
+    kind       uint16    MessageKind, plus MORE where another part of the same message follows
+    sequence   uint32    number of a request, counted from 0, and of its reply
+    length     uint32    length of the payload, at most LARGEST_FRAME
     checksum   uint32    CRC-32 of the payload
-    header     uint32    CRC-32 of the 20 bytes before, so that a broken length is never waited for
+    header     uint32    CRC-32 of the 20 bytes before, so that a corrupt length is detected
 """
 
 import enum
@@ -17,28 +17,30 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-VERSION = 3
-"""3: keys; long replies in parts; wrench at t1, stiffness, contacts and energies of a step."""
+PROTOCOL_VERSION = 3
+"""Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
+contacts and energies of a step."""
 
 LARGEST_FRAME = 1 << 20
-"""[byte]. What one side must hold of the other's before it can be checked. A step is 152 bytes;
-what is longer, a whole body, comes in parts."""
+"""Largest payload of a frame [byte], which must be held before it can be checked. A step request
+has 152 bytes; a whole body comes in parts."""
 LARGEST_REPLY = 1 << 30
-"""[byte], all parts. A snapshot of ten million tetrahedra is half of it. What a single reply may
-have follows from the mesh: see `snapshot_bytes` and `surface_bytes` in `messages.body`."""
+"""Largest reply, all parts [byte]. A snapshot of ten million tetrahedra is half of it. The limit of
+a single reply follows from the mesh: see `snapshot_bytes` and `surface_bytes` in
+`messages.body`."""
 READ_BYTES = 1 << 16
-"""How much to take from a socket at once [byte]. From 128 KiB on, every read would map fresh memory
-from the system, which takes longer than the rest of a round trip."""
+"""Size of a read from a socket [byte]. From 128 KiB on each read would map new memory from the
+system, which takes longer than the rest of a round trip."""
 MORE = 0x8000
 """Bit of `kind`: another part of the same message follows."""
 
 
 class MessageError(ValueError):
-    """What was received is not what the protocol allows."""
+    """A received message violates the protocol."""
 
 
-class Kind(enum.IntEnum):
-    """What a frame is. A reply has its request's kind, or is an ERROR or a CHALLENGE."""
+class MessageKind(enum.IntEnum):
+    """Kind of a message. A reply has the kind of its request, or is an ERROR or a CHALLENGE."""
 
     HELLO = 1
     STEP = 2
@@ -55,9 +57,11 @@ class Frame(NamedTuple):
     """One message, or a part of one."""
 
     kind: int
-    """With MORE, if more follows."""
+    """`MessageKind`, plus MORE if another part follows."""
     sequence: int
+    """Number of the request, in its reply too."""
     payload: bytes
+    """Content, at most `LARGEST_FRAME` bytes."""
 
 
 _HEADER = struct.Struct("<4sHHIII")
@@ -67,14 +71,16 @@ HEADER_BYTES = _HEADER.size + _CHECKSUM.size
 
 def pack_frame(kind: int, sequence: int, payload: bytes = b"") -> bytes:
     """Return the bytes of a frame."""
-    header = _HEADER.pack(MAGIC, VERSION, kind, sequence, len(payload), zlib.crc32(payload))
+    header = _HEADER.pack(
+        MAGIC, PROTOCOL_VERSION, kind, sequence, len(payload), zlib.crc32(payload)
+    )
     return header + _CHECKSUM.pack(zlib.crc32(header)) + payload
 
 
 class FrameReader:
-    """Cuts a stream of bytes into frames.
+    """Reads frames from a stream of bytes.
 
-    After a MessageError the stream cannot be read any further: nobody knows where a frame begins.
+    After a MessageError the stream cannot be read further: the start of the next frame is unknown.
     """
 
     def __init__(self, limit: int = LARGEST_FRAME) -> None:
@@ -84,34 +90,36 @@ class FrameReader:
 
     @property
     def is_within_a_frame(self) -> bool:
-        """Whether a part of a frame has come, so that the rest must follow."""
+        """Whether a part of a frame has arrived, so that the rest must follow."""
         return len(self._buffer) > 0
 
     def feed(self, data: bytes | memoryview) -> None:
-        """Take what the socket gave."""
+        """Append bytes from the socket."""
         self._buffer += data
 
     def take(self) -> Frame | None:
-        """Return the next frame, or None when it has not come completely.
+        """Return the next frame, or None if it is incomplete.
 
         Raises:
-            MessageError: these are not our bytes, they are broken, of another version, or too many.
+            MessageError: the bytes are not of this protocol or version, corrupt, or too many.
         """
         buffer = self._buffer
         if not buffer:
             return None
         if not MAGIC.startswith(buffer[:4]):
-            raise MessageError(f"this is not scalpel-sim: it begins with {bytes(buffer[:16])!r}")
+            raise MessageError(
+                f"the other side is not scalpel-sim: its data begin with {bytes(buffer[:16])!r}"
+            )
         if len(buffer) < HEADER_BYTES:
             return None
         _, version, kind, sequence, length, checksum = _HEADER.unpack_from(buffer)
-        if version != VERSION:
+        if version != PROTOCOL_VERSION:
             raise MessageError(
-                f"the other side speaks version {version} of the protocol and this one "
-                f"{VERSION}; use the same scalpel-sim on both"
+                f"the other side uses version {version} of the protocol and this one "
+                f"{PROTOCOL_VERSION}; use the same scalpel-sim on both"
             )
         if _CHECKSUM.unpack_from(buffer, _HEADER.size)[0] != zlib.crc32(buffer[: _HEADER.size]):
-            raise MessageError("a header is broken: its checksum is wrong")
+            raise MessageError("a header is corrupt: its checksum is wrong")
         if length > self.limit:
             raise MessageError(f"a message of {length} bytes; at most {self.limit} are allowed")
         if len(buffer) < HEADER_BYTES + length:
@@ -119,5 +127,5 @@ class FrameReader:
         payload = bytes(buffer[HEADER_BYTES : HEADER_BYTES + length])
         del buffer[: HEADER_BYTES + length]
         if zlib.crc32(payload) != checksum:
-            raise MessageError("a message is broken: its checksum is wrong")
+            raise MessageError("a message is corrupt: its checksum is wrong")
         return Frame(kind, sequence, payload)

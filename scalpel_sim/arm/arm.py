@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bridge.coupling.coupling import DeviceLimits
+from bridge import DeviceLimits
 from scalpel_sim.arm.blade import Blade
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.errors import unknown

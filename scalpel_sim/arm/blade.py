@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from bridge.coupling.coupling import ABSURD_FORCE, ABSURD_TORQUE
+from bridge import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
 from tissue import BladeSegment, FloatArray, Wrench
 
 _SHORTEST_EDGE = 1e-4
@@ -93,7 +93,8 @@ class Blade:
             wrench: World frame.
 
         Raises:
-            BladeError: the wrench is not finite, or larger than `ABSURD_FORCE` or `ABSURD_TORQUE`.
+            BladeError: the wrench is not finite, or larger than `MAX_PLAUSIBLE_FORCE` or
+                `MAX_PLAUSIBLE_TORQUE`.
                 What the blade felt before stays, and MuJoCo sees nothing of it.
         """
         # The last guard: MuJoCo takes 1e3 N without a word, and resets itself at 1e9 N or NaN.
@@ -107,11 +108,11 @@ class Blade:
         ty += rz * fx - rx * fz
         tz += rx * fy - ry * fx
         force, torque = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
-        if not (force <= ABSURD_FORCE and torque <= ABSURD_TORQUE):  # catches NaN too
+        if not (force <= MAX_PLAUSIBLE_FORCE and torque <= MAX_PLAUSIBLE_TORQUE):  # catches NaN too
             raise BladeError(
                 f"a wrench of {force:.3g} N and {torque:.3g} N m about its centre of mass was put "
-                f"on the blade; it must be finite and at most {ABSURD_FORCE:g} N and "
-                f"{ABSURD_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
+                f"on the blade; it must be finite and at most {MAX_PLAUSIBLE_FORCE:g} N and "
+                f"{MAX_PLAUSIBLE_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
             )
         self._applied[:] = (fx, fy, fz, tx, ty, tz)
 

@@ -3,11 +3,10 @@
 import mujoco
 import numpy as np
 
-from bridge import FixtureBox
-from bridge.collision.arm_geoms import N_SIZES, Kind, Part
+from bridge import SIZES_PER_SHAPE, ArmGeom, FixtureBox, GeomShape
 from tissue import FloatArray
 
-_KINDS: dict[int, Kind] = {
+_KINDS: dict[int, GeomShape] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
     int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
@@ -48,13 +47,13 @@ class ArmParts:
             body = int(model.geom_bodyid[i])
             kind = _KINDS[int(model.geom_type[i])]
             self.parts.append(
-                Part(
+                ArmGeom(
                     model.geom(i).name or f"{model.body(body).name} geom {i}",
                     kind,
-                    tuple(model.geom_size[i][: N_SIZES[kind]].tolist()),
+                    tuple(model.geom_size[i][: SIZES_PER_SHAPE[kind]].tolist()),
                     is_instrument=_carries(model, instrument, body),
-                    may_meet_instrument=n_joints.get(body, JOINTS_NEXT + 1) > JOINTS_NEXT,
-                    may_meet_fixtures=int(model.body_weldid[body]) != WORLD,
+                    checked_against_instrument=n_joints.get(body, JOINTS_NEXT + 1) > JOINTS_NEXT,
+                    checked_against_fixtures=int(model.body_weldid[body]) != WORLD,
                 )
             )
         self._positions = data.geom_xpos

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from bridge import Fixture, FixtureBox
-from bridge.collision.collisions import Collisions
+from bridge import Collisions, Fixture, FixtureBox
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, tables
 from tissue import FloatArray
@@ -52,7 +51,7 @@ class Touching:
 
     def look(self) -> None:
         """Look at where the arm is now. The first time that two things meet is logged."""
-        self._now = self._collisions.touching(self._parts.positions(), self._parts.axes())
+        self._now = self._collisions.colliding_pairs(self._parts.positions(), self._parts.axes())
         for pair in self._now:
             if pair not in self._frames:
                 _log.warning(

@@ -1,14 +1,24 @@
 import itertools
 import math
+import subprocess
+import sys
 import threading
 import time
 
 import numpy as np
 import pytest
 
-from bridge import Bridge, CouplingError, FixtureBox, InProcessLink, TissueFrame, VirtualCoupling
-from bridge.coupling.coupling import DeviceLimits
+from bridge import (
+    Bridge,
+    CouplingError,
+    DeviceLimits,
+    FixtureBox,
+    InProcessLink,
+    TissueFrame,
+    VirtualCoupling,
+)
 from tests.bridge.bits import bits
+from tests.bridge.conftest import ROOT
 from tests.bridge.coupling.walls import Wall
 from tissue import BladeSegment, BladeShape, BladeSweep, Material, TetrahedralMesh, Tissue, block
 
@@ -56,6 +66,38 @@ def test_a_blade_that_is_drawn_into_the_block_is_pushed_back(block_tissue, uprig
     felt = draw(bridge, upright, 60)
     assert felt[-1].force[1] < -0.01
     np.testing.assert_allclose(felt[-1].force, -bridge.result.force_on_tissue, atol=1e-9)
+
+
+def test_a_bridge_takes_a_tissue_as_it_is(block_tissue, upright):
+    tissue = block_tissue()
+    itself, linked = Bridge(tissue), Bridge(InProcessLink(block_tissue()))
+    felt = [draw(bridge, upright, 60)[-1] for bridge in (itself, linked)]
+    assert bits(felt[0]) == bits(felt[1])
+    assert felt[0].force.any() and np.array_equal(tissue.bounds, itself.result.bounds)
+
+
+@pytest.mark.parametrize(
+    ("thing", "found"),
+    [(None, "NoneType"), ("127.0.0.1:8766", "str"), (block((1, 1, 1), (1.0, 1.0, 1.0)), "Mesh")],
+    ids=["nothing", "an address", "a mesh"],
+)
+def test_what_is_neither_a_tissue_nor_a_link_is_refused_by_its_type(thing, found):
+    with pytest.raises(TypeError, match=rf"needs a tissue\.Tissue, or a link .*; got \w*{found}$"):
+        Bridge(thing)
+
+
+@pytest.mark.parametrize("made", [Tissue, InProcessLink])
+def test_a_class_in_place_of_an_object_is_refused(made):
+    with pytest.raises(TypeError, match=f"got {made.__name__}, the class and not an object of it"):
+        Bridge(made)
+
+
+def test_the_side_without_the_tissue_starts_without_its_compiler():
+    code = "import sys; from bridge import Bridge, TcpLink, serve; print('numba' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "False\n"
 
 
 def test_the_first_call_does_not_move_the_blade(block_tissue, upright):

@@ -88,7 +88,7 @@ def test_the_vertices_of_a_fixture_mesh_are_points():
 @pytest.mark.parametrize(
     ("rotation", "why"),
     [
-        (np.diag([1.0, 1.0, -1.0]), "mirrors"),
+        (np.diag([1.0, 1.0, -1.0]), "is a reflection"),
         (np.diag([1.0, 1.0, 1.001]), "not orthonormal"),
         (np.zeros((3, 3)), "not orthonormal"),
         (np.full((3, 3), np.nan), "not finite"),

@@ -11,7 +11,7 @@ from bridge.tcp.wire import MessageError
 from tissue import FloatArray, Snapshot, Surface
 
 PIECES_BYTES = 8
-"""[byte]. One integer."""
+"""Length of a reply with the number of pieces [byte]: one integer."""
 
 _COUNTS = struct.Struct("<2q")
 
@@ -27,7 +27,7 @@ def snapshot_bytes(n_nodes: int, n_tetrahedra: int) -> int:
 
 
 def surface_bytes(n_tetrahedra: int) -> int:
-    """Return the most that a surface reply can have [byte]: every face of every tetrahedron."""
+    """Return the largest length of a surface reply [byte]: every face of every tetrahedron."""
     n_triangles = 4 * n_tetrahedra
     return _COUNTS.size + n_triangles * (_TRIANGLE_BYTES + 3 * _SURFACE_VERTEX_BYTES)
 
@@ -51,8 +51,8 @@ def unpack_snapshot(payload: bytes) -> Snapshot:
     """Return the snapshot in a reply.
 
     Raises:
-        MessageError: the lengths do not agree, a number is not finite, or a tetrahedron names a
-            node that is not there.
+        MessageError: the lengths do not agree, a number is not finite, or a tetrahedron refers to
+            a node that does not exist.
     """
     reader = _ArrayReader(payload)
     n_nodes, n_tetrahedra = reader.counts
@@ -84,8 +84,8 @@ def unpack_surface(payload: bytes) -> Surface:
     """Return the surface in a reply.
 
     Raises:
-        MessageError: the lengths do not agree, a number is not finite, or a triangle names a
-            vertex that is not there.
+        MessageError: the lengths do not agree, a number is not finite, or a triangle refers to a
+            vertex that does not exist.
     """
     reader = _ArrayReader(payload)
     n_vertices, n_triangles = reader.counts
@@ -106,13 +106,13 @@ def unpack_pieces(payload: bytes) -> int:
     """Return the number of pieces in a reply.
 
     Raises:
-        MessageError: it is missing or negative.
+        MessageError: the number is missing or negative.
     """
     if len(payload) != PIECES_BYTES:
         raise MessageError(f"a number of pieces of {len(payload)} bytes; wanted {PIECES_BYTES}")
     n_pieces = int.from_bytes(payload, "little", signed=True)
     if n_pieces < 0:
-        raise MessageError(f"{n_pieces} pieces")
+        raise MessageError(f"a body of {n_pieces} pieces; wanted 0 or more")
     return n_pieces
 
 
@@ -129,7 +129,7 @@ def _flags(array: npt.NDArray[np.bool_]) -> bytes:
 
 
 class _ArrayReader:
-    """Takes one array after the other out of a payload. Arrays are copies."""
+    """Reads one array after the other from a payload. Arrays are copies."""
 
     def __init__(self, payload: bytes) -> None:
         if len(payload) < _COUNTS.size:
@@ -139,7 +139,7 @@ class _ArrayReader:
         self._at = _COUNTS.size
 
     def expect(self, n_bytes: int) -> None:
-        """Refuse a payload of another length."""
+        """Check the length of the payload [byte]."""
         if len(self._payload) != n_bytes:
             raise MessageError(
                 f"a body of {self.counts} points and elements in {len(self._payload)} bytes; "
@@ -147,21 +147,26 @@ class _ArrayReader:
             )
 
     def floats(self, shape: tuple[int, ...], what: str) -> FloatArray:
+        """Return the next array of float64, all finite."""
         array = self._take(shape, "<f8").astype(np.float64)
         if not np.isfinite(array).all():
             raise MessageError(f"{what} are not finite")
         return array
 
     def indices(self, shape: tuple[int, ...], n: int, what: str) -> npt.NDArray[np.int64]:
+        """Return the next array of indices from 0 to n - 1."""
         array = self._take(shape, "<i8").astype(np.int64)
         if array.size and not (array.min() >= 0 and array.max() < n):
-            raise MessageError(f"{what} name points {array.min()} to {array.max()} of {n}")
+            raise MessageError(
+                f"{what} refer to points {array.min()} to {array.max()}; there are {n}"
+            )
         return array
 
     def flags(self, n: int, what: str) -> npt.NDArray[np.bool_]:
+        """Return the next array of n flags."""
         array = self._take((n,), "u1")
         if array.size and array.max() > 1:
-            raise MessageError(f"{what} is neither 0 nor 1")
+            raise MessageError(f"a flag of {what} is neither 0 nor 1")
         return array.astype(np.bool_)
 
     def _take(self, shape: tuple[int, ...], dtype: str) -> npt.NDArray[np.generic]:

@@ -1,4 +1,4 @@
-"""The reply that says how well the cuts follow the blade, and what they did to the mesh."""
+"""The reply with the path error of the cuts and their effect on the mesh."""
 
 import struct
 
@@ -29,15 +29,17 @@ def unpack_quality(payload: bytes) -> CutReport:
     """Return the report in a reply.
 
     Raises:
-        MessageError: the length is wrong, a number is negative or none, or there is no tetrahedron.
+        MessageError: the length is wrong, a number is negative or NaN, or there is no tetrahedron.
     """
     if len(payload) != _QUALITY.size:
         raise MessageError(f"a quality report of {len(payload)} bytes; wanted {_QUALITY.size}")
     numbers = _QUALITY.unpack(payload)
     n_cut_nodes, n_initial, n_now = numbers[10:]
     check_counts(n_cut_nodes, min(n_initial, n_now) - 1)
-    if not all(number >= 0.0 for number in numbers[:10]):  # infinite: a step of what cannot move
-        raise MessageError(f"a quality report of {numbers[:10]}")
+    if not all(
+        number >= 0.0 for number in numbers[:10]
+    ):  # infinity is the time step of a body that cannot move
+        raise MessageError(f"a quality report of {numbers[:10]}; wanted numbers of 0 or more")
     return CutReport(
         n_cut_nodes,
         numbers[0],

@@ -1,4 +1,4 @@
-"""The reply to a step: what the tissue did to the blade, and what became of it."""
+"""The reply to a step: its result."""
 
 import struct
 
@@ -8,23 +8,23 @@ from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import BladeContacts, BodyContacts, Energies, FloatArray, StageTimes, StepResult, Wrench
 
-MOST_CONTACTS = 1 << 16
-"""Of the blade: a thousand times what a scalpel has in an organ."""
+MAX_CONTACTS = 1 << 16
+"""Largest number of contacts of the blade: a thousand times that of a scalpel in an organ."""
 
 _HEAD = struct.Struct("<8q9d")
-_N_ALWAYS = 9 + 9 + 36 + 3 + 6 + 3
-"""Floats of the arrays that every reply has."""
-_N_EACH = 3 + 3 + 1 + 3 + 1
-"""Floats of each contact."""
+_N_FIXED = 9 + 9 + 36 + 3 + 6 + 3
+"""Number of floats in the arrays of fixed length."""
+_N_PER_CONTACT = 3 + 3 + 1 + 3 + 1
+"""Number of floats of a contact."""
 _N_ENERGIES = len(Energies._fields)
-LARGEST_RESULT = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * MOST_CONTACTS + _N_ENERGIES)
-"""[byte]."""
+LARGEST_RESULT = _HEAD.size + 8 * (_N_FIXED + _N_PER_CONTACT * MAX_CONTACTS + _N_ENERGIES)
+"""Largest reply to a step [byte]."""
 
 
 def pack_result(result: StepResult) -> bytes:
     """Return a reply: the integers of a result, its single floats, its arrays.
 
-    The contacts and the energies, of which there may be any number and none, come last.
+    The contacts, of any number, and the energies, which are optional, come last.
     """
     touch, contacts, energies = result.touch, result.contacts, result.energies
     head = _HEAD.pack(
@@ -44,7 +44,7 @@ def pack_result(result: StepResult) -> bytes:
         touch.force,
         *result.profile,
     )
-    # One call for all: each array by itself costs as much as the rest of the message.
+    # One call for all arrays: each one by itself takes as long as the rest of the message.
     arrays = np.concatenate(
         (
             *result.wrench,
@@ -68,11 +68,11 @@ def pack_result(result: StepResult) -> bytes:
 def unpack_result(payload: bytes) -> StepResult:
     """Return the result in a reply.
 
-    The numbers of the physics are passed on as they are, NaN too: what becomes of a tissue that
-    diverged is decided in one place for both links, the coupling.
+    Physical quantities are passed on unchanged, NaN included: the coupling handles a tissue that
+    has diverged, for both links.
 
     Raises:
-        MessageError: the length is wrong, or a count is negative or too large.
+        MessageError: the length is wrong, or a count is out of range.
     """
     if len(payload) < _HEAD.size:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_HEAD.size} at least")
@@ -81,13 +81,15 @@ def unpack_result(payload: bytes) -> StepResult:
     check_counts(n_nodes, n_tetrahedra)
     if not (0 <= n_active <= n_tetrahedra and -1 <= tip_tetrahedron < n_tetrahedra):
         raise MessageError(
-            f"{n_active} active tetrahedra and tip in {tip_tetrahedron}, of {n_tetrahedra}"
+            f"{n_active} active tetrahedra and tip in number {tip_tetrahedron}, of {n_tetrahedra}"
         )
     if n_substeps < 0 or n_touching < 0:
-        raise MessageError(f"{n_substeps} substeps and {n_touching} contacts")
-    if not (0 <= n <= MOST_CONTACTS and audited in (0, 1)):
-        raise MessageError(f"{n} contacts of the blade, and {audited} audits")
-    wanted = _HEAD.size + 8 * (_N_ALWAYS + _N_EACH * n + _N_ENERGIES * audited)
+        raise MessageError(f"{n_substeps} substeps and {n_touching} contacts; wanted 0 or more")
+    if not (0 <= n <= MAX_CONTACTS and audited in (0, 1)):
+        raise MessageError(
+            f"{n} contacts of the blade (at most {MAX_CONTACTS}), audit flag {audited} (0 or 1)"
+        )
+    wanted = _HEAD.size + 8 * (_N_FIXED + _N_PER_CONTACT * n + _N_ENERGIES * audited)
     if len(payload) != wanted:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {wanted}")
     floats = np.frombuffer(payload, "<f8", offset=_HEAD.size).astype(np.float64)  # a copy
@@ -95,7 +97,7 @@ def unpack_result(payload: bytes) -> StepResult:
         wrench=Wrench(floats[0:3], floats[3:6], floats[6:9]),
         wrench_t1=Wrench(floats[9:12], floats[12:15], floats[15:18]),
         stiffness=floats[18:54].reshape(6, 6),
-        contacts=_contacts(floats[_N_ALWAYS : _N_ALWAYS + _N_EACH * n], n),
+        contacts=_contacts(floats[_N_FIXED : _N_FIXED + _N_PER_CONTACT * n], n),
         force_on_tissue=floats[54:57],
         bounds=floats[57:63].reshape(2, 3),
         n_tetrahedra=n_tetrahedra,
@@ -114,7 +116,7 @@ def unpack_result(payload: bytes) -> StepResult:
 
 
 def _contacts(floats: FloatArray, n: int) -> BladeContacts:
-    """Return the contacts whose floats follow one another, quantity by quantity."""
+    """Return the contacts whose floats follow one another by quantity."""
     return BladeContacts(
         point=floats[: 3 * n].reshape(n, 3),
         normal=floats[3 * n : 6 * n].reshape(n, 3),

@@ -1,4 +1,4 @@
-"""The request of every frame: where the blade went, and for how long the tissue shall live."""
+"""The request of a frame: the motion of the blade, and the time to advance the tissue by."""
 
 import math
 import struct
@@ -9,18 +9,18 @@ from bridge.tcp.wire import MessageError
 from tissue import BladeSegment, BladeSweep
 
 LARGEST_COORDINATE = 1e3
-"""[m]. No body is larger; a blade farther away is a broken message."""
+"""Largest coordinate [m]. No body is larger; a blade farther away means an invalid message."""
 _LONGEST_STEP = 1.0
-"""[s]. A frame is a millisecond; a step of hours would keep the tissue busy for days."""
+"""Longest step [s]. A frame is a millisecond; a step of hours would take days to compute."""
 _UNIT_TOLERANCE = 1e-6
-"""How far the length of `forward` may be from 1: what single precision leaves."""
+"""Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
 _NO_BLADE = struct.Struct("<d")
 _BLADE = struct.Struct("<19d")
 
 
 def pack_step(sweep: BladeSweep | None, dt: float) -> bytes:
-    """Return a request: `dt`, and unless no blade is near: tip, heel, forward at t0 and at t1."""
+    """Return a request: `dt`, and with a blade near: tip, heel, forward at t0 and at t1."""
     if sweep is None:
         return _NO_BLADE.pack(dt)
     return _BLADE.pack(dt, *np.concatenate((*sweep.t0, *sweep.t1)).tolist())
@@ -30,7 +30,7 @@ def unpack_step(payload: bytes) -> tuple[BladeSweep | None, float]:
     """Return the sweep and `dt` of a request.
 
     Raises:
-        MessageError: a number is missing, not finite, or nothing that a blade can do.
+        MessageError: a number is missing, not finite, or out of range.
     """
     if len(payload) == _NO_BLADE.size:
         return None, _checked_step(_NO_BLADE.unpack(payload)[0])
@@ -46,7 +46,7 @@ def unpack_step(payload: bytes) -> tuple[BladeSweep | None, float]:
 
 
 def _check_segment(numbers: list[float]) -> None:
-    # NaN is neither within limits nor near 1. Plain floats: a tenth of the time of array calls.
+    # The comparisons are false for NaN. Plain floats take a tenth of the time of array calls.
     for x in numbers[:6]:
         if not -LARGEST_COORDINATE <= x <= LARGEST_COORDINATE:
             raise MessageError(f"the blade is not within {LARGEST_COORDINATE:g} m: {numbers[:6]}")

@@ -1,4 +1,4 @@
-"""What has names and text: the description of the tissue (JSON) and an error (plain UTF-8)."""
+"""The messages of text: the description of the tissue (JSON) and an error (plain UTF-8)."""
 
 import math
 
@@ -11,9 +11,9 @@ from bridge.tcp.wire import MessageError
 from tissue import BladeShape, Material
 
 LARGEST_ERROR = 1 << 16
-"""[byte]. Text for a person to read."""
+"""Largest error [byte]: text for a person to read."""
 LARGEST_DESCRIPTION = 1 << 16
-"""[byte]. A name and a dozen numbers."""
+"""Largest description [byte]: a name and a dozen numbers."""
 
 
 class _Description(msgspec.Struct, forbid_unknown_fields=True):
@@ -57,10 +57,12 @@ def unpack_description(payload: bytes) -> TissueDescription:
         raise MessageError(f"the tissue's description cannot be read: {error}") from error
     bounds = np.array(found.bounds)
     if not (np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all()):
-        raise MessageError(f"the tissue's bounds are {bounds.tolist()} m")
+        raise MessageError(
+            f"the tissue's bounds are {bounds.tolist()} m; wanted finite corners, the lowest first"
+        )
     check_counts(found.n_nodes, found.n_tetrahedra)
     if found.floor is not None and not math.isfinite(found.floor):
-        raise MessageError(f"the floor is at {found.floor} m")
+        raise MessageError(f"the floor is at {found.floor} m; wanted a finite height")
     return TissueDescription(
         found.scene,
         found.material,
@@ -73,15 +75,17 @@ def unpack_description(payload: bytes) -> TissueDescription:
 
 
 def pack_error(message: str) -> bytes:
-    """Return the reply to what could not be done: one line for a person to read."""
-    return message[: LARGEST_ERROR // 4].encode("utf-8", "replace")  # a letter has 4 bytes at most
+    """Return the reply to a request that failed: one line for a person to read."""
+    return message[: LARGEST_ERROR // 4].encode(
+        "utf-8", "replace"
+    )  # a character has at most 4 bytes
 
 
 def unpack_error(payload: bytes) -> str:
-    """Return the line in an ERROR, without what could steer a terminal.
+    """Return the line in an ERROR, without control characters.
 
     Raises:
-        MessageError: it is no text.
+        MessageError: the payload is not UTF-8.
     """
     try:
         text = payload.decode("utf-8")

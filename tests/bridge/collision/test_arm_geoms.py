@@ -4,11 +4,11 @@ import fcl
 import numpy as np
 import pytest
 
-from bridge.collision.arm_geoms import Part
+from bridge.collision.arm_geoms import ArmGeom
 
 
 @pytest.mark.parametrize(
-    ("kind", "sizes", "why"),
+    ("shape", "sizes", "why"),
     [
         ("cone", (1.0, 1.0), "is a 'cone'; wanted one of box, sphere"),
         ("box", (1.0, 1.0), "a box has 3, all positive"),
@@ -17,13 +17,13 @@ from bridge.collision.arm_geoms import Part
         ("cylinder", (1.0, math.inf), "all positive"),
     ],
 )
-def test_a_part_of_no_shape_is_refused_by_name(kind, sizes, why):
-    with pytest.raises(ValueError, match=f"part 'wrist'.*{why}"):
-        Part("wrist", kind, sizes)
+def test_a_geom_of_no_shape_is_refused_by_name(shape, sizes, why):
+    with pytest.raises(ValueError, match=f"geom 'wrist'.*{why}"):
+        ArmGeom("wrist", shape, sizes)
 
 
 @pytest.mark.parametrize(
-    ("kind", "sizes", "half_extents"),
+    ("shape", "sizes", "half_extents"),
     [
         ("box", (1.0, 2.0, 3.0), (1.0, 2.0, 3.0)),
         ("sphere", (2.0,), (2.0, 2.0, 2.0)),
@@ -31,10 +31,10 @@ def test_a_part_of_no_shape_is_refused_by_name(kind, sizes, why):
         ("cylinder", (1.0, 3.0), (1.0, 1.0, 3.0)),
     ],
 )
-def test_the_box_around_a_part_is_that_of_the_collision_library(kind, sizes, half_extents):
-    part = Part("wrist", kind, sizes)
-    np.testing.assert_array_equal(part.half_extents, half_extents)
-    there = fcl.CollisionObject(part.geometry(), fcl.Transform())
+def test_the_box_around_a_geom_is_that_of_the_collision_library(shape, sizes, half_extents):
+    geom = ArmGeom("wrist", shape, sizes)
+    np.testing.assert_array_equal(geom.half_extents, half_extents)
+    there = fcl.CollisionObject(geom.geometry(), fcl.Transform())
     for axis in range(3):
         for gap, meets in ((-1e-3, True), (1e-3, False)):
             at = np.zeros(3)

@@ -38,46 +38,46 @@ def test_an_edge_that_passes_through_the_tissue_is_never_hidden(
     there = when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
     tip_t0 = np.array(inside) - there
     sweep = BladeSweep(segment(tip_t0, edge_t0), segment(tip_t0 + motion, edge_t1))
-    assert BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0).overlaps(sweep, DT).tissue
 
 
 def test_a_blade_above_the_tissue_does_not_touch_it():
-    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(resting((0.5, 0.5, 1.01)), DT).tissue
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).overlaps(resting((0.5, 0.5, 1.01)), DT).tissue
 
 
 def test_a_blade_beside_a_slanted_tissue_box_is_told_apart_by_its_own_axes():
     # The axis-aligned box of this diagonal edge would hold the corner (1, 1, 1); its own does not.
     diagonal = resting((1.5, 0.9, 0.5), (-0.6, 0.6, 0.0))
-    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).contacts(diagonal, DT).tissue
+    assert not BroadPhase(UNIT_BOX, SOUND_SPEED).overlaps(diagonal, DT).tissue
 
 
 def test_a_fast_blade_does_not_tunnel_through_a_thin_sheet():
     sheet = np.array([[-1.0, 0.0, -1.0], [1.0, 1e-4, 1.0]])
     before, after = segment((0, -0.5, 0), (0, 0, 0.1)), segment((0, 0.5, 0), (0, 0, 0.1))
     phase = BroadPhase(sheet, 0.0)
-    assert phase.contacts(BladeSweep(before, after), DT).tissue
-    assert not phase.contacts(BladeSweep(before, before), DT).tissue
-    assert not phase.contacts(BladeSweep(after, after), DT).tissue
+    assert phase.overlaps(BladeSweep(before, after), DT).tissue
+    assert not phase.overlaps(BladeSweep(before, before), DT).tissue
+    assert not phase.overlaps(BladeSweep(after, after), DT).tissue
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(2.9e-3, True), (3.1e-3, False)])
 def test_the_box_grows_by_what_sound_travels_in_a_step(gap, touches):
     phase = BroadPhase(UNIT_BOX, SOUND_SPEED)
-    assert phase.contacts(resting((0.5, 0.5, 1.0 + gap)), DT).tissue == touches
+    assert phase.overlaps(resting((0.5, 0.5, 1.0 + gap)), DT).tissue == touches
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(0.0499, True), (0.0501, False)])
 def test_the_box_of_a_falling_body_grows_by_what_it_fell_in_the_last_step(gap, touches):
     phase = BroadPhase(UNIT_BOX + np.array([0.0, 0.0, 0.05]), 0.0)
-    phase.tissue_moved(UNIT_BOX, DT)
-    assert phase.contacts(resting((0.5, 0.5, -1.0 - gap)), DT).tissue == touches
+    phase.update_bounds(UNIT_BOX, DT)
+    assert phase.overlaps(resting((0.5, 0.5, -1.0 - gap)), DT).tissue == touches
 
 
 def test_the_box_follows_the_tissue():
     phase = BroadPhase(UNIT_BOX, 0.0)
-    phase.tissue_moved(UNIT_BOX + 5.0, 1.0)
-    assert not phase.contacts(resting((0.5, 0.5, 0.5), (0, 0, 0.1)), DT).tissue
-    assert phase.contacts(resting((5.5, 5.5, 5.5), (0, 0, 0.1)), DT).tissue
+    phase.update_bounds(UNIT_BOX + 5.0, 1.0)
+    assert not phase.overlaps(resting((0.5, 0.5, 0.5), (0, 0, 0.1)), DT).tissue
+    assert phase.overlaps(resting((5.5, 5.5, 5.5), (0, 0, 0.1)), DT).tissue
 
 
 TABLE = FixtureBox("table", np.array([9.0, 9.0, 0.1]), np.array([0.0, 0.0, -0.5]))
@@ -99,13 +99,13 @@ CLAMP = FixtureMesh(
 )
 def test_the_fixtures_that_the_blade_meets_are_named(tip, named):
     phase = BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, CLAMP])
-    assert phase.contacts(resting(tip), DT).fixtures == named
+    assert phase.overlaps(resting(tip), DT).fixtures == named
 
 
 def test_a_fixture_of_many_triangles_does_not_hide_the_tissue():
     grid = np.random.default_rng(0).random((3000, 3))
     mesh = FixtureMesh("gauze", grid, np.arange(3000).reshape(1000, 3))
-    contacts = BroadPhase(UNIT_BOX, 0.0, [mesh]).contacts(resting((0.5, 0.5, 0.0)), DT)
+    contacts = BroadPhase(UNIT_BOX, 0.0, [mesh]).overlaps(resting((0.5, 0.5, 0.0)), DT)
     assert contacts == (True, ("gauze",))
 
 
@@ -114,8 +114,8 @@ def test_a_turned_box_is_met_where_it_is():
     turn = np.array([[s, -s, 0.0], [s, s, 0.0], [0.0, 0.0, 1.0]])
     bar = FixtureBox("bar", np.array([2.0, 0.02, 2.0]), np.array([5.0, 5.0, 0.0]), turn)
     phase = BroadPhase(UNIT_BOX, 0.0, [bar])
-    assert phase.contacts(resting((5.5, 5.5, 0.0)), DT).fixtures == ("bar",)
-    assert phase.contacts(resting((5.5, 4.5, 0.0)), DT).fixtures == ()
+    assert phase.overlaps(resting((5.5, 5.5, 0.0)), DT).fixtures == ("bar",)
+    assert phase.overlaps(resting((5.5, 4.5, 0.0)), DT).fixtures == ()
 
 
 def test_two_fixtures_of_one_name_are_refused():
@@ -148,18 +148,18 @@ class Source:
 
 def test_a_blade_in_the_hollow_of_a_body_touches_nothing():
     phase = BroadPhase(UNIT_BOX, 0.0, chunks=Source(HORSESHOE))
-    assert not phase.contacts(resting((0.5, 0.6, 0.0)), DT).tissue
-    assert phase.contacts(resting((0.9, 0.6, 0.0)), DT).tissue
-    assert BroadPhase(UNIT_BOX, 0.0).contacts(resting((0.5, 0.6, 0.0)), DT).tissue
+    assert not phase.overlaps(resting((0.5, 0.6, 0.0)), DT).tissue
+    assert phase.overlaps(resting((0.9, 0.6, 0.0)), DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0).overlaps(resting((0.5, 0.6, 0.0)), DT).tissue
 
 
 def test_chunks_are_asked_for_only_in_the_box_around_all_and_before_the_blade_holds_tissue():
     source = Source(HORSESHOE)
     phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
-    phase.contacts(resting((0.5, 0.6, 2.0)), DT)
-    assert phase.contacts(resting((0.5, 0.6, 0.0)), DT, engaged=True).tissue
+    phase.overlaps(resting((0.5, 0.6, 2.0)), DT)
+    assert phase.overlaps(resting((0.5, 0.6, 0.0)), DT, engaged=True).tissue
     assert source.n_asked == 0
-    phase.contacts(resting((0.5, 0.6, 0.0)), DT)
+    phase.overlaps(resting((0.5, 0.6, 0.0)), DT)
     assert source.n_asked == 1
 
 
@@ -170,18 +170,18 @@ def test_chunks_reach_as_far_as_sound_and_their_fastest_node_go_in_a_step(fastes
     blade = BladeSegment(
         np.array([0.5, 0.6, 0.0]), np.array([0.5, 0.6, 1.0]), np.array([0, 1.0, 0])
     )
-    assert phase.contacts(BladeSweep(blade, blade), DT).tissue == touches
+    assert phase.overlaps(BladeSweep(blade, blade), DT).tissue == touches
 
 
 def test_chunks_that_move_are_met_where_they_are():
     source = Source(HORSESHOE)
     phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
     blade = resting((0.5, 0.6, 0.0))
-    assert not phase.contacts(blade, DT).tissue
+    assert not phase.overlaps(blade, DT).tissue
     source.boxes = HORSESHOE + np.array([0.35, 0.0, 0.0])
-    assert phase.contacts(blade, DT).tissue
+    assert phase.overlaps(blade, DT).tissue
     source.boxes = HORSESHOE[:2]
-    assert not phase.contacts(blade, DT).tissue
+    assert not phase.overlaps(blade, DT).tissue
 
 
 @given(st.lists(vectors, min_size=1, max_size=6), vectors, edges, vectors, fractions)
@@ -192,7 +192,7 @@ def test_no_chunk_is_passed_through_unseen(corners, tip, edge, motion, when):
     boxes = np.stack([low - 5e-4, low + 5e-4], axis=1)
     bounds = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
     phase = BroadPhase(bounds, 0.0, chunks=Source(boxes))
-    assert phase.contacts(BladeSweep(segment(tip, edge), segment(tip + motion, edge)), DT).tissue
+    assert phase.overlaps(BladeSweep(segment(tip, edge), segment(tip + motion, edge)), DT).tissue
 
 
 def test_the_body_of_a_blade_meets_what_its_edge_does_not():
@@ -201,5 +201,5 @@ def test_the_body_of_a_blade_meets_what_its_edge_does_not():
         np.array([0.5, 1.2, 0.0]), np.array([0.5, 1.2, 1.0]), np.array([0, 1.0, 0])
     )
     sweep = BladeSweep(blade, blade)
-    assert not BroadPhase(UNIT_BOX, 0.0).contacts(sweep, DT).tissue
-    assert BroadPhase(UNIT_BOX, 0.0, blade=shape).contacts(sweep, DT).tissue
+    assert not BroadPhase(UNIT_BOX, 0.0).overlaps(sweep, DT).tissue
+    assert BroadPhase(UNIT_BOX, 0.0, blade=shape).overlaps(sweep, DT).tissue

@@ -23,7 +23,7 @@ def stick(start, end):
 def is_met(box, chunks):
     there = MovableBox()
     there.place(box)
-    return ChunkBoxes().are_met_by(box, there.object, chunks)
+    return ChunkBoxes().collide_with(box, there.object, chunks)
 
 
 @pytest.mark.parametrize(("x", "found"), [(0.5, [0]), (1.5, []), (2.5, [1])])

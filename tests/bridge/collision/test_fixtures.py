@@ -21,8 +21,8 @@ def test_a_malformed_box_is_refused_by_name(size, centre, why):
 @pytest.mark.parametrize(
     ("triangles", "why"),
     [
-        ([[0, 1, 3]], "name vertices 0 to 3, but its vertices are 0 to 2"),
-        ([[0, 1, -1]], "name vertices -1 to 1"),
+        ([[0, 1, 3]], "refer to vertices 0 to 3, but its vertices are 0 to 2"),
+        ([[0, 1, -1]], "refer to vertices -1 to 1"),
         (np.zeros((0, 3), int), "wanted"),
         ([[0, 1]], "wanted"),
         ([[0.0, 1.0, 2.0]], "type float64; wanted vertex indices"),

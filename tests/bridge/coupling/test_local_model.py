@@ -36,7 +36,7 @@ def answers(model, wall, pose, told=None):
     """The wall answers for a blade at a pose; to a model that was told of another."""
     result = wall.step(BladeSweep(pose, pose), DT)
     told = told or pose
-    model.answered(result, result.wrench._replace(point=told.tip), told)
+    model.update(result, result.wrench._replace(point=told.tip), told)
 
 
 def answer_of(wall, pose):
@@ -112,5 +112,5 @@ def test_a_blade_that_is_held_from_both_sides_is_pulled_back():
     both_ways = result._replace(contacts=result.contacts._replace(normal=both))
     for y in (-0.3e-3, 0.0):  # the share of the stiffness is learnt from two answers
         push = wrench_on(at(y))
-        model.answered(both_ways, push, at(y))
+        model.update(both_ways, push, at(y))
     assert model.wrench(at(-2e-3))[1] > 0.0

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import DeviceLimits
-from bridge.coupling.passivity import TRIFLE, Passivity, Travel
+from bridge.coupling.passivity import ENERGY_TOLERANCE, Passivity, Travel
 from bridge.coupling.virtual_coupling import least_damping
 
 DT = 1e-3
@@ -39,8 +39,8 @@ class Mass:
 
 def feel(passivity, wanted, way, given=0.0):
     travel = Travel(way, LEVER, given)
-    felt = passivity.passive(wanted, travel)
-    passivity.feel(felt, wanted, travel)
+    felt = passivity.correct(wanted, travel)
+    passivity.record(felt, wanted, travel)
     return felt
 
 
@@ -138,7 +138,7 @@ def test_the_account_starts_anew_where_nothing_is_felt():
         feel(passivity, along_x(0.0), along_x(1e-3))
     assert passivity.counters.energy == 0.0
     out = [feel(passivity, along_x(1.0), along_x(1e-3))[0] for _ in range(10)]
-    assert sum(out) * 1e-3 <= 2.0 * TRIFLE
+    assert sum(out) * 1e-3 <= 2.0 * ENERGY_TOLERANCE
 
 
 @pytest.mark.parametrize("delay", [0, 1])

@@ -81,14 +81,16 @@ def test_a_coupling_with_too_little_damping_is_told_the_numbers(caplog):
     Proxy(VirtualCoupling(stiffness=1e3), DT, UPRIGHT)
     assert not caplog.records
     Proxy(VirtualCoupling(stiffness=1e3, damping=0.5), DT, UPRIGHT)
-    assert "1000 N/m at 1 ms takes a damping of more than (1 + 1/2) K T = 1.5, and has 0.5" in (
+    assert "1000 N/m at 1 ms needs a damping of more than (1 + 1/2) K T = 1.5, and has 0.5" in (
         caplog.text
     )
     assert "lower the stiffness to 333" in caplog.text
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
-@pytest.mark.parametrize("name", ["stiffness", "damping", "turning_stiffness", "turning_damping"])
+@pytest.mark.parametrize(
+    "name", ["stiffness", "damping", "rotational_stiffness", "rotational_damping"]
+)
 def test_a_coupling_that_cannot_be_is_refused(name, bad):
     with pytest.raises(ValueError, match=f"the coupling's {name} is .*; it must be positive"):
         VirtualCoupling(**{name: bad})

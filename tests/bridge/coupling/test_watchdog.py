@@ -22,7 +22,7 @@ def test_silence_is_warned_of_once_and_counted_from_10_ms_on(caplog):
     watchdog = Watchdog()
     silent_for(watchdog, 0.020)
     assert watchdog.n_silent == 11
-    assert len(caplog.records) == 1 and "silent for 10 ms" in caplog.text
+    assert len(caplog.records) == 1 and "has not answered for 10 ms" in caplog.text
     watchdog.gain(0.0, DT)
     silent_for(watchdog, 0.020)
     assert len(caplog.records) == 2
@@ -47,7 +47,7 @@ def test_a_wrench_comes_back_by_a_ramp():
     assert watchdog.n_faded == 550 + round(RAMP / DT) - 1
 
 
-def test_what_is_let_go_comes_back_by_a_ramp_too():
+def test_a_wrench_that_was_reset_comes_back_by_a_ramp_too():
     watchdog = Watchdog()
-    watchdog.let_go()
+    watchdog.reset()
     assert watchdog.gain(0.0, DT) == pytest.approx(DT / RAMP)

@@ -6,10 +6,10 @@ import time
 
 from bridge import LinkError, TcpLink
 from bridge.tcp.address import parse_address
-from bridge.tcp.wire import FrameReader, Kind, pack_frame
+from bridge.tcp.wire import FrameReader, MessageKind, pack_frame
 
 DT = 1e-3
-HELLO = pack_frame(Kind.HELLO, 0)
+HELLO = pack_frame(MessageKind.HELLO, 0)
 
 
 def connected(address):
@@ -47,12 +47,12 @@ def link_once_free(address, key=None):
     raise AssertionError("the server never let go of its client")
 
 
-def seated(address):
+def connected_client(address):
     """Return a bare socket that the server takes for its client."""
     for _ in range(200):
         peer = connected(address)
         peer.sendall(HELLO)
-        if read_one(peer).kind == Kind.HELLO:
+        if read_one(peer).kind == MessageKind.HELLO:
             return peer
         peer.close()
         time.sleep(0.02)

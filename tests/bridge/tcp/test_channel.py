@@ -2,20 +2,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.tcp.authentication import direction_keys
 from bridge.tcp.channel import LARGEST_PART, Channel
-from bridge.tcp.seal import direction_keys
-from bridge.tcp.wire import HEADER_BYTES, LARGEST_FRAME, MORE, Frame, Kind, MessageError, pack_frame
+from bridge.tcp.wire import (
+    HEADER_BYTES,
+    LARGEST_FRAME,
+    MORE,
+    Frame,
+    MessageError,
+    MessageKind,
+    pack_frame,
+)
 
 KEYS = direction_keys(bytes(32), b"mine", b"theirs")
 OTHER_KEYS = direction_keys(bytes([1] * 32), b"mine", b"theirs")
 
 
 def ends(keys=KEYS):
-    """Return the channels of a client and a server, sealed with these keys, or plain."""
+    """Return the channels of a client and a server, authenticated by these keys, or plain."""
     client, server = Channel(), Channel()
     if keys is not None:
-        client.seal(keys.to_server, keys.to_client, plain_error_may_come=True)
-        server.seal(keys.to_client, keys.to_server)
+        client.authenticate(keys.to_server, keys.to_client, plain_error_may_come=True)
+        server.authenticate(keys.to_client, keys.to_server)
     return client, server
 
 
@@ -28,20 +36,22 @@ def received(channel, stream):
     return frames
 
 
-@pytest.mark.parametrize("keys", [None, KEYS], ids=["plain", "sealed"])
-@given(st.lists(st.tuples(st.sampled_from(Kind), st.integers(0, 99), st.binary(max_size=99))))
+@pytest.mark.parametrize("keys", [None, KEYS], ids=["plain", "authenticated"])
+@given(
+    st.lists(st.tuples(st.sampled_from(MessageKind), st.integers(0, 99), st.binary(max_size=99)))
+)
 def test_messages_arrive_as_they_were_sent(keys, messages):
     client, server = ends(keys)
     stream = [frame for message in messages for frame in client.pack(*message)]
     assert received(server, stream) == messages
 
 
-@pytest.mark.parametrize("keys", [None, KEYS], ids=["plain", "sealed"])
+@pytest.mark.parametrize("keys", [None, KEYS], ids=["plain", "authenticated"])
 @pytest.mark.parametrize("n", [LARGEST_PART, LARGEST_PART + 1, 3 * LARGEST_PART])
 def test_a_long_message_comes_in_parts_of_a_mebibyte_at_most(keys, n):
     client, server = ends(keys)
     payload = bytes(range(256)) * (n // 256 + 1)
-    stream = list(server.pack(Kind.SNAPSHOT, 3, payload[:n]))
+    stream = list(server.pack(MessageKind.SNAPSHOT, 3, payload[:n]))
     assert max(map(len, stream)) <= HEADER_BYTES + LARGEST_FRAME
     frames = received(client, stream)
     assert [bool(frame.kind & MORE) for frame in frames] == [True] * (len(frames) - 1) + [False]
@@ -51,27 +61,27 @@ def test_a_long_message_comes_in_parts_of_a_mebibyte_at_most(keys, n):
 def test_who_has_another_key_is_not_understood():
     _, server = ends()
     stranger, _ = ends(OTHER_KEYS)
-    with pytest.raises(MessageError, match="seal is wrong"):
-        received(server, stranger.pack(Kind.HELLO, 1))
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        received(server, stranger.pack(MessageKind.HELLO, 1))
 
 
-def test_a_message_without_a_seal_is_not_taken_where_seals_are_due():
+def test_a_message_without_a_tag_is_not_taken_where_tags_are_due():
     for end in ends():
-        with pytest.raises(MessageError, match="seal is wrong"):
-            received(end, [pack_frame(Kind.STEP, 1, bytes(100))])
+        with pytest.raises(MessageError, match="authentication tag is wrong"):
+            received(end, [pack_frame(MessageKind.STEP, 1, bytes(100))])
 
 
 def test_a_message_that_is_sent_back_is_not_taken():
     client, _ = ends()
-    with pytest.raises(MessageError, match="seal is wrong"):
-        received(client, client.pack(Kind.STEP, 1, b"to cut"))
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        received(client, client.pack(MessageKind.STEP, 1, b"to cut"))
 
 
-def test_only_the_first_answer_to_a_client_may_be_an_error_without_a_seal():
-    refusal = pack_frame(Kind.ERROR, 1, b"another key")
+def test_only_the_first_answer_to_a_client_may_be_an_error_without_a_tag():
+    refusal = pack_frame(MessageKind.ERROR, 1, b"another key")
     client, server = ends()
-    assert received(client, [refusal]) == [Frame(Kind.ERROR, 1, b"another key")]
+    assert received(client, [refusal]) == [Frame(MessageKind.ERROR, 1, b"another key")]
     client, server = ends()
-    received(client, server.pack(Kind.HELLO, 1))
-    with pytest.raises(MessageError, match="seal is wrong"):
+    received(client, server.pack(MessageKind.HELLO, 1))
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
         received(client, [refusal])

@@ -15,17 +15,17 @@ from bridge.tcp.address import parse_address
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
 from bridge.tcp.peer import HANDSHAKE_BYTES
-from bridge.tcp.server import MOST_CONNECTIONS, TissueServer
-from bridge.tcp.wire import VERSION, Kind, pack_frame
+from bridge.tcp.server import MAX_CONNECTIONS, TissueServer
+from bridge.tcp.wire import PROTOCOL_VERSION, MessageKind, pack_frame
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import (
     DT,
     HELLO,
     assert_serves,
     connected,
+    connected_client,
     link_once_free,
     read_all,
-    seated,
 )
 from tests.bridge.tcp.serve_block import block_tissue as make_block
 from tissue import BladeContacts, BladeSegment, BladeSweep
@@ -116,12 +116,12 @@ def test_a_failure_of_the_tissue_is_reported_in_its_words(link, upright):
 @pytest.mark.parametrize(
     ("garbage", "answer"),
     [
-        (b"GET / HTTP/1.1\r\n\r\n", "this is not scalpel-sim"),
-        (bytes(100), "this is not scalpel-sim"),
-        (pack_frame(Kind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
-        (HELLO[:4] + b"\x63\x00" + HELLO[6:], "speaks version 99"),
+        (b"GET / HTTP/1.1\r\n\r\n", "is not scalpel-sim"),
+        (bytes(100), "is not scalpel-sim"),
+        (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
+        (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
-        (pack_frame(Kind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
+        (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],
     ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
 )
@@ -129,16 +129,18 @@ def test_garbage_is_answered_by_its_reason_and_costs_the_connection(server, garb
     with connected(server.address) as peer:
         peer.sendall(garbage[:1000])
         (frame,) = read_all(peer)
-    assert frame.kind == Kind.ERROR
+    assert frame.kind == MessageKind.ERROR
     assert answer in unpack_error(frame.payload)
     assert_serves(server)
 
 
-@pytest.mark.parametrize("join", [connected, seated], ids=["before the hello", "as the client"])
+@pytest.mark.parametrize(
+    "join", [connected, connected_client], ids=["before the hello", "as the client"]
+)
 @pytest.mark.parametrize("part", [1, 10, 30])
 def test_half_a_message_costs_the_connection_after_a_while(server, join, part):
     with join(server.address) as peer:
-        peer.sendall(pack_frame(Kind.STEP, 1, pack_step(None, DT))[:part])
+        peer.sendall(pack_frame(MessageKind.STEP, 1, pack_step(None, DT))[:part])
         last = read_all(peer)[-1]
     assert "silent for too long" in unpack_error(last.payload)
     assert_serves(server)
@@ -147,7 +149,7 @@ def test_half_a_message_costs_the_connection_after_a_while(server, join, part):
 def test_a_message_that_trickles_in_does_not_keep_its_place(server):
     with connected(server.address) as peer, contextlib.suppress(OSError):
         started = time.monotonic()
-        for byte in pack_frame(Kind.SNAPSHOT, 0, bytes(1000)):
+        for byte in pack_frame(MessageKind.SNAPSHOT, 0, bytes(1000)):
             peer.sendall(bytes([byte]))
             time.sleep(0.02)
     assert time.monotonic() - started < 5.0
@@ -167,14 +169,14 @@ def test_a_peer_that_vanishes_makes_room(server, sent, how):
 
 def test_connections_that_say_nothing_do_not_keep_a_client_out(server):
     with contextlib.ExitStack() as stack:
-        for _ in range(MOST_CONNECTIONS - 1):
+        for _ in range(MAX_CONNECTIONS - 1):
             stack.enter_context(connected(server.address))
         assert_serves(server)
 
 
 def test_too_many_connections_are_refused(server):
     with contextlib.ExitStack() as stack:
-        for _ in range(MOST_CONNECTIONS):
+        for _ in range(MAX_CONNECTIONS):
             stack.enter_context(connected(server.address))
         with connected(server.address) as one_more:
             (frame,) = read_all(one_more)
@@ -183,18 +185,18 @@ def test_too_many_connections_are_refused(server):
 
 
 def test_a_client_that_never_reads_loses_its_place(server):
-    with seated(server.address) as peer:
+    with connected_client(server.address) as peer:
         peer.settimeout(5.0)
         with pytest.raises((ConnectionError, TimeoutError)):
             for sequence in range(1, 10**6):
-                peer.sendall(pack_frame(Kind.SNAPSHOT, sequence))
+                peer.sendall(pack_frame(MessageKind.SNAPSHOT, sequence))
     assert_serves(server)
 
 
 def test_a_flood_of_requests_is_answered_in_order(server):
     n = 500
-    requests = [pack_frame(Kind.STEP, 1 + i, pack_step(None, DT)) for i in range(n)]
-    with seated(server.address) as peer:
+    requests = [pack_frame(MessageKind.STEP, 1 + i, pack_step(None, DT)) for i in range(n)]
+    with connected_client(server.address) as peer:
         peer.sendall(b"".join(requests))
         peer.shutdown(socket.SHUT_WR)
         assert [frame.sequence for frame in read_all(peer)] == list(range(1, n + 1))
@@ -243,11 +245,11 @@ def test_a_client_that_comes_back_in_the_middle_of_a_cut_finds_a_whole_body(star
 
 
 def test_an_old_request_is_not_done_twice(server):
-    with seated(server.address) as peer:
-        step = pack_frame(Kind.STEP, 1, pack_step(None, DT))
+    with connected_client(server.address) as peer:
+        step = pack_frame(MessageKind.STEP, 1, pack_step(None, DT))
         peer.sendall(step + step)
         peer.shutdown(socket.SHUT_WR)
-        assert [frame.kind for frame in read_all(peer)] == [Kind.STEP, Kind.ERROR]
+        assert [frame.kind for frame in read_all(peer)] == [MessageKind.STEP, MessageKind.ERROR]
     assert_serves(server)
 
 
@@ -279,12 +281,12 @@ def impostor():
 @pytest.mark.parametrize(
     ("answer", "told"),
     [
-        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "this is not scalpel-sim"),
-        (HELLO[:4] + b"\x63\x00" + HELLO[6:], f"speaks version 99 .* this one {VERSION}"),
-        (pack_frame(Kind.HELLO, 0, b"\x00"), "description cannot be read"),
-        (pack_frame(Kind.STEP, 0), "a reply of kind 2"),
-        (pack_frame(Kind.ERROR, 0, pack_error("go away")), "refused: go away"),
-        (HELLO[:10], "the other side has gone"),
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "is not scalpel-sim"),
+        (HELLO[:4] + b"\x63\x00" + HELLO[6:], f"uses version 99 .* this one {PROTOCOL_VERSION}"),
+        (pack_frame(MessageKind.HELLO, 0, b"\x00"), "description cannot be read"),
+        (pack_frame(MessageKind.STEP, 0), "a reply of kind 2"),
+        (pack_frame(MessageKind.ERROR, 0, pack_error("go away")), "refused: go away"),
+        (HELLO[:10], "the other side has closed it"),
     ],
     ids=["http", "other version", "no description", "wrong kind", "refusal", "half a frame"],
 )
@@ -314,7 +316,7 @@ def test_an_unknown_host_gets_one_clear_error():
     "address", ["", "localhost", ":80", "localhost:", "a:b", "a:65536", "a:-1"]
 )
 def test_what_is_no_address_is_refused(address):
-    with pytest.raises(ValueError, match="is no address; wanted HOST:PORT"):
+    with pytest.raises(ValueError, match="is not an address; wanted HOST:PORT"):
         TcpLink(address)
 
 
@@ -366,7 +368,7 @@ def test_a_host_that_others_can_reach_is_refused(host):
 
 @pytest.mark.parametrize("port", [-1, 65536])
 def test_a_port_that_is_none_is_refused(port):
-    with pytest.raises(ValueError, match=f"port {port} is none"):
+    with pytest.raises(ValueError, match=f"port {port} does not exist"):
         TissueServer(make_block, port=port)
 
 

@@ -9,12 +9,12 @@ import pytest
 
 from bridge import LinkError, TcpLink
 from bridge.tcp.address import parse_address
+from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.channel import Channel
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import unpack_error
-from bridge.tcp.seal import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.server import TissueServer
-from bridge.tcp.wire import FrameReader, Kind, pack_frame
+from bridge.tcp.wire import FrameReader, MessageKind, pack_frame
 from tests.bridge.conftest import ServerProcess
 from tests.bridge.tcp.bare_sockets import DT, assert_serves, connected, read_all, read_one
 from tests.bridge.tcp.serve_block import block_tissue
@@ -59,15 +59,16 @@ def test_a_client_with_a_key_does_not_trust_a_server_without_one(start_server):
 def test_a_server_that_cannot_prove_that_it_has_the_key_is_left(listener):
     """It challenges, and then cannot know what to say."""
     address = listener(
-        pack_frame(Kind.CHALLENGE, 0, bytes(NONCE_BYTES)), pack_frame(Kind.HELLO, 1, bytes(300))
+        pack_frame(MessageKind.CHALLENGE, 0, bytes(NONCE_BYTES)),
+        pack_frame(MessageKind.HELLO, 1, bytes(300)),
     )
-    with pytest.raises(LinkError, match="seal is wrong"):
+    with pytest.raises(LinkError, match="authentication tag is wrong"):
         TcpLink(address, key=KEY)
 
 
 def test_a_challenge_of_another_length_is_no_challenge(listener):
     with pytest.raises(LinkError, match="a challenge of 5 bytes; wanted 32"):
-        TcpLink(listener(pack_frame(Kind.CHALLENGE, 0, b"prove")), key=KEY)
+        TcpLink(listener(pack_frame(MessageKind.CHALLENGE, 0, b"prove")), key=KEY)
 
 
 @pytest.fixture
@@ -89,14 +90,14 @@ def listener():
         yield start
 
 
-def seated_with_key(address):
+def client_with_key(address):
     """Return a bare socket that the server takes for its client, and its channel."""
     peer, channel, nonce = connected(address), Channel(), new_nonce()
-    peer.sendall(pack_frame(Kind.HELLO, 0, nonce))
+    peer.sendall(pack_frame(MessageKind.HELLO, 0, nonce))
     keys = direction_keys(KEY, nonce, read_one(peer).payload)
-    channel.seal(keys.to_server, keys.to_client)
-    peer.sendall(b"".join(channel.pack(Kind.HELLO, 1)))
-    assert next_frame(peer, channel).kind == Kind.HELLO
+    channel.authenticate(keys.to_server, keys.to_client)
+    peer.sendall(b"".join(channel.pack(MessageKind.HELLO, 1)))
+    assert next_frame(peer, channel).kind == MessageKind.HELLO
     return peer, channel
 
 
@@ -109,14 +110,16 @@ def next_frame(peer, channel):
 
 
 def test_a_recorded_step_is_not_done_twice(server):
-    peer, channel = seated_with_key(server.address)
+    peer, channel = client_with_key(server.address)
     with peer:
-        step = b"".join(channel.pack(Kind.STEP, 2, pack_step(None, DT)))
+        step = b"".join(channel.pack(MessageKind.STEP, 2, pack_step(None, DT)))
         peer.sendall(step)
-        assert next_frame(peer, channel).kind == Kind.STEP
+        assert next_frame(peer, channel).kind == MessageKind.STEP
         peer.sendall(step)
         refusal = next_frame(peer, channel)
-        assert refusal.kind == Kind.ERROR and "seal is wrong" in unpack_error(refusal.payload)
+        assert refusal.kind == MessageKind.ERROR and "authentication tag is wrong" in unpack_error(
+            refusal.payload
+        )
         assert peer.recv(1) == b""
     assert_serves(server, KEY)
 
@@ -124,38 +127,38 @@ def test_a_recorded_step_is_not_done_twice(server):
 def test_a_recorded_conversation_opens_no_other_one(server):
     nonce = new_nonce()
     with connected(server.address) as peer:
-        peer.sendall(pack_frame(Kind.HELLO, 0, nonce))
+        peer.sendall(pack_frame(MessageKind.HELLO, 0, nonce))
         keys = direction_keys(KEY, nonce, read_one(peer).payload)
         channel = Channel()
-        channel.seal(keys.to_server, keys.to_client)
-        proof = b"".join(channel.pack(Kind.HELLO, 1))
+        channel.authenticate(keys.to_server, keys.to_client)
+        proof = b"".join(channel.pack(MessageKind.HELLO, 1))
     with connected(server.address) as peer:
-        peer.sendall(pack_frame(Kind.HELLO, 0, nonce) + proof)
+        peer.sendall(pack_frame(MessageKind.HELLO, 0, nonce) + proof)
         challenge, refusal = read_all(peer)
-    assert challenge.kind == Kind.CHALLENGE
+    assert challenge.kind == MessageKind.CHALLENGE
     assert "your key is not" in unpack_error(refusal.payload)
     assert_serves(server, KEY)
 
 
-@pytest.mark.parametrize("where", ["magic", "kind", "sequence", "payload", "seal"])
+@pytest.mark.parametrize("where", ["magic", "kind", "sequence", "payload", "tag"])
 def test_a_step_that_somebody_changed_on_its_way_is_not_done(server, where):
-    """Somebody who can compute the checksums anew, but has no key."""
-    peer, channel = seated_with_key(server.address)
+    """Somebody who can compute the checksums again, but has no key."""
+    peer, channel = client_with_key(server.address)
     with peer:
-        (step,) = channel.pack(Kind.STEP, 2, pack_step(None, DT))
+        (step,) = channel.pack(MessageKind.STEP, 2, pack_step(None, DT))
         reader = FrameReader()
         reader.feed(step)
         kind, sequence, payload = reader.take()
         changed = {
             "magic": b"SCUX" + step[4:],
-            "kind": pack_frame(Kind.PIECES, sequence, payload),
+            "kind": pack_frame(MessageKind.PIECES, sequence, payload),
             "sequence": pack_frame(kind, sequence + 1, payload),
             "payload": pack_frame(kind, sequence, pack_step(None, 0.5) + payload[8:]),
-            "seal": pack_frame(kind, sequence, payload[:-1] + bytes([payload[-1] ^ 1])),
+            "tag": pack_frame(kind, sequence, payload[:-1] + bytes([payload[-1] ^ 1])),
         }[where]
         peer.sendall(changed)
         refusal = next_frame(peer, channel)
-        assert refusal.kind == Kind.ERROR
+        assert refusal.kind == MessageKind.ERROR
         assert peer.recv(1) == b""
     assert_serves(server, KEY)
 
@@ -163,13 +166,13 @@ def test_a_step_that_somebody_changed_on_its_way_is_not_done(server, where):
 def test_no_frame_with_a_random_change_is_done(server):
     random = np.random.default_rng(0)
     for _ in range(50):
-        peer, channel = seated_with_key(server.address)
+        peer, channel = client_with_key(server.address)
         with peer:
-            (step,) = channel.pack(Kind.STEP, 2, pack_step(None, DT))
+            (step,) = channel.pack(MessageKind.STEP, 2, pack_step(None, DT))
             changed = bytearray(step)
             changed[random.integers(len(step))] ^= 1 << random.integers(8)
             peer.sendall(bytes(changed))
-            assert next_frame(peer, channel).kind == Kind.ERROR
+            assert next_frame(peer, channel).kind == MessageKind.ERROR
     assert_serves(server, KEY)
 
 

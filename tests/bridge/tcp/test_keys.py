@@ -40,8 +40,8 @@ def test_the_file_comes_before_the_environment_and_neither_is_no_key(file, monke
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("", "0 bytes; wanted 16"),
-        ("ab" * 15, "15 bytes; wanted 16"),
+        ("", "0 bytes; wanted at least 16"),
+        ("ab" * 15, "15 bytes; wanted at least 16"),
         ("correct horse battery staple", "holds no key: wanted hexadecimal"),
         ("ab" * 16 + "c", "holds no key"),
         ("\xff" * 32, "holds no key"),

@@ -12,12 +12,19 @@ import pytest
 
 from bridge.tcp.messages.result import unpack_result
 from bridge.tcp.messages.step import pack_step
-from bridge.tcp.wire import Frame, FrameReader, Kind, pack_frame
+from bridge.tcp.wire import Frame, FrameReader, MessageKind, pack_frame
 from tests.bridge.bits import bits
-from tests.bridge.tcp.bare_sockets import DT, HELLO, assert_serves, connected, read_all, seated
+from tests.bridge.tcp.bare_sockets import (
+    DT,
+    HELLO,
+    assert_serves,
+    connected,
+    connected_client,
+    read_all,
+)
 
 N = int(os.environ.get("SCALPEL_SIM_MUTATIONS", "1000"))
-STEP = pack_frame(Kind.STEP, 1, pack_step(None, DT))
+STEP = pack_frame(MessageKind.STEP, 1, pack_step(None, DT))
 GROWTH_ALLOWED = 4 << 20
 """[byte]. What the allocator of a process that works may keep beyond its first thousand clients; a
 leak of one frame of 200 bytes in each mutation of the long setting would be 200 MB."""
@@ -57,15 +64,15 @@ def resident_bytes(process):
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux for the memory")
 def test_no_mutated_stream_has_an_effect_or_costs_memory(server):
     random = np.random.default_rng(0)
-    with seated(server.address) as peer:
+    with connected_client(server.address) as peer:
         peer.sendall(STEP)
         peer.shutdown(socket.SHUT_WR)
         good = what_it_did(read_all(peer)[-1])
     memory = 0
     for i in range(2 * N):
         for frame in answers(server.address, mutated(HELLO + STEP, random)):
-            assert frame.kind in (Kind.HELLO, Kind.STEP, Kind.ERROR)
-            if frame.kind == Kind.STEP:  # what was changed came after it, or was left out
+            assert frame.kind in (MessageKind.HELLO, MessageKind.STEP, MessageKind.ERROR)
+            if frame.kind == MessageKind.STEP:  # what was changed came after it, or was left out
                 assert what_it_did(frame) == good
         if i == N:
             memory = resident_bytes(server.process)
@@ -75,7 +82,7 @@ def test_no_mutated_stream_has_an_effect_or_costs_memory(server):
 
 def test_a_reader_of_mutated_frames_gives_the_frame_that_was_sent_or_an_error():
     random = np.random.default_rng(1)
-    sent = [Frame(Kind.HELLO, 0, b""), Frame(Kind.STEP, 1, pack_step(None, DT))]
+    sent = [Frame(MessageKind.HELLO, 0, b""), Frame(MessageKind.STEP, 1, pack_step(None, DT))]
     for _ in range(10 * N):
         reader = FrameReader()
         reader.feed(mutated(HELLO + STEP, random))

@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 from bridge.tcp.wire import (
     HEADER_BYTES,
     LARGEST_FRAME,
-    VERSION,
+    PROTOCOL_VERSION,
     FrameReader,
-    Kind,
     MessageError,
+    MessageKind,
     pack_frame,
 )
 
-frames = st.tuples(st.sampled_from(Kind), st.integers(0, 2**32 - 1), st.binary(max_size=200))
+frames = st.tuples(st.sampled_from(MessageKind), st.integers(0, 2**32 - 1), st.binary(max_size=200))
 
 
 def reader_of(data):
@@ -59,13 +59,15 @@ def test_bytes_that_are_not_ours_are_refused_at_once(data):
 
 
 def test_a_payload_over_the_limit_is_refused_before_it_comes():
-    stream = pack_frame(Kind.STEP, 0, bytes(LARGEST_FRAME + 1))
+    stream = pack_frame(MessageKind.STEP, 0, bytes(LARGEST_FRAME + 1))
     with pytest.raises(MessageError, match="1048577 bytes; at most 1048576"):
         reader_of(stream[:HEADER_BYTES]).take()
 
 
 def test_another_version_is_refused_by_its_number():
-    stream = bytearray(pack_frame(Kind.HELLO, 0))
-    struct.pack_into("<H", stream, 4, VERSION + 1)
-    with pytest.raises(MessageError, match=f"version {VERSION + 1} .* this one {VERSION}"):
+    stream = bytearray(pack_frame(MessageKind.HELLO, 0))
+    struct.pack_into("<H", stream, 4, PROTOCOL_VERSION + 1)
+    with pytest.raises(
+        MessageError, match=f"version {PROTOCOL_VERSION + 1} .* this one {PROTOCOL_VERSION}"
+    ):
         reader_of(bytes(stream)).take()

@@ -1,4 +1,4 @@
-"""What docs/wire.md and docs/client.py say is so: the client runs against a real server."""
+"""What docs/wire.md says is so, and docs/examples/client.py runs against a real server."""
 
 import re
 import subprocess
@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from bridge.tcp.address import parse_address
+from bridge.tcp.authentication import Authenticator, direction_keys
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
-from bridge.tcp.seal import Sealer, direction_keys
-from bridge.tcp.server import MOST_CONNECTIONS
-from bridge.tcp.wire import LARGEST_FRAME, MORE, VERSION, Kind
+from bridge.tcp.server import MAX_CONNECTIONS
+from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.tcp.serve_block import block_tissue
 from tissue import BladeContacts, Energies
 
 DOCS = Path(__file__).parents[3] / "docs"
 WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
-CLIENT = DOCS / "client.py"
+CLIENT = DOCS / "examples" / "client.py"
 
 
 def run_client(port):
@@ -52,15 +52,21 @@ def test_the_client_says_what_the_server_refuses(start_server):
 
 def test_every_kind_of_message_is_in_the_table():
     table = dict(re.findall(r"^\| (\d+) \| ([A-Z]+) \|", WIRE, re.MULTILINE))
-    assert {int(kind): name for kind, name in table.items()} == {kind: kind.name for kind in Kind}
+    assert {int(kind): name for kind, name in table.items()} == {
+        kind: kind.name for kind in MessageKind
+    }
 
 
 def test_the_limits_are_those_of_the_server():
-    assert f"Version {VERSION}." in WIRE and f"0x{MORE:x}" in WIRE and f"{LARGEST_FRAME:,}" in WIRE
+    assert (
+        f"Version {PROTOCOL_VERSION}." in WIRE
+        and f"0x{MORE:x}" in WIRE
+        and f"{LARGEST_FRAME:,}" in WIRE
+    )
     assert f"until HELLO is done, {HANDSHAKE_BYTES} bytes" in WIRE
     assert f"complete after {FRAME_SECONDS:g} s, and a reply read after {SEND_SECONDS:g} s" in WIRE
     assert f"HELLO must be done {HANDSHAKE_SECONDS:g} s" in WIRE
-    assert f"At most {MOST_CONNECTIONS} connections" in WIRE
+    assert f"At most {MAX_CONNECTIONS} connections" in WIRE
 
 
 def test_the_numbers_of_a_result_are_where_the_table_says():
@@ -88,10 +94,10 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
             result.work_of_blade,
             result.work_of_cutting,
         ),
-        "where the body touches itself": (result.touch.penetration, result.touch.force),
+        "contacts of the body with itself": (result.touch.penetration, result.touch.force),
         "wall time of collision": result.profile,
         "wrench on the blade": np.concatenate(result.wrench),
-        "the same at the end of the step": np.concatenate(result.wrench_t1),
+        "wrench at the end of the step": np.concatenate(result.wrench_t1),
         "local stiffness": result.stiffness.ravel(),
         "force on the tissue": result.force_on_tissue,
         "lowest and highest corner of the body": result.bounds.ravel(),
@@ -104,15 +110,15 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
         np.testing.assert_array_equal(found[name], numbers, err_msg=name)
 
 
-def test_the_seals_of_the_documentation_are_those_of_the_link():
+def test_the_tags_of_the_documentation_are_those_of_the_link():
     (code,) = re.findall(r"```python\n(.*?)```", WIRE, re.DOTALL)
     told = {}
     exec(compile(code, "wire.md", "exec"), told)
     key, mine, theirs = bytes(range(32)), bytes(32), bytes([7] * 32)
     to_server, to_client = told["direction_keys"](key, mine, theirs)
     assert (to_server, to_client) == direction_keys(key, mine, theirs)
-    sealer = Sealer(to_server)
+    authenticator = Authenticator(to_server)
     for n, payload in enumerate((b"", b"to cut")):
-        kind, sequence = Kind.STEP | MORE, 10 + n
-        seal = told["seal"](to_server, n, kind, sequence, payload)
-        assert sealer.sealed(kind, sequence, payload) == payload + seal
+        kind, sequence = MessageKind.STEP | MORE, 10 + n
+        tag = told["authentication_tag"](to_server, n, kind, sequence, payload)
+        assert authenticator.with_tag(kind, sequence, payload) == payload + tag

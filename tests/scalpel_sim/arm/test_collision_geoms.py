@@ -17,9 +17,11 @@ def parts_of(arm):
 def test_the_parts_are_the_links_and_the_instrument_but_not_the_hand(preset):
     parts = parts_of(Arm(preset, base_position=(0.0, 0.0, 0.1))).parts
     assert {part.name for part in parts if part.is_instrument} == {"stylus", "neck", "blade"}
-    standing = {part.name for part in parts if not part.may_meet_fixtures}
+    standing = {part.name for part in parts if not part.checked_against_fixtures}
     assert {"base", "pedestal"} <= standing <= {"base", "pedestal", "column"}
-    links = {part.name for part in parts if part.may_meet_instrument and not part.is_instrument}
+    links = {
+        part.name for part in parts if part.checked_against_instrument and not part.is_instrument
+    }
     assert {"base", "torso", "upper_arm", "forearm"} <= links
     assert not links & {"wrist", "gimbal", "hand", "table"}
 

@@ -57,9 +57,9 @@ def test_what_arrives_may_be_written_to():
 @pytest.mark.parametrize("index", [4, -1, 2**62])
 def test_a_tetrahedron_or_triangle_that_names_no_node_is_refused(index):
     tetrahedra, triangles = np.array([[0, 1, 2, index]]), np.array([[0, 1, index], [0, 1, 3]])
-    with pytest.raises(MessageError, match="tetrahedra name points"):
+    with pytest.raises(MessageError, match="tetrahedra refer to points"):
         unpack_snapshot(pack_snapshot(TETRAHEDRON._replace(tetrahedra=tetrahedra)))
-    with pytest.raises(MessageError, match="triangles name points"):
+    with pytest.raises(MessageError, match="triangles refer to points"):
         unpack_surface(pack_surface(SKIN._replace(triangles=triangles)))
 
 

@@ -19,13 +19,13 @@ def test_chunks_arrive_bit_for_bit(n):
     "boxes", [CHUNKS.boxes[:, ::-1], CHUNKS.boxes * np.nan, np.full((2, 2, 3), np.inf)]
 )
 def test_boxes_that_are_none_are_refused(boxes):
-    with pytest.raises(MessageError, match="the boxes of chunks are none"):
+    with pytest.raises(MessageError, match="the box of a chunk is not finite or inverted"):
         unpack_chunks(pack_chunks(Chunks(boxes, 0.0)))
 
 
 @pytest.mark.parametrize("fastest", [-1.0, np.nan, np.inf])
 def test_a_speed_that_is_none_is_refused(fastest):
-    with pytest.raises(MessageError, match="chunks that move at"):
+    with pytest.raises(MessageError, match="the fastest node moves at"):
         unpack_chunks(pack_chunks(CHUNKS._replace(fastest=fastest)))
 
 

@@ -65,8 +65,8 @@ def test_a_result_arrives_bit_for_bit_even_where_the_tissue_diverged(result):
     ("change", "why"),
     [
         ({"n_active": 4}, "4 active tetrahedra"),
-        ({"active_point_tetrahedron": 3}, "tip in 3"),
-        ({"active_point_tetrahedron": -2}, "tip in -2"),
+        ({"active_point_tetrahedron": 3}, "tip in number 3"),
+        ({"active_point_tetrahedron": -2}, "tip in number -2"),
         ({"n_tetrahedra": -1}, "-1 elements"),
         ({"n_substeps": -1}, "-1 substeps"),
         ({"touch": BodyContacts(-1, 0.0, 0.0, np.zeros(3))}, "-1 contacts"),
@@ -91,7 +91,7 @@ def test_a_result_with_impossible_counts_is_refused(change, why):
 
 @pytest.mark.parametrize(
     ("place", "value", "why"),
-    [(6, -1, "-1 contacts of the blade"), (6, 2**16 + 1, "65537 contacts"), (7, 2, "2 audits")],
+    [(6, -1, "-1 contacts of the blade"), (6, 2**16 + 1, "65537 contacts"), (7, 2, "audit flag 2")],
 )
 def test_a_result_with_an_impossible_number_of_blade_contacts_is_refused(place, value, why):
     packed = bytearray(pack_result(block_tissue().step(None, 1e-3)))

@@ -24,11 +24,11 @@ def ask(sequence, kind, payload=b""):
 
 
 (x0, y0, z0), (x1, y1, z1) = json.loads(ask(0, HELLO))["bounds"]
-x, y, way, down = (x0 + x1) / 2, y0 - 2e-3, (0.0, 1.0, 0.0), z0 - 5e-3  # upright, in front of it
-pose = (x, y, down, x, y, z1 + 5e-3, *way)
+x, y, bottom, forward = (x0 + x1) / 2, y0 - 2e-3, z0 - 5e-3, (0.0, 1.0, 0.0)  # upright
+pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
 for frame in range(1, 1001):  # 1 ms each, at 60 mm/s along y
     before, y = pose, y + 60e-6
-    pose = (x, y, down, x, y, z1 + 5e-3, *way)
+    pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
     result = ask(frame, STEP, struct.pack("<19d", 1e-3, *before, *pose))
     force, area = struct.unpack_from("<3d", result, 136), struct.unpack_from("<d", result, 72)[0]
     if frame % 100 == 0:

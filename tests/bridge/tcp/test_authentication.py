@@ -1,0 +1,68 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridge.tcp.authentication import TAG_BYTES, Authenticator, direction_keys, new_nonce
+from bridge.tcp.wire import Frame, MessageError, MessageKind
+
+KEY = bytes(range(32))
+
+
+def sent(payload, authenticator=None, kind=MessageKind.STEP, sequence=7):
+    """Return the frame in which a payload travels."""
+    return Frame(
+        kind, sequence, (authenticator or Authenticator(KEY)).with_tag(kind, sequence, payload)
+    )
+
+
+@given(st.lists(st.binary(max_size=100), max_size=5))
+def test_a_stream_of_messages_with_tags_is_verified_in_its_order(payloads):
+    here, there = Authenticator(KEY), Authenticator(KEY)
+    assert [there.verified(sent(payload, here)).payload for payload in payloads] == payloads
+
+
+@given(st.binary(max_size=50), st.data())
+def test_a_message_with_a_changed_byte_is_not_verified(payload, data):
+    frame = sent(payload)
+    changed = bytearray(frame.payload)
+    changed[data.draw(st.integers(0, len(changed) - 1))] ^= data.draw(st.integers(1, 255))
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        Authenticator(KEY).verified(frame._replace(payload=bytes(changed)))
+
+
+@pytest.mark.parametrize(
+    "change", [{"kind": MessageKind.SNAPSHOT}, {"sequence": 8}, {"payload": b""}]
+)
+def test_a_tag_is_worth_nothing_on_another_message(change):
+    with pytest.raises(MessageError, match="authentication tag is wrong"):
+        Authenticator(KEY).verified(sent(b"to cut")._replace(**change))
+
+
+def test_a_message_that_is_repeated_or_left_out_is_noticed():
+    here, there = Authenticator(KEY), Authenticator(KEY)
+    first, second = sent(b"1", here), sent(b"2", here)
+    with pytest.raises(MessageError):
+        there.verified(second)
+    there.verified(first)
+    with pytest.raises(MessageError):
+        there.verified(first)
+    assert there.verified(second).payload == b"2"
+
+
+def test_each_direction_of_each_conversation_has_keys_of_its_own():
+    nonces = [new_nonce() for _ in range(4)]
+    keys = [*direction_keys(KEY, *nonces[:2]), *direction_keys(KEY, *nonces[2:])]
+    keys += direction_keys(bytes(32), *nonces[:2])
+    assert len(set(keys)) == len(keys) == 6
+
+
+def test_a_tag_is_half_a_digest_of_what_the_documentation_says():
+    """RFC 2104 and RFC 4868, computed the long way: two hashes around padded keys."""
+    import hashlib
+    import struct
+
+    inner = bytes(b ^ 0x36 for b in KEY.ljust(64, b"\0"))
+    outer = bytes(b ^ 0x5C for b in KEY.ljust(64, b"\0"))
+    message = struct.pack("<QHI", 0, MessageKind.STEP, 7) + b"to cut"
+    digest = hashlib.sha256(outer + hashlib.sha256(inner + message).digest()).digest()
+    assert sent(b"to cut").payload == b"to cut" + digest[:TAG_BYTES]
