@@ -1,12 +1,14 @@
 """One run, from a simulation at its start to a folder of files, whatever may end it."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 from bridge import LinkError
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.output import run_folder as files
+from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import COMPLETE, Summary, summarise
 from scalpel_sim.simulation import Simulation
@@ -32,6 +34,7 @@ def perform(
     seed: int = 0,
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
+    exports: Sequence[Path] = (),
 ) -> Summary:
     """Do the run, and write its files.
 
@@ -45,6 +48,7 @@ def perform(
         seed: The same.
         seconds: How long [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
+        exports: Files that get the body's surface after the run; see `output.export`.
 
     Raises:
         Interrupted: the user or the system ended the run.
@@ -101,12 +105,16 @@ def perform(
     )
     with unwritten:
         outputs.write_summary(summary)
+    outputs.start_plots(simulation.title)  # by another process, while this one writes the replay
     with unwritten:
         add_to(replay, simulation)
     with unwritten:
         outputs.write_replay(replay)
-    with unwritten:  # last: the plotter may still be loading
-        outputs.write_plots(simulation.title)
+    for path in exports:
+        with unwritten:
+            export_surface(link.surface(), path)
+    with unwritten:
+        outputs.finish_plots()
     outputs.close()
 
     kept = f"{outputs.folder} holds what was done"

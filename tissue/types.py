@@ -4,11 +4,18 @@ SI units. Every vector in this package is in the tissue frame. The suffixes `_t0
 the start and the end of a step.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
+    from trimesh import Trimesh
+
+SKIN_COLOUR = (156, 63, 50, 255)
+CUT_COLOUR = (212, 68, 60, 255)
+"""Red, green, blue and opacity of skin and of cut faces in exported meshes, 0 to 255 (sRGB)."""
 
 
 class BladeSegment(NamedTuple):
@@ -203,6 +210,24 @@ class Surface(NamedTuple):
     """Indices into the vertices, shape (n_triangles, 3), counter-clockwise seen from outside."""
     is_cut: BoolArray
     """Whether the triangle is a face of a cut rather than skin, shape (n_triangles,)."""
+
+    def to_trimesh(self) -> "Trimesh":
+        """Return the surface as a trimesh mesh [m], tissue frame, with all its pieces.
+
+        Each face has a colour, and the face attribute `is_cut`: 1 for a face of a cut, 0 for skin.
+        Vertices are neither merged nor reordered: the sides of a cut that is not open stay apart.
+        The surface is closed. Where a cut ends inside the body, four triangles can share an edge,
+        and trimesh then does not call the mesh watertight.
+        """
+        from trimesh import Trimesh
+
+        return Trimesh(
+            vertices=self.positions,
+            faces=self.triangles,
+            face_colors=np.where(self.is_cut[:, None], CUT_COLOUR, SKIN_COLOUR).astype(np.uint8),
+            face_attributes={"is_cut": self.is_cut.astype(np.uint8)},
+            process=False,
+        )
 
 
 class Chunks(NamedTuple):

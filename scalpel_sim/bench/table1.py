@@ -32,7 +32,7 @@ from scalpel_sim.strokes.cuts import Cut, prepare_cut
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings
-from scalpel_sim.viewer.scene_packets import Stage
+from scalpel_sim.viewer.scene_packets import ScenePackets
 from tissue import block
 
 if TYPE_CHECKING:
@@ -197,7 +197,7 @@ def _into_nothing(simulation: Simulation, spent_on: list[float]) -> Picture:
 
     It adds the time [s] that each takes to `spent_on`.
     """
-    stage = Stage(shapes_of(simulation.arm.model), simulation.frame)
+    stage = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
     stage.opening(simulation.link.surface(), body_poses(simulation.arm.data))
     every = round(1.0 / (UPDATES_PER_SECOND * simulation.dt))
 

@@ -84,7 +84,7 @@ def view(
     """
     with talking(talk), Plotter() as plotter:
         from scalpel_sim.cli.run_setup import ready_run
-        from scalpel_sim.viewer.pictures import into_viewer, show
+        from scalpel_sim.viewer.pictures import into_viewer, show_in
         from scalpel_sim.viewer.viewer import Viewer
 
         with ready_run(scene, body, motion, talk) as ready:
@@ -96,11 +96,11 @@ def view(
                 wireframe=wireframe,
                 port=port,
             ) as viewer:
-                show(viewer, simulation)
+                show_in(viewer, simulation)
                 simulation.pictures.append(into_viewer(viewer))
                 _invite(viewer.url)
                 summary = _perform(ready, motion, talk, plotter, at_most_real_time=True)
-                show(viewer, simulation)
+                show_in(viewer, simulation)
                 report(summary, ready.folder, talk)
                 _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
 
@@ -272,6 +272,7 @@ def _perform(
             seed=motion.seed,
             seconds=seconds,
             every_frame=after_frame,
+            exports=motion.export,
         )
 
 

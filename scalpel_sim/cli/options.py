@@ -121,6 +121,9 @@ class Motion:
     "File with the key of that server; else SCALPEL_SIM_KEY, if that is set. See `scalpel-sim key`."
     out: Path | None = None
     "Folder for the files; out/SCENE if not given."
+    export: Annotated[tuple[Path, ...], Parameter(negative="")] = ()
+    """Write the body's surface after the run to this file too: .glb, .obj (pieces and cut faces by
+    name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
 
 
 @Parameter(name="*")

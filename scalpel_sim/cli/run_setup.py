@@ -13,6 +13,7 @@ from scalpel_sim.arm.scalpel import chosen_blade, expect_faces
 from scalpel_sim.cli.console import say
 from scalpel_sim.cli.options import Body, Motion, Talk
 from scalpel_sim.errors import UsageError
+from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scene_body import check, make_tissue
@@ -61,6 +62,7 @@ def ready_run(
         raise UsageError(
             "--key is for a tissue elsewhere; add --connect HOST:PORT, or leave it away"
         )
+    check_exports(motion.export)
     if motion.connect is None:
         link, scene, settings = _tissue_here(name, body, motion, talk, audits)
     else:

@@ -16,8 +16,8 @@ from scalpel_sim.figures.paint import Thing, paint, texture_of
 from scalpel_sim.figures.table import table_below
 from scalpel_sim.figures.wire import draw_mesh
 from scalpel_sim.viewer import textures
-from scalpel_sim.viewer.draping import drape
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
+from scalpel_sim.viewer.texture_mapping import map_texture
 from tissue import FloatArray
 
 WHITE = (1.0, 1.0, 1.0)
@@ -109,16 +109,13 @@ def _diagonal(moment: Moment) -> float:
 def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
     """Return the textured body on a white table, with the scalpel or without."""
     surface = moment.surface
-    draped = drape(surface, _diagonal(moment) / TILES_PER_BODY)
+    textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY)
     skin, inside = texture_of(textures.skin()), texture_of(textures.cut_face())
-    things = [Thing(draped.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
-    if len(draped.cut.triangles):
+    things = [Thing(textured.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
+    if len(textured.cut.triangles):
         scattered = (0.12, 0.03, 0.03)  # without it a narrow cut looks black
-        things.append(
-            Thing(
-                draped.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0, glow=scattered
-            )
-        )
+        cut = Thing(textured.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0)
+        things.append(cut._replace(glow=scattered))
     for mesh, shape in moment.tool if with_tool else ():
         red, green, blue = _STEEL if shape.is_blade else shape.colour[:3].tolist()
         gloss = 1.2 if shape.is_blade else 0.4

@@ -1,5 +1,6 @@
 """Draws plots in a process of its own, which loads matplotlib while the run goes on."""
 
+import contextlib
 import json
 import os
 import subprocess
@@ -36,22 +37,32 @@ class Plotter:
             env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
         )
 
-    def draw(self, recorded: Path, title: str, forces: Path, energies: Path) -> None:
-        """Draw what is in a `forces.csv`, and end the process.
+    def start(self, recorded: Path, title: str, forces: Path, energies: Path) -> None:
+        """Ask for the plots of a `forces.csv`. They are drawn while this process goes on.
 
         Args:
             recorded: The table.
             title: Heading of the pictures.
             forces: Where the picture of the forces goes.
             energies: Where that of the energies goes, if they are in the table.
+        """
+        self._forces = forces
+        paths = {"recorded": recorded, "forces": forces, "energies": energies}
+        request = json.dumps({"title": title} | {key: str(path) for key, path in paths.items()})
+        stdin = cast(IO[str], self._process.stdin)
+        with contextlib.suppress(BrokenPipeError):  # `finish` says why
+            stdin.write(request + "\n")
+            stdin.flush()
+
+    def finish(self) -> None:
+        """Wait until the plots are drawn, which ends the process.
 
         Raises:
             RunError: a plot could not be drawn or written.
         """
-        paths = {"recorded": recorded, "forces": forces, "energies": energies}
-        request = json.dumps({"title": title} | {key: str(path) for key, path in paths.items()})
+        forces = self._forces
         try:
-            _, complaint = self._process.communicate(request, timeout=SLOWEST)
+            _, complaint = self._process.communicate(timeout=SLOWEST)
         except subprocess.TimeoutExpired:
             self.close()
             raise RunError(f"{forces}: drawing it took more than {SLOWEST:g} s") from None
@@ -79,7 +90,7 @@ def draw_requested_plots() -> None:
     from scalpel_sim.output.force_plot import plot_forces
     from scalpel_sim.output.recording import read_forces
 
-    text = sys.stdin.read()
+    text = sys.stdin.readline()
     if text:
         request = json.loads(text)
         recording = read_forces(Path(request["recorded"]))

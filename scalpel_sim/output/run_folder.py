@@ -72,9 +72,13 @@ class Outputs:
         self._append(text)
         self._n_written = len(recording)
 
-    def write_plots(self, title: str) -> None:
-        """Draw `force.png`, and with an audit `energy.png`, from `forces.csv`."""
-        self._plotter.draw(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
+    def start_plots(self, title: str) -> None:
+        """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
+        self._plotter.start(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
+
+    def finish_plots(self) -> None:
+        """Wait until the plots are drawn."""
+        self._plotter.finish()
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""

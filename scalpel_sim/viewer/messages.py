@@ -1,4 +1,4 @@
-"""What the live viewer and its process say to each other."""
+"""Messages between a run and the process of its live viewer."""
 
 from typing import NamedTuple
 
@@ -10,30 +10,39 @@ from scalpel_sim.viewer.scene3d import Readings
 from tissue import FloatArray, Surface
 
 UPDATES_PER_SECOND = 25.0
-"""Pictures a second of wall time."""
+"""Rate at which the pages are updated, per second of wall time."""
 
 
-class Setting(NamedTuple):
-    """What is said once, before the first picture."""
+class ViewerSettings(NamedTuple):
+    """The first message to the viewer's process: what stays the same during the run."""
 
     title: str
+    """Heading of the page."""
     shapes: list[Shape]
+    """Visible shapes of the MuJoCo model."""
     frame: TissueFrame
+    """Pose of the tissue frame in the world."""
     wireframe: bool
+    """Whether the edges of the tissue's triangles are drawn at the start."""
     port: int | None
-    """Where to listen; None: at the first free port."""
+    """Port of the page; None for the first free port."""
 
 
-class Picture(NamedTuple):
-    """One instant of the run."""
+class SceneState(NamedTuple):
+    """A message for each update: the state of the scene at one instant."""
 
     surface: Surface
+    """Surface of the body, tissue frame."""
     body_poses: FloatArray
+    """Poses of all bodies of the MuJoCo model, see `model_shapes.body_poses`."""
     readings: Readings | None
+    """Numbers to show beside the picture."""
 
 
-class Greeting(msgspec.Struct):
-    """Where the page is, or why there is none."""
+class StartReply(msgspec.Struct):
+    """The reply of the viewer's process when it has started, or when it could not."""
 
     url: str = ""
+    """Address of the page; empty if there is none."""
     error: str = ""
+    """Reason why there is no page."""

@@ -1,4 +1,4 @@
-"""What the 3D views are handed of a running simulation."""
+"""Callbacks that hand a running simulation to the live viewer and to the replay."""
 
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.simulation import Picture, Simulation
@@ -9,7 +9,7 @@ from scalpel_sim.viewer.viewer import Viewer
 
 
 def readings(simulation: Simulation) -> Readings | None:
-    """Return the numbers to show beside the picture of now; None before the first frame."""
+    """Return the numbers to show beside the picture; None before the first frame."""
     wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
     if result is None:
         return None
@@ -30,7 +30,7 @@ def readings(simulation: Simulation) -> Readings | None:
 
 
 def into_replay(replay: ReplayWriter) -> Picture:
-    """Return what keeps a replay up to date."""
+    """Return a callback that adds a simulation to a replay after each frame."""
 
     def picture(simulation: Simulation) -> None:
         if replay.is_due(simulation.time):
@@ -40,7 +40,7 @@ def into_replay(replay: ReplayWriter) -> Picture:
 
 
 def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
-    """Add a simulation as it is now; before its first frame too."""
+    """Add the present state of a simulation to a replay, also before the first frame."""
     replay.add(
         simulation.time,
         simulation.link.surface(),
@@ -50,15 +50,15 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
 
 
 def into_viewer(viewer: Viewer) -> Picture:
-    """Return what keeps a live viewer up to date."""
+    """Return a callback that shows a simulation in a live viewer after each frame."""
 
     def picture(simulation: Simulation) -> None:
         if viewer.is_due():
-            show(viewer, simulation)
+            show_in(viewer, simulation)
 
     return picture
 
 
-def show(viewer: Viewer, simulation: Simulation) -> None:
-    """Show a simulation as it is now; before its first frame too."""
+def show_in(viewer: Viewer, simulation: Simulation) -> None:
+    """Show the present state of a simulation in a live viewer, also before the first frame."""
     viewer.show(simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation))

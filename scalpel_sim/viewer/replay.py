@@ -1,4 +1,4 @@
-"""The replay: one HTML file in which one plays the cut, without a network or this program."""
+"""The replay: one HTML file that plays a run in any browser, without a network."""
 
 import base64
 import gzip
@@ -9,44 +9,43 @@ from typing import NamedTuple
 import mujoco
 
 from bridge import TissueFrame
+from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
 from scalpel_sim.viewer.scene3d import Readings
-from scalpel_sim.viewer.scene_packets import Stage
+from scalpel_sim.viewer.scene_packets import ScenePackets
 from tissue import FloatArray, Surface
 
 FRAMES_PER_SECOND = 25.0
-"""Of simulated time, as long as the file stays small enough. A film has 24."""
+"""Frames kept per second of simulated time, as long as the file stays small enough."""
 
 FILE_LIMIT = 18_000_000
-"""Bytes that the frames may take in the file. Above about 20 MB a page opens slowly, and most
+"""Largest size of the frames in the file [bytes]. Above about 20 MB a page opens slowly, and most
 mail servers refuse it."""
 
 BYTES_PER_TRIANGLE = 55
-"""What a triangle takes in the file: measured 38 to 50 on cut blocks and organs, compressed and
-in base64. Only the number of frames that are kept hangs on it."""
+"""Size of one triangle in the file, compressed and in base64 [bytes]. Measured: 38 to 50 on cut
+blocks and organs. Only the number of frames that are kept depends on it."""
 
 _CAPTION = (
-    "Skin: red-brown, with vessels. Bright red: what the blade has laid open. Arrow: the force "
-    "that the blade feels; blue lines: of each contact, thirty times as long. Drag "
-    "to turn, scroll to zoom."
+    "Red-brown: skin. Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact "
+    "forces, magnified thirty times. Drag to turn the view, scroll to zoom."
 )
 
 
 class _Frame(NamedTuple):
-    """One instant of the run."""
+    """One frame of the replay."""
 
     time: float
-    surface: Surface
-    body_poses: FloatArray
-    readings: Readings | None
+    """Simulated time [s]."""
+    state: SceneState
 
 
 class ReplayWriter:
-    """Keeps pictures of a run and writes them as one page.
+    """Keeps frames of a run and writes them as one page.
 
-    Bodies with many triangles get fewer frames a second, so that the file stays small: when the
-    frames grow too heavy, every second one is dropped, and from then on half as many are taken.
+    Bodies with many triangles get fewer frames per second, so that the file stays small: when the
+    frames take too much space, every second one is dropped, and from then on half as many are kept.
     """
 
     def __init__(
@@ -60,13 +59,15 @@ class ReplayWriter:
         """Prepare a replay.
 
         Args:
-            model: Whose shapes are shown.
+            model: MuJoCo model whose shapes are shown.
             title: Heading of the page.
-            frame: Where the tissue lies in the world; by default at its origin.
-            wireframe: Start with the edges of the tissue's triangles drawn.
+            frame: Pose of the tissue frame in the world; by default they coincide.
+            wireframe: Whether the edges of the tissue's triangles are drawn at the start.
         """
-        self._stage = Stage(shapes_of(model), frame, wireframe=wireframe)
+        self._model = model
         self._title = title
+        self._tissue_frame = frame
+        self._wireframe = wireframe
         self._frames: list[_Frame] = []
         self._interval = 1.0 / FRAMES_PER_SECOND
         self._last: _Frame | None = None
@@ -74,7 +75,7 @@ class ReplayWriter:
     def is_due(self, time: float) -> bool:
         """Return whether a frame at this simulated time [s] would be kept.
 
-        Ask before extracting a surface, which costs far more than this.
+        Call it before extracting a surface, which takes far longer.
         """
         return not self._frames or time >= self._frames[-1].time + 0.999 * self._interval
 
@@ -85,21 +86,21 @@ class ReplayWriter:
         body_poses: FloatArray,
         readings: Readings | None = None,
     ) -> None:
-        """Offer one instant. It is kept if enough time has passed, or if it is the last.
+        """Add a frame, which is kept if enough time has passed, or if no other frame follows.
 
         Args:
             time: Simulated time [s].
-            surface: Of the body, tissue frame. Kept, not copied.
-            body_poses: Of all bodies of the model, see `model_shapes.body_poses`.
+            surface: Surface of the body, tissue frame. Kept, not copied.
+            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
         """
-        frame = _Frame(time, surface, body_poses, readings)
+        frame = _Frame(time, SceneState(surface, body_poses, readings))
         if not self.is_due(time):
             self._last = frame
             return
         self._last = None
         self._frames.append(frame)
-        n_triangles = sum(len(frame.surface.triangles) for frame in self._frames)
+        n_triangles = sum(len(frame.state.surface.triangles) for frame in self._frames)
         if n_triangles * BYTES_PER_TRIANGLE > FILE_LIMIT and len(self._frames) > 2:
             self._frames = self._frames[::2]
             self._interval *= 2.0
@@ -108,7 +109,8 @@ class ReplayWriter:
         """Write the page.
 
         Raises:
-            ValueError: there is nothing to show, because no frame was added.
+            ValueError: no frame was added.
+            RunError: meshcat's viewer was not found.
             OSError: the file cannot be written.
         """
         frames = [*self._frames, *([self._last] if self._last is not None else [])]
@@ -119,15 +121,19 @@ class ReplayWriter:
         )
 
     def _elements(self, frames: list[_Frame]) -> Iterator[str]:
-        """Yield the script elements that hold the run: the opening, then the frames."""
-        opening = self._stage.opening(frames[0].surface, frames[0].body_poses)
+        """Yield the script elements that hold the run: the opening packet, then the frames."""
+        shapes = shapes_of(
+            self._model
+        )  # here and not at the start, which trimesh would delay by 0.3 s
+        packets = ScenePackets(shapes, self._tissue_frame, wireframe=self._wireframe)
+        first = frames[0].state
+        opening = packets.opening(first.surface, first.body_poses)
         yield _script(opening, frames[0].time)
         for frame in frames:
-            packet = self._stage.frame(frame.surface, frame.body_poses, frame.readings)
-            yield _script(packet, frame.time)
+            yield _script(packets.frame(*frame.state), frame.time)
 
 
 def _script(packet: bytes, time: float) -> str:
-    """Return a packet as an element that a browser keeps without looking into it."""
+    """Return a packet as an element that a browser keeps as it is."""
     packed = base64.b64encode(gzip.compress(packet, compresslevel=1, mtime=0)).decode("ascii")
     return f'<script type="text/plain" class="packet" data-time="{time!r}">{packed}</script>'

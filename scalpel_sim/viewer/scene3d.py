@@ -1,13 +1,13 @@
-"""A scene in three dimensions, in meshcat's words: the layer that another viewer would replace.
+"""Commands that change a three-dimensional scene, in the format of meshcat.
 
-Objects live under paths, as in meshcat, and are sent as meshcat's commands (`set_object`,
-`set_transform`). The page that shows them (`page/`) adds what meshcat lacks: textured materials
-that many meshes share, several commands that take effect at once, a camera and lights that suit
-the size of the scene, and readings beside the picture.
+Objects have paths, as in meshcat, and are sent as meshcat's commands (`set_object`,
+`set_transform`). The page that shows them (`page/`) adds commands that meshcat lacks: textured
+materials that many meshes share, several commands that take effect together, a camera and lights
+that suit the size of the scene, and readings beside the picture.
 
-meshcat's viewer and its command format are used, but not its Python package: importing it costs
-0.4 s (IPython among others), and its server listens on all interfaces, keeps every property that
-was ever set, and waits for a reply to each command.
+meshcat's viewer and its command format are used, but not its Python package: importing it takes
+0.4 s (it imports IPython), and its server listens on all interfaces, keeps every property that was
+ever set, and waits for a reply to each command.
 """
 
 import base64
@@ -20,10 +20,10 @@ import numpy as np
 
 from scalpel_sim.output.energy_terms import TERMS
 from scalpel_sim.output.force_parts import ForceParts
-from scalpel_sim.viewer.draping import TriangleMesh
+from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
-# Typed arrays as MessagePack extensions. Source: msgpack-lite, the decoder inside meshcat's viewer.
+# MessagePack extension types of typed arrays. Source: msgpack-lite, the decoder of meshcat.
 _EXTENSION = {"int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 _JAVASCRIPT_ARRAY = {
     "int16": "Int16Array",
@@ -35,58 +35,65 @@ _JAVASCRIPT_ARRAY = {
 INT16_MAX = 32767
 
 
-class Look(NamedTuple):
-    """What a surface looks like: a three.js material, and the pictures on it."""
+class Appearance(NamedTuple):
+    """Appearance of a surface: a three.js material and its textures."""
 
     kind: str
-    """Class of three.js, for instance `MeshPhongMaterial`."""
+    """Name of the three.js class, for instance `MeshPhongMaterial`."""
     properties: Mapping[str, Any]
-    """As three.js names them; colours as 0xRRGGBB in sRGB."""
+    """Properties of the material by their three.js names; colours are 0xRRGGBB in sRGB."""
     maps: Mapping[str, bytes] = {}
-    """PNG pictures by the name of the property that holds them, for instance `map`."""
+    """Textures (PNG) by the name of the property that holds them, for instance `map`."""
 
 
 NO_VECTORS = np.zeros((0, 3))
 
 
 class Readings(NamedTuple):
-    """Numbers that are shown beside the picture, and the force that is shown in it."""
+    """Numbers that are shown beside the picture, and forces that are drawn in it."""
 
     time: float
     """Simulated time [s]."""
     force: FloatArray
-    """What the blade feels [N], world frame, shape (3,)."""
+    """Force of the tissue on the blade [N], world frame, shape (3,)."""
     point: FloatArray
-    """Where it feels it [m], world frame, shape (3,)."""
+    """Point at which the force acts [m], world frame, shape (3,)."""
     cut_area: float
-    """[m2]."""
+    """Area cut since the start [m2]."""
     n_tetrahedra: int
+    """Number of tetrahedra of the body."""
     contact_points: FloatArray = NO_VECTORS
-    """Where the tissue acts on the blade [m], world frame, shape (n_contacts, 3)."""
+    """Points at which the tissue acts on the blade [m], world frame, shape (n_contacts, 3)."""
     contact_forces: FloatArray = NO_VECTORS
-    """What it does there [N], world frame, shape (n_contacts, 3)."""
+    """Force on the blade at each of these points [N], world frame, shape (n_contacts, 3)."""
     parts: ForceParts | None = None
-    """What the force is made of."""
+    """The force in parts: of the edge, of the faces, and of friction."""
     energies: Energies | None = None
-    """Where the work of the blade went; None without an audit."""
+    """Energy balance: where the work of the blade went. None without an audit."""
 
 
 class Scene3D:
-    """Collects what is to change in the picture, until `take` hands it over as one packet."""
+    """Collects changes of the scene, until `take` returns them as one packet."""
 
     def __init__(self) -> None:
         self._commands: list[dict[str, Any]] = []
 
-    def set_look(self, name: str, look: Look) -> None:
-        """Define a look that meshes refer to by name."""
+    def set_appearance(self, name: str, appearance: Appearance) -> None:
+        """Define an appearance that meshes refer to by name."""
         pictures = {
             key: "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-            for key, png in look.maps.items()
+            for key, png in appearance.maps.items()
         }
-        self._add("set_look", name=name, kind=look.kind, properties=look.properties, maps=pictures)
+        self._add(
+            "set_appearance",
+            name=name,
+            kind=appearance.kind,
+            properties=appearance.properties,
+            maps=pictures,
+        )
 
-    def set_mesh(self, path: str, mesh: TriangleMesh, look: str) -> None:
-        """Put a mesh at `path`, in place of the one that is there."""
+    def set_mesh(self, path: str, mesh: TriangleMesh, appearance: str) -> None:
+        """Put a mesh at `path`; it replaces the mesh that is there."""
         attributes = {
             "position": _pack(mesh.positions, "float32"),
             "normal": _pack(mesh.normals * INT16_MAX, "int16", normalized=True),
@@ -104,7 +111,7 @@ class Scene3D:
                 "index": _pack(mesh.triangles.reshape(-1), index_type),
             },
         }
-        plain = {"uuid": f"{path} material", "type": "MeshPhongMaterial", "name": look}
+        plain = {"uuid": f"{path} material", "type": "MeshPhongMaterial", "name": appearance}
         self._add(
             "set_object",
             path=path,
@@ -122,22 +129,28 @@ class Scene3D:
         )
 
     def set_pose(self, path: str, position: FloatArray, rotation: FloatArray) -> None:
-        """Place what is under `path`: position [m], shape (3,), and rotation, shape (3, 3)."""
+        """Set position [m], shape (3,), and rotation, shape (3, 3), of the objects below `path`."""
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         matrix[:3, 3] = position
         self._add("set_transform", path=path, matrix=matrix.T.ravel().tolist())
 
     def set_camera(self, eye: FloatArray, target: FloatArray, extent: float) -> None:
-        """Look from `eye` at `target`, with light for a scene of size `extent` [m]."""
+        """Set camera and lights.
+
+        Args:
+            eye: Position of the camera [m], shape (3,).
+            target: Point that the camera looks at [m], shape (3,).
+            extent: Size of the scene [m], which the lights suit.
+        """
         self._add("set_camera", eye=eye.tolist(), target=target.tolist(), extent=extent)
 
     def set_wireframe(self, is_on: bool) -> None:
-        """Draw the edges of the triangles of the tissue, or do not."""
+        """Switch the wireframe on or off: the edges of the tissue's triangles."""
         self._add("set_wireframe", on=is_on)
 
     def set_readings(self, readings: Readings, newton_length: float) -> None:
-        """Show readings; an arrow at the blade is `newton_length` [m] long for each newton."""
+        """Show readings; the force arrow is `newton_length` [m] long for each newton."""
         self._add(
             "set_readings",
             time=readings.time,
@@ -150,11 +163,11 @@ class Scene3D:
                 np.hstack([readings.contact_points, readings.contact_forces]), "float32"
             ),
             parts=[] if readings.parts is None else [math.hypot(*part) for part in readings.parts],
-            account=_account(readings.energies),
+            energies=_energy_terms(readings.energies),
         )
 
     def take(self) -> bytes:
-        """Return all changes since the last call as one packet, which takes effect at once."""
+        """Return all changes since the last call as one packet; they take effect together."""
         commands, self._commands = self._commands, []
         return msgspec.msgpack.encode({"type": "batch", "commands": commands})
 
@@ -162,8 +175,8 @@ class Scene3D:
         self._commands.append({"type": command, **fields})
 
 
-def _account(energies: Energies | None) -> list[dict[str, Any]]:
-    """Return the terms of an account with their names and colours, in the table's order."""
+def _energy_terms(energies: Energies | None) -> list[dict[str, Any]]:
+    """Return the terms of the energy balance with names and colours, in the order of the table."""
     if energies is None:
         return []
     return [
@@ -173,7 +186,7 @@ def _account(energies: Energies | None) -> list[dict[str, Any]]:
 
 
 def _pack(array: FloatArray | IntArray, kind: str, *, normalized: bool = False) -> dict[str, Any]:
-    """Return an array as an attribute of a three.js geometry; rows are items."""
+    """Return an array as an attribute of a three.js geometry; each row is one item."""
     body = np.ascontiguousarray(array, dtype=kind).tobytes()
     return {
         "itemSize": 1 if array.ndim == 1 else array.shape[1],

@@ -1,4 +1,4 @@
-"""What one sees: the arm, the table, the body with its skin and its cuts, the force."""
+"""Packets of scene commands that show a run: the arm, the table, the tissue and the forces."""
 
 from collections.abc import Iterable
 
@@ -7,41 +7,44 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.viewer import textures
-from scalpel_sim.viewer.draping import TriangleMesh, drape
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import Look, Readings, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Readings, Scene3D
+from scalpel_sim.viewer.texture_mapping import map_texture
+from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Surface
 
 TISSUE = "/tissue"
-"""Everything below this path is in the tissue frame, everything else in the world frame."""
+"""Path of the tissue. Objects below it are in the tissue frame, all others in the world frame."""
 
 TILES_PER_BODY = 2.2
-"""Repeats of the texture along the diagonal of the body, whatever its size."""
+"""Repeats of the texture along the diagonal of the body."""
 
 CAMERA_DISTANCE = 2.4
-"""From the middle of the body, in diagonals of the body: it fills a third of the page's height,
-which leaves room for the stylus."""
+"""Distance of the camera from the body's centre, in diagonals of the body. The body then fills a
+third of the page's height, which leaves room for the stylus."""
 
 CAMERA_ELEVATION = float(np.radians(38.0))
+"""Elevation of the camera above the body's centre [rad]."""
 CAMERA_AZIMUTHS = np.radians([52.0, 128.0, 232.0, 308.0])
-"""From the tissue's x axis, across which strokes cut: so one looks into the cut as it opens, and
-still sees the flat of the blade."""
+"""Possible azimuths of the camera from the tissue's x axis [rad]. Strokes cut across that axis:
+from these directions one looks into the opening cut and still sees the flat of the blade."""
 ARM_AZIMUTH = float(np.radians(80.0))
-"""Where the arm should come in, seen from above, to the left or right of who looks: from the side,
-where it neither hides the cut nor is hidden by the body."""
+"""Best angle between the directions from the body to the camera and to the arm, seen from above
+[rad]: from the side the arm neither hides the cut nor is hidden by the body."""
 
 TABLE_RADIUS = 4.5
-"""Half width of a plane, in diagonals of the body. MuJoCo's planes are infinite whatever their size
-says; this one fades out around the body."""
+"""Half width of a plane, in diagonals of the body. Planes are infinite in MuJoCo, whatever size the
+model gives; the plane that is drawn fades out around the body."""
 
 ARROW_LENGTH = 0.15
-"""Length of the force arrow for each newton, in diagonals of the body."""
+"""Length of the force arrow per newton, in diagonals of the body."""
 
 TARGET_OPACITY = 0.15
-"""Of the marker of the hand's target: a hint of where the hand wants to be."""
+"""Opacity of the marker of the hand's target pose: only a hint."""
 
 MIX, ADD = 1, 2
-"""How a reflection joins the colour below it, as three.js numbers it: metal mixes, varnish adds."""
+"""How a reflection is combined with the colour below it, in the numbers of three.js: metal mixes,
+varnish adds."""
 
 _WET = {
     "color": 0xFFFFFF,
@@ -52,7 +55,7 @@ _WET = {
     "combine": ADD,
 }
 LIGHT_IN_A_CUT = 0x5A1216
-"""What light between the lips of a cut gives back. Without it a narrow cut looks black."""
+"""Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
 
 _STEEL = {
     "color": 0x98A1A8,
@@ -64,8 +67,8 @@ _STEEL = {
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
 
 
-class Stage:
-    """Turns the state of a run into packets for a page: an opening, then one packet a frame."""
+class ScenePackets:
+    """Makes the packets that show a run on a page: an opening packet, then one packet a frame."""
 
     def __init__(
         self,
@@ -74,12 +77,12 @@ class Stage:
         *,
         wireframe: bool = False,
     ) -> None:
-        """Set the stage.
+        """Prepare the packets of one run.
 
         Args:
-            shapes: What the model looks like, from `model_shapes.shapes_of`.
-            frame: Where the tissue lies in the world; by default at its origin.
-            wireframe: Draw the edges of the tissue's triangles from the start.
+            shapes: Visible shapes of the MuJoCo model, from `model_shapes.shapes_of`.
+            frame: Pose of the tissue frame in the world; by default they coincide.
+            wireframe: Whether the edges of the tissue's triangles are drawn at the start.
         """
         self._shapes = list(shapes)
         self._frame = frame or TissueFrame()
@@ -88,17 +91,17 @@ class Stage:
         self._diagonal = 1.0
 
     def opening(self, surface: Surface, body_poses: FloatArray) -> bytes:
-        """Return what is sent once, before the first frame: looks, shapes, camera.
+        """Return the packet that is sent once, before the first frame: appearances, shapes, camera.
 
         Args:
-            surface: The body at the start, which the camera frames.
-            body_poses: Of all bodies of the model, see `model_shapes.body_poses`.
+            surface: Surface of the body at the start, for which the camera is placed.
+            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
         """
         lowest, highest = surface.positions.min(axis=0), surface.positions.max(axis=0)
         centre = self._frame.points_to_world((lowest + highest) / 2.0)
         self._diagonal = float(np.linalg.norm(highest - lowest))
         scene = Scene3D()
-        _set_tissue_looks(scene, self._diagonal)
+        _set_tissue_appearances(scene, self._diagonal)
         for shape in self._shapes:
             self._set_shape(scene, shape, centre, body_poses[shape.body])
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
@@ -109,11 +112,17 @@ class Stage:
     def frame(
         self, surface: Surface, body_poses: FloatArray, readings: Readings | None = None
     ) -> bytes:
-        """Return the packet that shows one instant. Arguments as for `opening`."""
+        """Return the packet that shows one instant.
+
+        Args:
+            surface: Surface of the body, tissue frame.
+            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
+            readings: Numbers to show beside the picture.
+        """
         scene = Scene3D()
-        draped = drape(surface, self._diagonal / TILES_PER_BODY)
-        scene.set_mesh(f"{TISSUE}/skin", draped.skin, "skin")
-        scene.set_mesh(f"{TISSUE}/cut", draped.cut, "cut")
+        textured = map_texture(surface, self._diagonal / TILES_PER_BODY)
+        scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
+        scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
         for body in self._bodies:
             scene.set_pose(f"/bodies/{body}", *_position_and_rotation(body_poses[body]))
         if readings is not None:
@@ -123,33 +132,33 @@ class Stage:
     def _set_shape(
         self, scene: Scene3D, shape: Shape, centre: FloatArray, body_pose: FloatArray
     ) -> None:
-        """Put one shape under its body's path, with a look of its own."""
-        path, look = f"/bodies/{shape.body}/{shape.name}", f"look of {shape.name}"
+        """Put one shape below its body's path, with an appearance of its own."""
+        path, appearance = f"/bodies/{shape.body}/{shape.name}", f"appearance of {shape.name}"
         position, rotation = _position_and_rotation(shape.pose)
         mesh = shape.mesh
         if shape.kind == int(mujoco.mjtGeom.mjGEOM_PLANE):
             body_position, body_rotation = _position_and_rotation(body_pose)
             below = ((centre - body_position) @ body_rotation - position) @ rotation
             mesh = _plane_around(mesh, below, TABLE_RADIUS * self._diagonal)
-        scene.set_look(look, _look_of(shape))
-        scene.set_mesh(path, mesh, look)
+        scene.set_appearance(appearance, _appearance_of(shape))
+        scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
 
     def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
-        """Return where the camera stands: beside the line from the body to the arm, and above."""
+        """Return the camera's position [m]: above, and beside the line from the body to the arm."""
         axis, moving = self._frame.rotation[:, 0], [body for body in self._bodies if body > 0]
         arm = body_poses[moving, :2].mean(axis=0) if moving else centre[:2]
         azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
         level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
         towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
-        misses = np.abs(np.arccos(np.clip(level @ towards_arm, -1.0, 1.0)) - ARM_AZIMUTH)
+        deviations = np.abs(np.arccos(np.clip(level @ towards_arm, -1.0, 1.0)) - ARM_AZIMUTH)
         flat, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
-        direction = np.array([*(flat * level[misses.argmin()]), up])
+        direction = np.array([*(flat * level[deviations.argmin()]), up])
         return centre + CAMERA_DISTANCE * self._diagonal * direction
 
 
-def _set_tissue_looks(scene: Scene3D, diagonal: float) -> None:
-    """Define skin and cut faces. The relief is measured in metres, so it grows with the body."""
+def _set_tissue_appearances(scene: Scene3D, diagonal: float) -> None:
+    """Define the appearances of skin and cut faces, with relief [m] in proportion to the body."""
     relief = {"bumpScale": 0.0025 * diagonal}
     for name, picture, glow in (
         ("skin", textures.skin(), 0x000000),
@@ -157,17 +166,17 @@ def _set_tissue_looks(scene: Scene3D, diagonal: float) -> None:
     ):
         properties = {**_WET, **relief, "emissive": glow}
         maps = {"map": picture, "bumpMap": picture}
-        scene.set_look(name, Look("MeshPhongMaterial", properties, maps))
+        scene.set_appearance(name, Appearance("MeshPhongMaterial", properties, maps))
 
 
-def _look_of(shape: Shape) -> Look:
-    """Return what a shape of the model is made of: steel, table cloth, or paint."""
+def _appearance_of(shape: Shape) -> Appearance:
+    """Return the appearance of a shape of the model: steel, table cloth, or paint."""
     if shape.is_blade:
-        return Look("MeshPhongMaterial", _STEEL)
+        return Appearance("MeshPhongMaterial", _STEEL)
     red, green, blue, opacity = (float(channel) for channel in shape.colour)
     colour = int(np.dot(np.round(255.0 * np.clip([red, green, blue], 0.0, 1.0)), [65536, 256, 1]))
     if shape.kind == int(mujoco.mjtGeom.mjGEOM_PLANE):
-        return Look(
+        return Appearance(
             "MeshLambertMaterial",
             {"color": colour, "transparent": True},
             {"alphaMap": textures.fading_disc()},
@@ -175,7 +184,7 @@ def _look_of(shape: Shape) -> Look:
     if shape.is_target:
         opacity *= TARGET_OPACITY
     see_through = {"opacity": opacity, "transparent": opacity < 1.0}
-    return Look("MeshPhongMaterial", {**_PAINT, **see_through, "color": colour})
+    return Appearance("MeshPhongMaterial", {**_PAINT, **see_through, "color": colour})
 
 
 def _plane_around(mesh: TriangleMesh, centre: FloatArray, radius: float) -> TriangleMesh:

@@ -1,8 +1,8 @@
-"""The process behind the live viewer: takes pictures from a pipe, serves them to browsers.
+"""The process of the live viewer: it reads scene states from a pipe and serves them to browsers.
 
-Started by `viewer.Viewer`, which sends pickles down its standard input: first a `Setting`, then
-`Picture`s without end. It answers with one line on its standard output, a `Greeting` as JSON, and
-ends when its input ends. The pickles never leave the two processes.
+`viewer.Viewer` starts it and sends pickles to its standard input: first a `ViewerSettings`, then
+any number of `SceneState`s. The process replies with one line on its standard output, a
+`StartReply` as JSON, and ends when its input ends. The pickles never leave the two processes.
 """
 
 import asyncio
@@ -17,181 +17,200 @@ import msgspec
 import tornado.web
 import tornado.websocket
 
-from scalpel_sim.viewer.messages import UPDATES_PER_SECOND, Greeting, Picture, Setting
+from scalpel_sim.errors import RunError
+from scalpel_sim.viewer.messages import (
+    UPDATES_PER_SECOND,
+    SceneState,
+    StartReply,
+    ViewerSettings,
+)
 from scalpel_sim.viewer.page import live_page
-from scalpel_sim.viewer.scene_packets import Stage
+from scalpel_sim.viewer.scene_packets import ScenePackets
 
 LOOPBACK = "127.0.0.1"
-"""The only address that is listened at: nobody else on the network is to see or slow the run."""
+"""The only address that is listened on: no other machine can see the run or slow it down."""
 
 OWN_NAMES = r"(127\.0\.0\.1|localhost)"
-"""Names under which a browser may ask. A web site that makes its own name point here gets a 404."""
+"""Host names that a browser may ask for. Another name that resolves to this address gets a 404."""
 
 FIRST_PORT = 7000
-"""Where meshcat begins to look for a free port, too."""
+"""First port that is tried, the same as meshcat's."""
 LAST_PORT = 7099
+"""Last port that is tried."""
 
-FAREWELL = 1.0
-"""How long the last picture may take to reach the pages [s] before the process ends."""
+LAST_STATE_TIMEOUT = 1.0
+"""Time for the pages to draw the last state before the process ends [s]."""
 
 _CAPTION = (
-    "Bright red: what the blade has laid open. Blue: the force of each contact. Drag to turn, "
-    "scroll to zoom."
+    "Bright red: faces of the cut. Blue lines: contact forces. Drag to turn the view, scroll to "
+    "zoom."
 )
 
 
-class Inbox:
-    """The newest picture that came down the pipe. Older ones are forgotten unseen."""
+class NewestState:
+    """The newest scene state that came through the pipe. Older states are dropped."""
 
     def __init__(self) -> None:
-        self.newest: Picture | None = None
+        self.state: SceneState | None = None
         self.has_ended = threading.Event()
 
     def read(self, pipe: Any) -> None:
-        """Take pictures off the pipe until it ends."""
+        """Read scene states from the pipe until it ends."""
         try:
             while True:
-                self.newest = pickle.load(pipe)
-        except (EOFError, pickle.UnpicklingError):  # closed, or torn off in the middle
+                self.state = pickle.load(pipe)
+        except (EOFError, pickle.UnpicklingError):  # closed, or cut off inside a pickle
             self.has_ended.set()
 
 
-class Audience:
-    """The open pages, and the packets that each of them is due.
+class OpenPages:
+    """The open pages, and the packets that are sent to them.
 
-    A page gets a packet only after it has drawn the one before. One that is slow, asleep or stopped
-    in a debugger skips pictures; it never makes anything pile up here.
+    A page gets a packet only after it has drawn the previous one. A page that is slow, asleep or
+    stopped in a debugger skips states, so that no packets wait for it here.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, packets: ScenePackets) -> None:
+        self._packets = packets
         self._opening: bytes | None = None
-        self._packet: bytes | None = None
-        self._seen: Picture | None = None
-        self._pages: set[FrameSocket] = set()
+        self._newest: bytes | None = None
+        self._shown: SceneState | None = None
+        self._pages: set[PageSocket] = set()
 
-    def show(self, picture: Picture | None) -> None:
-        """Send a picture to every page that is ready for it, if it is a new one."""
-        if picture is None or picture is self._seen:
+    def show(self, state: SceneState | None) -> None:
+        """Send a scene state to every page that is ready for it, if the state is a new one."""
+        if state is None or state is self._shown:
             return
         if self._opening is None:
-            self._opening = self._stage.opening(picture.surface, picture.body_poses)
+            self._opening = self._packets.opening(state.surface, state.body_poses)
             for page in self._pages:
                 page.send(self._opening)
-        self._packet = self._stage.frame(picture.surface, picture.body_poses, picture.readings)
-        self._seen = picture
+        self._newest = self._packets.frame(state.surface, state.body_poses, state.readings)
+        self._shown = state
         for page in list(self._pages):
-            self.serve(page)
+            self.send_newest(page)
 
-    def admit(self, page: "FrameSocket") -> None:
-        """Let a page see the run from now on."""
+    def add(self, page: "PageSocket") -> None:
+        """Show the run to a page that was opened."""
         self._pages.add(page)
         if self._opening is not None:
             page.send(self._opening)
-        self.serve(page)
+        self.send_newest(page)
 
-    def serve(self, page: "FrameSocket") -> None:
-        """Send the newest packet to a page that has drawn what it had."""
-        if self._packet is not None and page.n_undrawn == 0 and page.last is not self._packet:
-            page.last = self._packet
-            page.send(self._packet)
+    def remove(self, page: "PageSocket") -> None:
+        """Forget a page that was closed."""
+        self._pages.discard(page)
 
-    async def farewell(self) -> None:
-        """Wait until all pages have drawn the last picture, but not for ever."""
-        for _ in range(round(FAREWELL * UPDATES_PER_SECOND)):
+    def send_newest(self, page: "PageSocket") -> None:
+        """Send the newest packet to a page that has drawn all packets before it."""
+        if self._newest is not None and page.n_undrawn == 0 and page.last is not self._newest:
+            page.last = self._newest
+            page.send(self._newest)
+
+    async def wait_until_drawn(self) -> None:
+        """Wait until all pages have drawn the last state, at most `LAST_STATE_TIMEOUT`."""
+        for _ in range(round(LAST_STATE_TIMEOUT * UPDATES_PER_SECOND)):
             if all(page.n_undrawn == 0 for page in self._pages):
                 return
             await asyncio.sleep(1.0 / UPDATES_PER_SECOND)
 
-    def dismiss(self, page: "FrameSocket") -> None:
-        """Forget a page that was closed."""
-        self._pages.discard(page)
 
-
-class FrameSocket(tornado.websocket.WebSocketHandler):
+class PageSocket(tornado.websocket.WebSocketHandler):
     """The connection to one open page."""
 
-    def initialize(self, audience: Audience) -> None:
-        """Take part in `audience`."""
-        self._audience = audience
+    def initialize(self, open_pages: OpenPages) -> None:
+        """Set the pages that this page is one of; called by tornado."""
+        self._open_pages = open_pages
         self.n_undrawn = 0
         self.last: bytes | None = None
 
     def open(self, *_: str, **__: str) -> None:
-        """A page was opened."""
-        self._audience.admit(self)
+        """Handle a page that was opened."""
+        self._open_pages.add(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """A page has drawn a packet."""
+        """Handle a page's message that it has drawn a packet."""
         self.n_undrawn = max(0, self.n_undrawn - 1)
-        self._audience.serve(self)
+        self._open_pages.send_newest(self)
 
     def on_close(self) -> None:
-        """A page was closed."""
-        self._audience.dismiss(self)
+        """Handle a page that was closed."""
+        self._open_pages.remove(self)
 
     def send(self, packet: bytes) -> None:
-        """Send a packet, and remember that the page owes an answer."""
+        """Send a packet, and count it until the page has drawn it."""
         self.n_undrawn += 1
         try:
             self.write_message(packet, binary=True).add_done_callback(lambda sent: sent.exception())
         except tornado.websocket.WebSocketClosedError:
-            self._audience.dismiss(self)
+            self._open_pages.remove(self)
 
 
-class Page(tornado.web.RequestHandler):
-    """The page itself."""
+class PageRequest(tornado.web.RequestHandler):
+    """A browser's request for the page."""
 
     def initialize(self, document: str) -> None:
-        """Serve `document`."""
+        """Set the document to serve; called by tornado."""
         self._document = document
 
     def get(self) -> None:
-        """Answer a browser that asks for the page."""
+        """Send the page."""
         self.set_header("Cache-Control", "no-store")
         self.write(self._document)
 
 
-async def serve(setting: Setting, inbox: Inbox) -> None:
-    """Serve pictures until the inbox has ended. Prints the greeting first."""
-    audience = Audience(Stage(setting.shapes, setting.frame, wireframe=setting.wireframe))
+async def serve(settings: ViewerSettings, newest: NewestState) -> None:
+    """Serve scene states until the input has ended. Prints the `StartReply` first."""
+    packets = ScenePackets(settings.shapes, settings.frame, wireframe=settings.wireframe)
+    open_pages = OpenPages(packets)
+    reply = _start(settings, open_pages)
+    print(msgspec.json.encode(reply).decode(), flush=True)
+    if reply.error:
+        return
+    while not newest.has_ended.is_set():
+        open_pages.show(newest.state)
+        await asyncio.sleep(1.0 / UPDATES_PER_SECOND)
+    open_pages.show(newest.state)
+    await open_pages.wait_until_drawn()
+
+
+def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
+    """Start to serve the page, and return its address, or why it cannot be served."""
+    try:
+        document = live_page(settings.title, _CAPTION)
+    except RunError as error:
+        return StartReply(error=str(error))
     application = tornado.web.Application()
-    document = live_page(setting.title, _CAPTION)
     application.add_handlers(
         OWN_NAMES,
-        [(r"/", Page, {"document": document}), (r"/frames", FrameSocket, {"audience": audience})],
+        [
+            (r"/", PageRequest, {"document": document}),
+            (r"/frames", PageSocket, {"open_pages": open_pages}),
+        ],
     )
-    greeting = _listen(application, setting.port)
-    print(msgspec.json.encode(greeting).decode(), flush=True)
-    if greeting.error:
-        return
-    while not inbox.has_ended.is_set():
-        audience.show(inbox.newest)
-        await asyncio.sleep(1.0 / UPDATES_PER_SECOND)
-    audience.show(inbox.newest)
-    await audience.farewell()
+    return _listen(application, settings.port)
 
 
-def _listen(application: tornado.web.Application, port: int | None) -> Greeting:
-    """Listen at `port`, or at the first free one, and say where."""
+def _listen(application: tornado.web.Application, port: int | None) -> StartReply:
+    """Listen on `port`, or on the first free port, and return the address."""
     candidates = range(FIRST_PORT, LAST_PORT + 1) if port is None else [port]
     for candidate in candidates:
         try:
             application.listen(candidate, address=LOOPBACK)
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
-                return Greeting(error=f"cannot listen at port {candidate}: {error.strerror}")
+                return StartReply(error=f"cannot listen on port {candidate}: {error.strerror}")
         else:
-            return Greeting(url=f"http://{LOOPBACK}:{candidate}/")
+            return StartReply(url=f"http://{LOOPBACK}:{candidate}/")
     if port is None:
-        return Greeting(error=f"all ports from {FIRST_PORT} to {LAST_PORT} are in use")
-    return Greeting(error=f"port {port} is in use; choose another one, or none to get a free one")
+        return StartReply(error=f"all ports from {FIRST_PORT} to {LAST_PORT} are in use")
+    return StartReply(error=f"port {port} is in use; choose another port, or none for a free one")
 
 
 def serve_page() -> None:
-    """Be the process that `viewer.Viewer` starts."""
+    """Run the process that `viewer.Viewer` starts."""
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
-    setting = pickle.load(sys.stdin.buffer)
-    inbox = Inbox()
-    threading.Thread(target=inbox.read, args=(sys.stdin.buffer,), daemon=True).start()
-    asyncio.run(serve(setting, inbox))
+    settings = pickle.load(sys.stdin.buffer)
+    newest = NewestState()
+    threading.Thread(target=newest.read, args=(sys.stdin.buffer,), daemon=True).start()
+    asyncio.run(serve(settings, newest))

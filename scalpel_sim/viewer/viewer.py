@@ -1,4 +1,4 @@
-"""The live viewer: a web page that follows a run, served by a process of its own."""
+"""The live viewer: a web page that follows a run, served by another process."""
 
 import contextlib
 import os
@@ -15,29 +15,31 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.viewer.messages import UPDATES_PER_SECOND, Greeting, Picture, Setting
+from scalpel_sim.viewer.messages import UPDATES_PER_SECOND, SceneState, StartReply, ViewerSettings
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.scene3d import Readings
 from tissue import FloatArray, Surface
 
 START_TIMEOUT = 30.0
-"""How long the viewer's process may take to say where it is [s]. Usually half a second."""
+"""How long the viewer's process may take to start [s]. It usually takes half a second."""
 
 CLOSE_TIMEOUT = 3.0
-"""How long it may take to end before it is killed [s]."""
+"""How long the viewer's process may take to end before it is killed [s]."""
 
 HIGHEST_PORT = 65535
 
+_PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
+
 
 class Viewer:
-    """Shows a run in any number of browser tabs, and never makes it wait.
+    """Shows a run in any number of browser tabs, and never makes the run wait.
 
-    A picture is handed to a thread, which sends it down a pipe to another process, which draws up
-    what the browsers need. A picture that comes while another is under way replaces the one that
-    waits. Tabs come and go; the process may die: the run is not disturbed.
+    A thread sends scene states through a pipe to another process, which serves them to the
+    browsers. A state that comes while another is being sent replaces the state that waits. Tabs may
+    be opened and closed, and the process may even end early, without disturbing the run.
 
     Attributes:
-        url: Address of the page, on this machine only.
+        url: Address of the page, which only this machine can open.
     """
 
     def __init__(
@@ -52,28 +54,29 @@ class Viewer:
         """Start the viewer's process and learn its address.
 
         Args:
-            model: Whose shapes are shown.
+            model: MuJoCo model whose shapes are shown.
             title: Heading of the page.
-            frame: Where the tissue lies in the world; by default at its origin.
-            wireframe: Start with the edges of the tissue's triangles drawn.
-            port: Where to listen; None for the first free port.
+            frame: Pose of the tissue frame in the world; by default they coincide.
+            wireframe: Whether the edges of the tissue's triangles are drawn at the start.
+            port: Port of the page; None for the first free port.
 
         Raises:
-            UsageError: there is no such port.
+            UsageError: the port does not exist.
             RunError: the port is in use, or the process did not start.
         """
         if port is not None and not 1 <= port <= HIGHEST_PORT:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
-        setting = Setting(title, list(shapes_of(model)), frame or TissueFrame(), wireframe, port)
-        self._process = _start_process()
+        self._process = _start_process()  # it starts while the shapes are made here
+        shapes = list(shapes_of(model))
+        settings = ViewerSettings(title, shapes, frame or TissueFrame(), wireframe, port)
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
-        self._waiting: Setting | Picture | None = setting
+        self._waiting: ViewerSettings | SceneState | None = settings
         self._is_closed = False
         self._last_shown = -float("inf")
-        self._sender = threading.Thread(target=self._send_pictures, name="viewer", daemon=True)
+        self._sender = threading.Thread(target=self._send_states, name="viewer", daemon=True)
         self._sender.start()
-        self.url = self._greeting().url
+        self.url = self._start_reply().url
 
     def __enter__(self) -> "Viewer":
         return self
@@ -88,13 +91,13 @@ class Viewer:
 
     @property
     def is_running(self) -> bool:
-        """Whether the viewer's process lives. A run need not care: `show` is harmless if not."""
+        """Whether the viewer's process runs. If it does not, `show` does nothing."""
         return not self._is_closed and self._process.poll() is None
 
     def is_due(self) -> bool:
-        """Return whether the pages can take a picture: at most `UPDATES_PER_SECOND` of wall time.
+        """Return whether it is time for an update: at most `UPDATES_PER_SECOND` in wall time.
 
-        Ask before extracting a surface, which costs far more than this.
+        Call it before extracting a surface, which takes far longer.
         """
         passed = time.monotonic() - self._last_shown
         return passed >= 1.0 / UPDATES_PER_SECOND and self.is_running
@@ -102,25 +105,25 @@ class Viewer:
     def show(
         self, surface: Surface, body_poses: FloatArray, readings: Readings | None = None
     ) -> None:
-        """Show one instant. Returns at once, whatever the viewer is doing.
+        """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
         Args:
-            surface: Of the body, tissue frame. Kept, not copied.
-            body_poses: Of all bodies of the model, see `model_shapes.body_poses`.
+            surface: Surface of the body, tissue frame. Kept, not copied.
+            body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
         """
         self._last_shown = time.monotonic()
         with self._changed:
-            self._waiting = Picture(surface, body_poses, readings)
+            self._waiting = SceneState(surface, body_poses, readings)
             self._changed.notify()
 
     def close(self) -> None:
-        """End the viewer's process. The pages keep the last picture."""
+        """End the viewer's process. The pages keep showing the last state."""
         with self._changed:
             self._is_closed = True
             self._changed.notify()
         self._sender.join(CLOSE_TIMEOUT)
-        if self._sender.is_alive():  # the process does not read any more
+        if self._sender.is_alive():  # the process has stopped reading
             self._process.kill()
         try:
             self._process.wait(CLOSE_TIMEOUT)
@@ -129,45 +132,45 @@ class Viewer:
             self._process.wait()
         cast(IO[bytes], self._process.stdout).close()
 
-    def _send_pictures(self) -> None:
-        """Send what waits until the viewer is closed or its process gone."""
+    def _send_states(self) -> None:
+        """Send the states that wait, until the viewer is closed or its process has ended."""
         try:
             while True:
                 with self._changed:
                     self._changed.wait_for(lambda: self._waiting is not None or self._is_closed)
-                    picture, self._waiting = self._waiting, None
-                if picture is None:
+                    message, self._waiting = self._waiting, None
+                if message is None:
                     break
-                self._pipe.write(pickle.dumps(picture, protocol=5))
+                self._pipe.write(pickle.dumps(message, protocol=5))
                 self._pipe.flush()
-        except OSError:  # the process is gone
+        except OSError:  # the process has ended
             pass
         finally:
             with contextlib.suppress(OSError):
                 self._pipe.close()
 
-    def _greeting(self) -> Greeting:
-        """Wait for the process to say where it listens."""
+    def _start_reply(self) -> StartReply:
+        """Wait for the first line of the process: the address of its page, or an error."""
         watchdog = threading.Timer(START_TIMEOUT, self._process.kill)
         watchdog.start()
         line = cast(IO[bytes], self._process.stdout).readline()
         watchdog.cancel()
-        greeting = msgspec.json.decode(line, type=Greeting) if line else Greeting()
-        if not greeting.url:
+        reply = msgspec.json.decode(line, type=StartReply) if line else StartReply()
+        if not reply.url:
             self.close()
-            reason = greeting.error or f"its process ended with code {self._process.returncode}"
+            reason = reply.error or f"its process ended with code {self._process.returncode}"
             raise RunError(f"the viewer did not start: {reason}")
-        return greeting
+        return reply
 
 
 def _start_process() -> subprocess.Popen[bytes]:
     """Start the viewer's process.
 
-    A process group of its own keeps it alive through the Ctrl-C that ends the run, so that the
-    pages get the last picture. It ends when the pipe does, however the run came to its end.
+    It is in a process group of its own, so that the Ctrl-C that ends the run does not end it and
+    the pages still get the last state. It ends when the pipe is closed, however the run ended.
     """
     return subprocess.Popen(
-        [sys.executable, "-c", "from scalpel_sim.viewer.server import serve_page; serve_page()"],
+        [sys.executable, "-c", _PROGRAM],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         start_new_session=True,

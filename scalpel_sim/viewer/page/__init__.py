@@ -1,52 +1,74 @@
-"""The web pages: meshcat's viewer, this project's picture around it, and what one can press."""
+"""The web pages of the live viewer and of the replay, built around meshcat's JavaScript viewer."""
 
 import html
 import importlib.util
 from pathlib import Path
 from string import Template
 
+from scalpel_sim.errors import RunError
+
 _HERE = Path(__file__).parent
+_BUNDLE = Path("viewer", "dist", "main.min.js")
+"""Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
+_REQUIREMENT = "meshcat>=0.3.2,<0.4"
+"""Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
 
 def live_page(title: str, caption: str) -> str:
-    """Return a page that follows a run over a web socket."""
-    return _page(title, caption, ("stage.js", "controls.js", "live.js"))
+    """Return a page that follows a run over a web socket.
+
+    Raises:
+        RunError: meshcat's viewer was not found.
+    """
+    return _page(title, caption, ("scene_view.js", "controls.js", "live.js"))
 
 
 def replay_page(title: str, caption: str, packets: str) -> str:
-    """Return a page that plays a run. It needs no network.
+    """Return a page that plays a run and needs no network.
 
     Args:
-        title: What was done.
-        caption: What one sees.
-        packets: The script elements that hold the run.
+        title: Heading of the page.
+        caption: Text below the heading.
+        packets: Script elements that hold the packets of the run.
+
+    Raises:
+        RunError: meshcat's viewer was not found.
     """
     controls = (_HERE / "player.html").read_text("utf-8")
-    return _page(title, caption, ("stage.js", "controls.js", "replay.js"), controls, packets)
+    return _page(title, caption, ("scene_view.js", "controls.js", "replay.js"), controls, packets)
 
 
 def _page(
     title: str, caption: str, scripts: tuple[str, ...], controls: str = "", data: str = ""
 ) -> str:
-    """Return one self-contained document."""
+    """Return one self-contained HTML document."""
     return Template((_HERE / "page.html").read_text("utf-8")).substitute(
         title=html.escape(title),
         caption=html.escape(caption),
         style=(_HERE / "page.css").read_text("utf-8"),
         controls=controls,
-        meshcat=_meshcat_viewer().read_text("utf-8"),
+        meshcat=_meshcat_bundle().read_text("utf-8"),
         data=data,
         scripts="\n".join((_HERE / script).read_text("utf-8") for script in scripts),
     )
 
 
-def _meshcat_viewer() -> Path:
-    """Return meshcat's viewer without importing meshcat, which would import IPython.
+def _meshcat_bundle() -> Path:
+    """Return the path of meshcat's viewer without importing meshcat, which would import IPython.
 
     Raises:
-        ModuleNotFoundError: meshcat is not installed.
+        RunError: meshcat is not installed, or its viewer is not where it was in tested versions.
     """
     spec = importlib.util.find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise ModuleNotFoundError("meshcat is not installed: pip install meshcat", name="meshcat")
-    return Path(spec.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
+    folders = spec.submodule_search_locations if spec is not None else None
+    if not folders:
+        raise RunError(
+            f"meshcat, whose viewer draws the page, is not installed: pip install '{_REQUIREMENT}'"
+        )
+    bundle = Path(folders[0]) / _BUNDLE
+    if not bundle.is_file():
+        raise RunError(
+            f"meshcat's viewer, which draws the page, is not at {bundle}: pip install "
+            f"'{_REQUIREMENT}'"
+        )
+    return bundle

@@ -1,4 +1,4 @@
-// What is on the page beside the picture.
+// The readings and controls of the page.
 "use strict";
 
 const element = (id) => document.getElementById(id);
@@ -9,16 +9,16 @@ function showReadings(readings) {
     element("force").textContent = `${readings.newtons.toFixed(2)} N`;
     element("parts").parentElement.hidden = readings.parts.length === 0;
     element("parts").textContent = `${readings.parts.map((part) => part.toFixed(2)).join(" · ")} N`;
-    showAccount(readings.account);
+    showEnergies(readings.energies);
     element("area").textContent = `${(readings.cut_area * 1e6).toFixed(0)} mm²`;
     element("tetrahedra").textContent = readings.tetrahedra.toLocaleString("en");
 }
 
-// A bar of where the work of the blade went: what was taken, not what was given back.
-function showAccount(account) {
-    const taken = account.filter((term) => term.joules > 0);
-    element("account").hidden = taken.length === 0;
-    element("account").replaceChildren(...taken.map((term) => {
+// A bar that shows where the work of the blade went. Terms that gave energy back are left out.
+function showEnergies(energies) {
+    const taken = energies.filter((term) => term.joules > 0);
+    element("energies").hidden = taken.length === 0;
+    element("energies").replaceChildren(...taken.map((term) => {
         const part = document.createElement("span");
         part.style.flexGrow = term.joules * 1e6;
         part.style.background = term.colour;
@@ -28,27 +28,27 @@ function showAccount(account) {
 }
 
 window.addEventListener("error", (event) => {
-    element("status").textContent = `this browser cannot draw the picture: ${event.message}`;
+    element("status").textContent = `This browser cannot draw the scene: ${event.message}`;
 });
 
-const picture = new Picture(element("meshcat-pane"), showReadings);
-window.viewer = picture.viewer; // as on meshcat's own page
+const sceneView = new SceneView(element("meshcat-pane"), showReadings);
+window.viewer = sceneView.viewer; // the name that meshcat's own page uses
 
 function setWireframe(on) {
     element("wireframe").checked = on;
-    picture.setWireframe(on);
+    sceneView.setWireframe(on);
+}
+
+function setContacts(on) {
+    element("contacts").checked = on;
+    sceneView.setContacts(on);
 }
 
 element("wireframe").addEventListener("change", (event) => setWireframe(event.target.checked));
-function setContacts(on) {
-    element("contacts").checked = on;
-    picture.setContacts(on);
-}
-
 element("contacts").addEventListener("change", (event) => setContacts(event.target.checked));
-element("home").addEventListener("click", () => picture.setCamera(picture.home));
+element("home").addEventListener("click", () => sceneView.setCamera(sceneView.initialView));
 window.addEventListener("keydown", (event) => {
-    if (event.key === "w") setWireframe(!picture.wireframe);
-    if (event.key === "c") setContacts(!picture.showsContacts);
-    if (event.key === "h") picture.setCamera(picture.home);
+    if (event.key === "w") setWireframe(!sceneView.wireframe);
+    if (event.key === "c") setContacts(!sceneView.showsContacts);
+    if (event.key === "h") sceneView.setCamera(sceneView.initialView);
 });

@@ -1,7 +1,7 @@
-// A page that follows a run. It says when it has drawn a packet, so that the server sends the next.
+// A page that follows a run. It tells the server when it has drawn a packet, and then gets the next.
 "use strict";
 
-const RETRY_AFTER = 2000; // [ms]
+const RETRY_AFTER = 2000; // time between attempts to reach the next run [ms]
 
 function follow() {
     const socket = new WebSocket(`ws://${location.host}/frames`);
@@ -9,17 +9,17 @@ function follow() {
     socket.onopen = () => { element("status").textContent = "live"; };
     socket.onmessage = (message) => {
         viewer.handle_command_bytearray(new Uint8Array(message.data));
-        element("wireframe").checked = picture.wireframe;
+        element("wireframe").checked = sceneView.wireframe;
         socket.send("drawn");
     };
     socket.onclose = () => {
-        element("status").textContent = "the run has ended; waiting for the next";
-        setTimeout(awaitNext, RETRY_AFTER);
+        element("status").textContent = "the run has ended; waiting for the next run";
+        setTimeout(waitForNextRun, RETRY_AFTER);
     };
 }
 
-function awaitNext() {
-    fetch("/").then(() => location.reload(), () => setTimeout(awaitNext, RETRY_AFTER));
+function waitForNextRun() {
+    fetch("/").then(() => location.reload(), () => setTimeout(waitForNextRun, RETRY_AFTER));
 }
 
 follow();

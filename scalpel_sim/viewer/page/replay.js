@@ -1,7 +1,7 @@
-// A flip-book: one packet for each instant, played in simulated time, in a loop.
+// Plays the frames of a run in simulated time, again and again.
 "use strict";
 
-const PAUSE_AT_END = 0.8; // [s] before the loop starts again
+const PAUSE_AT_END = 0.8; // pause before the replay starts again [s]
 
 class Player {
     constructor(frames, times) {
@@ -21,8 +21,8 @@ class Player {
         element("speed").addEventListener("change", (event) => { this.speed = Number(event.target.value); });
         window.addEventListener("keydown", (event) => {
             if (event.key === " ") { event.preventDefault(); this.toggle(); }
-            if (event.key === "ArrowRight") this.turn(1);
-            if (event.key === "ArrowLeft") this.turn(-1);
+            if (event.key === "ArrowRight") this.stepFrames(1);
+            if (event.key === "ArrowLeft") this.stepFrames(-1);
         });
         this.seek(0);
     }
@@ -51,25 +51,25 @@ class Player {
         else this.play();
     }
 
-    turn(pages) {
+    stepFrames(n) {
         this.pause();
-        const page = Math.min(Math.max(this.shown + pages, 0), this.frames.length - 1);
-        this.seek(this.times[page] - this.first);
+        const frame = Math.min(Math.max(this.shown + n, 0), this.frames.length - 1);
+        this.seek(this.times[frame] - this.first);
     }
 
     seek(now) {
         this.now = now;
         element("scrubber").value = now;
-        let page = 0;
-        while (page + 1 < this.times.length && this.times[page + 1] - this.first <= now + 1e-9) page += 1;
-        if (page === this.shown) return;
-        this.shown = page;
-        viewer.handle_command(this.frames[page]);
-        chart.mark(page);
+        let frame = 0;
+        while (frame + 1 < this.times.length && this.times[frame + 1] - this.first <= now + 1e-9) frame += 1;
+        if (frame === this.shown) return;
+        this.shown = frame;
+        viewer.handle_command(this.frames[frame]);
+        chart.mark(frame);
     }
 }
 
-// Force over time, with a mark where the replay is.
+// A chart of the force over time, with a mark at the frame that is shown.
 class Chart {
     constructor(frames) {
         this.forces = frames.map((frame) => {
@@ -83,7 +83,7 @@ class Chart {
         element("readings").append(this.canvas);
     }
 
-    mark(page) {
+    mark(frame) {
         const { width, height } = this.canvas;
         const context = this.canvas.getContext("2d");
         const peak = Math.max(...this.forces, 1e-9);
@@ -92,7 +92,7 @@ class Chart {
         context.clearRect(0, 0, width, height);
         context.lineWidth = 3;
         context.lineJoin = "round";
-        for (const [colour, end] of [["#c9b6b2", this.forces.length], ["#a33b30", page + 1]]) {
+        for (const [colour, end] of [["#c9b6b2", this.forces.length], ["#a33b30", frame + 1]]) {
             context.strokeStyle = colour;
             context.beginPath();
             this.forces.slice(0, end).forEach((force, i) => context.lineTo(x(i), y(force)));
@@ -100,11 +100,12 @@ class Chart {
         }
         context.fillStyle = "#a33b30";
         context.beginPath();
-        context.arc(x(page), y(this.forces[page]), 5, 0, 2 * Math.PI);
+        context.arc(x(frame), y(this.forces[frame]), 5, 0, 2 * Math.PI);
         context.fill();
     }
 }
 
+// Decodes a packet with meshcat's decoder, without applying it.
 function decode(bytes) {
     const { handle_command: apply } = viewer;
     let decoded;
@@ -114,7 +115,7 @@ function decode(bytes) {
     return decoded;
 }
 
-// Geometries are made once and kept for the next time round.
+// Makes the geometries of a frame once, so that they are there when the replay starts again.
 function keepGeometries(frame) {
     for (const command of frame.commands) {
         if (command.type !== "set_object") continue;
@@ -136,7 +137,7 @@ let chart, player;
 async function start() {
     const [opening, ...packed] = document.querySelectorAll("script.packet");
     viewer.handle_command(await unpack(opening));
-    setWireframe(picture.wireframe);
+    setWireframe(sceneView.wireframe);
     const frames = [];
     for (const script of packed) {
         frames.push(keepGeometries(await unpack(script)));
@@ -148,4 +149,4 @@ async function start() {
     player.play();
 }
 
-start().catch((error) => { element("status").textContent = `this replay cannot be shown: ${error}`; });
+start().catch((error) => { element("status").textContent = `This replay cannot be shown: ${error}`; });

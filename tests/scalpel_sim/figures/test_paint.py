@@ -7,7 +7,7 @@ from scalpel_sim.figures.camera import Margins, framing
 from scalpel_sim.figures.light import light_on, lights
 from scalpel_sim.figures.paint import Thing, paint
 from scalpel_sim.figures.table import table_below
-from scalpel_sim.viewer.draping import TriangleMesh
+from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 
 UP = np.array([0.0, 0.0, 1.0])
 LAMP = np.array([0.0, 0.0, 1.0])

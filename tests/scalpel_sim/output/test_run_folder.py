@@ -166,7 +166,8 @@ def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):
     image = pytest.importorskip("PIL.Image")
     outputs = Outputs(tmp_path, plotter)
     outputs.write_forces(recorded(50), all_rows=True)
-    outputs.write_plots("block: straight stroke")
+    outputs.start_plots("block: straight stroke")
+    outputs.finish_plots()
     with image.open(tmp_path / PLOT) as picture:
         pixels = np.asarray(picture.convert("RGB"))
     assert pixels.shape[0] > 500 and pixels.shape[1] > 800
@@ -210,7 +211,8 @@ def test_without_an_account_there_is_no_picture_of_it(tmp_path):
     with Plotter() as plotter:
         outputs = Outputs(tmp_path, plotter)
         outputs.write_forces(recording, all_rows=True)
-        outputs.write_plots("block: straight stroke")
+        outputs.start_plots("block: straight stroke")
+        outputs.finish_plots()
     assert (tmp_path / PLOT).exists() and not (tmp_path / ENERGY_PLOT).exists()
 
 

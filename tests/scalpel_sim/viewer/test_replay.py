@@ -1,9 +1,13 @@
 import re
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scalpel_sim.errors import RunError
 from scalpel_sim.output.force_parts import ForceParts
+from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import BYTES_PER_TRIANGLE, ReplayWriter
@@ -73,6 +77,26 @@ def test_a_title_is_text_and_not_markup(tmp_path):
     assert "<h1>&lt;b&gt;$bold&lt;/b&gt;</h1>" in (tmp_path / "replay.html").read_text()
 
 
+def test_without_meshcats_bundle_one_sentence_says_where_it_was_looked_for(tmp_path, monkeypatch):
+    monkeypatch.setattr(page, "_BUNDLE", Path("viewer", "dist", "moved.js"))
+    with pytest.raises(RunError, match=r"^meshcat's viewer.*moved\.js: pip install 'meshcat>=.*'$"):
+        write_cut(tmp_path / "replay.html")
+    assert not (tmp_path / "replay.html").exists()
+
+
+def test_without_meshcat_one_sentence_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(
+        RunError, match=r"^meshcat, .* is not installed: pip install 'meshcat>=.*'$"
+    ):
+        write_cut(tmp_path / "replay.html")
+
+
+def test_the_message_names_the_versions_of_meshcat_that_the_project_requires():
+    project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text("utf-8"))
+    assert page._REQUIREMENT in project["project"]["dependencies"]
+
+
 @pytest.mark.browser
 def test_the_page_plays_the_cut_by_itself_and_asks_nobody_for_anything(tab, tmp_path):
     asked = []
@@ -101,17 +125,17 @@ def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp
     replay.write(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
-    ends = tab.evaluate("[...picture.contacts.geometry.attributes.position.array]")
+    ends = tab.evaluate("[...sceneView.contacts.geometry.attributes.position.array]")
     start, end, _, other = np.reshape(ends, (4, 3))
     assert start == pytest.approx([0.0, 0.0, 0.08])
     assert (end - start)[1] < 0.0 and (other[2] - 0.08) / (end - start)[1] == pytest.approx(-0.2)
     assert tab.text_content("#parts") == "1.00 · 0.00 · 0.20 N"
     right = "(s) => document.querySelector(s).getBoundingClientRect().right"
     assert tab.evaluate(right, "#parts") < tab.evaluate(right, "#readings")
-    bars = tab.evaluate("[...document.querySelectorAll('#account span')].map((s) => s.title)")
+    bars = tab.evaluate("[...document.querySelectorAll('#energies span')].map((s) => s.title)")
     assert bars == ["cutting: toughness x area: 3.00 mJ", "friction on the blade: 1.00 mJ"]
     tab.uncheck("#contacts")
-    assert not tab.evaluate("picture.contacts.visible")
+    assert not tab.evaluate("sceneView.contacts.visible")
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +149,7 @@ def replay_tab(browser, tmp_path_factory):
     tab.evaluate("player.pause(), player.seek(player.length)")
     tab.evaluate("document.querySelectorAll('header, dl').forEach((e) => e.hidden = true)")
     tab.wait_for_function(
-        "picture.looks.get('skin').map.image && picture.looks.get('cut').map.image"
+        "sceneView.appearances.get('skin').map.image && sceneView.appearances.get('cut').map.image"
     )
     yield tab
     tab.close()

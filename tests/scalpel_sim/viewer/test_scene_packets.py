@@ -5,7 +5,7 @@ import pytest
 
 from bridge import TissueFrame
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
-from scalpel_sim.viewer.scene_packets import Stage
+from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.cut_block import cut_block
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 
@@ -21,7 +21,7 @@ def commands(packet: bytes) -> dict[str, dict]:
 
 def opening(surface, frame=FRAME):
     model, data = little_arm()
-    return commands(Stage(shapes_of(model), frame).opening(surface, body_poses(data)))
+    return commands(ScenePackets(shapes_of(model), frame).opening(surface, body_poses(data)))
 
 
 @pytest.mark.parametrize("size", [0.1, 1.0, 30.0])
@@ -45,11 +45,11 @@ def test_the_camera_turns_with_the_tissue():
 
 def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
     model, data = little_arm()
-    stage = Stage(shapes_of(model), FRAME)
-    first = commands(stage.opening(cut_block(0.0), body_poses(data)))
+    packets = ScenePackets(shapes_of(model), FRAME)
+    first = commands(packets.opening(cut_block(0.0), body_poses(data)))
     data.qpos[0] = 0.01
     mujoco.mj_kinematics(model, data)
-    later = commands(stage.frame(cut_block(0.01), body_poses(data), readings(0.1)))
+    later = commands(packets.frame(cut_block(0.01), body_poses(data), readings(0.1)))
     assert first["set_transform /tissue"]["matrix"][12:15] == pytest.approx(FRAME.origin)
     assert "set_transform /tissue" not in later
     handle = model.body("handle").id
@@ -60,16 +60,16 @@ def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
 
 def test_pictures_travel_once_and_geometry_with_every_frame():
     model, data = little_arm()
-    stage = Stage(shapes_of(model), FRAME)
-    first = commands(stage.opening(cut_block(0.0), body_poses(data)))
-    later = commands(stage.frame(cut_block(0.01), body_poses(data)))
-    assert {"set_look skin", "set_look cut"} <= first.keys()
+    packets = ScenePackets(shapes_of(model), FRAME)
+    first = commands(packets.opening(cut_block(0.0), body_poses(data)))
+    later = commands(packets.frame(cut_block(0.01), body_poses(data)))
+    assert {"set_appearance skin", "set_appearance cut"} <= first.keys()
     assert {"set_object /tissue/skin", "set_object /tissue/cut"} <= later.keys()
-    assert not any(key.startswith("set_look") for key in later)
+    assert not any(key.startswith("set_appearance") for key in later)
     assert not any(key.startswith("set_object /bodies") for key in later)
 
 
 def test_a_model_without_shapes_is_no_obstacle():
-    stage = Stage([])
-    camera = commands(stage.opening(cut_block(0.0), np.zeros((1, 7))))["set_camera"]
+    packets = ScenePackets([])
+    camera = commands(packets.opening(cut_block(0.0), np.zeros((1, 7))))["set_camera"]
     assert np.isfinite(camera["eye"]).all()

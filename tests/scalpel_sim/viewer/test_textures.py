@@ -2,14 +2,14 @@ import io
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from scalpel_sim.viewer import textures
 
 
 def decoded(png: bytes) -> np.ndarray:
     """Return red, green and blue as another program reads them, shape (height, width, 3)."""
-    image = pytest.importorskip("PIL.Image").open(io.BytesIO(png))
-    return np.asarray(image.convert("RGB"), dtype=float)
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=float)
 
 
 @pytest.fixture(params=[textures.skin, textures.cut_face], ids=["skin", "cut_face"])
@@ -18,7 +18,7 @@ def picture(request):
 
 
 def test_a_texture_is_a_square_picture_that_other_programs_read(picture):
-    assert picture.shape == (textures.SIZE, textures.SIZE, 3)
+    assert picture.shape == (textures.TEXTURE_PIXELS, textures.TEXTURE_PIXELS, 3)
 
 
 def test_a_texture_repeats_without_a_seam(picture):

@@ -12,6 +12,7 @@ from tornado.websocket import websocket_connect
 
 from scalpel_sim import Viewer
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.viewer import viewer as viewer_module
 from scalpel_sim.viewer.model_shapes import body_poses
 from tests.browser import WINDOW, new_tab, pixels_of
 from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
@@ -96,6 +97,13 @@ def test_without_a_wish_the_next_free_port_is_taken(viewer):
 def test_a_port_that_does_not_exist_is_wrong_use():
     with pytest.raises(UsageError, match="ports go from 1 to 65535"):
         Viewer(little_arm()[0], port=70000)
+
+
+def test_a_page_that_cannot_be_made_is_an_error_that_says_why(monkeypatch):
+    broken = "from scalpel_sim.viewer import page; page._BUNDLE = 'gone.js'; "
+    monkeypatch.setattr(viewer_module, "_PROGRAM", broken + viewer_module._PROGRAM)
+    with pytest.raises(RunError, match=r"did not start: meshcat's viewer.* is not at .*gone\.js"):
+        Viewer(little_arm()[0])
 
 
 def test_a_killed_viewer_does_not_disturb_the_run(viewer):
@@ -185,7 +193,7 @@ def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
         page.goto(viewer.url)
         page.wait_for_function("document.getElementById('time').textContent === '0.02 s'")
     tab.wait_for_function(
-        "picture.looks.get('skin').map.image && picture.looks.get('cut').map.image"
+        "sceneView.appearances.get('skin').map.image && sceneView.appearances.get('cut').map.image"
     )
     n_pixels = WINDOW["width"] * WINDOW["height"]
     assert len(pixels_of(tab, "tissue/skin")) > n_pixels / 30

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.viewer.draping import drape
+from scalpel_sim.viewer.texture_mapping import map_texture
 from tests.scalpel_sim.cut_block import cut_block
 from tissue import Surface, liver_lobe
 from tissue.mesh.faces import boundary_faces
@@ -23,8 +23,8 @@ def corners(points, triangles):
 
 def test_skin_and_cut_faces_together_are_the_surface():
     block = cut_block(0.01)
-    draped = drape(block, TILE)
-    for mesh, chosen in ((draped.skin, ~block.is_cut), (draped.cut, block.is_cut)):
+    textured = map_texture(block, TILE)
+    for mesh, chosen in ((textured.skin, ~block.is_cut), (textured.cut, block.is_cut)):
         ours = corners(mesh.positions, mesh.triangles)
         assert np.array_equal(ours, corners(block.positions, block.triangles[chosen]))
 
@@ -32,13 +32,15 @@ def test_skin_and_cut_faces_together_are_the_surface():
 def test_texture_sticks_to_the_material():
     whole = cut_block(0.01)
     bent = whole._replace(positions=whole.positions + 0.3 * np.sin(80.0 * whole.positions))
-    assert np.array_equal(drape(bent, TILE).skin.uv, drape(whole, TILE).skin.uv)
-    assert np.array_equal(drape(bent, TILE).skin.tints, drape(whole, TILE).skin.tints)
-    assert not np.array_equal(drape(bent, TILE).skin.normals, drape(whole, TILE).skin.normals)
+    assert np.array_equal(map_texture(bent, TILE).skin.uv, map_texture(whole, TILE).skin.uv)
+    assert np.array_equal(map_texture(bent, TILE).skin.tints, map_texture(whole, TILE).skin.tints)
+    assert not np.array_equal(
+        map_texture(bent, TILE).skin.normals, map_texture(whole, TILE).skin.normals
+    )
 
 
 def test_one_tile_of_texture_covers_one_tile_of_a_flat_side():
-    skin = drape(cut_block(0.0), TILE).skin
+    skin = map_texture(cut_block(0.0), TILE).skin
     edges = skin.positions[skin.triangles] - np.roll(skin.positions[skin.triangles], 1, axis=1)
     on_texture = skin.uv[skin.triangles] - np.roll(skin.uv[skin.triangles], 1, axis=1)
     assert np.allclose(
@@ -47,7 +49,7 @@ def test_one_tile_of_texture_covers_one_tile_of_a_flat_side():
 
 
 def test_texture_is_nowhere_stretched_to_more_than_the_square_root_of_three():
-    skin = drape(surface_of(liver_lobe()), TILE).skin
+    skin = map_texture(surface_of(liver_lobe()), TILE).skin
     a, b, c = (skin.positions[skin.triangles[:, i]] for i in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     u, v, w = (skin.uv[skin.triangles[:, i]] * TILE for i in range(3))
@@ -59,13 +61,13 @@ def test_a_block_keeps_its_edges_when_it_is_turned():
     turn, _ = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     block = cut_block(0.0)
-    skin = drape(block._replace(positions=block.positions @ turn.T), TILE).skin
+    skin = map_texture(block._replace(positions=block.positions @ turn.T), TILE).skin
     assert np.allclose(np.sort(np.abs(skin.normals @ turn), axis=1), [0.0, 0.0, 1.0], atol=1e-9)
 
 
 def test_an_organ_is_smooth_across_charts():
     surface = surface_of(liver_lobe())
-    skin = drape(surface, TILE).skin
+    skin = map_texture(surface, TILE).skin
     places, which = np.unique(skin.positions, axis=0, return_inverse=True)
     assert len(places) < len(skin.positions), "there are charts that meet"
     of_first = np.zeros((len(places), 3))
@@ -76,7 +78,7 @@ def test_an_organ_is_smooth_across_charts():
 
 @pytest.mark.parametrize("gap", [0.0, 0.01])
 def test_normals_are_unit_vectors_that_point_out(gap):
-    for mesh in drape(cut_block(gap), TILE):
+    for mesh in map_texture(cut_block(gap), TILE):
         assert np.allclose(np.linalg.norm(mesh.normals, axis=1), 1.0)
         a, b, c = (mesh.positions[mesh.triangles[:, i]] for i in range(3))
         outward = np.cross(b - a, c - a)[:, None, :]
@@ -85,5 +87,5 @@ def test_normals_are_unit_vectors_that_point_out(gap):
 
 def test_a_flat_triangle_has_a_normal_all_the_same():
     block = cut_block(0.0)
-    flat = drape(block._replace(positions=np.zeros_like(block.positions)), TILE).skin
+    flat = map_texture(block._replace(positions=np.zeros_like(block.positions)), TILE).skin
     assert np.isfinite(flat.normals).all()

@@ -1,42 +1,43 @@
-// The picture: meshcat's viewer, with shared textured materials, light for its size, and readings.
+// The view of the scene: meshcat's viewer with shared textured materials, lights that suit the size
+// of the scene, and readings.
 "use strict";
 
 const { THREE } = MeshCat;
 
-// Wet tissue must shine without losing its colour, and a slit must not be black.
+// Wet tissue must shine without losing its colour, and a narrow cut must not be black.
 const LAMP = { colour: 0xfff1e0, intensity: 0.88 };
 const RIM = { colour: 0xbfd4ff, intensity: 0.35 };
 const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
 const EXPOSURE = 1.0;
 
-const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: its filter is what makes shadows soft
+const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: filtering it makes the shadows soft
 const WIRE_COLOUR = 0xffe4d8;
 const ARROW_COLOUR = 0xffb000;
 const CONTACT_COLOUR = 0x12509e;
-const CONTACT_MAGNIFIED = 30; // a cut has some thirty contacts along its edge
-const FORCE_WORTH_AN_ARROW = 0.02; // [N]; below it the arrow would be a speck
+const CONTACT_SCALE = 30; // magnification: about thirty contacts along the edge share the force
+const SMALLEST_ARROW = 0.02; // [N]; the arrow of a smaller force would be too small to see
 
-// A decoded packet keeps its geometries, so that a replay uploads each of them once.
-class Picture {
+// A decoded command keeps its geometry, so that a replay uploads each geometry once.
+class SceneView {
     constructor(pane, onReadings) {
         this.viewer = new MeshCat.Viewer(pane);
         this.onReadings = onReadings;
-        this.looks = new Map();
+        this.appearances = new Map();
         this.wires = new Map();
         this.wireframe = false;
         this.showsContacts = true;
         this.prepare();
-        const ofMeshcat = this.viewer.handle_command.bind(this.viewer);
+        const meshcatHandles = this.viewer.handle_command.bind(this.viewer);
         const own = {
             batch: (command) => command.commands.forEach((c) => this.viewer.handle_command(c)),
-            set_look: (command) => this.setLook(command),
-            set_object: (command) => this.setObject(command) || ofMeshcat(command),
+            set_appearance: (command) => this.setAppearance(command),
+            set_object: (command) => this.setObject(command) || meshcatHandles(command),
             set_camera: (command) => this.setCamera(command),
             set_wireframe: (command) => this.setWireframe(command.on),
             set_readings: (command) => this.setReadings(command),
         };
         this.viewer.handle_command = (command) => {
-            (own[command.type] || ofMeshcat)(command);
+            (own[command.type] || meshcatHandles)(command);
             this.viewer.set_dirty();
         };
     }
@@ -47,7 +48,7 @@ class Picture {
             viewer.set_property(path, "visible", false);
         }
         viewer.hide_background();
-        viewer.renderer.setClearAlpha(0); // the page behind is the backdrop
+        viewer.renderer.setClearAlpha(0); // the page shows through as the background
         viewer.renderer.outputEncoding = THREE.sRGBEncoding;
         viewer.renderer.toneMapping = THREE.ACESFilmicToneMapping;
         viewer.renderer.toneMappingExposure = EXPOSURE;
@@ -66,7 +67,7 @@ class Picture {
         new ResizeObserver(() => viewer.set_3d_pane_size()).observe(viewer.dom_element);
     }
 
-    setLook({ name, kind, properties, maps }) {
+    setAppearance({ name, kind, properties, maps }) {
         const material = new THREE[kind]({ ...properties, side: THREE.DoubleSide });
         for (const colour of [material.color, material.specular, material.emissive]) {
             if (colour) colour.convertSRGBToLinear();
@@ -79,25 +80,24 @@ class Picture {
             if (property === "map") texture.encoding = THREE.sRGBEncoding;
             material[property] = texture;
         }
-        this.looks.set(name, material);
+        this.appearances.set(name, material);
     }
 
-    // Returns whether the object is a mesh with a shared look. Others are meshcat's business.
+    // Returns whether the object is a mesh with a shared appearance. meshcat handles all others.
     setObject(command) {
         const json = command.object;
-        const look = json.materials && this.looks.get(json.materials[0].name);
-        if (!look) return false;
-        const kept = command.geometry !== undefined;
-        if (!kept) command.geometry = geometryOf(json.geometries[0].data);
+        const material = json.materials && this.appearances.get(json.materials[0].name);
+        if (!material) return false;
+        if (command.geometry === undefined) command.geometry = geometryOf(json.geometries[0].data);
         const path = command.path.split("/").filter((part) => part);
         const node = this.viewer.scene_tree.find([...path, "<object>"]);
         if (node.object.isMesh) {
             if (!node.object.geometry.isKept) node.object.geometry.dispose();
             node.object.geometry = command.geometry;
-            node.object.material = look;
+            node.object.material = material;
         } else {
-            const mesh = new THREE.Mesh(command.geometry, look);
-            mesh.castShadow = !look.transparent;
+            const mesh = new THREE.Mesh(command.geometry, material);
+            mesh.castShadow = !material.transparent;
             mesh.receiveShadow = true;
             mesh.name = "<object>";
             node.set_object(mesh);
@@ -127,32 +127,32 @@ class Picture {
         this.viewer.set_dirty();
     }
 
-    // The scene is turned so that its z is up, which is y in three.js; the camera is not.
+    // Up is z in the scene and y in three.js. meshcat turns the scene; the camera is turned here.
     setCamera({ eye, target, extent }) {
-        const up = ([x, y, z]) => new THREE.Vector3(x, z, -y);
+        const turned = ([x, y, z]) => new THREE.Vector3(x, z, -y);
         const { camera, controls } = this.viewer;
-        camera.position.copy(up(eye));
+        camera.position.copy(turned(eye));
         camera.fov = 38;
         camera.near = extent / 100;
         camera.far = extent * 100;
         camera.updateProjectionMatrix();
-        controls.target.copy(up(target));
+        controls.target.copy(turned(target));
         controls.minDistance = extent / 10;
         controls.maxDistance = extent * 20;
         controls.update();
         this.light(new THREE.Vector3(...target), new THREE.Vector3(...eye), extent);
-        this.home = { eye, target, extent };
+        this.initialView = { eye, target, extent };
     }
 
-    // The lamp hangs over the left shoulder of who looks; the rim light comes from behind the body.
+    // The lamp hangs above and to the left of the camera; the rim light comes from behind the body.
     light(target, eye, extent) {
         const view = eye.clone().sub(target).setZ(0).normalize();
         const left = new THREE.Vector3(view.y, -view.x, 0);
         const up = new THREE.Vector3(0, 0, 1);
-        const away = (a, b, c) => target.clone()
+        const offset = (a, b, c) => target.clone()
             .addScaledVector(view, a * extent).addScaledVector(left, b * extent).addScaledVector(up, c * extent);
-        this.lamp.position.copy(away(0.9, 0.9, 3.6));
-        this.rim.position.copy(away(-2.5, -1.5, 1.8));
+        this.lamp.position.copy(offset(0.9, 0.9, 3.6));
+        this.rim.position.copy(offset(-2.5, -1.5, 1.8));
         this.lamp.target.position.copy(target);
         this.rim.target.position.copy(target);
         const camera = this.lamp.shadow.camera;
@@ -168,14 +168,14 @@ class Picture {
     setReadings(readings) {
         const force = new THREE.Vector3(...readings.force);
         const newtons = force.length();
-        this.arrow.visible = newtons > FORCE_WORTH_AN_ARROW;
+        this.arrow.visible = newtons > SMALLEST_ARROW;
         if (this.arrow.visible) {
             const length = newtons * readings.newton_length;
             this.arrow.position.set(...readings.point);
             this.arrow.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), force.normalize());
-            this.arrow.point(length, 0.1 * readings.newton_length / 0.15);
+            this.arrow.setSize(length, 0.1 * readings.newton_length / 0.15);
         }
-        this.contacts.point(readings.contacts.array, CONTACT_MAGNIFIED * readings.newton_length);
+        this.contacts.setForces(readings.contacts.array, CONTACT_SCALE * readings.newton_length);
         this.contacts.visible = this.showsContacts;
         this.onReadings({ ...readings, newtons });
     }
@@ -195,11 +195,11 @@ function geometryOf({ attributes, index }) {
     return geometry;
 }
 
-// An arrow along z from the origin: `point(length, size)` sets its length and that of the scene.
+// An arrow along z from the origin: `setSize(length, size)` sets its length and its thickness.
 function forceArrow() {
     const material = new THREE.MeshLambertMaterial({
         color: ARROW_COLOUR, emissive: ARROW_COLOUR,
-        depthTest: false, transparent: true, // seen through the tissue that the tip is in
+        depthTest: false, transparent: true, // visible through the tissue around the tip
     });
     material.color.convertSRGBToLinear().multiplyScalar(0.45);
     material.emissive.convertSRGBToLinear().multiplyScalar(0.6);
@@ -210,7 +210,7 @@ function forceArrow() {
     arrow.add(shaft, head);
     arrow.visible = false;
     shaft.renderOrder = head.renderOrder = 1;
-    arrow.point = (length, size) => {
+    arrow.setSize = (length, size) => {
         const tip = Math.min(0.45 * size, 0.6 * length);
         shaft.scale.set(0.055 * size, 0.055 * size, length - tip);
         shaft.position.z = (length - tip) / 2;
@@ -220,16 +220,16 @@ function forceArrow() {
     return arrow;
 }
 
-// A line at each contact: `point(contacts, scale)` takes rows of a point and a force.
+// A line at each contact: `setForces(contacts, scale)` takes rows of a point and a force.
 function contactLines() {
     const material = new THREE.LineBasicMaterial({
         color: CONTACT_COLOUR, depthTest: false, transparent: true,
     });
     const lines = new THREE.LineSegments(new THREE.BufferGeometry(), material);
     lines.name = "contacts";
-    lines.frustumCulled = false; // they move, and are few
+    lines.frustumCulled = false; // the bounds of moving lines would have to be computed again
     lines.renderOrder = 1;
-    lines.point = (contacts, scale) => {
+    lines.setForces = (contacts, scale) => {
         const ends = contacts.slice();
         for (let i = 0; i < ends.length; i += 6) {
             for (const axis of [0, 1, 2]) ends[i + 3 + axis] = ends[i + axis] + scale * ends[i + 3 + axis];
@@ -241,8 +241,8 @@ function contactLines() {
     return lines;
 }
 
-// What steel and wet tissue mirror: a grey room with lamps under its ceiling. Painted, not rendered,
-// because a filtered environment takes seconds where there is no graphics card.
+// The surroundings that steel and wet tissue reflect: a grey room with lamps under its ceiling. It is
+// drawn on six canvases, because filtering a rendered room takes seconds without a graphics card.
 function room() {
     const size = 64;
     const paint = (draw) => {

@@ -1,0 +1,230 @@
+"""Export of the body's surface as STL, OBJ, PLY or GLB files, for use in other programs.
+
+All files are in metres. STL, OBJ and PLY are in the tissue frame, whose z axis points up. GLB is
+turned so that y points up, as the format demands.
+
+- STL: one mesh, all pieces together.
+- PLY: one mesh; each face has a colour, and the properties `is_cut` and `piece`.
+- OBJ: an object for each piece, its faces in the groups `skin` and `cut`.
+- GLB: a node for each piece, with a mesh of its skin and a mesh of its cut faces.
+
+Pieces are numbered from 1, the largest at rest first, as in `summary.json`.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.run_folder import check_file
+from tissue import BoolArray, FloatArray, IntArray, Surface
+
+if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
+    from trimesh import Scene, Trimesh
+
+_GAMMA = 2.2
+"""Exponent between sRGB, in which colours are given, and the linear light that GLB wants."""
+
+_Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
+"""Transform from z up to y up, the axis that GLB prescribes."""
+
+
+class SurfacePiece(NamedTuple):
+    """The closed surface of one connected piece of the body."""
+
+    name: str
+    """`piece_1` for the largest at rest, and so on."""
+    surface: Surface
+    """Surface of this piece alone, with vertices of its own."""
+
+
+def export_surface(surface: Surface, path: Path) -> None:
+    """Write a body's surface in the format that the file name's ending asks for.
+
+    Raises:
+        UsageError: the ending is none of `ENDINGS`.
+        RunError: the file cannot be written.
+    """
+    write = _WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise _unknown_ending(path)
+    try:
+        path.write_bytes(write(surface))
+    except OSError as error:
+        raise RunError(
+            f"{path}: cannot be written ({error.strerror or error}); choose another --export"
+        ) from error
+
+
+def check_exports(paths: Iterable[Path]) -> None:
+    """Make sure before a run that its surface can be exported to these files.
+
+    Raises:
+        UsageError: an ending is none of `ENDINGS`, or there is no such folder.
+        RunError: the system refuses to write there.
+    """
+    for path in paths:
+        ending = path.suffix.lower()
+        if ending not in _WRITERS:
+            raise _unknown_ending(path)
+        check_file(path, ending, "--export")
+
+
+def surface_pieces(surface: Surface) -> list[SurfacePiece]:
+    """Return the closed surface of each connected piece of the body, the largest at rest first."""
+    piece = piece_of_vertices(surface)
+    of_triangle = piece[surface.triangles[:, 0]]
+    found = []
+    for number in range(int(piece.max()) + 1):
+        vertices, triangles = np.flatnonzero(piece == number), of_triangle == number
+        place = np.empty(len(piece), dtype=np.int64)
+        place[vertices] = np.arange(len(vertices))
+        own = Surface(
+            surface.positions[vertices],
+            surface.rest_positions[vertices],
+            place[surface.triangles[triangles]],
+            surface.is_cut[triangles],
+        )
+        found.append(SurfacePiece(f"piece_{number + 1}", own))
+    return found
+
+
+def piece_of_vertices(surface: Surface) -> IntArray:
+    """Return the number of the piece of each vertex, from 0, the largest at rest first.
+
+    Triangles that hang together through vertices are one closed shell, and pieces share no vertex.
+    A shell that encloses a negative volume is a cavity: it belongs to the piece around it.
+    """
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import connected_components
+
+    a, b, c = surface.triangles.T
+    n = len(surface.positions)
+    edges = np.concatenate([a, b]), np.concatenate([b, c])
+    n_shells, shell = connected_components(csr_array((np.ones(2 * len(a)), edges), shape=(n, n)))
+    corners = surface.rest_positions[surface.triangles]
+    volumes = np.bincount(shell[a], np.linalg.det(corners) / 6.0, n_shells)
+    outer = np.flatnonzero(volumes > 0.0)
+    outer = outer[np.argsort(-volumes[outer], kind="stable")]
+    piece = np.empty(n_shells, dtype=np.int64)
+    piece[outer] = np.arange(len(outer))
+    for cavity in np.flatnonzero(volumes <= 0.0):
+        point = surface.rest_positions[shell == cavity][0]
+        around = [_winding_number(point, corners[shell[a] == each]) for each in outer]
+        piece[cavity] = int(np.argmax(around))
+    found: IntArray = piece[shell]
+    return found
+
+
+def _winding_number(point: FloatArray, corners: FloatArray) -> float:
+    """Return how often closed triangles, shape (n, 3, 3), surround a point: 1 inside, 0 outside.
+
+    Source: A. Van Oosterom, J. Strackee, "The solid angle of a plane triangle", 1983.
+    """
+    a, b, c = np.moveaxis(corners - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    ab, bc, ca = (np.einsum("ij,ij->i", *pair) for pair in ((a, b), (b, c), (c, a)))
+    angle = np.arctan2(
+        np.linalg.det(np.stack([a, b, c], 1)), la * lb * lc + ab * lc + bc * la + ca * lb
+    )
+    return float(angle.sum() / (2.0 * np.pi))
+
+
+def _stl(surface: Surface) -> bytes:
+    """Return the surface as binary STL: triangles, and nothing else."""
+    return _exported(surface.to_trimesh(), "stl")
+
+
+def _ply(surface: Surface) -> bytes:
+    """Return the surface as binary PLY with a colour, `is_cut` and `piece` for each face."""
+    mesh = surface.to_trimesh()
+    piece = piece_of_vertices(surface)[surface.triangles[:, 0]] + 1
+    mesh.face_attributes["piece"] = piece.astype(np.int32)
+    return _exported(mesh, "ply")
+
+
+def _obj(surface: Surface) -> bytes:
+    """Return the surface as OBJ text.
+
+    Written here, because trimesh has no groups: skin and cut faces would not share their vertices.
+    """
+    lines: list[str] = []
+    n_before = 1
+    for name, piece in surface_pieces(surface):
+        lines.append(f"o {name}")
+        lines += (f"v {x!r} {y!r} {z!r}" for x, y, z in piece.positions.tolist())
+        for part, chosen in _parts(piece):
+            lines.append(f"g {name}_{part}")
+            lines += (f"f {a} {b} {c}" for a, b, c in (piece.triangles[chosen] + n_before).tolist())
+        n_before += len(piece.positions)
+    return ("\n".join(lines) + "\n").encode("ascii")
+
+
+def _glb(surface: Surface) -> bytes:
+    """Return the surface as GLB: a node for each piece, above its skin and its cut faces."""
+    from trimesh import Scene
+
+    scene = Scene(base_frame="world")
+    graph: Any = scene.graph
+    graph.update("body", "world", matrix=_Y_UP)
+    for name, piece in surface_pieces(surface):
+        graph.update(name, "body")
+        for part, chosen in _parts(piece):
+            scene.add_geometry(
+                _part_mesh(piece, chosen),
+                node_name=f"{name}_{part}",
+                geom_name=f"{name}_{part}",
+                parent_node_name=name,
+            )
+    return _exported(scene, "glb")
+
+
+def _parts(piece: Surface) -> Iterator[tuple[str, BoolArray]]:
+    """Yield the name and the triangles of the parts that a piece has: skin, and cut faces."""
+    for part, chosen in (("skin", ~piece.is_cut), ("cut", piece.is_cut)):
+        if chosen.any():
+            yield part, chosen
+
+
+def _part_mesh(piece: Surface, chosen: BoolArray) -> "Trimesh":
+    """Return some triangles of a piece, all of one colour, as a mesh with a material."""
+    from trimesh.visual import material, texture
+
+    part = piece._replace(triangles=piece.triangles[chosen], is_cut=piece.is_cut[chosen])
+    mesh = part.to_trimesh()
+    mesh.remove_unreferenced_vertices()
+    visual: Any = mesh.visual
+    colour = visual.face_colors[0] / 255.0
+    colour[:3] **= _GAMMA
+    pbr: Any = material.PBRMaterial
+    visuals: Any = texture.TextureVisuals
+    mesh.visual = visuals(
+        material=pbr(baseColorFactor=colour, roughnessFactor=0.5, metallicFactor=0.0)
+    )
+    return mesh
+
+
+def _exported(mesh: "Trimesh | Scene", kind: str) -> bytes:
+    """Return a file's bytes in one of trimesh's formats."""
+    exported = mesh.export(file_type=kind)
+    assert isinstance(exported, bytes)
+    return exported
+
+
+def _unknown_ending(path: Path) -> UsageError:
+    """Return the error for a file name whose ending is no format."""
+    *others, last = ENDINGS
+    return UsageError(f"--export is {path}; its name must end in {', '.join(others)} or {last}")
+
+
+_WRITERS: dict[str, Callable[[Surface], bytes]] = {
+    ".stl": _stl,
+    ".obj": _obj,
+    ".ply": _ply,
+    ".glb": _glb,
+}
+
+ENDINGS = tuple(_WRITERS)
+"""Endings of the file names that can be exported."""

@@ -1,0 +1,229 @@
+"""Exported surfaces, read again by trimesh: closed, of the right volume, outward, by piece."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+import trimesh
+
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.errors import UsageError
+from scalpel_sim.output.export import ENDINGS, export_surface, surface_pieces
+from tests import strokes
+from tissue import Material, Surface, TetrahedralMesh, Tissue, block, liver_lobe
+from tissue.mesh.pieces import piece_of_tetrahedra
+
+BLOCK = block((4, 2, 2), (0.04, 0.02, 0.02))
+
+FULL, SINGLE = 1e-9, 1e-5
+"""Relative error of volumes in formats with full and with single precision."""
+
+PRECISION = {".obj": FULL, ".stl": SINGLE, ".ply": SINGLE, ".glb": SINGLE}
+
+
+class Body(NamedTuple):
+    surface: Surface
+    volumes: np.ndarray
+    """Sum of the volumes of the tetrahedra of each piece [m3]."""
+
+
+def cut_block() -> Tissue:
+    """Return a block that is held at one end and cut across; the free end hangs and moves."""
+    tissue = Tissue(
+        BLOCK,
+        Material(toughness=0.5, friction=0.0),
+        fixed=BLOCK.positions[:, 0] <= 0.02,
+        gravity=(9.81, 0.0, 0.0),
+    )
+    strokes.make(tissue, strokes.straight(BLOCK, 0.75))
+    for _ in range(20):
+        tissue.step(None, 1e-3)
+    return tissue
+
+
+def half_cut_block() -> Tissue:
+    """Return a block with a cut that ends in the middle."""
+    tissue = Tissue(BLOCK, fixed=BLOCK.positions[:, 0] <= 0.005)
+    places = np.linspace(-0.005, 0.0113, 20)
+    edges = [([0.021, y, -0.005], [0.023, y, 0.025]) for y in places]
+    tissue.incise([(np.array(tip), np.array(heel)) for tip, heel in edges], [0.0, 1.0, 0.0])
+    return tissue
+
+
+TISSUES = {
+    "block": lambda: Tissue(BLOCK),
+    "liver lobe": lambda: Tissue(liver_lobe()),
+    "half cut block": half_cut_block,
+    "two pieces": cut_block,
+}
+
+
+@pytest.fixture(scope="module", params=TISSUES.values(), ids=TISSUES)
+def body(request) -> Body:
+    return body_of(request.param())
+
+
+def body_of(tissue: Tissue) -> Body:
+    snapshot = tissue.snapshot()
+    corners = snapshot.positions[snapshot.tetrahedra]
+    volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
+    return Body(tissue.surface(), np.bincount(piece_of_tetrahedra(snapshot), volumes))
+
+
+def exported(body: Body, folder: Path, ending: str) -> trimesh.Trimesh:
+    """Write a body and read it again, as one mesh whose parts share their vertices."""
+    path = folder / f"body{ending}"
+    export_surface(body.surface, path)
+    read = trimesh.load(path)
+    if isinstance(read, trimesh.Scene):
+        read = read.to_geometry()
+        read.merge_vertices(merge_tex=True, merge_norm=True)
+    return read
+
+
+def assert_is_closed(mesh: trimesh.Trimesh) -> None:
+    """Assert that each edge is passed as often in one direction as in the other."""
+    n = len(mesh.vertices)
+    there, back = mesh.edges @ [n, 1], mesh.edges @ [1, n]
+    assert np.array_equal(np.sort(there), np.sort(back))
+
+
+def test_as_a_trimesh_mesh_each_piece_is_closed_and_has_the_volume_of_its_tetrahedra(body):
+    pieces = surface_pieces(body.surface)
+    assert len(pieces) == len(body.volumes)
+    for piece, volume in zip(pieces, body.volumes, strict=True):
+        mesh = piece.surface.to_trimesh()
+        assert_is_closed(mesh)
+        assert mesh.volume == pytest.approx(volume, rel=FULL)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_an_exported_body_is_closed_and_has_the_volume_of_its_tetrahedra(body, ending, tmp_path):
+    mesh = exported(body, tmp_path, ending)
+    assert_is_closed(mesh)
+    assert mesh.volume == pytest.approx(body.volumes.sum(), rel=PRECISION[ending])
+
+
+@pytest.mark.parametrize("name", ["block", "liver lobe", "two pieces"])
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_unless_a_cut_ends_in_the_body_each_piece_is_a_watertight_body(name, ending, tmp_path):
+    """A cut that ends in the body has edges that four triangles share."""
+    body = body_of(TISSUES[name]())
+    mesh = exported(body, tmp_path, ending)
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    volumes = [each.volume for each in mesh.split()]
+    expected = pytest.approx(body.volumes.tolist(), rel=PRECISION[ending])
+    assert sorted(volumes, reverse=True) == expected
+
+
+def test_the_normals_of_a_block_point_out_of_it():
+    mesh = Tissue(BLOCK).surface().to_trimesh()
+    normals, middles = mesh.face_normals, mesh.triangles_center
+    size = np.array([0.04, 0.02, 0.02])
+    side = np.rint(np.where(np.abs(middles / size - 0.5) > 0.499, 2.0 * middles / size - 1.0, 0.0))
+    np.testing.assert_allclose(normals, side, atol=1e-12)
+
+
+def test_faces_of_a_cut_are_marked_and_have_a_colour_of_their_own():
+    surface = half_cut_block().surface()
+    mesh = surface.to_trimesh()
+    assert 0 < surface.is_cut.sum() < len(surface.is_cut)
+    assert np.array_equal(mesh.face_attributes["is_cut"], surface.is_cut)
+    skin, cut = (
+        np.unique(mesh.visual.face_colors[chosen], axis=0)
+        for chosen in (~surface.is_cut, surface.is_cut)
+    )
+    assert len(skin) == len(cut) == 1 and not np.array_equal(skin, cut)
+
+
+def hollow_block() -> Tissue:
+    """Return a block of 3 x 3 x 3 cells: the middle of its middle cell is another, loose block."""
+    mesh, inner = block((3, 3, 3), (0.03, 0.03, 0.03)), block((1, 1, 1), (0.004, 0.004, 0.004))
+    middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
+    around = (np.abs(middles - 0.015) > 0.005).any(axis=1)
+    positions = np.vstack([mesh.positions, inner.positions + 0.013])
+    loose = inner.tetrahedra + len(mesh.positions)
+    return Tissue(TetrahedralMesh(positions, np.vstack([mesh.tetrahedra[around], loose])))
+
+
+def test_a_cavity_belongs_to_the_piece_around_it():
+    pieces = surface_pieces(hollow_block().surface())
+    assert [piece.name for piece in pieces] == ["piece_1", "piece_2"]
+    volumes = [piece.surface.to_trimesh().volume for piece in pieces]
+    assert volumes == pytest.approx([0.03**3 - 0.01**3, 0.004**3])
+
+
+def test_a_glb_has_a_node_for_each_piece_and_meshes_for_its_skin_and_its_cut_faces(tmp_path):
+    surface = cut_block().surface()
+    export_surface(surface, tmp_path / "body.glb")
+    scene = trimesh.load(tmp_path / "body.glb")
+    parts = {f"piece_{i}_{part}" for i in (1, 2) for part in ("skin", "cut")}
+    assert scene.geometry.keys() == parts
+    assert scene.graph.transforms.parents["piece_2_cut"] == "piece_2"
+    n_cut = sum(len(mesh.faces) for name, mesh in scene.geometry.items() if "cut" in name)
+    assert n_cut == surface.is_cut.sum()
+    colours = {
+        name: tuple(mesh.visual.material.baseColorFactor) for name, mesh in scene.geometry.items()
+    }
+    assert colours["piece_1_cut"] == colours["piece_2_cut"] != colours["piece_1_skin"]
+
+
+def test_in_a_glb_y_points_up(tmp_path):
+    surface = cut_block().surface()
+    export_surface(surface, tmp_path / "body.glb")
+    vertices = trimesh.load(tmp_path / "body.glb").to_geometry().bounds
+    low, high = surface.positions.min(axis=0), surface.positions.max(axis=0)
+    expected = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
+    np.testing.assert_allclose(vertices, expected, atol=1e-6)
+
+
+def test_an_obj_has_an_object_for_each_piece_with_groups_for_skin_and_cut_faces(tmp_path):
+    export_surface(cut_block().surface(), tmp_path / "body.obj")
+    lines = (tmp_path / "body.obj").read_text().splitlines()
+    names = [line for line in lines if line[0] in "og"]
+    assert names == [
+        f"{kind} piece_{i}{part}"
+        for i in (1, 2)
+        for kind, part in (("o", ""), ("g", "_skin"), ("g", "_cut"))
+    ]
+
+
+def test_a_ply_says_of_each_face_its_piece_and_whether_it_is_of_a_cut(tmp_path):
+    surface = cut_block().surface()
+    export_surface(surface, tmp_path / "body.ply")
+    faces = trimesh.load(tmp_path / "body.ply").metadata["_ply_raw"]["face"]["data"]
+    assert np.array_equal(faces["is_cut"].ravel(), surface.is_cut)
+    assert np.unique(faces["piece"]).tolist() == [1, 2]
+
+
+def test_another_ending_is_refused_with_those_that_there_are(tmp_path):
+    with pytest.raises(UsageError, match=r"must end in \.stl, \.obj, \.ply or \.glb"):
+        export_surface(Tissue(BLOCK).surface(), tmp_path / "body.dae")
+
+
+def run(*words: str) -> int:
+    return command_line(["run", "grid2", "--quiet", "--seconds", "0.01", *words])
+
+
+def test_a_run_exports_the_body_to_each_file_that_is_asked_for(tmp_path):
+    files = [tmp_path / f"body{ending}" for ending in (*ENDINGS, ".STL")]
+    options = [word for file in files for word in ("--export", str(file))]
+    assert run("--out", str(tmp_path / "out"), *options) == 0
+    assert all(trimesh.load(file).area > 0.0 for file in files)
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("body.txt", "must end in .stl, .obj, .ply or .glb"),
+        ("body", "must end in .stl, .obj, .ply or .glb"),
+        ("nowhere/body.stl", "there is no folder"),
+    ],
+)
+def test_a_file_that_cannot_be_exported_to_is_refused_before_the_run(
+    name, expected, tmp_path, capsys
+):
+    assert run("--out", str(tmp_path / "out"), "--export", str(tmp_path / name)) == 2
+    assert expected in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
