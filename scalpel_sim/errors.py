@@ -9,23 +9,23 @@ EXIT_WRONG_USE = 2
 
 
 class UsageError(ValueError):
-    """What was asked for cannot be: an unknown name, a file that is no mesh. Exit code 2."""
+    """What was asked for is impossible: an unknown name, a file that is no mesh. Exit code 2."""
 
 
 class RunError(RuntimeError):
-    """What was asked for is sound, and still failed: a port in use, a full disk. Exit code 1."""
+    """What was asked for is possible, and failed: a port in use, a full disk. Exit code 1."""
 
 
 class Interrupted(RunError):
-    """The user, or the system, ended the run before its time. Exit code 1."""
+    """The user, or the system, ended the run early. Exit code 1."""
 
 
 EXPECTED = (ValueError, RuntimeError, OSError)
-"""What the parts raise on purpose. Anything else is a fault of the program itself."""
+"""Errors that are raised on purpose. Any other is a fault of the program itself."""
 
 
 def one_line(error: Exception) -> str:
-    """Return what to tell the user of an error."""
+    """Return the message of an error for the user, in one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     if isinstance(error, EXPECTED):
         return text
@@ -35,14 +35,14 @@ def one_line(error: Exception) -> str:
 def exit_code(error: BaseException) -> int:
     """Return the exit code for an error that reached the command line.
 
-    A `ValueError` is the language's own word for a wrong argument, and all parts of the project
-    raise one at their border; everything else went wrong on the way.
+    All parts of the project raise a `ValueError` for a wrong argument; every other error means that
+    the run failed.
     """
     return EXIT_WRONG_USE if isinstance(error, ValueError) else EXIT_RUN_FAILED
 
 
 def unknown(kind: str, name: str, choices: Iterable[str]) -> UsageError:
-    """Return the error for a name that is not among `choices`: the nearest, then all."""
+    """Return the error for a name that is not among `choices`: it names the nearest, then all."""
     choices = list(choices)
     near = difflib.get_close_matches(name.lower(), choices, n=1, cutoff=0.5)
     hint = f"Did you mean '{near[0]}'? " if near else ""

@@ -1,4 +1,4 @@
-"""From a scene to a simulation: body, stroke through it, and an arm that reaches."""
+"""From a scene to a simulation: the tissue, a stroke through it, and an arm that reaches."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from scalpel_sim.arm.placement import place
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scenes import Scene, read_stroke
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.planning import check_meets, plan
+from scalpel_sim.strokes.planning import check_meets, plan_stroke
 from tissue import TetrahedralMesh
 
 
@@ -19,24 +19,24 @@ def prepare(
 ) -> Simulation:
     """Return the simulation of a scene, at its start.
 
-    The stroke is planned on the body as it lies there, sagged and stretched: what the link says of
-    it is all that is used, so that a body elsewhere gives the same run as one that is here.
+    The stroke is planned on the body as it lies there, sagged and stretched. Only what the link
+    describes is used, so that a body in another process gives the same run as one in this process.
 
     Args:
         scene: What to cut, and how.
-        link: A body that is elsewhere already; None makes the scene's own in this process.
-        fixtures: What stands around the body, in its frame: where that lies in the world is chosen
-            here, so that the arm reaches.
+        link: A body that is already there; None makes that of the scene in this process.
+        fixtures: Rigid bodies around it, in the tissue frame: where that lies in the world is
+            chosen here, so that the arm reaches.
 
     Raises:
-        ValueError: the scene does not fit together; each part says how.
+        ValueError: parts of the scene do not fit together; the message says which.
         LinkError: the body is elsewhere, and cannot be reached.
     """
     if link is None:
         link = InProcessLink(make_tissue(scene), scene.name)
     body = link.snapshot()
     mesh = TetrahedralMesh(body.positions, body.tetrahedra)
-    stroke = read_stroke(scene) or plan(
+    stroke = read_stroke(scene) or plan_stroke(
         scene.stroke, mesh, speed=scene.speed, material=link.describe().material
     )
     check_meets(stroke, mesh)

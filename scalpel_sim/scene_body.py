@@ -1,4 +1,4 @@
-"""A scene's body: held, pulled, and settled."""
+"""The tissue of a scene: held, stretched, and settled."""
 
 import logging
 
@@ -6,24 +6,23 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
-from tissue import FloatArray, SolverSettings, Tissue, fixed_nodes
-from tissue.blade.toughness import toughness_law_of
+from tissue import FloatArray, SolverSettings, Tissue, fixed_nodes, toughness_law_of
 
 _log = logging.getLogger("scalpel_sim")
 
 LONG_DRAG = 0.1
-"""How far a blade may drag the tissue without a word, as a fraction of the body's middle extent."""
+"""How far a blade may drag the tissue without a warning, as a share of the body's median extent."""
 
 OPPOSITE_SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
-"""Pairs of sides that can be pulled apart, one pair an axis."""
+"""Pairs of sides that can be pulled apart, one pair per axis."""
 
 
 def make_tissue(scene: Scene) -> Tissue:
-    """Return the scene's body, at rest under gravity between the sides that hold it.
+    """Return the tissue of a scene, at rest under gravity between the sides that are held.
 
     Raises:
         MeshError: the mesh cannot be cut.
-        ValueError: the material or what is to be fixed makes no sense for this mesh.
+        ValueError: the material or the fixed nodes make no sense for this mesh.
     """
     mesh = scene.mesh()
     fixed = fixed_nodes(mesh, scene.fixed)
@@ -48,31 +47,31 @@ def make_tissue(scene: Scene) -> Tissue:
     return tissue
 
 
-def check(scene: Scene) -> None:
-    """Refuse what can be seen to be wrong before any tissue is made.
+def check_scene(scene: Scene) -> None:
+    """Check a scene as far as possible before its tissue is made.
 
     Raises:
         MeshError: the mesh cannot be cut.
-        ValueError: stroke or arm are unknown, or what is to be held is not there.
+        ValueError: stroke or arm are unknown, or no nodes are where they are to be held.
     """
     check_motion(scene)
     mesh = scene.mesh()
     fixed_nodes(mesh, scene.fixed)
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)
-    drag = toughest(scene) / scene.material.young_modulus
+    drag = highest_toughness(scene) / scene.material.young_modulus
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
     if drag > LONG_DRAG * extent:
         _log.warning(
             "the blade will drag the tissue along by some %.2g mm (toughness / Young's modulus) "
-            "before it parts, and the body measures %.3g mm: the cut may stay unfinished. A larger "
-            "--young or a smaller --toughness cuts cleanly",
+            "before the tissue parts, and the body measures %.3g mm: the cut may stay unfinished. "
+            "A larger --young or a smaller --toughness cuts cleanly",
             1e3 * drag,
             1e3 * extent,
         )
 
 
-def toughest(scene: Scene) -> float:
-    """Return the most that a square metre of the scene's cut costs [J/m2]: skin, speed, edge."""
+def highest_toughness(scene: Scene) -> float:
+    """Return the highest toughness in a scene [J/m2]: of the skin, or at the stroke's speed."""
     material = scene.material
     resistance = toughness_law_of(material, scene.blade)
     at_speed = resistance.toughness
@@ -105,4 +104,4 @@ def pulled_apart(positions: FloatArray, fixed: str, stretch: float) -> FloatArra
             "use --fix left,right or --stretch 0"
         )
     centre = (positions.min(axis=0) + positions.max(axis=0)) / 2.0
-    return centre + (positions - centre) * np.where(pulled, 1.0 + stretch, 1.0)
+    return np.asarray(centre + (positions - centre) * np.where(pulled, 1.0 + stretch, 1.0))

@@ -1,5 +1,6 @@
-"""What lies on the table: a body, what it is made of, how it is held, and the stroke through it."""
+"""Scenes: a body, its material, how it is held, and the stroke through it."""
 
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -19,14 +20,13 @@ from tissue import (
     Material,
     TetrahedralMesh,
     block,
-    liver_lobe,
-    read_mesh,
 )
-from tissue.input_checks import checked_threads
-from tissue.integrators.options import BY_NAME
 
 SCHEMES = ("stellar", "paper")
-"""As `tissue.cutting.scheme` has them, which is not imported here: it takes the compiler along."""
+"""Names of the schemes that `Tissue` takes."""
+
+RELAXATIONS = ("global", "hierarchical", "local")
+"""Names of the relaxations that `Tissue` takes."""
 
 COUPLINGS = ("rigid", "virtual")
 
@@ -39,62 +39,66 @@ PHANTOM = Material(
     blade_friction=MATERIALS["gelatin"].blade_friction.value,
 )
 """A soft gel phantom. toughness / young_modulus = 2 mm: the length by which the blade drags the
-tissue along before the tissue parts. It must be small against the body, or the blade draws the
-body after itself instead of cutting it."""
+tissue along before the tissue parts. It must be small against the body, or the blade drags the
+body along instead of cutting it."""
 
 PARENCHYMA = replace(MATERIALS["liver"].material, toughness=10.0)
-"""A liver in all but its toughness, which is well below the 164 J/m2 of liver with its vessels: so
-that toughness / young_modulus is 2 mm here too, and one stroke goes through. With that of liver the
-blade would drag it along by 35 mm first (`--material liver`)."""
+"""Liver in all but its toughness, which is well below the 164 J/m2 of liver with its vessels, so
+that toughness / young_modulus is 2 mm here too, and one stroke cuts through. With the toughness of
+liver the blade would drag it along by 35 mm first (`--material liver`)."""
 
-AS_USUAL = CutSettings()
-"""How closely cuts follow the blade, unless it is said otherwise."""
+DEFAULT_CUT_SETTINGS = CutSettings()
+"""How closely cuts follow the blade, unless a scene says otherwise."""
 
 STANDARD_GRAVITY = 9.81
-"""[m/s2], along -z."""
+"""Gravity along -z [m/s2]."""
 
 
 def check_scheme(name: str) -> None:
-    """Refuse a scheme of cutting that there is not.
+    """Check that a scheme of cutting exists.
 
     Raises:
-        UsageError: the message says which there are.
+        UsageError: it does not; the message lists the schemes.
     """
     if name not in SCHEMES:
         raise unknown("scheme", name, SCHEMES)
 
 
 def check_relaxation(name: str, threads: int) -> None:
-    """Refuse a way to relax that there is not, and threads where they would do nothing.
+    """Check that a relaxation exists, and that it uses threads where there are several.
 
     Raises:
-        UsageError: the message says which there are.
+        UsageError: it does not; the message says why.
     """
-    if name not in BY_NAME:
-        raise unknown("relaxation", name, tuple(BY_NAME))
+    if name not in RELAXATIONS:
+        raise unknown("relaxation", name, RELAXATIONS)
     if threads != 1 and name != "global":
         raise UsageError(f"--threads {threads} is for --relaxation global; {name} runs on one")
-    checked_threads(threads)
+    cores = os.cpu_count() or 1
+    if not 1 <= threads <= cores:
+        raise UsageError(
+            f"--threads is {threads}; it must be from 1 to {cores}, the number of cores"
+        )
 
 
-def has_account(relaxation: str, threads: int) -> bool:
-    """Whether the energy can be accounted for: where all nodes move together, on one thread."""
+def can_audit(relaxation: str, threads: int) -> bool:
+    """Whether an energy account can be kept: where all nodes move together, on one thread."""
     return relaxation == "global" and threads == 1
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A body and what is to be done to it. Lengths in metres, tissue frame."""
+    """A body, and the stroke that cuts it. Lengths in metres, tissue frame."""
 
     name: str
     about: str
-    """One line for a person."""
+    """A description in one line."""
     mesh: Callable[[], TetrahedralMesh]
     material: Material = PHANTOM
     fixed: str = "left,right"
-    """Which nodes do not move: names of sides, a box, or `none`; see
-    `tissue.boundary_conditions`."""
-    quality: CutSettings = AS_USUAL
+    """Which nodes do not move: names of sides, a box, or `none`, as `tissue.fixed_nodes` takes
+    them."""
+    quality: CutSettings = DEFAULT_CUT_SETTINGS
     """How closely cuts follow the blade, against how small the elements get."""
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
@@ -106,43 +110,43 @@ class Scene:
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""
     gravity: float = STANDARD_GRAVITY
-    """[m/s2], along -z."""
+    """Gravity along -z [m/s2]."""
     floor: float | None = None
-    """Height of a floor on which loose pieces land [m], tissue frame; None: they fall for ever."""
+    """Height of a floor on which loose pieces land [m], tissue frame; None: no floor."""
     blade: BladeShape | None = SCALPEL
     """The blade as a body; None: a line, as in the paper."""
     audit: bool = False
     """Whether an account of the energy is kept. Frames take a fifth to a third longer."""
     stroke: str = "straight"
-    """A name known to `scalpel_sim.strokes.stroke`, or a CSV file."""
+    """One of `scalpel_sim.strokes.planning.STROKES`, or a CSV file."""
     speed: float = 0.06
-    """Of the blade's tip [m/s]."""
+    """Speed of the blade's tip [m/s]."""
     arm: str = "auto"
     """`touch`, `premium`, or `auto`: the first of them that reaches."""
     tissue_every: int = 1
-    """Frames of the arm in which the tissue is asked once."""
+    """Number of frames after which the tissue is asked again."""
     coupling: str = "rigid"
     """Between the arm's blade and the one that cuts: `rigid` (they are one), or `virtual`."""
     coupling_stiffness: float | None = None
-    """Of a virtual coupling [N/m]; None: its usual one."""
+    """Stiffness of a virtual coupling [N/m]; None: the default."""
     coupling_damping: float | None = None
-    """Of a virtual coupling [N s/m]; None: what its stiffness takes to be stable."""
+    """Damping of a virtual coupling [N s/m]; None: twice what its stiffness needs."""
     passivity: bool = True
     """Whether what would give the arm energy out of nothing is damped."""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that mean nothing.
+        """Refuse names and numbers that make no sense.
 
         Raises:
             UsageError: stretch, gravity, speed or a number of the coupling is out of range; there
-                is no such scheme, relaxation or coupling; an audit of what has none.
+                is no such scheme, relaxation or coupling; an audit of a relaxation that has none.
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
-        if self.audit and not has_account(self.relaxation, self.threads):
+        if self.audit and not can_audit(self.relaxation, self.threads):
             raise UsageError(
                 "--audit needs --relaxation global and --threads 1, not "
-                f"{self.relaxation} and {self.threads}; leave it away, or them"
+                f"{self.relaxation} and {self.threads}; omit --audit, or change those"
             )
         self.virtual_coupling()
         if not 1 <= self.tissue_every <= MAX_FRAMES_PER_ANSWER:
@@ -158,10 +162,10 @@ class Scene:
             raise UsageError(f"speed is {self.speed} m/s; it must be above 0 and at most 1")
 
     def virtual_coupling(self) -> VirtualCoupling | None:
-        """Return what is between the arm's blade and the one that cuts; None where they are one.
+        """Return the coupling of the arm's blade to the one that cuts; None where they are one.
 
         Raises:
-            UsageError: there is no such coupling, or it has no such stiffness or damping.
+            UsageError: there is no such coupling, or it cannot have such a stiffness or damping.
         """
         if self.coupling not in COUPLINGS:
             raise unknown("coupling", self.coupling, COUPLINGS)
@@ -187,13 +191,19 @@ class Scene:
         }
 
 
+def _liver_lobe() -> TetrahedralMesh:
+    from tissue import liver_lobe  # loads numba
+
+    return liver_lobe()
+
+
 SCENES = {
     scene.name: scene
     for scene in (
         Scene(
             "organ",
             "an organ of some 5,000 tetrahedra, 90 x 60 x 30 mm",
-            liver_lobe,
+            _liver_lobe,
             material=PARENCHYMA,
         ),
         Scene(
@@ -225,7 +235,7 @@ def scene_called(name: str) -> Scene:
     """Return the scene of that name.
 
     Raises:
-        UsageError: there is none; the message says which there are.
+        UsageError: there is none; the message lists them.
     """
     if name not in SCENES:
         raise unknown("scene", name, SCENES)
@@ -236,7 +246,7 @@ def material_called(name: str) -> Material:
     """Return the material of that name.
 
     Raises:
-        UsageError: there is none; the message says which there are.
+        UsageError: there is none; the message lists them.
     """
     if name not in MATERIALS:
         raise unknown("material", name, MATERIALS)
@@ -248,21 +258,23 @@ def mesh_scene(path: Path, scale: float = 1.0) -> Scene:
 
     Raises:
         MeshError: the file holds no mesh that could be cut.
-        UsageError: the scale is no positive number.
+        UsageError: the scale is not a positive number.
     """
     if not (np.isfinite(scale) and scale > 0.0):
         raise UsageError(
             f"--scale is {scale}; it must be positive: the metres in one unit of {path}"
         )
+    from tissue import read_mesh  # loads numba
+
     mesh = read_mesh(path, scale)
     return Scene(path.stem, f"the mesh {path.name}", lambda: mesh)
 
 
 def scene_of(link: TissueLink) -> Scene:
-    """Return a scene around a body that is there already.
+    """Return a scene around a body that already exists.
 
     Raises:
-        LinkError: the body is elsewhere, and cannot be reached.
+        LinkError: the body is in another process, and cannot be reached.
     """
     body = link.describe()
     known = SCENES.get(body.scene)
@@ -274,10 +286,10 @@ def scene_of(link: TissueLink) -> Scene:
 
 
 def check_motion(scene: Scene) -> None:
-    """Refuse a stroke or an arm that there is not.
+    """Check that stroke and arm of a scene exist.
 
     Raises:
-        UsageError: neither a known name nor a CSV file; an arm that is not known.
+        UsageError: the stroke is neither a known name nor a CSV file, or the arm is unknown.
     """
     read_stroke(scene)
     if scene.arm not in _ARMS:
@@ -285,10 +297,10 @@ def check_motion(scene: Scene) -> None:
 
 
 def read_stroke(scene: Scene) -> Stroke | None:
-    """Return the stroke of a CSV file, or None for one that is to be planned.
+    """Return the stroke of a CSV file, or None for a stroke that is to be planned.
 
     Raises:
-        UsageError: neither a known name nor a CSV file.
+        UsageError: the stroke is neither a known name nor a CSV file.
     """
     if scene.stroke.lower().endswith(".csv"):
         return from_csv(scene.stroke)
@@ -298,12 +310,14 @@ def read_stroke(scene: Scene) -> Stroke | None:
 
 
 def changed(scene: Scene, **changes: Any) -> Scene:
-    """Return the scene with those fields, material properties and qualities replaced that are not
-    None. Properties change the `material` that is given beside them, else the scene's. `snap` is
-    the floor of snapping too: nodes of slivers snap as those of the mean element.
+    """Return the scene with some fields replaced; a change that is None is ignored.
 
-    A stretch that came with the scene is dropped where other sides are held; one that was asked
-    for stays, and is refused later where nothing can be pulled.
+    Names are those of fields of the scene, of its material or of its cut settings. Properties of a
+    material change the `material` that is given beside them, else the scene's. `snap` sets the
+    floor of snapping too: nodes of slivers snap like those of the mean element.
+
+    The stretch of the scene is dropped where other sides are held; one that is given stays, and is
+    refused later where nothing can be pulled.
     """
     given = {name: value for name, value in changes.items() if value is not None}
     if given.get("fixed", scene.fixed) != scene.fixed:

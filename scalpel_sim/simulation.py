@@ -1,4 +1,4 @@
-"""The frame loop: arm, blade, bridge, and back, a thousand times a simulated second."""
+"""The frame loop: arm, blade, bridge, tissue and back, 1000 frames per simulated second."""
 
 import gc
 import time
@@ -9,35 +9,36 @@ import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.arm import Arm
-from scalpel_sim.arm.collision_monitor import Touching
-from scalpel_sim.output.frame_row import row_of
+from scalpel_sim.arm.collision_monitor import CollisionMonitor
+from scalpel_sim.output.frame_row import WallTimes, row_of
 from scalpel_sim.output.recording import Recording
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
 
-_AT_REST = StageTimes(0.0, 0.0, 0.0)
-"""Of a frame in which the tissue was not asked."""
+_NO_STEP = StageTimes(0.0, 0.0, 0.0)
+"""Times of a frame in which the tissue was not asked."""
 
 EveryFrame = Callable[["Simulation"], bool | None]
-"""Called after each frame; a run ends early where it returns True."""
+"""Called after each frame; a run ends early when it returns True."""
 
-Picture = Callable[["Simulation"], None]
-"""Called after each frame too, and takes what it wants to show: a replay, a live viewer."""
+DrawFrame = Callable[["Simulation"], None]
+"""Called after each frame, timed as the stage RD: a replay or a live viewer draws it."""
 
 
 class Simulation:
-    """An arm that leads a blade along a stroke, and the tissue that the blade meets.
+    """An arm that leads a blade along a stroke, and the tissue that the blade cuts.
 
     Args:
         arm: At the start of the stroke. `arm.model` and `arm.data` are MuJoCo's own.
         stroke: Where the hand leads the blade, tissue frame.
         link: The tissue.
         frame: Where the tissue lies in the world.
-        fixtures: What stands around it in the world, beside the arm's table: see `touching`.
-        tissue_every: Frames in which the tissue is asked once, for all of them.
-        coupling: Between the arm's blade and the one that cuts; None where they are one.
+        fixtures: Rigid bodies around it in the world, beside the arm's table: see `touching`.
+        tissue_every: Number of frames after which the tissue is asked again.
+        coupling: Spring and damper between the arm's blade and the one that cuts; None where they
+            are one.
         passivity: Whether what would give the arm energy out of nothing is damped.
     """
 
@@ -66,76 +67,79 @@ class Simulation:
             passivity=passivity,
         )
         self.wrench = NO_WRENCH
-        """What the blade felt in the last frame, world frame."""
-        self.touching = Touching(arm, fixtures)
-        """Which parts of the arm meet what."""
+        """Wrench on the blade in the last frame, world frame."""
+        self.touching = CollisionMonitor(arm, fixtures)
+        """Collisions of the arm with fixtures and with itself."""
         self.recording = Recording()
         """What happened in each frame so far."""
-        self.pictures: list[Picture] = []
-        """Called after each frame, outside its clock; most frames they let pass."""
+        self.pictures: list[DrawFrame] = []
+        """Called after each frame; most frames they skip."""
         self.wall_seconds = 0.0
-        """Wall time spent in frames and pictures so far."""
+        """Wall time of frames, pictures and recording so far."""
         self.dt: float = arm.model.opt.timestep
 
     @property
     def title(self) -> str:
-        """What is cut, and how, for a heading."""
+        """Name of the scene and of the stroke, for a heading."""
         return f"{self.link.describe().scene}: {self.stroke.name} stroke"
 
     @property
     def time(self) -> float:
-        """Simulated time [s]: that of the frames so far."""
+        """Simulated time of the frames so far [s]."""
         return len(self.recording) * self.dt
 
     @property
     def result(self) -> StepResult:
-        """What the tissue did when it was last asked, tissue frame."""
+        """Result of the last step of the tissue, tissue frame."""
         result = self.bridge.result
         if result is None:
             raise RuntimeError("no frame has been done yet: call step() or run() first")
         return result
 
     def step(self) -> Wrench:
-        """Do one frame and return what the blade felt in it.
+        """Do one frame and return the wrench on the blade.
 
         Raises:
             ArmError: MuJoCo's state is no longer finite.
-            CouplingError: the tissue answered with what no arm may feel.
+            CouplingError: the tissue answered with a wrench that no arm may render.
             LinkError: the tissue is elsewhere, and did not answer.
         """
         start = time.perf_counter()
         self.arm.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
         self.arm.step1()
-        self.touching.look()
+        self.touching.check()
         segment = self.arm.blade.segment()
-        self.wrench = self._answer(segment)
+        self.wrench = self._wrench_on(segment)
         self.arm.blade.apply(self.wrench)
         self.arm.step2()
         self.arm.check()
-        framed = time.perf_counter()
-        for picture in self.pictures:
-            picture(self)
+        done = time.perf_counter()
+        for draw in self.pictures:
+            draw(self)
         drawn = time.perf_counter()
-
-        profile = self.result.profile if self.bridge.answered else _AT_REST
-        self.recording.append(
-            row_of(
-                self.time,
-                segment,
-                self.wrench,
-                self.bridge.wrench_raw,
-                self.result,
-                profile,
-                self.frame,
-                picture_seconds=drawn - framed,
-                frame_seconds=framed - start,
-            )
-        )
+        self._record(segment, frame_seconds=done - start, picture_seconds=drawn - done)
         self.wall_seconds += time.perf_counter() - start
         return self.wrench
 
-    def _answer(self, segment: BladeSegment) -> Wrench:
-        """Return what the tissue answers; where it does not, let go of the arm."""
+    def _record(
+        self, segment: BladeSegment, *, frame_seconds: float, picture_seconds: float
+    ) -> None:
+        """Add the frame to the recording, and to its row how long that took."""
+        start = time.perf_counter()
+        stages = self.result.profile if self.bridge.answered else _NO_STEP
+        row = row_of(
+            self.time,
+            segment,
+            self.wrench,
+            self.bridge.wrench_raw,
+            self.result,
+            self.frame,
+            WallTimes(*stages, picture_seconds, frame_seconds),
+        )
+        self.recording.append((*row, time.perf_counter() - start))
+
+    def _wrench_on(self, segment: BladeSegment) -> Wrench:
+        """Return the wrench of the tissue; where there is none, take the last one off the arm."""
         try:
             return self.bridge.step(segment, self.dt)
         except Exception:
@@ -143,7 +147,7 @@ class Simulation:
             raise
 
     def run(self, seconds: float, every_frame: EveryFrame | None = None) -> None:
-        """Do frames until `seconds` of simulated time have passed, or `every_frame` says so."""
+        """Do frames until `seconds` of simulated time have passed or `every_frame` returns True."""
         n_frames = round(seconds / self.dt)
         with no_garbage_collection():
             while len(self.recording) < n_frames:
@@ -154,7 +158,7 @@ class Simulation:
 
 @contextmanager
 def no_garbage_collection() -> Iterator[None]:
-    """Keep Python's cycle collector out of the frames, where it would cost milliseconds at random.
+    """Disable Python's cycle collector, which would cost milliseconds in random frames.
 
     A frame makes no cycles: what it allocates is freed by counting references.
     """

@@ -1,4 +1,4 @@
-"""Ctrl-C and the system's request to end, as a wish between two frames."""
+"""Ctrl-C and the system's request to end, which a run obeys between two frames."""
 
 import signal
 import threading
@@ -9,10 +9,10 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopSignals:
-    """While entered, the first signal sets `reason`; the second does what it did before.
+    """While entered, the first signal sets `reason`; the second has its usual effect.
 
     So a run ends between two frames with its files whole, and one that hangs can still be killed.
-    Outside the main thread, where Python hears no signals, it does nothing.
+    Outside the main thread, where Python gets no signals, it does nothing.
     """
 
     def __init__(self) -> None:

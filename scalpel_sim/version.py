@@ -1,4 +1,4 @@
-"""Which version of a package this is."""
+"""The version of an installed package."""
 
 import importlib.metadata
 

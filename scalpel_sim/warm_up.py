@@ -1,4 +1,4 @@
-"""Every kernel, run once before the clock starts; as a program, those that move a body."""
+"""Runs every kernel once, so that it is compiled; as a program, only those that move a body."""
 
 import subprocess
 import sys
@@ -15,30 +15,29 @@ from tissue import (
     TetrahedralMesh,
     Tissue,
     block,
+    cache_directory,
     fixed_nodes,
 )
-from tissue.core.jit import cache_directory
 
 _SIDE = 0.02
-"""Of the block that is cut [m]."""
+"""Length of the sides of the block that is cut [m]."""
 N_STEPS = 20
 _DT = 1e-3
 
 
 def kernels_are_compiled() -> bool:
-    """Return whether binaries of these very sources lie in the cache."""
+    """Return whether the cache has binaries of exactly these sources."""
     return any(cache_directory().rglob("*.nbi"))
 
 
 def warm_up() -> None:
     """Load the kernels, or compile them where this is the first run of these sources.
 
-    A small block is settled, cut half through and looked at: the run that follows does nothing
-    that this did not do.
+    A small block is settled, cut half through and measured, which calls every kernel of a run.
     """
     mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
     if not kernels_are_compiled():
-        with _motion_compiled_beside():
+        with _compile_motion_in_parallel():
             places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
             Tissue(mesh, blade=BladeShape()).incise(places, _edge(0.0).forward)
     tissue = Tissue(
@@ -62,7 +61,7 @@ def warm_up() -> None:
 
 
 def move_two_pieces() -> None:
-    """Let two pieces fall for a step, which may touch: forces, steps and contact."""
+    """Advance two falling pieces, which may touch, by a step: forces, integration and contact."""
     mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
     apart = np.vstack([mesh.positions, mesh.positions + 2.0 * _SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
@@ -70,10 +69,10 @@ def move_two_pieces() -> None:
 
 
 @contextmanager
-def _motion_compiled_beside() -> Iterator[None]:
-    """Compile what moves a body in another process meanwhile: on two cores 50 s in place of 73.
+def _compile_motion_in_parallel() -> Iterator[None]:
+    """Compile the kernels that move a body in another process: on two cores 50 s in place of 73.
 
-    The binaries come by the cache. Should it fail, they are compiled here.
+    The cache passes on the binaries. If that fails, they are compiled in this process.
     """
     other = subprocess.Popen(
         [sys.executable, "-m", "scalpel_sim.warm_up"],

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scalpel_sim.strokes.planning import plan
+from scalpel_sim.strokes.planning import plan_stroke
 from tests import bodies, soundness, strokes
 from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe, read_mesh
 
@@ -79,7 +79,7 @@ def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
     tissue = at_rest(mesh, fixed=bodies.sides(mesh, share=0.1))
     before = tissue.snapshot()
     whole = tissue.n_pieces()
-    planned = plan(stroke, mesh)
+    planned = plan_stroke(stroke, mesh)
     poses = [planned.pose(t) for t in np.arange(0.0, planned.duration + strokes.DT, strokes.DT)]
     strokes.make(tissue, poses)
     expect_sound(before, tissue, pieces=whole + 1)

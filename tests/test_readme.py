@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.output.run_folder import NAMES
+from scalpel_sim.output.run_folder import RUN_FILES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -57,7 +57,7 @@ def test_the_forces_of_a_step_are_there_with_the_account_of_its_energy(capsys):
 
 
 def test_every_file_that_a_run_writes_is_explained():
-    assert [name for name in NAMES if f"`{name}`" not in README] == []
+    assert [name for name in RUN_FILES if f"`{name}`" not in README] == []
 
 
 def test_the_options_of_the_readme_are_those_of_the_program(capsys):

@@ -1,11 +1,18 @@
+from .blade.toughness import ToughnessLaw as ToughnessLaw
+from .blade.toughness import toughness_law_of as toughness_law_of
 from .blade_shape import BladeShape as BladeShape
 from .boundary_conditions import fixed_nodes as fixed_nodes
 from .core.array_types import BoolArray as BoolArray
 from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray
+from .core.jit import cache_directory as cache_directory
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
+from .elasticity.spring_calibration import SpringError as SpringError
+from .elasticity.spring_calibration import calibrated as calibrated
+from .elasticity.spring_calibration import spring_error as spring_error
+from .geometry.connected_components import components as components
 from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import LocalTimeStepping as LocalTimeStepping
 from .io.mesh_io import read_mesh as read_mesh
@@ -16,6 +23,8 @@ from .material_presets import DAMPING_BAND as DAMPING_BAND
 from .material_presets import MATERIALS as MATERIALS
 from .material_presets import Preset as Preset
 from .material_presets import SourcedValue as SourcedValue
+from .mesh.faces import boundary_faces as boundary_faces
+from .mesh.pieces import pieces_of as pieces_of
 from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
@@ -64,16 +73,25 @@ __all__ = [
     "Snapshot",
     "SolverSettings",
     "SourcedValue",
+    "SpringError",
     "StageTimes",
     "StepResult",
     "Surface",
     "TetrahedralMesh",
     "Tissue",
     "TissueError",
+    "ToughnessLaw",
     "Wrench",
     "block",
+    "boundary_faces",
+    "cache_directory",
+    "calibrated",
+    "components",
     "fixed_nodes",
     "liver_lobe",
+    "pieces_of",
     "read_mesh",
+    "spring_error",
+    "toughness_law_of",
     "write_vtu",
 ]

@@ -20,7 +20,7 @@ ARMS = {
     "touch": DeviceLimits(force=3.3, torque=0.33),
     "premium": DeviceLimits(force=8.5, torque=0.188),
 }
-"""The arms there are, smallest first, and the most that each can make a hand feel.
+"""The arms, smallest first, and the largest force and torque that each can render.
 
 Forces, and the torque of the Premium 1.5 with its six motors: CHAI3D, CPhantomDevices.cpp, after
 the vendor's data sheets. The gimbal of the Touch has no motors: the hand alone resists a torque, so
@@ -30,7 +30,7 @@ no limit of the device belongs here. 0.33 N m is 3.3 N on a lever of 10 cm, the 
 JOINTS = ("waist", "shoulder", "elbow", "yaw", "pitch", "roll")
 
 BLADE_HEIGHT, BLADE_THICKNESS, _STEEL = 6e-3, 0.4e-3, 7800.0
-"""Of a no. 11 scalpel blade [m], [m], and its density [kg/m3]."""
+"""Height [m], thickness [m] and density [kg/m3] of a no. 11 scalpel blade."""
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -42,15 +42,15 @@ class ArmError(RuntimeError):
 class Arm:
     """An arm, its blade, and the virtual hand that leads it. World frame.
 
-    A frame is `step1`, then read `blade`, push `blade`, then `step2` and `check`.
+    A frame is `step1`, then `blade.segment` and `blade.apply`, then `step2` and `check`.
 
     Args:
         preset: One of `ARMS`.
         blade_length: From heel to tip [m].
         mount_angle: Between stylus and blade [rad]: at 0 the blade goes on in the stylus's
             direction, at pi/2 it points to the stylus's +z.
-        base_position: Of the middle of the base's underside [m].
-        base_yaw: By which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
+        base_position: Middle of the base's underside [m].
+        base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
 
     Raises:
@@ -77,9 +77,9 @@ class Arm:
         self.preset = preset
         self.limits = ARMS[preset]
         self.model = spec.compile()
-        """MuJoCo's own."""
+        """MuJoCo's model."""
         self.data = mujoco.MjData(self.model)
-        """MuJoCo's own."""
+        """MuJoCo's data."""
         self.blade = Blade(self.model, self.data)
         self.hand = Hand(self.model, self.data)
         self._warnings = self.data.warning
@@ -101,12 +101,14 @@ class Arm:
         """
         angles = np.array(qpos, np.float64)
         if angles.shape != (len(JOINTS),) or not np.isfinite(angles).all():
-            raise ValueError(f"qpos is {angles.tolist()}; wanted {len(JOINTS)} finite angles [rad]")
+            raise ValueError(
+                f"qpos is {angles.tolist()}; it must be {len(JOINTS)} finite angles [rad]"
+            )
         low, high = self.model.jnt_range.T
         if ((angles < low) | (angles > high)).any():
             i = int(np.argmax((angles < low) | (angles > high)))
             raise ValueError(
-                f"joint '{JOINTS[i]}' is put to {angles[i]:.3f} rad; its range is {low[i]:.3f} to "
+                f"joint '{JOINTS[i]}' is set to {angles[i]:.3f} rad; its range is {low[i]:.3f} to "
                 f"{high[i]:.3f}"
             )
         mujoco.mj_resetData(self.model, self.data)
@@ -120,11 +122,11 @@ class Arm:
         mujoco.mj_step1(self.model, self.data)
 
     def step2(self) -> None:
-        """Do the second half of a step, with the wrench that the blade was given."""
+        """Do the second half of a step, with the wrench that is applied to the blade."""
         mujoco.mj_step2(self.model, self.data)
 
     def check(self) -> None:
-        """Refuse to go on from a bad state. For every frame: it costs some 3 us.
+        """Refuse to continue from a bad state. For every frame: it costs some 3 us.
 
         MuJoCo's own answer, a silent reset to the start, is switched off in the model.
 
@@ -148,8 +150,8 @@ class Arm:
 def route_warnings() -> None:
     """Send MuJoCo's warnings to the logger `scalpel_sim`.
 
-    By itself MuJoCo appends them to MUJOCO_LOG.TXT in the working directory. Whoever has set a
-    handler of their own keeps it.
+    By itself MuJoCo appends them to MUJOCO_LOG.TXT in the working directory. A handler that is
+    already set stays.
     """
     if mujoco.get_mju_user_warning() is None:
         mujoco.set_mju_user_warning(_log_warning)
@@ -160,7 +162,7 @@ def _log_warning(text: str) -> None:
 
 
 def _put_base(spec: mujoco.MjSpec, position: FloatArray, yaw: float) -> None:
-    """Move the arm, and put a column under a base that does not stand on the table."""
+    """Move the arm, and add a column below a base that does not stand on the table."""
     base = spec.body("base")
     base.pos = position
     base.quat = [math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)]

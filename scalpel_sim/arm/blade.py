@@ -10,7 +10,7 @@ from bridge import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
 from tissue import BladeSegment, FloatArray, Wrench
 
 _SHORTEST_EDGE = 1e-4
-"""[m]. A shorter cutting edge is a mistake in the model: its direction would be noise."""
+"""Shortest cutting edge [m]. A shorter one is a mistake in the model: its direction is noise."""
 
 
 class BladeError(ValueError):
@@ -18,7 +18,7 @@ class BladeError(ValueError):
 
 
 class Blade:
-    """The cutting edge of a body of a MuJoCo model, which one reads, and pushes.
+    """The cutting edge of a body of a MuJoCo model: its pose is read, a wrench applied.
 
     Works on any model: name the two sites at the ends of the edge. Call `segment` and `apply`
     between `mj_step1` and `mj_step2`: there the sites are where `qpos` says (after a plain
@@ -26,7 +26,7 @@ class Blade:
 
     Args:
         model: A compiled model.
-        data: Its data. Both are kept, and seen live.
+        data: Its data. Both are kept, so that the blade follows them.
         heel: Site at the end of the edge that is nearest the handle.
         tip: Site at the sharp end.
         body: The body that carries both sites, and feels the wrench. None: the one they sit on.
@@ -84,7 +84,7 @@ class Blade:
         return BladeSegment(self._tip.copy(), self._heel.copy(), self._rotation @ self._forward)
 
     def apply(self, wrench: Wrench) -> None:
-        """Push the blade until the next call.
+        """Apply a wrench to the blade until the next call.
 
         MuJoCo's `xfrc_applied` acts at the body's centre of mass, the wrench at its own point: the
         lever adds (point - centre of mass) x force to the torque.
@@ -95,9 +95,9 @@ class Blade:
         Raises:
             BladeError: the wrench is not finite, or larger than `MAX_PLAUSIBLE_FORCE` or
                 `MAX_PLAUSIBLE_TORQUE`.
-                What the blade felt before stays, and MuJoCo sees nothing of it.
+                The wrench of the call before stays applied.
         """
-        # The last guard: MuJoCo takes 1e3 N without a word, and resets itself at 1e9 N or NaN.
+        # The last guard: MuJoCo accepts 1e3 N silently, and resets itself at 1e9 N or NaN.
         # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
         fx, fy, fz = wrench.force.tolist()
         tx, ty, tz = wrench.torque.tolist()
@@ -110,7 +110,7 @@ class Blade:
         force, torque = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
         if not (force <= MAX_PLAUSIBLE_FORCE and torque <= MAX_PLAUSIBLE_TORQUE):  # catches NaN too
             raise BladeError(
-                f"a wrench of {force:.3g} N and {torque:.3g} N m about its centre of mass was put "
+                f"a wrench of {force:.3g} N and {torque:.3g} N m about its centre of mass acts "
                 f"on the blade; it must be finite and at most {MAX_PLAUSIBLE_FORCE:g} N and "
                 f"{MAX_PLAUSIBLE_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
             )
@@ -119,7 +119,7 @@ class Blade:
 
 def _identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str) -> int:
     """Return MuJoCo's number for a name."""
-    identifier = mujoco.mj_name2id(model, kind, name)
+    identifier: int = mujoco.mj_name2id(model, kind, name)
     if identifier < 0:
         count = model.nsite if kind == mujoco.mjtObj.mjOBJ_SITE else model.nbody
         names = [mujoco.mj_id2name(model, kind, i) for i in range(count)]

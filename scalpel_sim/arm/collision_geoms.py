@@ -1,23 +1,25 @@
-"""The geoms of a MuJoCo arm as parts for the collision library, and what it stands on."""
+"""The geoms of a MuJoCo arm as parts for the collision library, and its tables."""
 
 import mujoco
 import numpy as np
 
-from bridge import SIZES_PER_SHAPE, ArmGeom, FixtureBox, GeomShape
+from bridge import ArmGeom, FixtureBox, GeomShape
 from tissue import FloatArray
 
-_KINDS: dict[int, GeomShape] = {
-    int(mujoco.mjtGeom.mjGEOM_SPHERE): "sphere",
-    int(mujoco.mjtGeom.mjGEOM_CAPSULE): "capsule",
-    int(mujoco.mjtGeom.mjGEOM_CYLINDER): "cylinder",
-    int(mujoco.mjtGeom.mjGEOM_BOX): "box",
+_SHAPES: dict[int, tuple[GeomShape, int]] = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): ("capsule", 2),
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): ("cylinder", 2),
+    int(mujoco.mjtGeom.mjGEOM_BOX): ("box", 3),
 }
+"""The types of geom that take part in collisions: name, and how many of MuJoCo's sizes they use."""
 JOINTS_NEXT = 2
-"""Links this many joints from the instrument or fewer are next to it: those of a gimbal, whose axes
-meet in a point, so that their shapes overlap in any pose."""
+"""Number of joints up to which a link is a neighbour of the instrument: the links of a gimbal,
+whose axes meet in a point, overlap in any pose."""
 
 TABLE_THICKNESS = 0.02
-"""[m]. MuJoCo's table is a plane; what has gone 2 cm through it was seen on the way."""
+"""Thickness of the box that stands for a table [m]. MuJoCo's table is a plane; a part that has gone
+2 cm through it was detected before."""
 
 WORLD = 0
 """MuJoCo's number for the body that everything stands in."""
@@ -38,19 +40,19 @@ class ArmParts:
         self._geoms = [
             i
             for i in range(model.ngeom)
-            if int(model.geom_type[i]) in _KINDS
+            if int(model.geom_type[i]) in _SHAPES
             and int(model.geom_bodyid[i]) != WORLD
-            and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is not there to be met
+            and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is no solid body
         ]
         self.parts = []
         for i in self._geoms:
             body = int(model.geom_bodyid[i])
-            kind = _KINDS[int(model.geom_type[i])]
+            shape, n_sizes = _SHAPES[int(model.geom_type[i])]
             self.parts.append(
                 ArmGeom(
                     model.geom(i).name or f"{model.body(body).name} geom {i}",
-                    kind,
-                    tuple(model.geom_size[i][: SIZES_PER_SHAPE[kind]].tolist()),
+                    shape,
+                    tuple(model.geom_size[i][:n_sizes].tolist()),
                     is_instrument=_carries(model, instrument, body),
                     checked_against_instrument=n_joints.get(body, JOINTS_NEXT + 1) > JOINTS_NEXT,
                     checked_against_fixtures=int(model.body_weldid[body]) != WORLD,
@@ -61,11 +63,11 @@ class ArmParts:
 
     def positions(self) -> FloatArray:
         """Return where the parts are now [m], world frame, shape (n, 3). A copy."""
-        return self._positions[self._geoms]
+        return np.asarray(self._positions[self._geoms])
 
     def axes(self) -> FloatArray:
-        """Return their axes as columns, shape (n, 3, 3). A copy."""
-        return self._axes[self._geoms].reshape(-1, 3, 3)
+        """Return the axes of the parts as columns, shape (n, 3, 3). A copy."""
+        return np.asarray(self._axes[self._geoms].reshape(-1, 3, 3))
 
 
 def instrument_body(model: mujoco.MjModel, blade: int) -> int:

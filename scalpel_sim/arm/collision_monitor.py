@@ -1,4 +1,4 @@
-"""What the arm and its instrument meet: looked for in each frame, counted, and said once."""
+"""Collisions of the arm and its instrument: detected in each frame, counted, and logged once."""
 
 import logging
 from collections import Counter
@@ -12,17 +12,17 @@ from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, tables
 from tissue import FloatArray
 
 FLOOR_MARGIN = 0.02
-"""[m], by which the floor reaches beyond the body. For the tissue it has no end; where the arm's
-base stands there is none."""
+"""How far the floor reaches beyond the body [m]. For the tissue it is infinite, but it must not
+reach the arm's base."""
 
 _log = logging.getLogger("scalpel_sim")
 
 
-class Touching:
-    """Looks at an arm after each frame.
+class CollisionMonitor:
+    """Detects in each frame which parts of an arm collide with fixtures or with each other.
 
-    Nothing pushes back where arm and fixtures meet, for neither MuJoCo nor the tissue knows of it:
-    a run in which they do is not what the device would do, and its user must hear of it.
+    Nothing pushes back where they collide, for neither MuJoCo nor the tissue knows of it: such a
+    run is not what the device would do, so its user gets a warning.
 
     Args:
         arm: Its model's planes are fixtures too: the table.
@@ -41,16 +41,16 @@ class Touching:
 
     @property
     def now(self) -> tuple[tuple[str, str], ...]:
-        """Which part met what in the last frame."""
+        """Pairs that collided in the last frame: part, and fixture or part."""
         return self._now
 
     @property
     def frames(self) -> dict[str, int]:
-        """In how many frames a part met something, by "PART, FIXTURE"."""
+        """In how many frames each pair collided, by "PART, FIXTURE OR PART"."""
         return {", ".join(pair): n for pair, n in self._frames.items()}
 
-    def look(self) -> None:
-        """Look at where the arm is now. The first time that two things meet is logged."""
+    def check(self) -> None:
+        """Detect the collisions of the arm as it is now. The first one of each pair is logged."""
         self._now = self._collisions.colliding_pairs(self._parts.positions(), self._parts.axes())
         for pair in self._now:
             if pair not in self._frames:
@@ -68,7 +68,7 @@ def floor_below(bounds: FloatArray, height: float) -> FixtureBox:
 
     Args:
         bounds: Lowest and highest corner of the body [m], shape (2, 3).
-        height: Of the upper side of the floor [m].
+        height: Height of the upper side of the floor [m].
     """
     low, high = bounds[:, :2]
     centre = np.array([*(0.5 * (low + high)), height - 0.5 * TABLE_THICKNESS])

@@ -30,13 +30,13 @@ class Impedance:
     """
 
     stiffness: float = 5e3
-    """[N/m]."""
+    """Stiffness against displacement [N/m]."""
     damping: float = 40.0
-    """[N s/m]; about critical for the 70 g that one feels of the arm."""
-    turning_stiffness: float = 10.0
-    """[N m/rad]."""
-    turning_damping: float = 0.15
-    """[N m s/rad]; about critical for those 70 g, 8 cm from the middle of the edge."""
+    """Damping of displacement [N s/m]; about critical for the 70 g that the hand feels."""
+    rotational_stiffness: float = 10.0
+    """Stiffness against turning [N m/rad]."""
+    rotational_damping: float = 0.15
+    """Damping of turning [N m s/rad]; about critical for 70 g at 8 cm from the edge's middle."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -92,7 +92,7 @@ def add_hand(
         spring.biastype = mujoco.mjtBias.mjBIAS_AFFINE
         spring.biasprm[:3] = 0.0, -impedance.stiffness, -impedance.damping
     _actuator(spec, ACTUATORS[3]).set_to_orientation(
-        impedance.turning_stiffness, impedance.turning_damping
+        impedance.rotational_stiffness, impedance.rotational_damping
     )
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
 
@@ -125,12 +125,12 @@ class Hand:
         self._is_held = False
 
     def hold(self, pose: BladeSegment) -> None:
-        """Want the blade at rest at `pose`, world frame. Also where a path jumps, or begins."""
+        """Lead the blade to rest at `pose`, world frame: where a path begins, or jumps."""
         self._is_held = False
         self.follow(pose)
 
     def follow(self, pose: BladeSegment) -> None:
-        """Want the blade at `pose` now, and moving as it has since the last call, a step ago.
+        """Lead the blade to `pose`, moving as the pose has moved since the last call, a step ago.
 
         The dampers resist motion relative to the path, not to the world: without that the blade
         would lag by speed x damping / stiffness, 0.5 mm at 60 mm/s.
@@ -162,12 +162,12 @@ class Hand:
 
     @property
     def deflection(self) -> FloatArray:
-        """How far the middle of the edge is from where the hand wants it [m], world frame, (3,)."""
-        return self._edge - self._position
+        """Displacement of the middle of the edge from its target [m], world frame, shape (3,)."""
+        return np.asarray(self._edge - self._position)
 
     @property
     def force(self) -> FloatArray:
-        """What the hand did to the blade in the last step [N], world frame, shape (3,)."""
+        """Force of the hand on the blade in the last step [N], world frame, shape (3,)."""
         force = np.empty(3)
         mujoco.mju_rotVecQuat(force, self._output[:3], self._quaternion)
         return force

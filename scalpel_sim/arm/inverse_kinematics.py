@@ -41,8 +41,8 @@ class Reach(NamedTuple):
     """Whether, and how comfortably, an arm reaches poses."""
 
     angles: FloatArray
-    """Of the six joints [rad], shape (..., 6). Where the elbow cannot stretch or fold enough, the
-    nearest that it can."""
+    """Angles of the six joints [rad], shape (..., 6). Where the elbow cannot stretch or fold
+    enough, the nearest that it can."""
     margin: FloatArray
     """Smallest distance of an angle from an end of its range, as a fraction of half the range:
     1 in the middle, negative beyond. Shape (...)."""
@@ -73,8 +73,8 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
 
     Args:
         arm: From `geometry`.
-        positions: Of the origin of the blade's body, in the frame of the base [m], shape (..., 3).
-        axes: Of the blade's body as columns, in the frame of the base, shape (..., 3, 3).
+        positions: Origin of the blade's body, in the frame of the base [m], shape (..., 3).
+        axes: Axes of the blade's body as columns, in the frame of the base, shape (..., 3, 3).
         mount_angle: Between stylus and blade [rad].
     """
     c, s = np.cos(mount_angle), np.sin(mount_angle)
@@ -109,4 +109,5 @@ def _margin(angles: FloatArray, ranges: FloatArray) -> FloatArray:
     """Return the smallest distance of the angles from the ends of their ranges, relative."""
     low, high = ranges[np.isfinite(ranges).all(axis=1)].T
     watched = angles[..., np.isfinite(ranges).all(axis=1)]
-    return (np.minimum(watched - low, high - watched) / (0.5 * (high - low))).min(axis=-1)
+    margins = np.minimum(watched - low, high - watched) / (0.5 * (high - low))
+    return np.asarray(margins.min(axis=-1))

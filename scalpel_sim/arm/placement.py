@@ -14,20 +14,21 @@ from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray
 
 AUTO = "auto"
-"""Takes the smallest arm that reaches, and renders the force if one does."""
+"""Chooses the smallest arm that reaches, and renders the force if one does."""
 
 SAMPLES = 9
-"""Poses along the stroke that the search looks at. A planned stroke bends by less than its own
-sagitta between them; `DENSE_SAMPLES` confirm the place that was found."""
+"""Number of poses along the stroke that the search uses. A planned stroke bends by less than its
+own sagitta between them; `DENSE_SAMPLES` confirm the place that was found."""
 
 DENSE_SAMPLES = 65
+"""Number of poses along the stroke at which the chosen place is confirmed."""
 
 YAWS = np.arange(24) * (2.0 * math.pi / 24)
 """Directions from the base to the stroke that the search tries [rad]."""
 
 DISTANCES, HEIGHTS = np.linspace(0.25, 1.0, 11), np.linspace(-0.7, 0.7, 13)
-"""Of the middle of the stroke from the axis of the waist, and over the shoulder, that the search
-tries, as fractions of the length of the stretched arm."""
+"""Distances of the middle of the stroke from the axis of the waist, and heights over the shoulder,
+that the search tries, as fractions of the length of the stretched arm."""
 
 MOUNT_ANGLES = (0.0, math.pi / 4.0, math.pi / 2.0)
 """Angles between stylus and blade that the search tries [rad]: scalpel handles are straight or
@@ -38,16 +39,17 @@ NEEDED_MARGIN = 0.04
 hand yields, and a joint that meets its stop would push back."""
 
 BASE_RADIUS = 0.08
-"""[m] about the axis of the waist, in which the body must not lie."""
+"""Radius about the axis of the waist in which the body must not lie [m]."""
 
 LINK_CLEARANCE = 0.01
-"""[m] between the axes of upper arm and forearm and the box around the body."""
+"""Smallest distance of the axes of upper arm and forearm from the box around the body [m]."""
 
 TABLE_CLEARANCE = 0.01
-"""[m] between the table and what is lowest, blade or body: the blade passes beneath the body."""
+"""Distance of the table from the lowest point of blade and body [m]: the blade passes beneath the
+body."""
 
 AWKWARD = 2.0
-"""Taken off the margin of a place where a link passes through the body, or where the base
+"""Subtracted from the margin of a place where a link passes through the body, or where the base
 stands on a column: any place without that is better."""
 
 SMALLEST_SCALE, SCALE_HALVINGS = 1e-3, 7
@@ -69,11 +71,11 @@ class Placement(NamedTuple):
     mount_angle: float
     """Between stylus and blade [rad]."""
     base_position: FloatArray
-    """Of the middle of the base's underside [m], shape (3,)."""
+    """Middle of the base's underside [m], shape (3,)."""
     base_yaw: float
-    """By which the base is turned about +z [rad]."""
+    """Angle by which the base is turned about +z [rad]."""
     tissue_origin: FloatArray
-    """Of the tissue frame, which is not turned [m], shape (3,)."""
+    """Origin of the tissue frame, which is not turned [m], shape (3,)."""
     qpos: FloatArray
     """Angles of the joints at the start of the stroke [rad], shape (6,)."""
     margin: float
@@ -104,13 +106,13 @@ def place(
         bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3). The base
             stands beside it, and it lies above the table.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches, and renders the force.
-        force: Expected on the blade [N], toughness times the length of edge in the tissue. It only
-            matters to `auto`; where no arm reaches and renders it, the largest that reaches is
-            taken, and feels what it can.
+        force: Expected force on the blade [N], toughness times the length of edge in the tissue. It
+            only matters to `auto`; where no arm reaches and renders it, the largest that reaches is
+            taken, and renders what it can.
 
     Raises:
         UsageError: no arm has this name.
-        PlacementError: none reaches; the message says at which scale it would.
+        PlacementError: no arm reaches; the message says at which scale one would.
     """
     if preset != AUTO and preset not in ARMS:
         raise unknown("arm", preset, [*ARMS, AUTO])
@@ -130,22 +132,22 @@ class _Path(NamedTuple):
     """Poses of the blade's body along a stroke, tissue frame."""
 
     positions: FloatArray
-    """[m], shape (n, 3)."""
+    """Origin of the blade's body [m], shape (n, 3)."""
     axes: FloatArray
-    """As columns, shape (n, 3, 3)."""
+    """Axes of the blade's body as columns, shape (n, 3, 3)."""
     lowest: float
-    """Of the blade and of the body along the stroke [m]."""
+    """Lowest height of the blade and of the tissue along the stroke [m]."""
     bounds: FloatArray
-    """Of the body [m], shape (2, 3)."""
+    """Lowest and highest corner of the tissue [m], shape (2, 3)."""
 
 
 class _Places(NamedTuple):
-    """Candidates, relative to the middle of the stroke; arrays of one shape."""
+    """Candidate places of the base, relative to the middle of the stroke; arrays of one shape."""
 
     yaws: FloatArray
     distances: FloatArray
     heights: FloatArray
-    """Of the middle of the stroke over the base's underside [m]."""
+    """Height of the middle of the stroke over the base's underside [m]."""
 
 
 def _place(stroke: Stroke, bounds: FloatArray, preset: str) -> Placement:
@@ -202,7 +204,7 @@ def _path(stroke: Stroke, bounds: FloatArray, edge_height: float, samples: int) 
 
 
 def _scores(measures: Geometry, path: _Path, places: _Places, mount_angle: float) -> FloatArray:
-    """Return how good each place is: the margin along the path, less what is awkward there."""
+    """Return how good each place is: the margin along the path, less `AWKWARD` where it applies."""
     positions, axes = _in_base(path, places)
     reached = reach(measures, positions, axes, mount_angle)
     base = _base(path, places)
@@ -212,18 +214,15 @@ def _scores(measures: Geometry, path: _Path, places: _Places, mount_angle: float
     in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), links) + base[:, None, None]
     through = _distance_to_box(in_tissue, path.bounds) < LINK_CLEARANCE
     score = reached.margin.min(axis=1) - AWKWARD * on_column - AWKWARD * through.any(axis=(1, 2))
-    return np.where(stands_beside, score, -np.inf)
+    return np.asarray(np.where(stands_beside, score, -np.inf))
 
 
 def _base(path: _Path, places: _Places) -> FloatArray:
     """Return where the base stands, tissue frame [m], shape (n_places, 3)."""
     outward = _turns(places.yaws)[:, :, 1]
     middle = (path.positions.min(axis=0) + path.positions.max(axis=0)) / 2.0
-    return (
-        middle
-        - places.distances[:, None] * outward
-        - np.multiply.outer(places.heights, [0.0, 0.0, 1.0])
-    )
+    beside = middle - places.distances[:, None] * outward
+    return np.asarray(beside - np.multiply.outer(places.heights, [0.0, 0.0, 1.0]))
 
 
 def _in_base(path: _Path, places: _Places) -> tuple[FloatArray, FloatArray]:
@@ -251,22 +250,23 @@ def _links(measures: Geometry, angles: FloatArray) -> FloatArray:
 
 
 def _distance_to_box(points: FloatArray, box: FloatArray) -> FloatArray:
-    """Return how far points are from a box, 0 inside."""
-    return np.linalg.norm(np.maximum(np.maximum(box[0] - points, points - box[1]), 0.0), axis=-1)
+    """Return how far points are from a box [m]; 0 inside."""
+    outside = np.maximum(np.maximum(box[0] - points, points - box[1]), 0.0)
+    return np.asarray(np.linalg.norm(outside, axis=-1))
 
 
 def _advice(stroke: Stroke, bounds: FloatArray, preset: str) -> str:
     """Return the message that an arm does not reach, by how much, and what to do."""
     measures, edge_height = _measured(preset)
     path = _path(stroke, bounds, edge_height, SAMPLES)
-    way = 1e3 * np.ptp(path.positions, axis=0)
+    extent = 1e3 * np.ptp(path.positions, axis=0)
     message = (
         f"the {preset} arm does not reach the whole stroke '{stroke.name}': a blade of "
-        f"{1e3 * stroke.blade_length:.0f} mm over {way[0]:.0f} x {way[1]:.0f} x {way[2]:.0f} mm "
-        "(x, y, z)"
+        f"{1e3 * stroke.blade_length:.0f} mm over "
+        f"{extent[0]:.0f} x {extent[1]:.0f} x {extent[2]:.0f} mm (x, y, z)"
     )
     larger = list(ARMS)[list(ARMS).index(preset) + 1 :]
-    other = f", or take --arm {larger[0]}" if larger else ""
+    other = f", or choose --arm {larger[0]}" if larger else ""
     low, high = math.log(SMALLEST_SCALE), 0.0
     if not _reaches(measures, _scaled(path, SMALLEST_SCALE)):
         return f"{message}. Move the stroke, or make --scale smaller{other}"

@@ -1,4 +1,4 @@
-"""The blade that the arm holds: a scalpel's, one of other measures, or the paper's line."""
+"""The blade that the arm holds: a scalpel, one with other measures, or the paper's line."""
 
 import math
 from dataclasses import replace
@@ -7,10 +7,10 @@ from scalpel_sim.errors import UsageError
 from tissue import BladeShape
 
 SCALPEL = BladeShape()
-"""A new blade of the usual sizes: see `tissue.blade_shape` for its measures."""
+"""A new scalpel blade of the usual sizes, with the defaults of `tissue.BladeShape`."""
 
 ON_FACES = ("blade_friction", "blade_viscosity")
-"""Properties of a material that say how it rubs on the faces of a blade."""
+"""Properties of a material that act on the faces of a blade."""
 
 
 def chosen_blade(
@@ -21,18 +21,18 @@ def chosen_blade(
     height: float | None = None,
     edge_radius: float | None = None,
 ) -> BladeShape | None:
-    """Return the blade that is asked for; None is the paper's, a line.
+    """Return the blade that is asked for; None is a line, the blade of the paper.
 
     Args:
         usual: The blade where nothing is asked for.
-        thickness: [m]; 0 for a line.
-        bevel: Between each bevel and the plane of the blade [degree].
-        height: From the edge to the back [m].
-        edge_radius: [m].
+        thickness: Thickness [m]; 0 for a line.
+        bevel: Angle between each bevel and the plane of the blade [degree].
+        height: Distance from the edge to the back [m].
+        edge_radius: Radius of the edge [m].
 
     Raises:
         UsageError: a line is asked for, and something of a body beside it.
-        ValueError: there can be no such blade; `tissue.blade_shape` says why.
+        ValueError: there can be no such blade; `tissue.BladeShape` says why.
     """
     measures = {"bevel": bevel, "height": height, "edge_radius": edge_radius}
     given = {name: value for name, value in measures.items() if value is not None}
@@ -41,7 +41,7 @@ def chosen_blade(
             option = next(iter(given)).replace("_", "-")
             raise UsageError(
                 f"--blade-{option} is about a blade with faces, and --blade-thickness 0 is a line; "
-                "leave one of them away"
+                "omit one of them"
             )
         return None
     if thickness is not None:
@@ -52,7 +52,7 @@ def chosen_blade(
 
 
 def expect_faces(blade: BladeShape | None, asked: dict[str, object]) -> None:
-    """Refuse properties that would change nothing, because the blade is none that they act on.
+    """Refuse properties that would change nothing, because this blade has no faces or no radius.
 
     Args:
         blade: The blade that was chosen.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import App, Parameter
 
 from scalpel_sim.bench.watch import Watch, watching
-from scalpel_sim.cli.console import talking
-from scalpel_sim.cli.options import Talk
+from scalpel_sim.cli.console import log_to_stderr
+from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import UsageError
 
 if TYPE_CHECKING:  # `--help` should not wait for it
@@ -45,7 +45,7 @@ Measure = Callable[[Watch], "Findings"]
 
 
 @bench.default
-def short(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+def short(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
     """A short set: the kernels in small bodies, a scene, and what the machine could do at best."""
     from scalpel_sim.bench import kernels, roofline, scenes
 
@@ -56,12 +56,14 @@ def short(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
             lambda watch: roofline.measure(measuring.runs, SHORT, watch),
         ],
         measuring,
-        talk,
+        printing,
     )
 
 
 @bench.command
-def scenes(*names: str, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+def scenes(
+    *names: str, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()
+) -> None:
     """Whole runs of the scenes: time of a frame, and of each stage of it.
 
     Args:
@@ -70,22 +72,28 @@ def scenes(*names: str, measuring: Measuring = Measuring(), talk: Talk = Talk())
     from scalpel_sim.bench import scenes as benchmark
 
     chosen = benchmark.check_names(names)
-    _run([lambda watch: benchmark.measure(measuring.runs, chosen, watch)], measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, chosen, watch)], measuring, printing)
 
 
 @bench.command
 def kernels(
-    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+    *,
+    largest: Largest = None,
+    measuring: Measuring = Measuring(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Forces, steps, a cut step and the search for contact, in 576 to 60,000 tetrahedra."""
     from scalpel_sim.bench import kernels as benchmark
 
-    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, printing)
 
 
 @bench.command
 def scaling(
-    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+    *,
+    largest: Largest = None,
+    measuring: Measuring = Measuring(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """What a step, and a local frame, cost in bodies of 576 to 1,000,000 tetrahedra."""
     from scalpel_sim.bench import local_frame
@@ -97,18 +105,21 @@ def scaling(
             lambda watch: local_frame.measure(measuring.runs, largest, watch),
         ],
         measuring,
-        talk,
+        printing,
     )
 
 
 @bench.command
 def roofline(
-    *, largest: Largest = None, measuring: Measuring = Measuring(), talk: Talk = Talk()
+    *,
+    largest: Largest = None,
+    measuring: Measuring = Measuring(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Bandwidth and arithmetic of this machine, and the share of them that a step uses."""
     from scalpel_sim.bench import roofline as benchmark
 
-    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, printing)
 
 
 @bench.command
@@ -117,7 +128,7 @@ def peers(
     largest: Largest = None,
     python: Path | None = None,
     measuring: Measuring = Measuring(),
-    talk: Talk = Talk(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """MuJoCo flex, Newton and Rapier in the same rounds as ours, as far as they are installed.
 
@@ -126,26 +137,30 @@ def peers(
     """
     from scalpel_sim.bench import peers as benchmark
 
-    _run([lambda watch: benchmark.measure(measuring.runs, largest, python, watch)], measuring, talk)
+    _run(
+        [lambda watch: benchmark.measure(measuring.runs, largest, python, watch)],
+        measuring,
+        printing,
+    )
 
 
 @bench.command
-def table1(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+def table1(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
     """The three grids of the paper's Table 1, with its own scheme and ours, beside its figures."""
     from scalpel_sim.bench import table1 as benchmark
 
-    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, printing)
 
 
 @bench.command
-def cut(*, measuring: Measuring = Measuring(), talk: Talk = Talk()) -> None:
+def cut(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
     """The cost of a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
     from scalpel_sim.bench import cut as benchmark
 
-    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, talk)
+    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, printing)
 
 
-def _run(benchmarks: Sequence[Measure], measuring: Measuring, talk: Talk) -> None:
+def _run(benchmarks: Sequence[Measure], measuring: Measuring, printing: PrintOptions) -> None:
     """Measure, and say, keep and compare what was found."""
     from scalpel_sim.bench.machine import load as machine_load
     from scalpel_sim.bench.results import as_json, load, results_of, save
@@ -158,16 +173,16 @@ def _run(benchmarks: Sequence[Measure], measuring: Measuring, talk: Talk) -> Non
     if measuring.save is not None:
         check_file(measuring.save, ".json", "--save")
     load_at_start = machine_load()
-    with talking(talk), watching(talk) as watch:
-        load_kernels(talk)
+    with log_to_stderr(printing), watching(printing) as watch:
+        load_kernels(printing)
         found = [measure(watch) for measure in benchmarks]
     results = results_of(found, load_at_start)
     text = as_json(results)
     if measuring.save is not None:
         save(measuring.save, text)
-    if talk.json:
+    if printing.json:
         print(text)
-    elif not talk.quiet:
+    elif not printing.quiet:
         _print(found, results, before)
 
 

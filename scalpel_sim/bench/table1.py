@@ -27,8 +27,8 @@ from scalpel_sim.output.summary import STAGES
 from scalpel_sim.output.table_1 import MACHINE, TABLE_1
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scenes import SCHEMES, Scene
-from scalpel_sim.simulation import Picture, Simulation
-from scalpel_sim.strokes.cuts import Cut, prepare_cut
+from scalpel_sim.simulation import DrawFrame, Simulation
+from scalpel_sim.strokes.cuts import PlannedCut, prepare_cut
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings
@@ -165,7 +165,7 @@ def _run(cells: _Cells, scheme: str) -> Row:
     scene = Scene("table1", "a grid of the paper", lambda: block(cells, size), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
-    simulation = prepare_cut(Cut(scene, _WAY, DEPTHS[cells]), tissue)
+    simulation = prepare_cut(PlannedCut(scene, _WAY, DEPTHS[cells]), tissue)
     spent_on: list[float] = []
     simulation.pictures.append(_into_nothing(simulation, spent_on))
     simulation.run(simulation.stroke.duration)
@@ -192,7 +192,7 @@ def _during_cut(recording: Recording) -> dict[str, np.ndarray]:
     return {name: recording.column(name)[frames] for name in (*STAGES.values(), "frame_s")}
 
 
-def _into_nothing(simulation: Simulation, spent_on: list[float]) -> Picture:
+def _into_nothing(simulation: Simulation, spent_on: list[float]) -> DrawFrame:
     """Return what makes the live view's pictures at its rate, and shows them to nobody.
 
     It adds the time [s] that each takes to `spent_on`.

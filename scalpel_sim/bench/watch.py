@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.options import Talk
+from scalpel_sim.cli.options import PrintOptions
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -41,9 +41,9 @@ class Bar(Watch):
 
 
 @contextmanager
-def watching(talk: Talk) -> Iterator[Watch]:
+def watching(printing: PrintOptions) -> Iterator[Watch]:
     """Yield a bar if a person is looking at one."""
-    if talk.quiet or not sys.stderr.isatty():
+    if printing.quiet or not sys.stderr.isatty():
         yield SILENT
         return
     from rich.console import Console

@@ -10,14 +10,26 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
-from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
+from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
-from scalpel_sim.cli.console import progress, report, say, say_error, talking
-from scalpel_sim.cli.options import Body, FigureNumber, Motion, SceneName, Talk
+from scalpel_sim.cli.console import log_to_stderr, print_report, progress, say, say_error
+from scalpel_sim.cli.options import (
+    CONNECTION,
+    PAGE,
+    ArmOptions,
+    ClientOptions,
+    FigureNumber,
+    Flag,
+    OutputOptions,
+    PrintOptions,
+    SceneName,
+    TissueOptions,
+)
 from scalpel_sim.errors import (
     EXIT_OK,
     EXIT_RUN_FAILED,
     EXIT_WRONG_USE,
+    UsageError,
     exit_code,
     one_line,
 )
@@ -27,15 +39,15 @@ from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
 
 if TYPE_CHECKING:  # imported where they are used: `--help` should not wait for a compiler
-    from scalpel_sim.cli.run_setup import Ready
+    from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
     from scalpel_sim.output.summary import Summary
     from scalpel_sim.simulation import Simulation
 
 PROGRAM = "scalpel-sim"
 SHORTEST_PAUSE = 5e-3
-"""[s]. Shorter ones cost more in waking up than they are worth."""
-LOOK_AGAIN = 0.2
-"""How often a finished `view` looks whether it is still wanted [s]."""
+"""Shortest pause that slows a run to real time [s]: a shorter one costs more than it gains."""
+SECONDS_PER_CHECK = 0.2
+"""How often a finished `view` checks whether its page is still wanted [s]."""
 
 app = App(
     name=PROGRAM,
@@ -45,50 +57,73 @@ app = App(
 )
 
 
-@app.command
-def run(
+@app.command(name="run")
+def _run(
     scene: SceneName = None,
     /,
     *,
-    body: Body = Body(),
-    motion: Motion = Motion(),
-    talk: Talk = Talk(),
+    tissue: TissueOptions = TissueOptions(),
+    arm: ArmOptions = ArmOptions(),
+    client: ClientOptions = ClientOptions(),
+    output: OutputOptions = OutputOptions(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Let the arm cut, print a table, write files to a folder."""
-    with talking(talk), Plotter() as plotter:  # it loads while we do
-        from scalpel_sim.cli.run_setup import ready_run
+    """Cut a body with the arm, print a table, and write files to a folder.
 
-        with ready_run(scene, body, motion, talk, audits=True) as ready:
-            report(_perform(ready, motion, talk, plotter), ready.folder, talk)
+    For example:
+
+    ```console
+    scalpel-sim run
+    scalpel-sim run slab --stroke curved --toughness 10
+    scalpel-sim run organ --material liver --blade-thickness 0.001 --out out/liver
+    scalpel-sim run --mesh organ.msh --scale 0.001 --fix bottom --material mine.toml
+    ```
+    """
+    with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
+        from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+
+        options = RunOptions(tissue, arm, client, output, printing)
+        with prepared_run(scene, options, audits=True) as prepared:
+            print_report(_perform(prepared, options, plotter), prepared.folder, printing)
 
 
-@app.command
-def view(
+@app.command(name="view")
+def _view(
     scene: SceneName = None,
     /,
     *,
-    wireframe: Annotated[bool, Parameter(negative="")] = False,
-    port: int | None = None,
-    body: Body = Body(),
-    motion: Motion = Motion(),
-    talk: Talk = Talk(),
+    wireframe: Annotated[Flag, Parameter(group=PAGE)] = False,
+    port: Annotated[int | None, Parameter(group=PAGE)] = None,
+    tissue: TissueOptions = TissueOptions(),
+    arm: ArmOptions = ArmOptions(),
+    client: ClientOptions = ClientOptions(),
+    output: OutputOptions = OutputOptions(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Do the same at the speed of life, and show it live in a browser.
+    """Run at real-time speed, and show the cut live in a browser.
 
-    On a terminal it waits for Enter, so that one can open the page first. Afterwards the page stays
+    On a terminal it waits for Enter, so that you can open the page first. Afterwards the page stays
     until Ctrl-C.
+
+    For example:
+
+    ```console
+    scalpel-sim view
+    scalpel-sim view slab --wireframe --port 8080
+    ```
 
     Args:
         wireframe: Show the edges of the mesh.
-        port: Where the page is served, on this machine only; a free port if not given.
+        port: Port of the page, on this machine only [default: any free port].
     """
-    with talking(talk), Plotter() as plotter:
-        from scalpel_sim.cli.run_setup import ready_run
+    with log_to_stderr(printing), Plotter() as plotter:
+        from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.viewer.pictures import into_viewer, show_in
         from scalpel_sim.viewer.viewer import Viewer
 
-        with ready_run(scene, body, motion, talk) as ready:
-            simulation = ready.simulation
+        options = RunOptions(tissue, arm, client, output, printing)
+        with prepared_run(scene, options) as prepared:
+            simulation = prepared.simulation
             with Viewer(
                 simulation.arm.model,
                 title=simulation.title,
@@ -98,46 +133,54 @@ def view(
             ) as viewer:
                 show_in(viewer, simulation)
                 simulation.pictures.append(into_viewer(viewer))
-                _invite(viewer.url)
-                summary = _perform(ready, motion, talk, plotter, at_most_real_time=True)
+                _wait_for_start(viewer.url)
+                summary = _perform(prepared, options, plotter, at_most_real_time=True)
                 show_in(viewer, simulation)
-                report(summary, ready.folder, talk)
+                print_report(summary, prepared.folder, printing)
                 _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
 
 
-@app.command
-def serve(
+@app.command(name="serve")
+def _serve(
     scene: SceneName = None,
     /,
     *,
-    host: str = DEFAULT_HOST,
-    port: int = DEFAULT_PORT,
-    key: Path | None = None,
-    body: Body = Body(),
-    talk: Talk = Talk(),
+    host: Annotated[str, Parameter(group=CONNECTION)] = DEFAULT_HOST,
+    port: Annotated[int, Parameter(group=CONNECTION)] = DEFAULT_PORT,
+    key: Annotated[Path | None, Parameter(group=CONNECTION)] = None,
+    tissue: TissueOptions = TissueOptions(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Hold the tissue for an arm in another process: `scalpel-sim run --connect HOST:PORT`.
 
     Every client finds the body as at the start. Ctrl-C ends it.
 
-    Args:
-        host: Address to listen on; with a key any, such as 0.0.0.0, else this machine's own only.
-        port: Port to listen on; 0 for any free one.
-        key: Serve only who has the key in this file; else in SCALPEL_SIM_KEY, if that is set.
-    """
-    from bridge import serve as serve_tissue
-    from bridge.tcp.keys import chosen_key
-    from scalpel_sim.cli.run_setup import chosen_scene, load_kernels, springs_as_asked
-    from scalpel_sim.scene_body import check, make_tissue
+    For example, on two machines that share the file link.key:
 
-    with talking(talk):
+    ```console
+    scalpel-sim serve organ --host 0.0.0.0 --key link.key
+    scalpel-sim run --connect tissue.example.org:8766 --key link.key
+    ```
+
+    Args:
+        host: Address to listen on: any with a key, such as 0.0.0.0; else one of this machine alone.
+        port: Port to listen on; 0 for any free one.
+        key: Serve only clients that have the key in this file [default: the key in
+            SCALPEL_SIM_KEY, if that is set].
+    """
+    from bridge import chosen_key
+    from bridge import serve as serve_tissue
+    from scalpel_sim.cli.run_setup import chosen_scene, load_kernels, springs_as_asked
+    from scalpel_sim.scene_body import check_scene, make_tissue
+
+    with log_to_stderr(printing):
         secret = chosen_key(key)
-        served = chosen_scene(scene, body)
-        check(served)
-        served, springs = springs_as_asked(served, body)
-        if springs and not talk.quiet:
-            say(", ".join(f"{key} {value:.4g}" for key, value in springs["springs"].items()))
-        load_kernels(talk)
+        served = chosen_scene(scene, tissue)
+        check_scene(served)
+        served, springs = springs_as_asked(served, tissue.material)
+        if springs and not printing.quiet:
+            say(", ".join(f"{name} {value:.4g}" for name, value in springs["springs"].items()))
+        load_kernels(printing)
         serve_tissue(
             lambda: make_tissue(served),
             scene=served.name,
@@ -150,20 +193,20 @@ def serve(
         )
 
 
-@app.command
-def key(file: Path, /, *, talk: Talk = Talk()) -> None:
+@app.command(name="key")
+def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
     """Write a new random key to a file, for `serve --key` and, copied there, `run --key`.
 
-    Whoever has the file can connect, so hand it over as you would a password.
+    Everyone who has the file can connect, so hand it over as you would a password.
 
     Args:
         file: Must not exist yet. Only you can read it.
     """
-    from bridge.tcp.keys import write_new_key
+    from bridge import write_new_key
 
-    with talking(talk):
+    with log_to_stderr(printing):
         write_new_key(file)
-        if not talk.quiet:
+        if not printing.quiet:
             print(f"{file}: a new key, readable by you alone")
 
 
@@ -171,31 +214,57 @@ app.command(bench)
 app.command(validate)
 
 
-@app.command
-def materials(name: str | None = None, /, *, talk: Talk = Talk()) -> None:
+@app.command(name="materials")
+def _materials(
+    name: str | None = None,
+    /,
+    *,
+    write: Path | None = None,
+    force: Flag = False,
+    printing: PrintOptions = PrintOptions(),
+) -> None:
     """Print the materials that --material knows, with the source of each figure.
 
-    Args:
-        name: One of them; all if not given.
-    """
-    with talking(talk):
-        from scalpel_sim.cli.materials import as_json, chosen_presets, print_presets
+    Or write the numbers of a material and of a scalpel to a file, with a comment on each, to be
+    changed and given as --material and --blade:
 
+    ```console
+    scalpel-sim materials liver --write mine.toml
+    scalpel-sim run organ --material mine.toml --blade mine.toml
+    ```
+
+    Args:
+        name: One of them [default: all; to write, the soft gel of the scenes].
+        write: Write this FILE.toml instead of printing.
+        force: Replace the file if it exists.
+    """
+    with log_to_stderr(printing):
+        from scalpel_sim.cli.materials import chosen_presets, presets_as_json, print_presets
+
+        if write is not None:
+            from scalpel_sim.cli.material_template import write_template
+
+            write_template(write, name, force=force)
+            if not printing.quiet:
+                print(f"{write}: written; use it with --material {write} --blade {write}")
+            return
+        if force:
+            raise UsageError("--force is for --write FILE.toml; add that, or omit it")
         presets = chosen_presets(name)
-        if talk.json:
-            print(as_json(presets))
+        if printing.json:
+            print(presets_as_json(presets))
         else:
             print_presets(presets)
 
 
-@app.command
-def figure(
+@app.command(name="figure")
+def _figure(
     number: FigureNumber,
     /,
     *,
     output: Path | None = None,
     scheme: str = "stellar",
-    talk: Talk = Talk(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
 
@@ -204,36 +273,36 @@ def figure(
 
     Args:
         number: 10, 11 or 12.
-        output: The file; figure10.png (11, 12) in this folder if not given.
+        output: The file [default: figure10.png (11, 12) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.run_folder import check_file
     from scalpel_sim.scenes import check_scheme
 
     path = output or Path(f"figure{number}.png")
-    with talking(talk):
+    with log_to_stderr(printing):
         check_scheme(scheme)
         check_file(path, ".png", "--output")
         from scalpel_sim.cli.run_setup import load_kernels
         from scalpel_sim.figures.figures import draw_figure
 
-        load_kernels(talk)
-        if not talk.quiet:
+        load_kernels(printing)
+        if not printing.quiet:
             say(f"cutting and drawing Figure {number}: about half a minute")
         drawn = draw_figure(number, path, scheme)
-        if talk.json:
+        if printing.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
-        elif not talk.quiet:
+        elif not printing.quiet:
             print(f"{path}: {drawn.caption}")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Do what the command line asks, and end the process with the exit code for how it went."""
+    """Run the command line, and end the process with its exit code."""
     sys.exit(command_line(sys.argv[1:] if arguments is None else arguments))
 
 
 def command_line(arguments: Sequence[str]) -> int:
-    """Do what the arguments ask, and return the exit code.
+    """Run the command that the arguments name, and return the exit code.
 
     Every error becomes one line on standard error: what, where, why, and what to do. With
     `--verbose` the traceback comes before it.
@@ -256,28 +325,30 @@ def command_line(arguments: Sequence[str]) -> int:
 
 
 def _perform(
-    ready: "Ready", motion: Motion, talk: Talk, plotter: Plotter, *, at_most_real_time: bool = False
+    prepared: "PreparedRun",
+    options: "RunOptions",
+    plotter: Plotter,
+    *,
+    at_most_real_time: bool = False,
 ) -> "Summary":
     """Do the run, with a progress bar on a terminal."""
     from scalpel_sim.output.run_folder import Outputs
     from scalpel_sim.run import perform, run_time
 
-    seconds = run_time(ready.simulation, motion.seconds)
-    with progress(seconds, talk) as advance:
-        after_frame = _paced(advance) if at_most_real_time else advance
+    seconds = run_time(prepared.simulation, options.arm.seconds)
+    with progress(seconds, options.printing) as advance:
         return perform(
-            ready.simulation,
-            Outputs(ready.folder, plotter),
-            settings=ready.settings,
-            seed=motion.seed,
+            prepared.simulation,
+            Outputs(prepared.folder, plotter),
+            settings=prepared.settings,
             seconds=seconds,
-            every_frame=after_frame,
-            exports=motion.export,
+            every_frame=_paced(advance) if at_most_real_time else advance,
+            exports=options.output.export,
         )
 
 
 def _paced(after_frame: Callable[["Simulation"], None]) -> Callable[["Simulation"], None]:
-    """Return the same, with a pause where simulated time would overtake the clock on the wall."""
+    """Return `after_frame` followed by a pause where simulated time is ahead of the wall clock."""
     start = time.monotonic()
 
     def pause(simulation: "Simulation") -> None:
@@ -289,8 +360,8 @@ def _paced(after_frame: Callable[["Simulation"], None]) -> Callable[["Simulation
     return pause
 
 
-def _invite(url: str) -> None:
-    """Say where the page is, and give a person at a terminal the time to open it."""
+def _wait_for_start(url: str) -> None:
+    """Print where the page is; at a terminal, wait until it has been opened."""
     if sys.stdin is not None and sys.stdin.isatty():
         say(f"open {url}, then press Enter to begin")
         sys.stdin.readline()
@@ -299,8 +370,8 @@ def _invite(url: str) -> None:
 
 
 def _stay_while(condition: Callable[[], bool], message: str) -> None:
-    """Say so, and return when the condition fails, or on Ctrl-C."""
+    """Print a message, and return when the condition fails, or on Ctrl-C."""
     with StopSignals() as stop:
-        say(message)  # from now on Ctrl-C is heard
+        say(message)  # from now on Ctrl-C ends it without a traceback
         while condition() and stop.reason is None:
-            time.sleep(LOOK_AGAIN)
+            time.sleep(SECONDS_PER_CHECK)

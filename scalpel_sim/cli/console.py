@@ -1,4 +1,4 @@
-"""What the command line says: log lines, the progress bar, the report of a run."""
+"""What the command line prints: log lines, the progress bar, the report of a run."""
 
 import logging
 import math
@@ -9,23 +9,23 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scalpel_sim.cli.options import Talk
+from scalpel_sim.cli.options import PrintOptions
 
-if TYPE_CHECKING:  # an error of use should be said without waiting for a compiler
+if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
     from scalpel_sim.output.summary import Summary
     from scalpel_sim.simulation import Simulation
 
 SECONDS_PER_PROGRESS = 0.1
-"""So often is the progress bar drawn [s]."""
+"""Interval at which the progress bar is drawn [s]."""
 
 
 @contextmanager
-def talking(talk: Talk) -> Iterator[None]:
-    """Send what the parts log to standard error, as much of it as was asked for."""
+def log_to_stderr(options: PrintOptions) -> Iterator[None]:
+    """Send log messages to standard error, from the level that was asked for."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_OneLine())
     root = logging.getLogger()
-    level = logging.ERROR if talk.quiet else logging.INFO if talk.verbose else logging.WARNING
+    level = logging.ERROR if options.quiet else logging.INFO if options.verbose else logging.WARNING
     before = root.level
     root.addHandler(handler)
     root.setLevel(level)
@@ -37,7 +37,7 @@ def talking(talk: Talk) -> Iterator[None]:
 
 
 class _OneLine(logging.Formatter):
-    """`warning: unused nodes dropped`, and plain text for what is only information."""
+    """One line a message: `warning: unused nodes dropped`, and no prefix for information."""
 
     def format(self, record: logging.LogRecord) -> str:
         """Return the line."""
@@ -46,19 +46,19 @@ class _OneLine(logging.Formatter):
 
 
 def say(message: str) -> None:
-    """Print one line on standard error, where it cannot get between the figures."""
+    """Print one line on standard error, where it does not mix with the results."""
     print(message, file=sys.stderr, flush=True)
 
 
 def say_error(message: str) -> None:
-    """Print one line on standard error."""
+    """Print an error on standard error, in one line."""
     say(f"error: {' '.join(message.split())}")
 
 
 @contextmanager
-def progress(seconds: float, talk: Talk) -> Iterator[Callable[["Simulation"], None]]:
-    """Yield what to call after each frame: it moves a bar if a person is looking at one."""
-    if talk.quiet or not sys.stderr.isatty():
+def progress(seconds: float, options: PrintOptions) -> Iterator[Callable[["Simulation"], None]]:
+    """Yield a function to call after each frame. On a terminal it draws a progress bar."""
+    if options.quiet or not sys.stderr.isatty():
         yield lambda simulation: None
         return
     from rich.console import Console
@@ -88,16 +88,16 @@ def progress(seconds: float, talk: Talk) -> Iterator[Callable[["Simulation"], No
         yield advance
 
 
-def report(summary: "Summary", folder: Path, talk: Talk) -> None:
-    """Say how it went."""
-    if talk.json:
+def print_report(summary: "Summary", folder: Path, options: PrintOptions) -> None:
+    """Print the summary of a run, as a table or as JSON, and the names of its files."""
+    if options.json:
         from scalpel_sim.output.run_folder import summary_json
 
         print(summary_json(summary))
-    elif not talk.quiet:
+    elif not options.quiet:
         from rich.console import Console
 
-        from scalpel_sim.output.report import print_table
+        from scalpel_sim.output.report import print_summary
 
-        print_table(summary, Console())
+        print_summary(summary, Console())
         print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")

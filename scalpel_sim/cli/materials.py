@@ -26,11 +26,11 @@ SOURCED = (
     "damping_ratio",
     "blade_friction",
 )
-"""The figures of a preset."""
+"""Names of the figures of a preset."""
 
 
 def chosen_presets(name: str | None) -> list[Preset]:
-    """Return the preset of that name, or all.
+    """Return the preset of that name, or all presets.
 
     Raises:
         UsageError: there is none of that name; the message says which there are.
@@ -42,13 +42,13 @@ def chosen_presets(name: str | None) -> list[Preset]:
     return [MATERIALS[name]]
 
 
-def as_json(presets: Sequence[Preset]) -> str:
+def presets_as_json(presets: Sequence[Preset]) -> str:
     """Return the presets and their sources as JSON, SI units."""
     return json.dumps([_as_numbers(preset) for preset in presets], indent=2, ensure_ascii=False)
 
 
 def print_presets(presets: Sequence[Preset]) -> None:
-    """Print what the presets are, and below where each figure comes from."""
+    """Print a table of the presets, and below it the source of each figure."""
     console = Console()
     table = Table(title="Materials", title_justify="left")
     for heading in HEADINGS:
@@ -70,7 +70,7 @@ def print_presets(presets: Sequence[Preset]) -> None:
         f"{_NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
         "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
         f"stretching at {low:g} and {high:g} Hz, less between. friction: on the faces of "
-        "a blade. J / E: how far a blade drags the tissue along before it parts.",
+        "a blade. J / E: how far a blade drags the tissue along before the tissue parts.",
         markup=False,
         highlight=False,
         soft_wrap=True,
@@ -85,18 +85,18 @@ def print_presets(presets: Sequence[Preset]) -> None:
 
 
 def _marked(figure: SourcedValue, scale: float = 1.0) -> str:
-    """Return the number, with a mark if nobody was found to have measured it."""
+    """Return the number, with a mark if it could not be traced to a measurement."""
     return f"{figure.value * scale:.4g}{'' if figure.is_confirmed else _NOT_CONFIRMED}"
 
 
 def _line(name: str, figure: SourcedValue) -> str:
-    """Return what is known of a figure, in a line."""
+    """Return one line on how a figure was measured, and by whom."""
     mark = "" if figure.is_confirmed else _NOT_CONFIRMED
     source = f" [{figure.source}]" if figure.source else ""
     return f"  {name}{mark}: {figure.measured}{source}"
 
 
 def _as_numbers(preset: Preset) -> dict[str, Any]:
-    """Return a preset as JSON has it."""
+    """Return a preset as numbers and text, for JSON."""
     figures = {name: getattr(preset, name)._asdict() for name in SOURCED}
     return {"name": preset.name, "about": preset.about, "law": preset.law} | figures

@@ -7,22 +7,35 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from bridge import InProcessLink, TcpLink, TissueLink
-from bridge.tcp.keys import chosen_key
+from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.arm.scalpel import chosen_blade, expect_faces
 from scalpel_sim.cli.console import say
-from scalpel_sim.cli.options import Body, Motion, Talk
+from scalpel_sim.cli.material_file import (
+    is_material_file,
+    read_blade,
+    read_material,
+    warn_of_unused_tables,
+)
+from scalpel_sim.cli.options import (
+    ArmOptions,
+    BladeOptions,
+    ClientOptions,
+    MaterialOptions,
+    OutputOptions,
+    PrintOptions,
+    TissueOptions,
+)
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
-from scalpel_sim.scene_body import check, make_tissue
+from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scenes import (
     DEFAULT_SCENE,
     Scene,
+    can_audit,
     changed,
     check_motion,
-    has_account,
     material_called,
     mesh_scene,
     scene_called,
@@ -30,88 +43,15 @@ from scalpel_sim.scenes import (
 )
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.warm_up import kernels_are_compiled, warm_up
+from tissue import BladeShape, Material
 
 _log = logging.getLogger("scalpel_sim")
 
 LONGEST_RUN = 3600.0
-"""[s] of simulated time: more is a slip of the keyboard."""
+"""Longest simulated time that can be asked for [s]: more is taken for a typing error."""
 
-
-class Ready(NamedTuple):
-    """A run that only has to be started."""
-
-    simulation: Simulation
-    folder: Path
-    settings: dict[str, Any]
-    """What the command line and the scene resolved to."""
-
-
-@contextmanager
-def ready_run(
-    name: str | None, body: Body, motion: Motion, talk: Talk, *, audits: bool = False
-) -> Iterator[Ready]:
-    """Yield the run that the command line asks for, and let go of the tissue afterwards.
-
-    `audits` says whether an account of the energy is kept where nothing is said of it.
-    """
-    if motion.seconds is not None and not 0.0 < motion.seconds <= LONGEST_RUN:
-        raise UsageError(
-            f"--seconds is {motion.seconds}; it must be above 0 and at most {LONGEST_RUN:g}"
-        )
-    if motion.key is not None and motion.connect is None:
-        raise UsageError(
-            "--key is for a tissue elsewhere; add --connect HOST:PORT, or leave it away"
-        )
-    check_exports(motion.export)
-    if motion.connect is None:
-        link, scene, settings = _tissue_here(name, body, motion, talk, audits)
-    else:
-        link, scene, settings = _tissue_elsewhere(name, body, motion, talk)
-    try:
-        simulation = prepare(scene, link)
-        settings |= {"arm": simulation.arm.preset, "seconds": motion.seconds}
-        yield Ready(simulation, _folder(motion, scene), settings)
-    finally:
-        link.close()
-
-
-def _tissue_here(
-    name: str | None, body: Body, motion: Motion, talk: Talk, audits: bool
-) -> tuple[TissueLink, Scene, dict[str, Any]]:
-    """Make the tissue in this process, after all checks that need none."""
-    scene = changed(chosen_scene(name, body), **_given(motion))
-    if audits and body.audit is None and has_account(scene.relaxation, scene.threads):
-        scene = replace(scene, audit=True)
-    check(scene)
-    check_folder(_folder(motion, scene))
-    scene, springs = springs_as_asked(scene, body)
-    load_kernels(talk)
-    _log.info("settling %s", scene.about)
-    return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs
-
-
-def _tissue_elsewhere(
-    name: str | None, body: Body, motion: Motion, talk: Talk
-) -> tuple[TissueLink, Scene, dict[str, Any]]:
-    """Reach the tissue in another process, and take the scene from what it says of itself."""
-    assert motion.connect is not None
-    for field in fields(body):
-        if getattr(body, field.name) not in (None, False):
-            raise UsageError(
-                f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
-                f"{motion.connect}; give it to `scalpel-sim serve`"
-            )
-    link = TcpLink(motion.connect, key=chosen_key(motion.key))
-    try:
-        scene = changed(scene_of(link), **_given(motion))
-        if name not in (None, scene.name):
-            raise UsageError(f"{motion.connect} holds '{scene.name}', not '{name}'")
-        check_motion(scene)
-        check_folder(_folder(motion, scene))
-    except BaseException:
-        link.close()
-        raise
-    elsewhere = {
+_UNKNOWN_TO_CLIENT = frozenset(
+    {
         "fixed",
         "stretch",
         "gravity",
@@ -122,30 +62,126 @@ def _tissue_elsewhere(
         "threads",
         "blade",
         "audit",
-    }  # the server knows, and does not say
-    settings = {key: value for key, value in scene.settings().items() if key not in elsewhere}
-    return link, scene, settings | {"connect": motion.connect}
+    }
+)
+"""Settings of a scene that a server knows and does not send."""
 
 
-def springs_as_asked(scene: Scene, body: Body) -> tuple[Scene, dict[str, Any]]:
-    """Return the scene, calibrated if that is asked for, and for its report what its springs are.
+class RunOptions(NamedTuple):
+    """What the command line asks for, group by group."""
+
+    tissue: TissueOptions
+    arm: ArmOptions
+    client: ClientOptions
+    output: OutputOptions
+    printing: PrintOptions
+
+
+class PreparedRun(NamedTuple):
+    """A run that only has to be started."""
+
+    simulation: Simulation
+    folder: Path
+    settings: dict[str, Any]
+    """What the command line and the scene resolved to."""
+
+
+@contextmanager
+def prepared_run(
+    name: str | None, options: RunOptions, *, audits: bool = False
+) -> Iterator[PreparedRun]:
+    """Yield the run that the command line asks for, and close the link to the tissue afterwards.
+
+    Args:
+        name: The scene; None for the default one.
+        options: What the command line asks for.
+        audits: Whether an account of the energy is kept where nothing is said of it.
+
+    Raises:
+        UsageError: options that make no sense, or not together.
+        LinkError: the tissue is elsewhere, and cannot be reached.
+    """
+    seconds, client = options.arm.seconds, options.client
+    if seconds is not None and not 0.0 < seconds <= LONGEST_RUN:
+        raise UsageError(f"--seconds is {seconds}; it must be above 0 and at most {LONGEST_RUN:g}")
+    if client.key is not None and client.connect is None:
+        raise UsageError("--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it")
+    check_exports(options.output.export)
+    if client.connect is None:
+        link, scene, settings = _tissue_here(name, options, audits)
+    else:
+        link, scene, settings = _tissue_elsewhere(name, options, client.connect)
+    try:
+        simulation = prepare(scene, link)
+        settings |= {"arm": simulation.arm.preset, "seconds": seconds}
+        yield PreparedRun(simulation, _folder(options.output, scene), settings)
+    finally:
+        link.close()
+
+
+def _tissue_here(
+    name: str | None, options: RunOptions, audits: bool
+) -> tuple[TissueLink, Scene, dict[str, Any]]:
+    """Make the tissue in this process, after all checks that need none."""
+    tissue = options.tissue
+    scene = changed(chosen_scene(name, tissue), **_changes_of_scene(options.arm))
+    if audits and tissue.solver.audit is None and can_audit(scene.relaxation, scene.threads):
+        scene = replace(scene, audit=True)
+    check_scene(scene)
+    check_folder(_folder(options.output, scene))
+    scene, springs = springs_as_asked(scene, tissue.material)
+    load_kernels(options.printing)
+    _log.info("settling %s", scene.about)
+    return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs
+
+
+def _tissue_elsewhere(
+    name: str | None, options: RunOptions, address: str
+) -> tuple[TissueLink, Scene, dict[str, Any]]:
+    """Connect to the tissue in another process, and make a scene from what its server describes."""
+    tissue = options.tissue
+    for group in (tissue.body, tissue.material, tissue.blade, tissue.solver):
+        for field in fields(group):
+            if getattr(group, field.name) not in (None, False):
+                raise UsageError(
+                    f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
+                    f"{address}; give it to `scalpel-sim serve`"
+                )
+    link = TcpLink(address, key=chosen_key(options.client.key))
+    try:
+        scene = changed(scene_of(link), **_changes_of_scene(options.arm))
+        if name not in (None, scene.name):
+            raise UsageError(f"{address} holds '{scene.name}', not '{name}'")
+        check_motion(scene)
+        check_folder(_folder(options.output, scene))
+    except BaseException:
+        link.close()
+        raise
+    settings = {
+        key: value for key, value in scene.settings().items() if key not in _UNKNOWN_TO_CLIENT
+    }
+    return link, scene, settings | {"connect": address}
+
+
+def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dict[str, Any]]:
+    """Return the scene, calibrated on request, and a report on its springs for the summary.
 
     Raises:
         UsageError: the scene's law has no springs.
-        ValueError: no stiffness of the springs is what is asked for.
+        ValueError: no stiffness of the springs gives the Young's modulus that is asked for.
     """
-    if not (body.calibrate or body.spring_error):
+    if not (options.calibrate or options.spring_error):
         return scene, {}
     if scene.material.law != "springs":
-        option = "--calibrate" if body.calibrate else "--spring-error"
+        option = "--calibrate" if options.calibrate else "--spring-error"
         raise UsageError(
             f"{option} is about law springs; law {scene.material.law} is as stiff as asked for on "
-            "any mesh. Add --law springs, or leave it away"
+            "any mesh. Add --law springs, or omit it"
         )
-    from tissue.elasticity.spring_calibration import calibrated, spring_error
+    from tissue import calibrated, spring_error
 
     mesh = scene.mesh()
-    if body.calibrate:
+    if options.calibrate:
         scene = replace(scene, material=calibrated(mesh, scene.material))
     error = spring_error(mesh, scene.material)
     return scene, {
@@ -160,17 +196,17 @@ def springs_as_asked(scene: Scene, body: Body) -> tuple[Scene, dict[str, Any]]:
     }
 
 
-def load_kernels(talk: Talk) -> None:
+def load_kernels(options: PrintOptions) -> None:
     """Load the kernels; where they must be compiled first, say why nothing seems to happen."""
-    if not talk.quiet and not kernels_are_compiled():
+    if not options.quiet and not kernels_are_compiled():
         say("compiling kernels, first run only (about a minute)")
     warm_up()
 
 
-def _given(motion: Motion) -> dict[str, Any]:
-    """Return what of the motion is a field of the scene."""
+def _changes_of_scene(arm: ArmOptions) -> dict[str, Any]:
+    """Return the options of the arm that are fields of the scene."""
     return {
-        name: getattr(motion, name)
+        name: getattr(arm, name)
         for name in (
             "stroke",
             "speed",
@@ -184,53 +220,117 @@ def _given(motion: Motion) -> dict[str, Any]:
     }
 
 
-def _folder(motion: Motion, scene: Scene) -> Path:
-    """Return where the files go."""
-    return motion.out or Path("out") / scene.name
+def _folder(output: OutputOptions, scene: Scene) -> Path:
+    """Return the folder of the files."""
+    return output.out or Path("out") / scene.name
 
 
-def chosen_scene(name: str | None, body: Body) -> Scene:
-    """Return the scene or the user's mesh, with what the user changed about it."""
-    if body.mesh is None:
-        if body.scale is not None:
+def chosen_scene(name: str | None, options: TissueOptions) -> Scene:
+    """Return the scene, or one around the user's mesh, with the changes that the user asks for.
+
+    Raises:
+        MeshError: the mesh cannot be cut.
+        UsageError: there is no such scene, or options that make no sense together.
+        ValueError: a number is out of its range.
+    """
+    body, solver = options.body, options.solver
+    scene = _scene_or_mesh(name, body.mesh, body.scale)
+    _warn_of_unused_tables(options)
+    blade = _blade_as_asked(scene.blade, options.blade)
+    expect_faces(blade, vars(options.material))
+    return replace(
+        changed(
+            scene,
+            fixed=body.fix,
+            material=_material_as_asked(scene.material, options.material),
+            scheme=solver.scheme,
+            relaxation=solver.relaxation,
+            threads=solver.threads,
+            snap=solver.snap,
+            guard=solver.guard,
+            stretch=body.stretch,
+            gravity=body.gravity,
+            floor=body.floor,
+            audit=solver.audit,
+        ),
+        blade=blade,
+    )
+
+
+def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> Scene:
+    """Return the scene of that name, or one around a mesh."""
+    if mesh is None:
+        if scale is not None:
             raise UsageError("--scale is for a --mesh; the scenes come in metres")
-        scene = scene_called(name or DEFAULT_SCENE)
-    elif name is not None:
-        raise UsageError(f"both the scene '{name}' and --mesh {body.mesh} are given; choose one")
-    else:
-        scene = mesh_scene(body.mesh, 1.0 if body.scale is None else body.scale)
-    scene = changed(
-        scene,
-        fixed=body.fix,
-        material=None if body.material is None else material_called(body.material),
-        law=body.law,
-        young_modulus=body.young,
-        poisson_ratio=body.poisson_ratio,
-        density=body.density,
-        toughness=body.toughness,
-        skin_toughness=body.skin_toughness,
-        toughness_exponent=body.toughness_exponent,
-        toughness_speed=body.toughness_speed,
-        work_to_rupture=body.work_to_rupture,
-        blade_friction=body.blade_friction,
-        blade_viscosity=body.blade_viscosity,
-        scheme=body.scheme,
-        relaxation=body.relaxation,
-        threads=body.threads,
-        snap=body.snap,
-        guard=body.guard,
-        stretch=body.stretch,
-        gravity=body.gravity,
-        friction=body.friction,
-        floor=body.floor,
-        audit=body.audit,
-    )
-    blade = chosen_blade(
-        scene.blade,
-        thickness=body.blade_thickness,
-        bevel=body.blade_bevel,
-        height=body.blade_height,
-        edge_radius=body.blade_edge_radius,
-    )
-    expect_faces(blade, vars(body))
-    return replace(scene, blade=blade)
+        return scene_called(name or DEFAULT_SCENE)
+    if name is not None:
+        raise UsageError(f"both the scene '{name}' and --mesh {mesh} are given; choose one")
+    return mesh_scene(mesh, 1.0 if scale is None else scale)
+
+
+def _warn_of_unused_tables(options: TissueOptions) -> None:
+    """Log a warning where a file has a table that no option asks for."""
+    name = options.material.material
+    is_file = name is not None and is_material_file(name)
+    # A material by name is a choice, which a `[material]` beside the blade does not question.
+    if name is None or is_file:
+        warn_of_unused_tables(Path(name) if name is not None else None, options.blade.blade)
+
+
+def _material_as_asked(usual: Material, options: MaterialOptions) -> Material:
+    """Return the material of that name or file, else the usual one, with single numbers replaced.
+
+    Raises:
+        UsageError: no such material or file, or numbers that make no sense together.
+    """
+    numbers = {
+        "law": options.law,
+        "young_modulus": options.young,
+        "poisson_ratio": options.poisson_ratio,
+        "density": options.density,
+        "toughness": options.toughness,
+        "skin_toughness": options.skin_toughness,
+        "toughness_exponent": options.toughness_exponent,
+        "toughness_speed": options.toughness_speed,
+        "work_to_rupture": options.work_to_rupture,
+        "friction": options.friction,
+        "blade_friction": options.blade_friction,
+        "blade_viscosity": options.blade_viscosity,
+    }
+    given: dict[str, Any] = {key: value for key, value in numbers.items() if value is not None}
+    name = options.material
+    if name is None:
+        return replace(usual, **given)
+    if not is_material_file(name):
+        return replace(material_called(name), **given)
+    in_file = read_material(Path(name))
+    try:
+        return replace(usual, **(in_file | given))
+    except ValueError as error:
+        raise UsageError(f"{name}: {error}") from error
+
+
+def _blade_as_asked(usual: BladeShape | None, options: BladeOptions) -> BladeShape | None:
+    """Return the blade of a file, else the usual one, with single measures replaced.
+
+    Raises:
+        UsageError: no such file, or measures that make no sense together.
+    """
+    measures = {
+        "thickness": options.blade_thickness,
+        "bevel": options.blade_bevel,
+        "height": options.blade_height,
+        "edge_radius": options.blade_edge_radius,
+    }
+    given = {key: value for key, value in measures.items() if value is not None}
+    if options.blade is None:
+        return chosen_blade(usual, **given)
+    in_file = read_blade(options.blade)
+    if "bevel_degrees" in in_file:
+        in_file["bevel"] = in_file.pop("bevel_degrees")
+    if given.get("thickness", in_file.get("thickness")) == 0.0:
+        in_file = {"thickness": 0.0}  # a line, on which the other numbers of the file do not act
+    try:
+        return chosen_blade(usual, **(in_file | given))
+    except ValueError as error:
+        raise UsageError(f"{options.blade}: {error}") from error

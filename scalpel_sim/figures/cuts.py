@@ -7,7 +7,7 @@ import numpy as np
 
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.cuts import Cut, prepare_cut
+from scalpel_sim.strokes.cuts import PlannedCut, prepare_cut
 from scalpel_sim.viewer.model_shapes import Shape, body_poses, shapes_of
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Snapshot, Surface
@@ -20,9 +20,9 @@ REST = 0.4
 TOOL = ("blade", "stylus")
 """Bodies of the arm that are seen in a picture; the rest of it would stand in the way."""
 
-FIGURE_10 = Cut(
+FIGURE_10 = PlannedCut(
     replace(SCENES["slab"], stretch=STRETCH),
-    way=np.array([[0.4, -0.2], [0.62, 1.5]]),
+    path=np.array([[0.4, -0.2], [0.62, 1.5]]),
     depth=0.7,
     lean=0.12,
 )
@@ -31,16 +31,16 @@ FIGURE_10_MOMENTS = (0.0, 0.35, 0.65, 1.0)
 """As shares of the stroke; the last is after the rest."""
 
 FIGURE_12 = (
-    Cut(
+    PlannedCut(
         replace(SCENES["grid2"], stretch=STRETCH),
-        way=np.array(
+        path=np.array(
             [[0.15, -0.3], [0.3, 0.0], [0.62, 0.45], [0.55, 0.8], [0.3, 1.1], [-0.2, 1.5]]
         ),
         depth=0.75,
     ),
-    Cut(
+    PlannedCut(
         replace(SCENES["grid7"], stretch=STRETCH),
-        way=np.array(
+        path=np.array(
             [[0.5, -0.25], [0.35, 0.15], [0.45, 0.45], [0.65, 0.7], [0.55, 1.0], [0.4, 1.6]]
         ),
         depth=0.7,
@@ -58,12 +58,12 @@ class Moment(NamedTuple):
     """The parts of the scalpel, tissue frame, and what they are."""
 
 
-def by(scheme: str, cut: Cut) -> Cut:
+def by(scheme: str, cut: PlannedCut) -> PlannedCut:
     """Return the same cut, done by that scheme."""
     return cut._replace(scene=replace(cut.scene, scheme=scheme))
 
 
-def moments(cut: Cut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:
+def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:
     """Do a cut, and return what it looks like at shares of its stroke; 1 is after the rest."""
     simulation = prepare_cut(cut)
     duration = simulation.stroke.duration

@@ -1,4 +1,4 @@
-"""Where the work of the blade went over time, as one picture."""
+"""The energy account over time, as one picture."""
 
 from pathlib import Path
 
@@ -8,25 +8,25 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from scalpel_sim.output.energy_terms import TERMS, Term
-from scalpel_sim.output.force_plot import DOTS_PER_INCH, MAGNITUDE, legend, plain
+from scalpel_sim.output.force_plot import DOTS_PER_INCH, MAGNITUDE, legend, simplify
 from scalpel_sim.output.recording import Recording
 
 _MJ_PER_J = 1e3
 PERCENT = 100.0
 
-SMALLEST_SHOWN = 0.003
-"""Share of the largest term below which another one is left out of the picture: no line as thin
-could be seen. The table has it."""
+SMALLEST_VISIBLE = 0.003
+"""Share of the largest term below which a term is left out of the picture: its line would be too
+thin to be seen. The table has it."""
 
 OPACITY = 0.85
-"""So that the grid is seen through what is stacked."""
+"""Opacity of the stacked terms: the grid is seen through them."""
 
 _MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
-"""Fixed: see `scalpel_sim.output.force_plot`."""
+"""Fixed margins, for the reason given in `scalpel_sim.output.force_plot`."""
 
 
 def plot_energies(recording: Recording, title: str, path: Path) -> None:
-    """Write a PNG: the terms of the account on top of each other, and what is not accounted for."""
+    """Write a PNG: the terms of the account on top of each other, and the residual."""
     time = recording.column("time_s")
     work = recording.column("work_of_blade_j")
     figure = Figure(figsize=(8.0, 5.8))
@@ -47,18 +47,18 @@ def plot_energies(recording: Recording, title: str, path: Path) -> None:
     below.set_ylabel("residual\n[% of the work]")
     below.set_xlabel("time [s]")
     for axes in (above, below):
-        plain(axes)
+        simplify(axes)
     figure.align_ylabels()
     FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
 
 
 def _stack(axes: Axes, time: np.ndarray, recording: Recording, sign: float) -> None:
-    """Draw what took energy upwards from zero, or with the other sign what gave it downwards."""
+    """Stack the terms of one sign: from zero upwards for 1, downwards for -1."""
     base = np.zeros_like(time)
-    for term in _shown(recording):
-        height = np.clip(sign * _of(recording, term), 0.0, None)
+    for term in _visible(recording):
+        height = np.clip(sign * _energy(recording, term), 0.0, None)
         if height.any():
-            is_first = sign > 0.0 or not (_of(recording, term) > 0.0).any()
+            is_first = sign > 0.0 or not (_energy(recording, term) > 0.0).any()
             label = term.label if is_first else None
             low, high = sign * _MJ_PER_J * base, sign * _MJ_PER_J * (base + height)
             axes.fill_between(
@@ -67,14 +67,16 @@ def _stack(axes: Axes, time: np.ndarray, recording: Recording, sign: float) -> N
             base = base + height
 
 
-def _shown(recording: Recording) -> list[Term]:
+def _visible(recording: Recording) -> list[Term]:
     """Return the terms that are large enough to be seen."""
-    sizes = [float(np.abs(_of(recording, term)).max(initial=0.0)) for term in TERMS]
+    sizes = [float(np.abs(_energy(recording, term)).max(initial=0.0)) for term in TERMS]
     return [
-        term for term, size in zip(TERMS, sizes, strict=True) if size > SMALLEST_SHOWN * max(sizes)
+        term
+        for term, size in zip(TERMS, sizes, strict=True)
+        if size > SMALLEST_VISIBLE * max(sizes)
     ]
 
 
-def _of(recording: Recording, term: Term) -> np.ndarray:
+def _energy(recording: Recording, term: Term) -> np.ndarray:
     """Return a term over time [J]."""
     return recording.column(f"{term.name}_j")

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from scalpel_sim.output.recording import Recording
 
-# Okabe and Ito's palette: told apart by those who see fewer colours too.
+# Okabe and Ito's palette, which colour-blind readers can distinguish too.
 COMPONENTS = (("x", "#d55e00"), ("y", "#009e73"), ("z", "#0072b2"))
 PARTS = (
     ("edge_force", "edge", "#cc79a7"),
@@ -24,15 +24,15 @@ _AREA = "#aa3377"
 LIMITED = "#d55e00"
 DOTS_PER_INCH = 150
 _MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.065, "top": 0.91, "hspace": 0.16}
-"""Fixed: to let matplotlib find them by itself would draw everything twice."""
+"""Fixed: matplotlib finds margins by itself only by drawing everything twice."""
 _MM2_PER_M2 = 1e6
 
 _SAME = 1e-9
-"""Relative difference between what the tissue did and what the arm felt that is only rounding."""
+"""Relative difference between the forces of tissue and arm that is only rounding."""
 
 
 def plot_forces(recording: Recording, title: str, path: Path) -> None:
-    """Write a PNG: the force that the arm feels, what it is made of, the area that was cut."""
+    """Write a PNG: the force that the arm feels, the parts of it, and the area that was cut."""
     time = recording.column("time_s")
     figure = Figure(figsize=(8.0, 7.2))
     above, middle, below = figure.subplots(
@@ -44,13 +44,13 @@ def plot_forces(recording: Recording, title: str, path: Path) -> None:
     _plot_area(below, time, recording)
     below.set_xlabel("time [s]")
     for axes in (above, middle, below):
-        plain(axes)
+        simplify(axes)
     figure.align_ylabels()
     FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
 
 
-def plain(axes: Axes) -> None:
-    """Leave away what frames a plot without telling anything."""
+def simplify(axes: Axes) -> None:
+    """Remove the parts of the frame that carry no information, and draw a light grid."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(color="0.9", lw=0.6)
     axes.set_axisbelow(True)
@@ -58,7 +58,7 @@ def plain(axes: Axes) -> None:
 
 
 def legend(axes: Axes, n_columns: int) -> None:
-    """Put the legend over the plot, where it hides nothing."""
+    """Put the legend above the plot, where it hides nothing."""
     axes.legend(
         ncols=n_columns,
         frameon=False,
@@ -72,7 +72,7 @@ def legend(axes: Axes, n_columns: int) -> None:
 
 
 def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
-    """Draw what the arm feels; where the device is at its limit, what the tissue did instead."""
+    """Draw the force on the arm and, where the device limits it, the force of the tissue."""
     force, raw = recording.vector("force"), recording.vector("tissue_force")
     size, wanted = (np.linalg.norm(vectors, axis=1) for vectors in (force, raw))
     is_limited = np.abs(force - raw).max(axis=1, initial=0.0) > _SAME * wanted
@@ -90,7 +90,7 @@ def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
 
 
 def _plot_parts(axes: Axes, time: np.ndarray, recording: Recording) -> None:
-    """Draw what the force on the blade is made of."""
+    """Draw the parts of the force on the blade."""
     for name, label, colour in PARTS:
         size = np.linalg.norm(recording.vector(name), axis=1)
         axes.plot(time, size, color=colour, lw=1.2, label=label)

@@ -1,19 +1,35 @@
 """One frame as a row of `forces.csv`: see `scalpel_sim.output.recording.COLUMNS`."""
 
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.output.recording import N_OF_ACCOUNT
-from tissue import BladeSegment, Energies, StageTimes, StepResult, Wrench
+from tissue import BladeSegment, Energies, StepResult, Wrench
 
 UPPER = itemgetter(0, 4, 8, 1, 2, 5)
-"""Of a symmetric matrix of nine numbers, in the order of the columns."""
+"""Takes the six different numbers of a symmetric 3 x 3 matrix, in the order of the columns."""
 
 NO_ACCOUNT = (np.nan,) * N_OF_ACCOUNT
-"""What is not known without an audit."""
+"""The energies of a frame without an audit."""
+
+
+class WallTimes(NamedTuple):
+    """Wall times of one frame [s], in the order of the columns."""
+
+    collision: float
+    """Collision detection (CD)."""
+    topology: float
+    """Geometric changes (GC)."""
+    relaxation: float
+    """Relaxation (RX)."""
+    pictures: float
+    """Rendering (RD)."""
+    frame: float
+    """The whole frame, without pictures and without its recording."""
 
 
 def row_of(
@@ -22,24 +38,19 @@ def row_of(
     felt: Wrench,
     raw: Wrench,
     result: StepResult,
-    profile: StageTimes,
     frame: TissueFrame,
-    *,
-    picture_seconds: float,
-    frame_seconds: float,
+    wall_times: WallTimes,
 ) -> tuple[float, ...]:
-    """Return the row of one frame.
+    """Return the row of one frame: all columns but the last, the time that recording it takes.
 
     Args:
-        time: Simulated time at which it began [s].
-        blade: Where the blade is at its end, world frame.
-        felt: What the arm felt in it, world frame.
-        raw: The same before any limit of the device.
-        result: What the tissue said last, tissue frame.
-        profile: Wall times of its stages in this frame.
+        time: Simulated time at which the frame began [s].
+        blade: Where the blade is at the end of the frame, world frame.
+        felt: Wrench that the arm felt in the frame, world frame.
+        raw: That wrench before any limit of the device.
+        result: Last result of the tissue, tissue frame.
         frame: Where the tissue lies in the world.
-        picture_seconds: Wall time of pictures [s].
-        frame_seconds: Wall time of all else [s].
+        wall_times: Wall times of the frame and of its stages.
     """
     parts = force_parts(result.contacts, frame.vectors_to_tissue(blade.forward))
     stiffness = frame.matrix_to_world(result.stiffness[:3, :3])
@@ -57,14 +68,10 @@ def row_of(
         result.anchored_length,
         result.work_of_blade,
         *_account(result.energies),
-        profile.collision,
-        profile.topology,
-        profile.relaxation,
-        picture_seconds,
-        frame_seconds,
+        *wall_times,
     )
 
 
 def _account(energies: Energies | None) -> tuple[float, ...]:
-    """Return where the work of the blade went, and what is not accounted for [J]."""
+    """Return the terms of the energy account, and the residual [J]."""
     return NO_ACCOUNT if energies is None else (*energies[1:], energies.residual)

@@ -1,4 +1,4 @@
-"""Draws plots in a process of its own, which loads matplotlib while the run goes on."""
+"""A process that draws plots; it loads matplotlib while the run continues."""
 
 import contextlib
 import json
@@ -10,8 +10,8 @@ from typing import IO, cast
 
 from scalpel_sim.errors import RunError
 
-SLOWEST = 60.0
-"""How long a plot may take [s]: a second, or ten when matplotlib first looks for fonts."""
+_TIMEOUT = 60.0
+"""How long a plot may take [s]. It takes a second, or ten when matplotlib first looks for fonts."""
 
 
 _PROGRAM = (
@@ -62,10 +62,10 @@ class Plotter:
         """
         forces = self._forces
         try:
-            _, complaint = self._process.communicate(timeout=SLOWEST)
+            _, complaint = self._process.communicate(timeout=_TIMEOUT)
         except subprocess.TimeoutExpired:
             self.close()
-            raise RunError(f"{forces}: drawing it took more than {SLOWEST:g} s") from None
+            raise RunError(f"{forces}: drawing it took more than {_TIMEOUT:g} s") from None
         if self._process.returncode != 0:
             reason = complaint.strip().rpartition("\n")[2] or f"exit {self._process.returncode}"
             raise RunError(f"{forces}: could not be drawn ({reason})")
@@ -77,7 +77,7 @@ class Plotter:
         self.close()
 
     def close(self) -> None:
-        """End the process, if it still lives."""
+        """End the process, if it still runs."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stderr):
@@ -85,7 +85,7 @@ class Plotter:
 
 
 def draw_requested_plots() -> None:
-    """Load what is needed, and draw what the standard input then asks for."""
+    """Load matplotlib, and draw the plots that standard input then asks for."""
     from scalpel_sim.output.energy_plot import plot_energies
     from scalpel_sim.output.force_plot import plot_forces
     from scalpel_sim.output.recording import read_forces

@@ -8,8 +8,8 @@ import numpy as np
 from tissue import Energies, FloatArray
 
 ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
-"""Where the work of the blade went since the start, and what is not accounted for: see
-`tissue.Energies`. NaN without an audit."""
+"""Columns of the energy account since the start: the terms of `tissue.Energies`, and the residual.
+NaN without an audit."""
 N_OF_ACCOUNT = len(ACCOUNT)
 
 
@@ -38,20 +38,22 @@ COLUMNS = (
     "rx_s",
     "rd_s",
     "frame_s",
+    "recording_s",
 )
 """Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
-averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` the same
-before the limits of the device. `edge_force`, `pressing_force` and `friction_force` are what the
-tissue does to the blade's edge, to its faces, and along them, at the end of the frame; `stiffness`
-is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall times of the
-stages that the paper's Table 1 names; `frame_s` is the wall time of the whole frame without
-pictures (`rd_s`)."""
+averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the
+tissue exerts, before the limits of the device. `edge_force`, `pressing_force` and `friction_force`
+are what the tissue does to the blade's edge, to its faces, and along them, at the end of the frame;
+`stiffness` is how fast that force changes with the blade's position. `cd_s` to `rd_s` are wall
+times of the stages that the paper's Table 1 names: collision detection, geometric changes,
+relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
+and without the recording of its row (`recording_s`)."""
 
 FRAMES_AT_FIRST = 1024
 
 
 class Recording:
-    """Rows of `COLUMNS`, one a frame. Grows by doubling, so that a frame allocates nothing."""
+    """Rows of `COLUMNS`, one per frame. Grows by doubling, so that a frame allocates nothing."""
 
     def __init__(self, n_frames: int = FRAMES_AT_FIRST) -> None:
         self._rows = np.zeros((max(n_frames, 1), len(COLUMNS)))
@@ -77,13 +79,13 @@ class Recording:
         return self.rows[:, COLUMNS.index(name)]
 
     def vector(self, name: str) -> FloatArray:
-        """Return the three columns of `tip`, `force` and the like, shape (n_frames, 3). A view."""
+        """Return the three columns of a vector such as `tip`, shape (n_frames, 3). A view."""
         first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
         return self.rows[:, first : first + 3]
 
     @property
     def is_audited(self) -> bool:
-        """Whether it is known where the work of the blade went."""
+        """Whether the energy account was kept."""
         return len(self) > 0 and bool(np.isfinite(self.column("residual_j")[-1]))
 
 
@@ -92,13 +94,13 @@ def read_forces(path: Path) -> Recording:
 
     Raises:
         ValueError: the file is no such table.
-        OSError: it cannot be read.
+        OSError: the file cannot be read.
     """
     with path.open(encoding="ascii") as file:
         header = file.readline().strip()
         if header != ",".join(COLUMNS):
             raise ValueError(
-                f"{path}: the first line is '{header[:200]}'; wanted the columns of a run"
+                f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )
         lines = file.readlines()
     rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(COLUMNS)))

@@ -1,21 +1,24 @@
-"""The table that a run prints, with the paper's figures beside ours where it has them."""
+"""The table that a run prints, with the paper's figures beside ours where there are any."""
 
-from collections.abc import Callable
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.output.energy_terms import TERMS
-from scalpel_sim.output.summary import COMPLETE, STAGES, Summary
+from scalpel_sim.output.summary import COMPLETE, Summary
 from scalpel_sim.output.table_1 import TABLE_1
 
-STAGE_NAMES = dict(
-    zip(STAGES, ("relaxation", "pictures", "topology, geometry", "collision"), strict=True)
-)
+STAGE_NAMES = {
+    "RX": "relaxation",
+    "RD": "rendering",
+    "GC": "geometric changes",
+    "CD": "collision detection",
+}
+"""Names of the stages of the paper's Table 1, in its order."""
 
 MOST_PIECES = 8
-"""Pieces that the table has rows for, the largest; `summary.json` has them all."""
+"""Number of pieces that the table shows, the largest; `summary.json` has them all."""
 
 G_PER_KG = 1e3
 _KPA_PER_PA = 1e-3
@@ -26,11 +29,79 @@ _MJ_PER_J = 1e3
 
 
 _PAPER = {"grid2": TABLE_1[2, 2, 2], "slab": TABLE_1[4, 6, 4]}
-"""By scene. The paper has no such figures for the other bodies."""
+"""Rows of the paper's Table 1 by scene. The paper has no such figures for the other bodies."""
+
+SATURATIONS = {
+    "force_limited": "force above the device's limit",
+    "torque_limited": "torque above the device's limit",
+    "slew_limited": "force changed too fast for the device",
+    "absurd": "absurd answers",
+    "silent": "tissue silent for 10 ms",
+    "faded": "force faded or ramped",
+}
+"""Counters of the bridge that the table shows where they are not zero, and their labels."""
 
 
-def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> None:
-    """Add how far the cut is off the blade's path, and what following it costs."""
+class _Rows:
+    """The table of a run, with a column of the paper's figures where there are any."""
+
+    def __init__(self, summary: Summary) -> None:
+        self.paper = _PAPER.get(summary.scene)
+        self.table = Table(
+            title=f"{summary.scene}: {summary.settings['stroke']} stroke",
+            title_justify="left",
+            show_header=self.paper is not None,
+        )
+        self.table.add_column(style="bold")
+        self.table.add_column("this run" if self.paper else "", justify="right")
+        if self.paper is not None:
+            self.table.add_column("paper (1998)", justify="right", style="dim")
+
+    def add(self, label: str, ours: str, theirs: str = "") -> None:
+        """Add a row; `theirs` is left out where the paper has no figures for the scene."""
+        self.table.add_row(label, ours, *([theirs] if self.paper else []))
+
+
+def print_summary(summary: Summary, console: Console) -> None:
+    """Print the figures of a run as a table."""
+    rows = _Rows(summary)
+    if summary.status != COMPLETE:
+        rows.add("status", summary.status)
+    rows.add("simulated time", f"{summary.simulated_seconds:.3f} s")
+    rows.add("real-time factor", f"{summary.real_time_factor:.2f}")
+    _add_mesh(rows, summary)
+    if "springs" in summary.settings:
+        _add_springs(rows, summary.settings["springs"])
+    _add_cut(rows, summary)
+    _add_counters(rows, summary.counters)
+    _add_times(rows, summary)
+    console.print(rows.table)
+    if summary.energies_j is not None:
+        console.print(_account(summary.energies_j, summary.residual_of_work))
+
+
+def _add_mesh(rows: _Rows, summary: Summary) -> None:
+    """Add the size of the mesh, the pieces, and the quality of the cut."""
+    paper = rows.paper
+    rows.add(
+        "tetrahedra before",
+        f"{summary.tetrahedra_initial:,}",
+        f"{paper.tetrahedra_initial:,}" if paper else "",
+    )
+    rows.add(
+        "tetrahedra after",
+        f"{summary.tetrahedra_final:,}",
+        f"{paper.tetrahedra_final:,}" if paper else "",
+    )
+    rows.add("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
+    for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
+        rows.add(f"piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
+    if summary.quality is not None:
+        _add_quality(rows, summary.quality)
+
+
+def _add_quality(rows: _Rows, quality: dict[str, float]) -> None:
+    """Add the distance of the cut from the blade's path, and its effect on mesh and time step."""
     mean, largest, altitude, before = (
         f"{quality[name] * _MM_PER_M:.3g}"
         for name in (
@@ -41,116 +112,71 @@ def _add_quality(row: Callable[[str, str], None], quality: dict[str, float]) -> 
         )
     )
     sizes = quality["path_error_mean_node_sizes"], quality["path_error_largest_node_sizes"]
-    row("path error, mean", f"{mean} mm, {sizes[0]:.2g} node sizes")
-    row("path error, largest", f"{largest} mm, {sizes[1]:.2g} node sizes")
+    rows.add("path error, mean", f"{mean} mm, {sizes[0]:.2g} node sizes")
+    rows.add("path error, largest", f"{largest} mm, {sizes[1]:.2g} node sizes")
     guards = quality["smallest_altitude_m"] / quality["guard_m"] if quality["guard_m"] > 0.0 else 0
-    row("smallest altitude", f"{altitude} mm" + (f", {guards:.2g} x the guard" if guards else ""))
-    row("smallest altitude before", f"{before} mm")
-    row("growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}")
-    row("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
-    row("growth of substeps", f"{quality['substep_growth']:.2f}")
+    rows.add(
+        "smallest altitude", f"{altitude} mm" + (f", {guards:.2g} x the guard" if guards else "")
+    )
+    rows.add("smallest altitude before", f"{before} mm")
+    rows.add("growth of tetrahedra", f"{quality['tetrahedra_growth']:.2f}")
+    rows.add("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
+    rows.add("growth of substeps", f"{quality['substep_growth']:.2f}")
 
 
-def _add_springs(row: Callable[[str, str], None], springs: dict[str, float]) -> None:
-    """Add what the springs are like on this mesh, beside what they stand for."""
+def _add_springs(rows: _Rows, springs: dict[str, float]) -> None:
+    """Add the elastic constants of the springs on this mesh."""
     mean, softest, stiffest = (
         springs[f"young_modulus_{which}pa"] * _KPA_PER_PA for which in ("", "softest_", "stiffest_")
     )
     error = springs["young_modulus_error"]
-    row("springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}")
-    row("springs: by direction", f"{softest:.3g} to {stiffest:.3g} kPa")
-    row("springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}")
+    rows.add("springs: Young's modulus", f"{mean:.3g} kPa, {error:+.1%}")
+    rows.add("springs: by direction", f"{softest:.3g} to {stiffest:.3g} kPa")
+    rows.add("springs: Poisson's ratio", f"{springs['poisson_ratio']:.2f}")
 
 
-SATURATIONS = {
-    "force_limited": "force above the device's limit",
-    "torque_limited": "torque above the device's limit",
-    "slew_limited": "force changed too fast for the device",
-    "absurd": "absurd answers",
-    "silent": "tissue silent for 10 ms",
-    "faded": "force faded or ramped",
-}
-"""What the bridge counts of what came between tissue and arm, and what the table calls it."""
+def _add_cut(rows: _Rows, summary: Summary) -> None:
+    """Add the area of the cut, the forces, the collisions and the work."""
+    rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
+    rows.add("peak force", f"{summary.force_peak_n:.3f} N")
+    rows.add("mean force", f"{summary.force_mean_n:.3f} N")
+    for pair, frames in summary.touched.items():
+        rows.add(f"collision: {pair}", f"{frames:,} frames")
+    rows.add("work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ")
 
 
-def _add_counters(row: Callable[[str, str], None], counters: dict[str, Any]) -> None:
-    """Add what came between the tissue and the arm, where anything did."""
+def _add_counters(rows: _Rows, counters: dict[str, Any]) -> None:
+    """Add what limited or replaced the answers of the tissue, where anything did."""
     for name, label in SATURATIONS.items():
         if counters.get(name):
-            row(label, f"{counters[name]:,} frames")
+            rows.add(label, f"{counters[name]:,} frames")
     passivity = counters.get("passivity", {})
     if passivity.get("frames"):
         away = passivity["injected_away"] * _MJ_PER_J
-        row("damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ")
+        rows.add("damped for passivity", f"{passivity['frames']:,} frames, {away:.2g} mJ")
 
 
-def print_table(summary: Summary, console: Console) -> None:
-    """Print the figures of a run as a table."""
-    paper = _PAPER.get(summary.scene)
-    table = Table(
-        title=f"{summary.scene}: {summary.settings['stroke']} stroke",
-        title_justify="left",
-        show_header=False,
-    )
-    table.add_column(style="bold")
-    table.add_column(justify="right")
-    if paper is not None:
-        table.show_header = True
-        table.columns[1].header = "this run"
-        table.add_column("paper (1998)", justify="right", style="dim")
-
-    def row(label: str, ours: str, theirs: str = "") -> None:
-        table.add_row(label, ours, *([theirs] if paper else []))
-
-    if summary.status != COMPLETE:
-        row("status", summary.status)
-    row("simulated time", f"{summary.simulated_seconds:.3f} s")
-    row("real-time factor", f"{summary.real_time_factor:.2f}")
-    row(
-        "tetrahedra before",
-        f"{summary.tetrahedra_initial:,}",
-        f"{paper.tetrahedra_initial:,}" if paper else "",
-    )
-    row(
-        "tetrahedra after",
-        f"{summary.tetrahedra_final:,}",
-        f"{paper.tetrahedra_final:,}" if paper else "",
-    )
-    row("pieces", "unknown" if summary.pieces is None else str(summary.pieces))
-    for number, piece in enumerate(summary.each_piece[:MOST_PIECES], 1):
-        row(f"piece {number}, {'held' if piece['held'] else 'loose'}", _piece(piece))
-    if summary.quality is not None:
-        _add_quality(row, summary.quality)
-    if "springs" in summary.settings:
-        _add_springs(row, summary.settings["springs"])
-    row("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
-    row("peak force", f"{summary.force_peak_n:.3f} N")
-    row("mean force", f"{summary.force_mean_n:.3f} N")
-    for pair, frames in summary.touched.items():
-        row(f"met: {pair}", f"{frames:,} frames")
-    row("work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ")
-    _add_counters(row, summary.counters)
-    row(
+def _add_times(rows: _Rows, summary: Summary) -> None:
+    """Add the frame rates, and below a line the shares of the stages."""
+    paper = rows.paper
+    rows.add(
         "frames/s, median",
         f"{summary.frame_rate_median:,.0f}",
         f"{paper.frame_rate} (mean)" if paper else "",
     )
-    row("frames/s, 99th percentile", f"{summary.frame_rate_p99:,.0f}")
-    table.add_section()
-    for stage, meaning in STAGE_NAMES.items():
-        row(
-            f"{stage}  {meaning}",
+    rows.add("frames/s, 99th percentile", f"{summary.frame_rate_p99:,.0f}")
+    rows.table.add_section()
+    for stage, name in STAGE_NAMES.items():
+        rows.add(
+            f"{stage}  {name}",
             f"{summary.share[stage]:.1%}",
             f"{paper.percent[stage]} %" if paper else "",
         )
-    row("other (arm, bridge)", f"{summary.share['other']:.1%}")
-    console.print(table)
-    if summary.energies_j is not None:
-        console.print(_account(summary.energies_j, summary.residual_of_work))
+    rows.add("other (arm, bridge)", f"{summary.share['other']:.1%}")
 
 
 def _account(energies: dict[str, float], residual_of_work: float | None) -> Table:
-    """Return where the work of the blade went; shares are of that work, and add up to 100 %."""
+    """Return the energy account as a table; the shares are of the blade's work, 100 % in all."""
     work = energies["work_of_blade"]
     table = Table(title="where the work of the blade went", title_justify="left", show_header=False)
     table.add_column(style="bold")
@@ -158,8 +184,8 @@ def _account(energies: dict[str, float], residual_of_work: float | None) -> Tabl
     table.add_column(justify="right")
 
     def row(label: str, energy: float, share: float | None) -> None:
-        shown = "" if share is None else f"{share:.2%}"
-        table.add_row(label, f"{energy * _MJ_PER_J:.4f} mJ", shown)
+        percent = "" if share is None else f"{share:.2%}"
+        table.add_row(label, f"{energy * _MJ_PER_J:.4f} mJ", percent)
 
     row("work of the blade", work, 1.0 if work else None)
     table.add_section()

@@ -1,4 +1,4 @@
-"""The folder that a run fills, and that an end at any time leaves readable."""
+"""The folder of a run's files, which stays readable when the run ends early."""
 
 import json
 import tempfile
@@ -22,32 +22,34 @@ ENERGY_PLOT = "energy.png"
 INITIAL = "initial.vtu"
 FINAL = "final.vtu"
 REPLAY = "replay.html"
-NAMES = (SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
+RUN_FILES = (SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
+"""Names of all files that a run can write."""
 
 FRAMES_PER_FLUSH = 100
-"""So often are rows of `forces.csv` handed to the system: a kill loses a tenth of a second."""
+"""Number of rows of `forces.csv` that are written together: a kill loses a tenth of a second."""
 
 
 class Outputs:
-    """A folder with the files of one run. Those of an earlier run are removed, nothing else is.
+    """A folder with the files of one run. Files of an earlier run are removed, and no others.
 
-    Every `write_` raises RunError where the system refuses.
+    Every `write_` method raises RunError where the system refuses.
 
     Args:
-        folder: Made where there is none.
-        plotter: Draws the plots. Whoever made it closes it.
+        folder: The folder; it is made if there is none.
+        plotter: Draws the plots. The caller closes it.
 
     Raises:
-        UsageError, RunError: as `check_folder`.
+        UsageError: the path is a file, or lies below one.
+        RunError: the folder cannot be made or written.
     """
 
     def __init__(self, folder: Path, plotter: Plotter) -> None:
         self.folder = folder
         self._plotter = plotter
         check_folder(folder)
-        for name in NAMES:
-            _explained(folder / name, lambda path: path.unlink(missing_ok=True))
-        self._forces = _explained(folder / FORCES, lambda path: path.open("ab", buffering=0))
+        for name in RUN_FILES:
+            _naming_path(folder / name, lambda path: path.unlink(missing_ok=True))
+        self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
         self._append(",".join(COLUMNS) + "\n")
         self._n_written = 0
 
@@ -57,10 +59,10 @@ class Outputs:
 
     def write_mesh(self, name: str, snapshot: Snapshot) -> None:
         """Write the body as `initial.vtu` or `final.vtu`."""
-        _explained(self.path(name), lambda path: write_vtu(path, snapshot))
+        _naming_path(self.path(name), lambda path: write_vtu(path, snapshot))
 
     def write_forces(self, recording: Recording, *, all_rows: bool = False) -> None:
-        """Add the recording's new rows to `forces.csv`, once enough of them have come together.
+        """Add the recording's new rows to `forces.csv`, once there are enough of them.
 
         Numbers are written so that reading them gives the same bits.
         """
@@ -82,19 +84,19 @@ class Outputs:
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""
-        _explained(self.path(REPLAY), replay.write)
+        _naming_path(self.path(REPLAY), replay.write)
 
     def write_summary(self, summary: Summary) -> None:
         """Write `summary.json`."""
         text = summary_json(summary) + "\n"
-        _explained(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
+        _naming_path(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
 
     def close(self) -> None:
         """Close `forces.csv`. May be called twice."""
         self._forces.close()
 
     def _append(self, text: str) -> None:
-        _explained(self.path(FORCES), lambda _: self._forces.write(text.encode("ascii")))
+        _naming_path(self.path(FORCES), lambda _: self._forces.write(text.encode("ascii")))
 
 
 def check_folder(folder: Path) -> None:
@@ -106,28 +108,26 @@ def check_folder(folder: Path) -> None:
     """
     blocking = next((p for p in (folder, *folder.parents) if p.exists() and not p.is_dir()), None)
     if blocking is not None:
-        raise UsageError(
-            f"{blocking}: is a file, and a folder is wanted there; choose another --out"
-        )
+        raise UsageError(f"{blocking}: is a file, where a folder is needed; choose another --out")
 
     def try_to_write(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path) as file:
             file.write(b"can this folder be written?")
 
-    _explained(folder, try_to_write)
+    _naming_path(folder, try_to_write)
 
 
 def check_file(path: Path, suffix: str, option: str) -> None:
-    """Make sure that a file can be written, before the work that fills it.
+    """Make sure that a file can be written, before the work whose result it is for.
 
     Args:
         path: The file; one that is there will be overwritten.
         suffix: What its name must end in.
-        option: What chose it, for the message.
+        option: The option that chose it, for the message.
 
     Raises:
-        UsageError: another suffix, a folder, or in a folder that is not there.
+        UsageError: another suffix, a folder, or a file in a folder that does not exist.
         RunError: the system refuses.
     """
     if path.suffix.lower() != suffix:
@@ -152,8 +152,8 @@ def summary_json(summary: Summary) -> str:
     return json.dumps(summary._asdict(), indent=2, allow_nan=False)
 
 
-def _explained(path: Path, action: Callable[[Path], T]) -> T:
-    """Do `action`, and turn the system's refusal into one line that names the path."""
+def _naming_path(path: Path, action: Callable[[Path], T]) -> T:
+    """Do `action`, and turn an error of the system into one line that names the path."""
     try:
         return action(path)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A run in twenty numbers: what `summary.json` holds and the table prints."""
+"""The figures of a run: what `summary.json` holds and the table prints."""
 
 import platform
 from collections.abc import Sequence
@@ -14,7 +14,8 @@ COMPLETE = "complete"
 """The status of a run that reached its end; any other status says what ended it."""
 
 STAGES = {"RX": "rx_s", "RD": "rd_s", "GC": "gc_s", "CD": "cd_s"}
-"""The columns of the paper's Table 1, and where the recording keeps them."""
+"""The stages of the paper's Table 1, in its order, and the columns of the recording with their
+times: relaxation, rendering, geometric changes, collision detection."""
 
 PACKAGES = ("scalpel-sim", "numpy", "numba", "mujoco")
 
@@ -25,65 +26,74 @@ class Summary(NamedTuple):
     scene: str
     status: str
     """`complete`, or what ended the run before its time."""
-    seed: int
     simulated_seconds: float
     wall_seconds: float
     """Wall time of the frame loop, pictures included, compilation and files excluded."""
     real_time_factor: float
-    """Simulated time over wall time: above 1 is faster than life."""
+    """Simulated time over wall time: above 1 is faster than real time."""
     frames: int
     frame_rate_median: float
-    """Whole frames (arm, bridge, CD, GC, RX; no pictures) a second, at the median frame time."""
+    """Whole frames (arm, bridge, CD, GC, RX; no pictures) per second, at the median frame time."""
     frame_rate_p99: float
-    """The same at the 99th percentile of the frame time: 1 frame in 100 is slower."""
+    """Frames per second at the 99th percentile of the frame time: 1 frame in 100 is slower."""
     tetrahedra_initial: int
     tetrahedra_final: int
     pieces: int | None
     """None where the link to the tissue was lost."""
     each_piece: list[dict[str, Any]]
-    """The pieces, the largest first: see `tissue.Piece`."""
+    """Mass properties of the pieces (`tissue.Piece`), the largest first."""
     quality: dict[str, float] | None
-    """Path error against time step, see `quality_figures`; None where the link was lost."""
+    """How closely the cut follows the blade, and what it did to the mesh; None where the link was
+    lost."""
     cut_area_m2: float
     force_peak_n: float
-    """Largest force that the blade felt, after the device's limits."""
+    """Largest force on the blade, after the device's limits."""
     force_mean_n: float
-    """Mean of its magnitude over the frames in which the blade felt any."""
+    """Mean magnitude of the force on the blade over the frames in which there was any."""
     work_of_blade_j: float
     energies_j: dict[str, float] | None
-    """Where it went: see `tissue.Energies`, and `residual`, which is not accounted for. None
-    without an audit."""
+    """The energy account: the terms of `tissue.Energies`, and their `residual`. None without an
+    audit."""
     residual_of_work: float | None
     """The residual over the work of the blade; None without an audit, or without work."""
     share: dict[str, float]
-    """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link).
-    They sum to 1."""
+    """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link,
+    recording). They sum to 1."""
     counters: dict[str, Any]
-    """What the bridge had to do: broad-phase rejections, saturations and the like."""
+    """Counters of the bridge: broad-phase rejections, saturations and others."""
     touched: dict[str, int]
-    """In how many frames a part of the arm met what it must not: "PART, FIXTURE OR PART"."""
+    """In how many frames a part of the arm collided, by "PART, FIXTURE OR PART"."""
     settings: dict[str, Any]
     """The resolved settings of the run: material, stroke, arm."""
     versions: dict[str, str]
 
 
-def summarise(
-    recording: Recording,
-    *,
-    scene: str,
-    status: str,
-    seed: int,
-    dt: float,
-    wall_seconds: float,
-    tetrahedra_initial: int,
-    tetrahedra_final: int,
-    pieces: Sequence[Piece] | None,
-    quality: CutReport | None,
-    counters: dict[str, Any],
-    touched: dict[str, int],
-    settings: dict[str, Any],
-) -> Summary:
-    """Return the figures of a run whose frames of `dt` [s] took `wall_seconds` in all."""
+class RunFacts(NamedTuple):
+    """What a summary needs beside the recorded frames."""
+
+    scene: str
+    status: str
+    """`complete`, or what ended the run before its time."""
+    dt: float
+    """Simulated time of a frame [s]."""
+    wall_seconds: float
+    """Wall time of the frame loop [s]."""
+    tetrahedra_initial: int
+    tetrahedra_final: int
+    pieces: Sequence[Piece] | None
+    """The pieces at the end; None where the link to the tissue was lost."""
+    quality: CutReport | None
+    """The report on the cut at the end; None where the link to the tissue was lost."""
+    counters: dict[str, Any]
+    """Counters of the bridge."""
+    touched: dict[str, int]
+    """In how many frames each pair of parts collided."""
+    settings: dict[str, Any]
+    """The resolved settings of the run."""
+
+
+def summarise(recording: Recording, facts: RunFacts) -> Summary:
+    """Return the summary of a run."""
     n = len(recording)
     force = np.linalg.norm(recording.vector("force"), axis=1)
     felt = force[force > 0.0]
@@ -92,30 +102,29 @@ def summarise(
     energies = final_energies(recording)
     work = float(recording.column("work_of_blade_j")[-1]) if n else 0.0
     return Summary(
-        scene=scene,
-        status=status,
-        seed=seed,
-        simulated_seconds=n * dt,
-        wall_seconds=wall_seconds,
-        real_time_factor=n * dt / wall_seconds if n else 0.0,
+        scene=facts.scene,
+        status=facts.status,
+        simulated_seconds=n * facts.dt,
+        wall_seconds=facts.wall_seconds,
+        real_time_factor=n * facts.dt / facts.wall_seconds if n else 0.0,
         frames=n,
         frame_rate_median=float(1.0 / median),
         frame_rate_p99=float(1.0 / slow),
-        tetrahedra_initial=tetrahedra_initial,
-        tetrahedra_final=tetrahedra_final,
-        pieces=None if pieces is None else len(pieces),
-        each_piece=[_as_numbers(piece) for piece in pieces or ()],
-        quality=None if quality is None else quality_figures(quality),
+        tetrahedra_initial=facts.tetrahedra_initial,
+        tetrahedra_final=facts.tetrahedra_final,
+        pieces=None if facts.pieces is None else len(facts.pieces),
+        each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
+        quality=None if facts.quality is None else quality_figures(facts.quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         work_of_blade_j=work,
         energies_j=energies,
         residual_of_work=energies["residual"] / work if energies and work else None,
-        share=shares(recording, wall_seconds),
-        counters=counters,
-        touched=touched,
-        settings=settings,
+        share=shares(recording, facts.wall_seconds),
+        counters=facts.counters,
+        touched=facts.touched,
+        settings=facts.settings,
         versions=versions(),
     )
 
@@ -136,7 +145,7 @@ def _as_numbers(piece: Piece) -> dict[str, Any]:
 
 
 def quality_figures(report: CutReport) -> dict[str, float]:
-    """Return how far the cut is off the blade's path, and what it did to elements and time step."""
+    """Return the distance of the cut from the blade's path, and its effect on mesh and step."""
     return {
         "path_error_mean_m": report.path_error_mean,
         "path_error_largest_m": report.path_error_largest,
@@ -153,7 +162,7 @@ def quality_figures(report: CutReport) -> dict[str, float]:
 
 
 def final_energies(recording: Recording) -> dict[str, float] | None:
-    """Return where the work of the blade went by the last frame [J]; None without an audit."""
+    """Return the energy account at the last frame [J]; None without an audit."""
     if not recording.is_audited:
         return None
     names = ("work_of_blade_j", *ACCOUNT)
@@ -161,13 +170,13 @@ def final_energies(recording: Recording) -> dict[str, float] | None:
 
 
 def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:
-    """Return which fraction of the wall time each stage took; `other` is the rest."""
+    """Return the fraction of the wall time that each stage took; `other` is the rest."""
     total = wall_seconds if wall_seconds > 0.0 else 1.0
     share = {stage: float(recording.column(name).sum()) / total for stage, name in STAGES.items()}
     return share | {"other": 1.0 - sum(share.values())}
 
 
 def versions() -> dict[str, str]:
-    """Return what the figures depend on besides the settings."""
+    """Return the versions of packages, Python and platform, on which the figures depend."""
     found = {name.replace("-", "_"): version(name) for name in PACKAGES}
     return found | {"python": platform.python_version(), "platform": platform.platform()}

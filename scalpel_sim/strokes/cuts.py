@@ -1,4 +1,4 @@
-"""A cut told as shares of a body: an arm leads an upright edge along a way through it."""
+"""A cut given as shares of a body: an arm leads an upright edge along a path through it."""
 
 from typing import NamedTuple
 
@@ -13,19 +13,19 @@ from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray, Tissue
 
 _SPEED = 0.06
-"""Of the blade [m/s]."""
+"""Speed of the blade [m/s]."""
 POSE_EVERY = 1e-3
-"""Between two poses of a stroke [m]."""
+"""Distance between two poses of a stroke [m]."""
 _ABOVE = 0.35
 """How far the edge reaches above the body, as a share of its height."""
 
 
-class Cut(NamedTuple):
-    """A body and a way of the blade through it."""
+class PlannedCut(NamedTuple):
+    """A body and a path of the blade through it."""
 
     scene: Scene
-    way: FloatArray
-    """Corners of the way seen from above, as shares of the body's extent along x and y; shape
+    path: FloatArray
+    """Corners of the path seen from above, as shares of the body's extent along x and y; shape
     (n, 2). Between them it runs smoothly."""
     depth: float
     """How far the tip reaches below the body's upper side, as a share of its height."""
@@ -33,7 +33,7 @@ class Cut(NamedTuple):
     """By how much the edge leans towards +x [rad]."""
 
 
-def prepare_cut(cut: Cut, tissue: Tissue | None = None) -> Simulation:
+def prepare_cut(cut: PlannedCut, tissue: Tissue | None = None) -> Simulation:
     """Return the simulation of a cut, at its start: arm in place, and the scene's body or yours."""
     link = InProcessLink(tissue or make_tissue(cut.scene), cut.scene.name)
     bounds = link.describe().bounds
@@ -43,22 +43,22 @@ def prepare_cut(cut: Cut, tissue: Tissue | None = None) -> Simulation:
     return Simulation(placement.arm(), stroke, link, frame)
 
 
-def _stroke(cut: Cut, bounds: FloatArray) -> Stroke:
-    """Return the stroke along the way, with the edge a little longer than it cuts deep."""
+def _stroke(cut: PlannedCut, bounds: FloatArray) -> Stroke:
+    """Return the stroke along the path, with the edge a little longer than it cuts deep."""
     low, high = bounds
-    corners = low[:2] + cut.way * (high - low)[:2]
-    way = _evenly(_smooth(corners))
-    ahead = np.gradient(way, axis=0)
+    corners = low[:2] + cut.path * (high - low)[:2]
+    path = _evenly(_smooth(corners))
+    ahead = np.gradient(path, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     height = float(high[2] - low[2])
     up = np.array([np.sin(cut.lean), 0.0, np.cos(cut.lean)])
     below, above = cut.depth * height, _ABOVE * height
     segments = []
-    for (x, y), forward in zip(way, ahead, strict=True):
+    for (x, y), forward in zip(path, ahead, strict=True):
         at = np.array([x, y, high[2]])
         segments.append(BladeSegment(at - below * up, at + above * up, np.array([*forward, 0.0])))
     times = (
-        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1))]) / _SPEED
+        np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]) / _SPEED
     )
     return Stroke(times, segments, cut.scene.name)
 

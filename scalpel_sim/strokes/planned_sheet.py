@@ -14,7 +14,7 @@ from tissue import BladeSegment, BoolArray, FloatArray, IntArray
 #          +----+----------o----------+----> motion
 
 
-class Sheet(NamedTuple):
+class PlannedSheet(NamedTuple):
     """A surface ruled by the edge of a blade that moves through it."""
 
     origin: FloatArray
@@ -70,7 +70,7 @@ class Sheet(NamedTuple):
         ]
 
 
-def edges_of(tetrahedra: IntArray) -> IntArray:
+def mesh_edges(tetrahedra: IntArray) -> IntArray:
     """Return the distinct edges of a mesh, shape (n_edges, 2)."""
     pairs = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
     ends = np.sort(tetrahedra[:, pairs].reshape(-1, 2), axis=1)
@@ -82,14 +82,14 @@ def section(positions: FloatArray, edges: IntArray, heights: FloatArray) -> Floa
     """Return where edges of the body cross a sheet [m], shape (n, 3).
 
     Args:
-        positions: [m], shape (n_nodes, 3).
+        positions: Positions of the nodes [m], shape (n_nodes, 3).
         edges: Node indices, shape (n_edges, 2).
-        heights: Of the nodes over the sheet [m], shape (n_nodes,).
+        heights: Heights of the nodes over the sheet [m], shape (n_nodes,).
     """
     crossing = edges[is_above(heights)[edges[:, 0]] != is_above(heights)[edges[:, 1]]]
     first, second = heights[crossing[:, 0]], heights[crossing[:, 1]]
     share = (first / (first - second))[:, None]
-    return (1.0 - share) * positions[crossing[:, 0]] + share * positions[crossing[:, 1]]
+    return np.asarray((1.0 - share) * positions[crossing[:, 0]] + share * positions[crossing[:, 1]])
 
 
 def is_above(heights: FloatArray) -> BoolArray:

@@ -1,4 +1,4 @@
-"""Strokes that place themselves: through the middle of a body, part of the way, or against it."""
+"""Strokes that are planned for a body: through its middle, part of the way, or against it."""
 
 import logging
 import math
@@ -7,11 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from scalpel_sim.errors import unknown
-from scalpel_sim.strokes.planned_sheet import Sheet, edges_of, is_above, section
+from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
-from tissue import FloatArray, IntArray, Material, TetrahedralMesh
-from tissue.geometry.connected_components import components
-from tissue.mesh.faces import boundary_faces
+from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
 
 STROKES = {
     "straight": "a plane across the middle of the body, clean through",
@@ -20,16 +18,16 @@ STROKES = {
     "stop": "the straight stroke, ended inside the body: a slit",
     "press": "the blade pushed against the body, not far enough to cut",
 }
-"""The strokes that one can ask for by name, and what each does."""
+"""The strokes that have a name, and what each does."""
 
 DEFAULT_SPEED = 0.06
-"""[m/s]: an unhurried incision."""
+"""Speed of an unhurried incision [m/s]."""
 
 TILT = math.radians(25.0)
-"""By how much the slanted sheet leans, where the body is wide enough for it."""
+"""Angle by which the slanted sheet leans [rad], where the body is wide enough for it."""
 
 RAKE = math.radians(15.0)
-"""By how much the tip of the slanted blade trails its heel."""
+"""Angle by which the tip of the slanted blade trails its heel [rad]."""
 
 SAGITTA = 0.11
 """Height of the curved sheet's bend, as a fraction of the section's length."""
@@ -51,27 +49,27 @@ ABOUT_EQUAL = 0.8
 """The blade lies level, and moves down, where the section is this much thinner than it is high."""
 
 _BLADE_MARGIN, BLADE_MARGIN_SHARE = 5e-3, 0.3
-"""By how much the blade is longer than the section, at both ends: [m], plus a share of the section.
+"""Length of the blade beyond the section, at both ends: [m], plus a share of the section.
 Tissue sags, stretches, and is dragged along; a blade that it slips off leaves a bridge."""
 
 _GAP, GAP_SHARE = 5e-3, 0.1
 """How far before the body the blade starts: [m], plus a share of the section's length."""
 
 OVERSHOOT, OVERSHOOT_SHARE = 15e-3, 0.4
-"""How far beyond the body the blade goes on: [m], or a share of the section's length where that is
-more, and in either case what the body gives way by. The last of the tissue is dragged along before
-it parts."""
+"""How far beyond the body the stroke ends: [m], or a share of the section's length where that is
+more, and in either case the body's displacement. The last of the tissue is dragged along before it
+parts."""
 
-FARTHEST_GIVE = 0.5
-"""By how much of half its width a body gives way at most: then it is drawn out between its held
-sides like a string, which bending and shear do not know of."""
+LARGEST_DISPLACEMENT = 0.5
+"""Largest displacement of a body before the blade, as a fraction of half its width: beyond that it
+is stretched between its held sides like a string, which bending and shear do not cover."""
 
 SLIP_SHARE = 0.3
-"""Part of what the body gives way by that may be along the edge: the sine of `RAKE`, and some."""
+"""Part of the body's displacement that may be along the edge: the sine of `RAKE`, and a reserve."""
 
 STOP_SHARE, STOP_LATEST = 0.55, 0.9
 """Fraction of the section's length at which the stroke `stop` ends, and at which it ends at the
-latest where the body gives way first."""
+latest where the body is displaced first."""
 
 PRESS_TOUGHNESS_SHARE = 0.5
 """A press goes as deep as half of what would cut: depth x Young's modulus is a force per length of
@@ -81,22 +79,22 @@ DEEPEST_PRESS = 0.1
 """Deepest press that is planned by itself, as a fraction of the section's length."""
 
 PRESS_DWELL = 0.5
-"""How long the blade rests at the end of a press [s]: the tissue comes to rest under it."""
+"""Time for which the blade rests at the end of a press [s]: the tissue comes to rest under it."""
 
 _RAMP = 0.1
-"""Time in which the blade gathers its speed, and loses it [s]: the arm has inertia."""
+"""Time in which the blade speeds up, and slows down [s]: the arm has inertia."""
 
 SAMPLE = 5e-3
 """Time between the poses of a planned stroke [s]. 20 of them make a ramp."""
 
 _MOST_SAMPLES = 2000
-"""Between the ramps: what a stroke of 10 s takes. On a longer one they lie farther apart, so that a
-mesh in millimetres that is read as metres is soon refused for its size."""
+"""Largest number of poses between the ramps: that of a stroke of 10 s. On a longer one they are
+farther apart, so that a mesh in millimetres that is read as metres is soon refused for its size."""
 
 _log = logging.getLogger("scalpel_sim")
 
 
-def plan(
+def plan_stroke(
     name: str,
     mesh: TetrahedralMesh,
     *,
@@ -113,10 +111,10 @@ def plan(
     Args:
         name: One of `STROKES`.
         mesh: The body as it lies before the stroke, tissue frame [m].
-        speed: Of the blade between its ramps [m/s].
-        material: What the body is made of: how far it gives way before the blade, and how deep a
-            press may go.
-        depth: How far a press goes in [m]. None: half of what would cut.
+        speed: Speed of the blade between its ramps [m/s].
+        material: What the body is made of: how far the blade displaces it, and how deep a press may
+            go.
+        depth: Depth of a press [m]. None: half of what would cut.
 
     Raises:
         UsageError: no stroke has this name.
@@ -125,7 +123,7 @@ def plan(
     if name not in STROKES:
         raise unknown("stroke", name, STROKES)
     _check_positive("speed", speed, "m/s")
-    edges = edges_of(mesh.tetrahedra)
+    edges = mesh_edges(mesh.tetrahedra)
     sheet = _sheet(name, mesh, edges)
     cut = section(mesh.positions, edges, sheet.height(mesh.positions))
     travels, depths = sheet.travel(cut), sheet.depth(cut)
@@ -133,17 +131,17 @@ def plan(
     length = last - first
     start = first - max(_GAP + GAP_SHARE * length, 0.5 * speed * _RAMP)
     thickness = float(np.ptp(depths))
-    give = _give(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
-    end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + give
+    displacement = _displacement(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
+    end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement
     if name == "stop":
-        end = first + min(STOP_SHARE * length + give, STOP_LATEST * length)
+        end = first + min(STOP_SHARE * length + displacement, STOP_LATEST * length)
     if name == "press":
         if depth is None:
             harmless = PRESS_TOUGHNESS_SHARE * material.toughness / material.young_modulus
             depth = min(harmless, DEEPEST_PRESS * length)
         _check_positive("depth", depth, "m")
         end = first + depth
-    margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * give
+    margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * displacement
     times, travels = _timed(sheet, start, end, speed)
     segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
     if name == "press":
@@ -152,14 +150,14 @@ def plan(
 
 
 def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
-    """Refuse a stroke that never touches the body.
+    """Check that a stroke touches the body.
 
     Args:
         stroke: In the tissue frame.
         mesh: The body as it lies before the stroke, tissue frame [m].
 
     Raises:
-        StrokeError: the message says how far the edge stays away, and where the body is.
+        StrokeError: it does not; the message says how far away the edge is, and where the body is.
     """
     distance = _distance(stroke, mesh)
     if distance > 0.0:
@@ -171,8 +169,10 @@ def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
         )
 
 
-def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Sheet:
-    """Return the first sheet that parts the body in two, or else the first there is."""
+def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> PlannedSheet:
+    """Return the first sheet that parts the body in two, or else the first of all."""
+    from tissue import components  # loads numba
+
     pieces, _ = components(len(mesh.positions), edges)
     first = None
     for sheet in _candidates(name, mesh, edges):
@@ -185,8 +185,8 @@ def _sheet(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Sheet:
     return first
 
 
-def _candidates(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Iterator[Sheet]:
-    """Yield sheets of one kind, the best first: in the middle, and with its whole tilt or bend."""
+def _candidates(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Iterator[PlannedSheet]:
+    """Yield sheets for a stroke, the best first: in the middle, and with full tilt or bend."""
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     width = float(high[0] - low[0])
     for strength in (1.0, 0.5):
@@ -199,13 +199,13 @@ def _candidates(name: str, mesh: TetrahedralMesh, edges: IntArray) -> Iterator[S
             return
 
 
-def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> Sheet:
-    """Return the sheet of one kind through the middle of a section that is normal to x.
+def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> PlannedSheet:
+    """Return the sheet of a stroke through the middle of a section that is normal to x.
 
     Args:
-        name: Kind of stroke.
+        name: One of `STROKES`.
         cut: Points of the section [m], shape (n, 3).
-        width: Of the body along x [m]; tilt and bend stay within a share of it.
+        width: Width of the body along x [m]; tilt and bend stay within a share of it.
         strength: Fraction of the full tilt or bend.
     """
     low, high = cut.min(axis=0), cut.max(axis=0)
@@ -215,7 +215,7 @@ def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> Shee
     motion, down = (-z, y) if level else (y, -z)
     length, thickness = float(extent @ np.abs(motion)), float(extent @ np.abs(down))
     room = strength * WIDEST * width
-    sheet = Sheet((low + high) / 2.0, motion, down, x)
+    sheet = PlannedSheet((low + high) / 2.0, motion, down, x)
     if name == "slanted":
         tilt = min(strength * TILT, math.atan2(room, 0.5 * thickness))
         return sheet._replace(
@@ -228,12 +228,14 @@ def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> Shee
     return sheet
 
 
-def _divides(sheet: Sheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) -> bool:
+def _divides(sheet: PlannedSheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) -> bool:
     """Whether the sheet leaves one piece more than there was, and both held sides whole.
 
     A tetrahedron's part on one side of the sheet holds its nodes on that side, joined by edges; so
     the parts of the body hang together as its nodes do along the edges that do not cross.
     """
+    from tissue import components
+
     above = is_above(sheet.height(mesh.positions))
     whole = edges[above[edges[:, 0]] == above[edges[:, 1]]]
     parts, _ = components(len(mesh.positions), whole)
@@ -243,52 +245,54 @@ def _divides(sheet: Sheet, mesh: TetrahedralMesh, edges: IntArray, pieces: int) 
     return parts == pieces + 1 and not left.any() and bool(right.all())
 
 
-def _give(width: float, length: float, thickness: float, material: Material) -> float:
-    """Return how far the middle of the body gives way before the blade [m], roughly.
+def _displacement(width: float, length: float, thickness: float, material: Material) -> float:
+    """Return how far the blade displaces the middle of the body before it cuts [m], roughly.
 
     Each half is a beam that is built in at its held side, and bends and shears under its half of
     the cutting force, toughness x thickness: a long soft body is dragged along by more than its
     section measures.
 
     Args:
-        width: Of the body between its held sides [m].
-        length: Of the section along the motion [m].
-        thickness: Of the section along the blade [m].
+        width: Width of the body between its held sides [m].
+        length: Length of the section along the motion [m].
+        thickness: Thickness of the section along the blade [m].
         material: Gives stiffness and toughness.
     """
     half, force = width / 2.0, material.toughness * thickness / 2.0
     bending = half**3 / (3.0 * material.young_modulus * thickness * length**3 / 12.0)
     shear = half / (material.young_modulus / 3.0 * thickness * length)  # G = E/3: incompressible
-    return min(force * (bending + shear), FARTHEST_GIVE * half)
+    return min(force * (bending + shear), LARGEST_DISPLACEMENT * half)
 
 
-def _timed(sheet: Sheet, start: float, end: float, speed: float) -> tuple[FloatArray, FloatArray]:
+def _timed(
+    sheet: PlannedSheet, start: float, end: float, speed: float
+) -> tuple[FloatArray, FloatArray]:
     """Return times [s] and travels [m] along the motion, at an even speed along the sheet's bend.
 
-    The speed rises and falls as half a cosine over `_RAMP`; a way too short for that is taken more
-    slowly.
+    The speed rises and falls as half a cosine over `_RAMP`; on a path too short for that it is
+    lower.
     """
     fine = np.linspace(start, end, 1001)  # a bend of 11 % is followed to 1e-6 of its length
     pieces = np.hypot(np.diff(fine), np.diff(sheet.bulge(fine)[0]))
-    ways = np.concatenate([[0.0], np.cumsum(pieces)])
-    speed = min(speed, ways[-1] / _RAMP)
-    duration = ways[-1] / speed + _RAMP
+    paths = np.concatenate([[0.0], np.cumsum(pieces)])
+    speed = min(speed, paths[-1] / _RAMP)
+    duration = paths[-1] / speed + _RAMP
     ramp = np.linspace(0.0, _RAMP, math.ceil(_RAMP / SAMPLE) + 1)
     n_even = min(math.ceil((duration - 2.0 * _RAMP) / SAMPLE), _MOST_SAMPLES)
     even = np.linspace(_RAMP, duration - _RAMP, n_even + 1)
-    # Rounded to a nanosecond, so that the ends of the parts are one and the same.
+    # Rounded to a nanosecond, so that the ends of two parts are equal.
     times = np.unique(np.concatenate([ramp, even, duration - ramp]).round(9))
     duration = float(times[-1])
     done = np.where(
         times <= duration / 2.0,
         _ramped(times, speed),
-        ways[-1] - _ramped(duration - times, speed),
+        paths[-1] - _ramped(duration - times, speed),
     )
-    return times, np.interp(done, ways, fine)
+    return times, np.interp(done, paths, fine)
 
 
 def _ramped(times: FloatArray, speed: float) -> FloatArray:
-    """Return the way covered since a start from rest [m]."""
+    """Return the distance covered since a start from rest [m]."""
     ramp = np.minimum(times, _RAMP)
     gathering = 0.5 * speed * (ramp - _RAMP / math.pi * np.sin(math.pi * ramp / _RAMP))
     return gathering + speed * (times - ramp)
@@ -312,7 +316,8 @@ def _distance(stroke: Stroke, mesh: TetrahedralMesh) -> float:
     heels = 2 * np.arange(len(poses) - 1)[:, None]
     strips = np.concatenate([heels + corners for corners in np.array([[0, 1, 2], [2, 1, 3]])])
     skin = surface(mesh.positions, boundary_faces(mesh.tetrahedra))
-    return max(0.0, fcl.distance(skin, surface(swept, strips)))
+    distance: float = fcl.distance(skin, surface(swept, strips))
+    return max(0.0, distance)
 
 
 def _is_inside(point: FloatArray, mesh: TetrahedralMesh) -> bool:
@@ -326,11 +331,11 @@ def _is_inside(point: FloatArray, mesh: TetrahedralMesh) -> bool:
 
 
 def _check_positive(what: str, value: float, unit: str) -> None:
-    """Refuse a speed or depth that is none."""
+    """Refuse a speed or depth that is not positive."""
     if not (math.isfinite(value) and value > 0.0):
         raise StrokeError(f"the {what} of the stroke is {value} {unit}; it must be positive")
 
 
 def _millimetres(point: FloatArray) -> str:
-    """Return a point as people read it."""
+    """Return a point in millimetres, for a message."""
     return "(" + ", ".join(f"{1e3 * value:.0f}" for value in point) + ")"

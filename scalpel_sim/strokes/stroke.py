@@ -13,10 +13,11 @@ from scalpel_sim.errors import UsageError
 from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 0.01
-"""By which fraction the blade's length may vary along a stroke: what rounding in a file leaves."""
+"""Fraction by which the blade's length may vary along a stroke: what rounding in a file leaves."""
 
 FASTEST = 2.0
-"""[m/s]. No hand cuts faster; times in milliseconds or positions in millimetres do."""
+"""Highest speed of a blade [m/s]. No hand cuts faster; times in milliseconds or positions in
+millimetres do."""
 
 _COLUMNS = ("t", "tip_x", "tip_y", "tip_z", "heel_x", "heel_y", "heel_z")
 FORWARD_COLUMNS = ("forward_x", "forward_y", "forward_z")
@@ -59,7 +60,7 @@ class Stroke:
             raise StrokeError("tip, heel and forward of every pose are three numbers each")
         _check(given, tips, heels, forwards)
         self.times = given - given[0]
-        """[s], from 0; shape (n,)."""
+        """Times of the poses [s], from 0; shape (n,)."""
         self._instants: list[float] = self.times.tolist()
         edges = tips - heels
         lengths = np.linalg.norm(edges, axis=1)
@@ -73,7 +74,7 @@ class Stroke:
 
     @property
     def duration(self) -> float:
-        """[s]."""
+        """How long the stroke takes [s]."""
         return float(self.times[-1])
 
     def pose(self, t: float) -> BladeSegment:
@@ -94,11 +95,11 @@ class Stroke:
 
 
 def from_csv(path: str | Path) -> Stroke:
-    """Read a stroke from a CSV file: one pose a line, in metres and seconds, tissue frame.
+    """Read a stroke from a CSV file: one pose per line, in metres and seconds, tissue frame.
 
     The first line names the columns: `t, tip_x, tip_y, tip_z, heel_x, heel_y, heel_z` and, if
     wanted, `forward_x, forward_y, forward_z`, in any order. Without the latter the blade cuts
-    the way it moves. Empty lines, and lines that start with #, are skipped.
+    in the direction in which it moves. Empty lines, and lines that start with #, are skipped.
 
     Raises:
         StrokeError: no such file, or one that is no such table; the message names file and line.
@@ -174,7 +175,7 @@ def _check(times: FloatArray, tips: FloatArray, heels: FloatArray, forwards: Flo
         i = int(np.argmax(speeds > FASTEST)) + 1
         raise _PoseError(
             i,
-            f"the blade gets here at {speeds[i - 1]:.3g} m/s, and {FASTEST:g} m/s is the limit; "
+            f"the blade arrives here at {speeds[i - 1]:.3g} m/s, and {FASTEST:g} m/s is the limit; "
             "are the times in seconds and the positions in metres?",
         )
 
@@ -209,7 +210,7 @@ def _columns(path: Path, number: int, header: list[str]) -> list[int]:
     if sorted(names) != sorted(wanted):
         raise StrokeError(
             f"{path}, line {number}: the columns are '{','.join(header)[:200]}'; wanted "
-            f"{','.join(_COLUMNS)} and, if the blade does not cut the way it moves, "
+            f"{','.join(_COLUMNS)} and, if the blade does not cut in the direction of motion, "
             f"{','.join(FORWARD_COLUMNS)}"
         )
     return [names.index(name) for name in wanted]
@@ -234,8 +235,8 @@ def _row(path: Path, number: int, cells: list[str], columns: list[int]) -> list[
 def _forwards_of_motion(path: Path, tips: FloatArray, heels: FloatArray) -> FloatArray:
     """Return the direction in which the middle of the edge moves, across the edge, at each pose.
 
-    Where the blade rests, or only slides along itself, it faces the way it did before, or at the
-    start the way it will.
+    Where the blade rests, or only slides along itself, it keeps the direction that it had before,
+    or at the start the first one that it will have.
     """
     edges = (tips - heels) / np.maximum(np.linalg.norm(tips - heels, axis=1, keepdims=True), 1e-12)
     moves = np.gradient((tips + heels) / 2.0, axis=0)
@@ -244,8 +245,8 @@ def _forwards_of_motion(path: Path, tips: FloatArray, heels: FloatArray) -> Floa
     moving = lengths > 1e-3 * lengths.max(initial=0.0)
     if not moving.any():
         raise StrokeError(
-            f"{path}: the blade never moves across its edge, so the file must say which way it "
-            f"cuts, in columns {','.join(FORWARD_COLUMNS)}"
+            f"{path}: the blade never moves across its edge, so the file must give the direction "
+            f"in which it cuts, in columns {','.join(FORWARD_COLUMNS)}"
         )
     last = np.maximum.accumulate(np.where(moving, np.arange(len(moves)), -1))
-    return moves[np.where(last < 0, int(np.argmax(moving)), last)]
+    return np.asarray(moves[np.where(last < 0, int(np.argmax(moving)), last)])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from scalpel_sim.cli.console import say, talking
-from scalpel_sim.cli.options import Talk
+from scalpel_sim.cli.console import log_to_stderr, say
+from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import RunError
 
 if TYPE_CHECKING:  # `--help` should not wait for it
@@ -23,7 +23,7 @@ def validate(
     out: Path = Path("out/validate"),
     only: list[str] | None = None,
     quick: Annotated[bool, Parameter(negative="")] = False,
-    talk: Talk = Talk(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Run scenes against theory and published figures; print a table, write a report with plots.
 
@@ -44,14 +44,14 @@ def validate(
 
     scenes = chosen(only or ())
     check_folder(out)
-    with talking(talk):
-        load_kernels(talk)
-        done = _run(scenes, quick=quick, talk=talk)
+    with log_to_stderr(printing):
+        load_kernels(printing)
+        done = _run(scenes, quick=quick, printing=printing)
         text = as_json(done, quick=quick, versions=versions())
         write(out, done, text, quick=quick)
-    if talk.json:
+    if printing.json:
         print(text)
-    elif not talk.quiet:
+    elif not printing.quiet:
         from rich.console import Console
 
         from scalpel_sim.validate.report import print_table
@@ -63,13 +63,13 @@ def validate(
         raise RunError(f"{failed} lines are out of their bounds; {out / PAGE} says which")
 
 
-def _run(scenes: Sequence["Scene"], *, quick: bool, talk: Talk) -> list["Done"]:
+def _run(scenes: Sequence["Scene"], *, quick: bool, printing: PrintOptions) -> list["Done"]:
     """Run the scenes one after the other, and say which one is on."""
     from scalpel_sim.validate.results import Done
 
     done = []
     for i, scene in enumerate(scenes):
-        if not talk.quiet:
+        if not printing.quiet:
             say(f"{i + 1} of {len(scenes)}: {scene.title}")
         started = time.perf_counter()
         findings = scene.measure(quick)

@@ -1,7 +1,7 @@
 """Callbacks that hand a running simulation to the live viewer and to the replay."""
 
 from scalpel_sim.output.force_parts import force_parts
-from scalpel_sim.simulation import Picture, Simulation
+from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
 from scalpel_sim.viewer.scene3d import Readings
@@ -29,7 +29,7 @@ def readings(simulation: Simulation) -> Readings | None:
     )
 
 
-def into_replay(replay: ReplayWriter) -> Picture:
+def into_replay(replay: ReplayWriter) -> DrawFrame:
     """Return a callback that adds a simulation to a replay after each frame."""
 
     def picture(simulation: Simulation) -> None:
@@ -49,7 +49,7 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
     )
 
 
-def into_viewer(viewer: Viewer) -> Picture:
+def into_viewer(viewer: Viewer) -> DrawFrame:
     """Return a callback that shows a simulation in a live viewer after each frame."""
 
     def picture(simulation: Simulation) -> None:

@@ -1,3 +1,8 @@
+import subprocess
+import sys
+
+import pytest
+
 from scalpel_sim import SCENES
 from scalpel_sim.scenes import changed, material_called
 
@@ -19,3 +24,15 @@ def test_properties_change_the_material_that_is_given_beside_them():
 
 def test_what_is_not_given_stays():
     assert changed(GRID2, material=None, law=None, floor=None) == GRID2
+
+
+@pytest.mark.parametrize("module", ["scalpel_sim.scenes", "scalpel_sim.cli.app"])
+def test_a_list_of_scenes_and_the_help_wait_for_no_compiler_and_no_plots(module):
+    program = (
+        f"import sys, {module}; "
+        "print([name for name in ('numba', 'matplotlib', 'scipy') if name in sys.modules])"
+    )
+    path = [path for path in sys.path if path]
+    code = f"import sys; sys.path[:0] = {path!r}; {program}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

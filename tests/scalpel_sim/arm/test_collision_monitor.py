@@ -4,7 +4,7 @@ import pytest
 from bridge import FixtureBox
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.arm.arm import ARMS, Arm
-from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, Touching, floor_below
+from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, CollisionMonitor, floor_below
 from scalpel_sim.scenes import changed
 
 
@@ -22,16 +22,16 @@ def lowered(arm, height):
 
 @pytest.mark.parametrize("preset", ARMS)
 def test_an_arm_at_home_meets_nothing(preset, caplog):
-    touching = Touching(Arm(preset))
-    touching.look()
+    touching = CollisionMonitor(Arm(preset))
+    touching.check()
     assert touching.now == () and touching.frames == {} and not caplog.records
 
 
 def test_a_blade_that_is_led_into_the_table_is_counted_and_said_once(caplog):
     arm = Arm("touch")
-    touching = Touching(arm)
+    touching = CollisionMonitor(arm)
     for _ in lowered(arm, -0.005):
-        touching.look()
+        touching.check()
     assert ("blade", "table") in touching.now
     assert touching.frames["blade, table"] > 5
     said = [
@@ -45,19 +45,19 @@ def test_a_handle_that_meets_a_clamp_is_named_with_it():
     arm.step1()
     handle = arm.data.geom("stylus").xpos
     clamp = FixtureBox("clamp", np.full(3, 0.01), handle + np.array([0.0, 0.0, 0.012]))
-    touching = Touching(arm, [clamp])
-    touching.look()
+    touching = CollisionMonitor(arm, [clamp])
+    touching.check()
     assert ("stylus", "clamp") in touching.now
 
 
 def test_an_instrument_that_is_folded_back_on_the_arm_is_seen():
     arm = Arm("touch", blade_length=0.16)
-    touching = Touching(arm)
+    touching = CollisionMonitor(arm)
     poses = np.random.default_rng(0).uniform(*arm.model.jnt_range.T, (300, 6))
     met = set()
     for qpos in poses:
         arm.reset(qpos)
-        touching.look()
+        touching.check()
         met |= set(touching.now)
     assert {("blade", "upper_arm"), ("blade", "base")} <= met
     assert not any(other in ("wrist", "gimbal", "stylus") for _, other in met)

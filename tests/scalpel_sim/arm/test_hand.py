@@ -110,8 +110,8 @@ def test_a_pose_that_is_not_finite_is_refused_and_leaves_the_hand_where_it_was()
 
 @pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
 def test_an_impedance_is_positive(value):
-    with pytest.raises(ValueError, match="turning_stiffness is"):
-        Impedance(turning_stiffness=value)
+    with pytest.raises(ValueError, match="rotational_stiffness is"):
+        Impedance(rotational_stiffness=value)
 
 
 # A free blade in space: whoever has an arm of their own can have the hand too.

@@ -3,7 +3,7 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
-from scalpel_sim.strokes.planning import STROKES, plan
+from scalpel_sim.strokes.planning import STROKES, plan_stroke
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -24,7 +24,7 @@ def in_world(pose, placement):
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
 @pytest.mark.parametrize("name", STROKES)
 def test_both_arms_lead_the_blade_along_every_stroke(preset, mesh, name):
-    stroke = plan(name, mesh)
+    stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh), preset)
     assert placement.margin >= NEEDED_MARGIN
     arm = placement.arm()
@@ -47,7 +47,7 @@ def test_both_arms_lead_the_blade_along_every_stroke(preset, mesh, name):
 
 @pytest.mark.parametrize("preset", ARMS)
 def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
-    stroke = plan("slanted", SLAB)
+    stroke = plan_stroke("slanted", SLAB)
     placement = place(stroke, bounds(SLAB), preset)
     there, wanted = placement.arm().blade.segment(), in_world(stroke.pose(0.0), placement)
     for part in range(3):
@@ -57,7 +57,7 @@ def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
 @pytest.mark.parametrize("name", STROKES)
 def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(mesh, name):
-    stroke = plan(name, mesh)
+    stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh))
     assert placement.base_position[2] == 0.0
     assert (bounds(mesh)[0] + placement.tissue_origin)[2] >= 0.01 - 1e-12
@@ -67,7 +67,7 @@ def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(me
 @pytest.mark.parametrize("preset", ARMS)
 @pytest.mark.parametrize("name", STROKES)
 def test_base_and_links_stay_out_of_the_body(preset, name):
-    stroke = plan(name, SLAB)
+    stroke = plan_stroke(name, SLAB)
     placement = place(stroke, bounds(SLAB), preset)
     box = bounds(SLAB) + placement.tissue_origin
     arm = placement.arm()
@@ -82,27 +82,27 @@ def test_base_and_links_stay_out_of_the_body(preset, name):
 
 
 def test_auto_takes_the_smallest_arm_that_reaches_and_renders_the_force():
-    stroke = plan("straight", SLAB)
+    stroke = plan_stroke("straight", SLAB)
     assert place(stroke, bounds(SLAB)).preset == "touch"
     assert place(stroke, bounds(SLAB), force=3.4).preset == "premium"
     assert place(stroke, bounds(SLAB), force=100.0).preset == "premium"
     large = block((4, 6, 4), (0.16, 0.24, 0.16))
-    assert place(plan("straight", large), bounds(large)).preset == "premium"
+    assert place(plan_stroke("straight", large), bounds(large)).preset == "premium"
 
 
 @pytest.mark.parametrize(
     ("preset", "remedy"),
-    [("touch", "smaller, or take --arm premium"), ("premium", "smaller"), ("auto", "smaller")],
+    [("touch", "smaller, or choose --arm premium"), ("premium", "smaller"), ("auto", "smaller")],
 )
 def test_a_stroke_out_of_reach_is_refused_with_the_scale_that_would_do(preset, remedy):
     mesh = block((4, 6, 4), (0.4, 0.6, 0.4))
     with pytest.raises(PlacementError, match=rf"at 0\.\d+ times the size: .*{remedy}$") as error:
-        place(plan("straight", mesh), bounds(mesh), preset)
+        place(plan_stroke("straight", mesh), bounds(mesh), preset)
     scale = float(str(error.value).split(" times the size")[0].split()[-1])
     smaller = block((4, 6, 4), (0.4 * scale, 0.6 * scale, 0.4 * scale))
-    place(plan("straight", smaller), bounds(smaller), preset)
+    place(plan_stroke("straight", smaller), bounds(smaller), preset)
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="Known: touch, premium, auto"):
-        place(plan("straight", SLAB), bounds(SLAB), "omni")
+        place(plan_stroke("straight", SLAB), bounds(SLAB), "omni")

@@ -15,13 +15,13 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import read_forces
-from scalpel_sim.output.run_folder import ENERGY_PLOT, NAMES
+from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES
 from tissue import MATERIALS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
 FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
 
-UNAUDITED = set(NAMES) - {ENERGY_PLOT}
+UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
 """The files of a run without an account of its energy."""
 
 WRONG_USE = {
@@ -115,6 +115,10 @@ WRONG_USE = {
     "an account of nodes at different instants": (
         ["run", "slab", "--audit", "--relaxation", "local"],
         "--audit needs --relaxation global",
+    ),
+    "fewer threads than one": (
+        ["run", "slab", "--threads", "0"],
+        "--threads is 0; it must be from 1",
     ),
     "an account by two threads": (
         ["run", "slab", "--audit", "--threads", "2"],
@@ -253,17 +257,17 @@ def test_a_run_prints_the_table_of_the_paper_and_writes_every_file(files, capsys
         "path error",
     ):
         assert words in out
-    assert sorted(os.listdir("out/slab")) == sorted(NAMES)
+    assert sorted(os.listdir("out/slab")) == sorted(RUN_FILES)
     assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
 
 
 def test_json_prints_the_summary_and_nothing_else(files, capsys):
-    words = ["run", "grid2", "--seconds", "0.02", "--seed", "5", "--json", "--out", "here"]
+    words = ["run", "grid2", "--seconds", "0.02", "--json", "--out", "here"]
     assert command_line(words) == 0
     printed = json.loads(capsys.readouterr().out)
     with open("here/summary.json") as file:
         assert json.load(file) == printed
-    assert (printed["scene"], printed["seed"], printed["frames"]) == ("grid2", 5, 20)
+    assert (printed["scene"], printed["frames"]) == ("grid2", 20)
     assert printed["settings"]["arm"] == "touch"  # what auto resolved to
     assert printed["simulated_seconds"] == pytest.approx(0.02)
 
@@ -406,7 +410,7 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == f"interrupted by {number.name}"
     assert summary["frames"] == len(read_forces(forces)) >= 100
-    assert sorted(path.name for path in folder.iterdir()) == sorted(NAMES)
+    assert sorted(path.name for path in folder.iterdir()) == sorted(RUN_FILES)
 
 
 def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
@@ -436,7 +440,7 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
         server.communicate(timeout=60)
     assert server.returncode == 0
     ours, theirs = (read_forces(folder / "forces.csv") for folder in (here, there))
-    timed = 5  # columns of wall times at the end
+    timed = 6  # columns of wall times at the end
     assert ours.column("cut_area_m2").max() > 0.0
     assert ours.is_audited  # so that no number is a NaN
     assert np.array_equal(ours.rows[:, :-timed], theirs.rows[:, :-timed])

@@ -14,7 +14,7 @@ from scalpel_sim.output.energy_terms import TERMS
 from scalpel_sim.output.force_plot import LIMITED, PARTS, plot_forces
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS, Recording
-from scalpel_sim.output.report import print_table
+from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.run_folder import (
     ENERGY_PLOT,
     FORCES,
@@ -25,9 +25,8 @@ from scalpel_sim.output.run_folder import (
     Outputs,
     summary_json,
 )
-from scalpel_sim.output.summary import Summary, summarise
-from tissue import CutReport, Energies, MeshMeasures, Snapshot, block
-from tissue.mesh.pieces import pieces_of
+from scalpel_sim.output.summary import RunFacts, Summary, summarise
+from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
 
 DT = 1e-3
 QUALITY = CutReport(
@@ -65,25 +64,26 @@ def recorded(n_frames: int) -> Recording:
     rng = np.random.default_rng(0)
     recording = Recording(1)
     for i in range(n_frames):
-        recording.append((i * DT, *rng.normal(size=untimed), *rng.uniform(0.0, 1e-5, 5)))
+        recording.append((i * DT, *rng.normal(size=untimed), *rng.uniform(0.0, 1e-5, 6)))
     return recording
 
 
 def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any) -> Summary:
     return summarise(
         recording,
-        scene="block",
-        status="complete",
-        seed=7,
-        dt=DT,
-        wall_seconds=wall_seconds,
-        tetrahedra_initial=6,
-        tetrahedra_final=8,
-        pieces=PIECES,
-        quality=QUALITY,
-        counters=counters,
-        touched={},
-        settings={"stroke": "straight"},
+        RunFacts(
+            scene="block",
+            status="complete",
+            dt=DT,
+            wall_seconds=wall_seconds,
+            tetrahedra_initial=6,
+            tetrahedra_final=8,
+            pieces=PIECES,
+            quality=QUALITY,
+            counters=counters,
+            touched={},
+            settings={"stroke": "straight"},
+        ),
     )
 
 
@@ -220,7 +220,8 @@ def still(n_frames: int = 100) -> Recording:
     """A recording of nothing, to put something in."""
     recording = Recording()
     for i in range(n_frames):
-        recording.append([i * DT] + [0.0] * (len(COLUMNS) - 2) + [1e-4])
+        row = dict.fromkeys(COLUMNS, 0.0) | {"time_s": i * DT, "frame_s": 1e-4}
+        recording.append(list(row.values()))
     return recording
 
 
@@ -249,7 +250,7 @@ def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
     outputs.write_summary(summary_of(recorded(10)))
     found = json.loads((tmp_path / SUMMARY).read_text())
     promised = (
-        "scene seed simulated_seconds wall_seconds real_time_factor frame_rate_median "
+        "scene simulated_seconds wall_seconds real_time_factor frame_rate_median "
         "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
         "force_peak_n "
         "force_mean_n work_of_blade_j share versions"
@@ -272,7 +273,7 @@ def test_the_summary_tells_of_each_piece():
 
 def test_the_table_has_a_row_for_each_piece():
     console = Console(record=True, width=100)
-    print_table(summary_of(recorded(10)), console)
+    print_summary(summary_of(recorded(10)), console)
     text = console.export_text()
     assert "piece 1, loose" in text and "piece 2, held" in text
 
@@ -280,7 +281,7 @@ def test_the_table_has_a_row_for_each_piece():
 def test_the_table_tells_what_came_between_the_tissue_and_the_arm():
     console = Console(record=True, width=100)
     passivity = {"energy": 0.0, "least_energy": -5e-7, "injected_away": 2e-3, "frames": 12}
-    print_table(
+    print_summary(
         summary_of(recorded(10), force_limited=1234, silent=0, passivity=passivity), console
     )
     text = console.export_text()
@@ -322,7 +323,7 @@ def test_the_table_has_a_row_for_each_term_of_the_account():
     recording = still()
     recording.column("work_of_blade_j")[-1] = 4e-3
     recording.column("friction_j")[-1] = 1e-3
-    print_table(summary_of(recording), console)
+    print_summary(summary_of(recording), console)
     (row,) = [line for line in console.export_text().splitlines() if "friction on" in line]
     assert "1.0000 mJ" in row and "25.00%" in row
 

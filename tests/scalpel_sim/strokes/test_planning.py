@@ -6,7 +6,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from scalpel_sim.strokes.planning import STROKES, check_meets, plan
+from scalpel_sim.strokes.planning import STROKES, check_meets, plan_stroke
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
 from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe, read_mesh
 
@@ -65,7 +65,7 @@ def pieces(tetrahedra):
 @pytest.mark.parametrize("name", THROUGH)
 def test_a_stroke_clean_through_parts_left_from_right(body, name):
     mesh = BODIES[body]()
-    stroke = plan(name, mesh)
+    stroke = plan_stroke(name, mesh)
     centroids = mesh.positions[mesh.tetrahedra].mean(axis=1)
     side = swept_side(stroke, centroids)
     x = centroids[:, 0]
@@ -88,7 +88,7 @@ def mesh_share(mesh, chosen):
 @pytest.mark.parametrize("name", THROUGH)
 def test_the_blade_is_longer_than_the_section_and_leaves_the_body_behind(body, name):
     mesh = BODIES[body]()
-    stroke = plan(name, mesh)
+    stroke = plan_stroke(name, mesh)
     for pose in stroke.poses(200):
         assert not near_body(mesh, pose.tip)
         assert not near_body(mesh, pose.heel)
@@ -109,7 +109,7 @@ def near_body(mesh, point, clearance=0.003):
 @pytest.mark.parametrize("name", STROKES)
 @pytest.mark.parametrize("speed", [0.02, 0.06, 0.3])
 def test_the_blade_starts_and_ends_at_rest_and_keeps_to_its_speed(name, speed):
-    stroke = plan(name, BODIES["slab"](), speed=speed)
+    stroke = plan_stroke(name, BODIES["slab"](), speed=speed)
     times = np.arange(0.0, stroke.duration, 1e-3)
     middles = np.array([(pose.tip + pose.heel) / 2.0 for pose in map(stroke.pose, times)])
     speeds = np.linalg.norm(np.diff(middles, axis=0), axis=1) / 1e-3
@@ -120,21 +120,21 @@ def test_the_blade_starts_and_ends_at_rest_and_keeps_to_its_speed(name, speed):
 
 
 def test_the_edge_stands_in_a_slab_and_lies_on_a_sheet_on_edge():
-    standing = plan("straight", BODIES["slab"]()).pose(0.0)
+    standing = plan_stroke("straight", BODIES["slab"]()).pose(0.0)
     assert np.allclose(standing.forward, [0.0, 1.0, 0.0])
     assert standing.tip[2] < 0.0 < 0.04 < standing.heel[2]
-    lying = plan("straight", BODIES["sheet on edge"]()).pose(0.0)
+    lying = plan_stroke("straight", BODIES["sheet on edge"]()).pose(0.0)
     assert np.allclose(lying.forward, [0.0, 0.0, -1.0])
     assert lying.heel[1] < 0.0 < 0.006 < lying.tip[1]
 
 
 def test_the_straight_stroke_is_in_the_middle():
-    for pose in plan("straight", BODIES["slab"]()).poses(5):
+    for pose in plan_stroke("straight", BODIES["slab"]()).poses(5):
         assert pose.tip[0] == pose.heel[0] == pytest.approx(0.02)
 
 
 def test_the_slanted_sheet_leans_by_25_degrees_and_the_blade_is_raked_by_15():
-    pose = plan("slanted", BODIES["slab"]()).pose(0.0)
+    pose = plan_stroke("slanted", BODIES["slab"]()).pose(0.0)
     edge = (pose.tip - pose.heel) / np.linalg.norm(pose.tip - pose.heel)
     normal = np.cross(edge, pose.forward)
     assert np.degrees(np.arccos(abs(normal[0]))) == pytest.approx(25.0)
@@ -142,7 +142,7 @@ def test_the_slanted_sheet_leans_by_25_degrees_and_the_blade_is_raked_by_15():
 
 
 def test_the_curved_sheet_bends_by_11_percent_and_the_blade_turns_along():
-    stroke = plan("curved", BODIES["slab"]())
+    stroke = plan_stroke("curved", BODIES["slab"]())
     poses = stroke.poses(2000)
     tips = np.array([pose.tip for pose in poses])
     within = (tips[:, 1] > 0.0) & (tips[:, 1] < 0.06)
@@ -155,22 +155,22 @@ def test_the_curved_sheet_bends_by_11_percent_and_the_blade_turns_along():
 
 
 def test_a_sheet_through_a_narrow_body_leans_less_and_spares_the_held_sides():
-    pose = plan("slanted", BODIES["narrow"]()).pose(0.0)
+    pose = plan_stroke("slanted", BODIES["narrow"]()).pose(0.0)
     normal = np.cross(pose.tip - pose.heel, pose.forward)
     assert 5.0 < np.degrees(np.arccos(abs(normal[0]) / np.linalg.norm(normal))) < 12.0
 
 
 @pytest.mark.parametrize(("toughness", "share"), [(0.0, 0.55), (1e3, 0.9)])
 def test_stop_ends_at_55_percent_or_later_where_the_body_gives_way_but_inside(toughness, share):
-    stroke = plan("stop", BODIES["across"](), material=Material(toughness=toughness))
+    stroke = plan_stroke("stop", BODIES["across"](), material=Material(toughness=toughness))
     assert stroke.pose(stroke.duration).tip[1] == pytest.approx(share * 0.03)
 
 
 def test_press_goes_half_as_deep_as_toughness_over_stiffness():
     material = Material(young_modulus=20e3, toughness=40.0)
-    stroke = plan("press", BODIES["slab"](), material=material)
+    stroke = plan_stroke("press", BODIES["slab"](), material=material)
     assert stroke.pose(stroke.duration).tip[1] == pytest.approx(1e-3)
-    deeper = plan("press", BODIES["slab"](), depth=2.5e-3)
+    deeper = plan_stroke("press", BODIES["slab"](), depth=2.5e-3)
     assert deeper.pose(deeper.duration).tip[1] == pytest.approx(2.5e-3)
     resting = deeper.pose(deeper.duration - 0.4)
     assert np.array_equal(resting.tip, deeper.pose(deeper.duration).tip)
@@ -183,7 +183,7 @@ def test_press_goes_half_as_deep_as_toughness_over_stiffness():
 )
 def test_the_blade_goes_on_by_what_a_long_soft_body_gives_way(half_width, give):
     mesh = block((8, 2, 2), (2 * half_width, 0.02, 0.02))
-    stroke = plan("straight", mesh, material=Material(young_modulus=10e3, toughness=20.0))
+    stroke = plan_stroke("straight", mesh, material=Material(young_modulus=10e3, toughness=20.0))
     assert stroke.pose(stroke.duration).tip[1] == pytest.approx(0.02 + 0.015 + give)
 
 
@@ -199,26 +199,26 @@ def fork():
 
 @pytest.mark.parametrize("name", THROUGH)
 def test_a_branched_body_is_cut_where_it_falls_into_two(name):
-    tip = plan(name, fork()).pose(0.5).tip
+    tip = plan_stroke(name, fork()).pose(0.5).tip
     assert tip[0] > 0.055
 
 
 def test_an_unknown_stroke_is_refused_with_the_known_ones():
     with pytest.raises(ValueError, match="Did you mean 'slanted'\\? Known: straight, slanted"):
-        plan("slant", BODIES["slab"]())
+        plan_stroke("slant", BODIES["slab"]())
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
 def test_a_speed_that_is_none_is_refused(speed):
     with pytest.raises(StrokeError, match="speed of the stroke"):
-        plan("straight", BODIES["slab"](), speed=speed)
+        plan_stroke("straight", BODIES["slab"](), speed=speed)
 
 
 @pytest.mark.parametrize("body", ["slab", "organ", "sheet on edge"])
 @pytest.mark.parametrize("name", STROKES)
 def test_planned_strokes_meet_the_body(body, name):
     mesh = BODIES[body]()
-    check_meets(plan(name, mesh), mesh)
+    check_meets(plan_stroke(name, mesh), mesh)
 
 
 def shifted(stroke, shift):
@@ -231,7 +231,7 @@ def shifted(stroke, shift):
 
 def test_a_stroke_beside_the_body_is_refused_with_the_distance():
     mesh = BODIES["slab"]()
-    beside = shifted(plan("straight", mesh), [0.0325, 0.0, 0.0])
+    beside = shifted(plan_stroke("straight", mesh), [0.0325, 0.0, 0.0])
     with pytest.raises(
         StrokeError, match=r"'mine' stays 12\.5 mm away .* \(0, 0, 0\) to \(40, 60, 40\)"
     ):

@@ -1,0 +1,235 @@
+import json
+import math
+import re
+import tomllib
+from dataclasses import fields
+from typing import get_args, get_type_hints
+
+import pytest
+
+from scalpel_sim import SCALPEL
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.cli.material_file import BladeTable, MaterialTable, read_blade, read_material
+from scalpel_sim.cli.material_template import BLADE_COMMENTS, MATERIAL_COMMENTS, template
+from scalpel_sim.cli.options import BladeOptions, MaterialOptions, TissueOptions
+from scalpel_sim.cli.run_setup import chosen_scene
+from scalpel_sim.errors import UsageError
+from scalpel_sim.scenes import PHANTOM
+from tissue import MATERIALS, BladeShape, Material
+
+WRONG_FILES = {
+    "no file": (None, r"cannot be read: No such file.*materials --write"),
+    "no text": (b"\xff\xfe\x00", "is not a text file"),
+    "no TOML": ("[material]\nyoung_modulus 5", r"is not valid TOML: .*line 2"),
+    "a key twice": ("[material]\ndensity = 1\ndensity = 2", "is not valid TOML"),
+    "nothing": ("", r"has no table \[material\]; .*materials --write"),
+    "the other table alone": ("[blade]\nheight = 0.01", r"has no table \[material\]"),
+    "a table of another name": ("[matrial]\ndensity = 1000", "Did you mean 'material'"),
+    "no table": ("young_modulus = 5e3", r"stands in no table; write \[material\]"),
+    "a number for a table": ("material = 3", r"material is 3; it must be a table"),
+    "a wrong key": ("[material]\nyung_modulus = 5e3", "Did you mean 'young_modulus'"),
+    "a key as the option has it": ("[material]\nyoung = 5e3", "Did you mean 'young_modulus'"),
+    "a key in another case": ("[material]\nDensity = 1e3", "Did you mean 'density'"),
+    "a key of the other table": (
+        "[material]\nheight = 0.01",
+        r"height, which belongs to \[blade\]",
+    ),
+    "a wrong key of the blade": ("[blade]\nbevel_angle = 10", "Did you mean 'bevel_degrees'"),
+    "a text for a number": ('[material]\ndensity = "heavy"', 'density is "heavy"; .* above 0'),
+    "a truth for a number": ("[material]\ndensity = true", "density is true; .* above 0"),
+    "a list for a number": ("[material]\ndensity = [1, 2]", r"density is \[1, 2\]; .* above 0"),
+    "a negative number": ("[material]\nyoung_modulus = -1", "young_modulus is -1; .* above 0"),
+    "zero where it may not be": ("[material]\ndensity = 0", "density is 0; .* above 0"),
+    "no number": ("[material]\ntoughness = nan", "toughness is nan; .* 0 or more"),
+    "infinity": ("[material]\ntoughness = inf", "toughness is inf; .* 0 or more"),
+    "a ratio of what keeps its volume": ("[material]\npoisson_ratio = 0.5", "0 to below 0.5"),
+    "a law that there is not": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
+    "a number for a law": ("[material]\nlaw = 1", 'law is 1; .*"springs" or "neo_hookean"'),
+    "a ratio that the law cannot have": (
+        '[material]\nlaw = "springs"\npoisson_ratio = 0.1',
+        "poisson_ratio is 0.1; springs",
+    ),
+    "a calibration of what has no springs": (
+        '[material]\nlaw = "neo_hookean"\nspring_calibration = 0.9',
+        "spring_calibration is 0.9",
+    ),
+}
+
+WRONG_BLADES = {
+    "the other table alone": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
+    "a negative thickness": ("[blade]\nthickness = -1", "thickness is -1; .* 0 or more"),
+    "no height": ("[blade]\nheight = 0", "height is 0; .* above 0"),
+    "a bevel of a hammer": ("[blade]\nbevel_degrees = 80", "80 degrees; at most 60"),
+    "bevels that do not fit": ("[blade]\nthickness = 0.01", "only 0.006 m high"),
+}
+
+
+def options(path, *, blade=None, **given) -> TissueOptions:
+    return TissueOptions(
+        material=MaterialOptions(material=None if path is None else str(path), **given),
+        blade=BladeOptions(blade=blade),
+    )
+
+
+def test_the_tables_have_the_fields_of_material_and_blade():
+    assert set(MaterialTable.__struct_fields__) == {field.name for field in fields(Material)}
+    in_degrees = {field.name for field in fields(BladeShape)} - {"bevel_angle"}
+    assert set(BladeTable.__struct_fields__) == in_degrees | {"bevel_degrees"}
+    assert tuple(MATERIAL_COMMENTS) == MaterialTable.__struct_fields__
+    assert tuple(BLADE_COMMENTS) == BladeTable.__struct_fields__
+
+
+@pytest.mark.parametrize("table", [MaterialTable, BladeTable])
+def test_each_key_says_what_it_may_be(table):
+    for hint in get_type_hints(table, include_extras=True).values():
+        assert get_args(hint)[0].__metadata__[0].description
+
+
+@pytest.mark.parametrize("name", [None, *MATERIALS])
+def test_what_is_written_reads_back_to_the_same_material_and_blade(name, tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    words = ["materials", *([] if name is None else [name]), "--write", str(path)]
+    assert command_line(words) == 0
+    assert str(path) in capsys.readouterr().out
+    wanted = PHANTOM if name is None else MATERIALS[name].material
+    assert Material(**read_material(path)) == wanted
+    scene = chosen_scene("slab", options(path, blade=path))
+    assert (scene.material, scene.blade) == (wanted, SCALPEL)
+
+
+def test_any_material_reads_back_to_the_same_bits(tmp_path):
+    odd = Material(young_modulus=1 / 3 * 1e4, toughness=math.pi, retardation_time=1e-300)
+    path = tmp_path / "odd.toml"
+    path.write_text(template(odd, "an odd one"), encoding="utf-8")
+    assert Material(**read_material(path)) == odd
+
+
+def test_every_number_of_the_file_has_a_comment_and_a_preset_its_sources(tmp_path):
+    liver = MATERIALS["liver"]
+    text = template(liver.material, "liver", liver)
+    for paragraph in text.split("\n\n")[1:]:
+        lines = [line for line in paragraph.splitlines() if not line.startswith("[")]
+        assert lines[0].startswith("# ") and " = " in lines[-1]
+    assert "Gokgol et al. 2012" in text
+    assert max(map(len, text.splitlines())) <= 100
+    assert set(tomllib.loads(text)) == {"material", "blade"}
+
+
+def test_a_file_is_not_written_over_unless_that_is_asked_for(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text("precious")
+    assert command_line(["materials", "--write", str(path)]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert path.read_text() == "precious"
+    assert command_line(["materials", "--write", str(path), "--force", "-q"]) == 0
+    assert Material(**read_material(path)) == PHANTOM
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["--write", "mine.txt"], "must end in .toml"),
+        (["livr", "--write", "mine.toml"], "Did you mean 'liver'"),
+        (["liver", "--force"], "--force is for --write"),
+    ],
+)
+def test_what_cannot_be_written_is_wrong_use(words, expected, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert command_line(["materials", *words]) == 2
+    assert expected in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_not_there_is_a_failed_run(tmp_path, capsys):
+    assert command_line(["materials", "--write", str(tmp_path / "no" / "mine.toml")]) == 1
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("case", WRONG_FILES)
+def test_a_wrong_file_is_named_with_the_key_and_what_would_be_right(case, tmp_path):
+    content, expected = WRONG_FILES[case]
+    path = tmp_path / "mine.toml"
+    if content is not None:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(UsageError, match=expected) as caught:
+        chosen_scene("slab", options(path))
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("case", WRONG_BLADES)
+def test_a_wrong_blade_is_named_with_the_key_and_what_would_be_right(case, tmp_path):
+    content, expected = WRONG_BLADES[case]
+    path = tmp_path / "mine.toml"
+    path.write_text(content)
+    with pytest.raises(UsageError, match=expected) as caught:
+        chosen_scene("organ", options(None, blade=path))
+    assert str(path) in str(caught.value)
+
+
+def test_a_wrong_file_gets_one_line_and_exit_code_2(tmp_path, capsys):
+    path = tmp_path / "mine.toml"
+    path.write_text("[material]\nyung_modulus = 5e3\n")
+    assert command_line(["run", "grid2", "--material", str(path)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.match(f"error: {path}: .*Did you mean 'young_modulus'", line)
+
+
+def test_a_key_that_is_not_given_keeps_the_value_of_the_scene(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("[material]\ndensity = 900\n[blade]\nheight = 0.01\n")
+    scene = chosen_scene("organ", options(path, blade=path))
+    usual = chosen_scene("organ", TissueOptions())
+    assert scene.material.density == 900.0
+    assert scene.material.toughness == usual.material.toughness
+    assert scene.blade == BladeShape(height=0.01)
+
+
+def test_an_option_overrides_the_file(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('[material]\nlaw = "springs"\npoisson_ratio = 0.1\ntoughness = 7\n')
+    scene = chosen_scene("slab", options(path, law="neo_hookean", toughness=9.0))
+    assert (scene.material.law, scene.material.poisson_ratio) == ("neo_hookean", 0.1)
+    assert scene.material.toughness == 9.0
+
+
+def test_a_thickness_of_zero_in_the_file_is_a_line_unless_an_option_makes_it_a_blade(tmp_path):
+    path = tmp_path / "line.toml"
+    path.write_text("[blade]\nthickness = 0\nbevel_degrees = 20\nheight = 0.01\n")
+    assert chosen_scene("organ", options(None, blade=path)).blade is None
+    thick = TissueOptions(blade=BladeOptions(blade=path, blade_thickness=1e-3))
+    shape = BladeShape(thickness=1e-3, bevel_angle=math.radians(20.0), height=0.01)
+    assert chosen_scene("organ", thick).blade == shape
+    assert read_blade(path)["bevel_degrees"] == 20.0
+
+
+def test_a_table_that_no_option_asks_for_gets_a_warning(tmp_path, caplog):
+    path = tmp_path / "mine.toml"
+    path.write_text("[material]\ndensity = 900\n[blade]\nheight = 0.01\n")
+    chosen_scene("slab", options(path, blade=path))
+    chosen_scene("slab", options("liver", blade=path))
+    assert not caplog.records
+    chosen_scene("slab", options(path))
+    assert f"add --blade {path}" in caplog.text
+    chosen_scene("slab", options(None, blade=path))
+    assert f"add --material {path}" in caplog.text
+
+
+def test_a_material_of_a_file_reaches_the_tissue(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").write_text(
+        "[material]\nyoung_modulus = 2e4\n[blade]\nthickness = 0.001\n"
+    )
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--material", "mine.toml"]
+    assert command_line([*words, "--blade", "mine.toml", "--toughness", "7"]) == 0
+    settings = json.loads(capsys.readouterr().out)["settings"]
+    assert settings["material"]["young_modulus"] == 2e4
+    assert settings["material"]["toughness"] == 7.0
+    assert settings["blade"]["thickness"] == 0.001
+
+
+@pytest.mark.parametrize("option", ["--material", "--blade"])
+def test_a_file_for_a_tissue_elsewhere_belongs_to_its_server(option, capsys):
+    assert command_line(["run", "--connect", "127.0.0.1:1", option, "mine.toml"]) == 2
+    assert f"{option} belongs to the tissue" in capsys.readouterr().err
