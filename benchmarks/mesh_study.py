@@ -1,12 +1,12 @@
-"""Mesh study: sag and frequencies of a bar against theory, for each law, and coarse to fine meshes.
+"""Mesh study: sag and frequencies of a bar against theory, for each law and for finer meshes.
 
-    python benchmarks/mesh_study.py [--finest 8] [--out docs]
+Usage: PYTHONPATH=. python benchmarks/mesh_study.py [--finest N] [--out FOLDER]
 
-writes `mesh_study.md` and `mesh_study.png`. A square bar, 8 times as long as thick, of n cells
-through its thickness (Kuhn's six tetrahedra each), is clamped at one end. Its sag is that under its
-own weight. Everything is at small strain and follows from the stiffness matrix of
-`tissue.elasticity.stiffness_matrix`, which a test holds against the forces that the engine computes
-(tests/test_mechanics.py).
+It writes `mesh_study.md` and `mesh_study.png`. A square bar, 8 times as long as thick, of n cells
+through its thickness (Kuhn's six tetrahedra each), is clamped at one end and sags under its own
+weight. All strains are small, and everything follows from the stiffness matrix of
+`tissue.elasticity.stiffness_matrix`, which `tests/test_mechanics.py` compares with the forces that
+the engine computes.
 """
 
 import argparse
@@ -27,22 +27,24 @@ SLENDERNESS = 8
 """Length over thickness."""
 
 N_MODES = 14
-"""Modes computed: bending comes in pairs, and the first stretching mode is about the ninth."""
+"""Number of modes computed: bending comes in pairs, and the first stretching mode is about the
+ninth."""
 
 N_BEAM_ELEMENTS = 400
-"""Of the beam that stands for theory; its frequencies are then right to 1e-5."""
+"""Number of elements of the beam that stands for theory; its frequencies are then right to
+1e-5."""
 
 RATIOS = {0.0: "tab:gray", 0.3: "tab:green", 0.45: "tab:blue", 0.49: "tab:purple"}
-"""Poisson's ratios of the study, and their colours."""
+"""Poisson's ratios of the study, and their colours in the plots."""
 
 MODES = ("bending 1", "bending 2", "torsion 1", "stretching 1")
 
 TORSION_CONSTANT = 0.140577
-"""Of a square section: J = 0.1406 a^4 (Saint-Venant's series)."""
+"""Torsion constant of a square section over a^4, by Saint-Venant's series."""
 
 
 class Model(NamedTuple):
-    """A law, as a line of the study."""
+    """A law that is studied."""
 
     name: str
     material: Material
@@ -51,7 +53,7 @@ class Model(NamedTuple):
 
 
 def models() -> list[Model]:
-    """Return the lines of the study."""
+    """Return the laws that are studied."""
     plain = Material(young_modulus=10e3, density=1000.0)
     found = [Model("springs, nu 0.25 asked", plain)]
     for nu in RATIOS:
@@ -63,14 +65,14 @@ def models() -> list[Model]:
 
 
 class Mode(NamedTuple):
-    """How the bar swings by itself."""
+    """A natural mode of the bar."""
 
     kind: str
     """bending, torsion or stretching."""
     frequency: float
-    """[Hz]."""
+    """Natural frequency [Hz]."""
     motion: FloatArray
-    """Displacements of the nodes, the largest component 1; shape (n_nodes, 3)."""
+    """Displacements of the nodes, scaled so that the largest component is 1; shape (n_nodes, 3)."""
 
 
 class Bar:
@@ -93,7 +95,7 @@ class Bar:
         return splu(self.stiffness)
 
     def deflection(self, forces: FloatArray) -> float:
-        """Return how far the free end goes down under small forces on the nodes [m]."""
+        """Return how far the free end sinks under small forces on the nodes [m]."""
         motion = np.zeros(self.is_free.size)
         motion[self.is_free] = self._factors.solve(forces.ravel()[self.is_free])
         return -float(motion.reshape(-1, 3)[self.is_end, 2].mean())
@@ -101,7 +103,7 @@ class Bar:
     def sag_ratio(self) -> float:
         """Return the sag under the bar's own weight over Timoshenko's."""
         weight = np.zeros((len(self.masses), 3))
-        weight[:, 2] = -self.masses * 1e-3  # of an acceleration so small that strains are small
+        weight[:, 2] = -self.masses * 1e-3  # an acceleration so small that strains are small
         per_length = 1e-3 * self.material.density * self.thickness**2
         bent = per_length * self.length**4 / (8.0 * self.bending_stiffness)
         sheared = per_length * self.length**2 / (2.0 * self.shear_stiffness)
@@ -139,7 +141,7 @@ class Bar:
         return dict(zip(MODES, map(float, values), strict=True))
 
     def _kind(self, motion: FloatArray) -> str:
-        """Return what a mode does: the share of momentum squared that each simple motion has."""
+        """Return the simple motion with the largest share of the momentum squared of a mode."""
         x, y, z = self.mesh.positions.T
         arm = np.stack([y - y.mean(), z - z.mean()])
         polar = np.hypot(*arm)
@@ -171,7 +173,7 @@ class Bar:
         return self.material.young_modulus * self.thickness**4 / 12.0
 
     def theory(self) -> dict[str, float]:
-        """Return what beam theory has for `MODES` [Hz]: Timoshenko, Saint-Venant, rod."""
+        """Return the frequencies of `MODES` by theory [Hz]: Timoshenko, Saint-Venant, rod."""
         bending = self._timoshenko()
         density = self.material.density
         polar = 6.0 * TORSION_CONSTANT  # J over the polar moment a^4 / 6
@@ -206,14 +208,14 @@ class Bar:
 
 def _lowest(matrix: csr_array, n: int) -> tuple[FloatArray, FloatArray]:
     """Return the lowest eigenvalues of a matrix in order, and their vectors."""
-    start = np.ones(matrix.shape[0])  # else it starts at random
+    start = np.ones(matrix.shape[0])  # a fixed start; the default is random
     values, vectors = eigsh(matrix.tocsc(), k=n, sigma=0.0, v0=start)
     order = np.argsort(values)
     return values[order], vectors[:, order]
 
 
-class Line(NamedTuple):
-    """A law on one mesh: everything over theory."""
+class Row(NamedTuple):
+    """The results of one law on one mesh, each over its theoretical value."""
 
     model: str
     n: int
@@ -222,15 +224,15 @@ class Line(NamedTuple):
     frequencies: dict[str, float]
 
 
-def study(model: Model, counts: Sequence[int]) -> list[Line]:
-    """Return the lines of one law, from coarse to fine."""
-    lines = []
+def study(model: Model, counts: Sequence[int]) -> list[Row]:
+    """Return the rows of one law, from the coarsest mesh to the finest."""
+    rows = []
     for n in counts:
         bar = Bar(n, model)
         theory = bar.theory()
         ratios = {mode: found / theory[mode] for mode, found in bar.frequencies().items()}
-        lines.append(Line(model.name, n, len(bar.mesh.tetrahedra), bar.sag_ratio(), ratios))
-    return lines
+        rows.append(Row(model.name, n, len(bar.mesh.tetrahedra), bar.sag_ratio(), ratios))
+    return rows
 
 
 def extrapolated(coarse: float, fine: float, ratio: float) -> float:
@@ -238,33 +240,33 @@ def extrapolated(coarse: float, fine: float, ratio: float) -> float:
     return fine + (fine - coarse) / (ratio**2 - 1.0)
 
 
-def as_markdown(studies: Sequence[Sequence[Line]]) -> str:
-    """Return the page."""
-    rows = []
-    for lines in studies:
-        for line in lines:
-            figures = [line.sag, *(line.frequencies[mode] for mode in MODES)]
-            rows.append(_row(line.model, f"{line.n}", f"{line.n_tetrahedra:,}", figures))
-        coarse, fine = lines[-2:]
+def as_markdown(studies: Sequence[Sequence[Row]]) -> str:
+    """Return the page of Markdown."""
+    text_rows = []
+    for rows in studies:
+        for row in rows:
+            ratios = [row.sag, *(row.frequencies[mode] for mode in MODES)]
+            text_rows.append(_text_row(row.model, f"{row.n}", f"{row.n_tetrahedra:,}", ratios))
+        coarse, fine = rows[-2:]
         pairs = [(coarse.sag, fine.sag)]
         pairs += [(coarse.frequencies[mode], fine.frequencies[mode]) for mode in MODES]
         limits = [extrapolated(a, b, fine.n / coarse.n) for a, b in pairs]
-        rows.append(_row(lines[0].model, "limit", "", limits))
-    return TEXT.format(rows="\n".join(rows), modes=" | ".join(MODES))
+        text_rows.append(_text_row(rows[0].model, "limit", "", limits))
+    return TEXT.format(rows="\n".join(text_rows), modes=" | ".join(MODES))
 
 
-def _row(model: str, n: str, n_tetrahedra: str, figures: Sequence[float]) -> str:
-    return f"| {model} | {n} | {n_tetrahedra} | " + " | ".join(f"{x:.3f}" for x in figures) + " |"
+def _text_row(model: str, n: str, n_tetrahedra: str, ratios: Sequence[float]) -> str:
+    return f"| {model} | {n} | {n_tetrahedra} | " + " | ".join(f"{x:.3f}" for x in ratios) + " |"
 
 
 TEXT = """\
 # Mesh study: a clamped bar against theory
 
 A square bar, 8 times as long as thick, clamped at one end; n cells through its thickness, six
-tetrahedra each. Every figure is over its theoretical value: 1 is right, a sag below 1 or a
+tetrahedra each. Every figure is divided by its theoretical value: 1 is right, a sag below 1 or a
 frequency above 1 is too stiff. Sag: under the bar's own weight, against Timoshenko's beam. Bending:
-Timoshenko's beam. Torsion: Saint-Venant. Stretching: the rod. "limit" carries the last two meshes
-on to elements of no size, with an error that falls as the square of their size.
+Timoshenko's beam. Torsion: Saint-Venant. Stretching: the rod. "limit" extrapolates the last two
+meshes to elements of zero size, with an error that falls as the square of their size.
 
 | law | n | tetrahedra | sag | {modes} |
 |---|---|---|---|---|---|---|---|
@@ -272,21 +274,22 @@ on to elements of no size, with an error that falls as the square of their size.
 
 ![Sag and first bending frequency over n](mesh_study.png)
 
-- **Springs** converge too, but to a material of their own: on this mesh of cells, Young's modulus
-  1.03 of what was asked for, Poisson's ratio 0.03, and half the shear modulus along the axes, which
-  torsion feels. `--spring-error` and `tissue.elasticity.spring_calibration` tell it for any mesh.
-- **Plain** linear tetrahedra lock, the more the less compressible they are. The engine does not use
-  them: it averages the dilatation over nodes, and Poisson's ratio hardly matters any more. What is
-  left is how stiff linear tetrahedra are in bending.
-- **The clamp** holds the section from narrowing, which beam theory leaves free. So the limit at a
-  Poisson's ratio of 0, where nothing narrows, is nearest to 1, and the others are some 1 to 3 %
-  stiffer as they should be.
+- **Springs** converge too, but to another material: on this mesh of cells, 1.03 times the Young's
+  modulus asked for, a Poisson's ratio of 0.03, and half the shear modulus along the axes, which
+  shows in torsion. `--spring-error` and `tissue.elasticity.spring_calibration` report this for any
+  mesh.
+- **Plain** linear tetrahedra lock, and the more so the less compressible they are. The engine does
+  not use them: it averages the dilatation over nodes, after which Poisson's ratio hardly matters.
+  The remaining error is the stiffness of linear tetrahedra in bending.
+- **The clamp** keeps the section from narrowing, which beam theory leaves free. So the limit at a
+  Poisson's ratio of 0, where nothing narrows, is nearest to 1, and the others are about 1 to 3 %
+  stiffer, as they should be.
 
 Made by `python benchmarks/mesh_study.py`.
 """
 
 
-def draw(studies: Sequence[Sequence[Line]], path: Path) -> None:
+def draw(studies: Sequence[Sequence[Row]], path: Path) -> None:
     """Draw sag and first bending frequency over the number of cells."""
     import matplotlib
 
@@ -294,8 +297,8 @@ def draw(studies: Sequence[Sequence[Line]], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     figure, axes = plt.subplots(1, 2, figsize=(11.0, 4.6), layout="constrained")
-    for lines in studies:
-        model = lines[0].model
+    for rows in studies:
+        model = rows[0].model
         of_ratio = [colour for nu, colour in RATIOS.items() if f"nu {nu}" in model.split(",")[1]]
         style = {
             "ls": ":" if "plain" in model else "-",
@@ -304,15 +307,15 @@ def draw(studies: Sequence[Sequence[Line]], path: Path) -> None:
             "label": model,
             "color": of_ratio[0] if "neo" in model else "tab:orange",
         }
-        counts = [line.n for line in lines]
-        axes[0].plot(counts, [line.sag for line in lines], **style)
-        axes[1].plot(counts, [line.frequencies[MODES[0]] for line in lines], **style)
+        counts = [row.n for row in rows]
+        axes[0].plot(counts, [row.sag for row in rows], **style)
+        axes[1].plot(counts, [row.frequencies[MODES[0]] for row in rows], **style)
     titles = ("sag under its own weight / theory", "first bending frequency / theory")
     for axis, title in zip(axes, titles, strict=True):
         axis.axhline(1.0, color="black", lw=0.8)
         axis.set_xscale("log", base=2)
-        axis.set_xticks([line.n for line in studies[0]])
-        axis.set_xticklabels([str(line.n) for line in studies[0]])
+        axis.set_xticks([row.n for row in studies[0]])
+        axis.set_xticklabels([str(row.n) for row in studies[0]])
         axis.set_xlabel("cells through the thickness")
         axis.set_title(title)
         axis.grid(alpha=0.3)
@@ -326,7 +329,7 @@ def draw(studies: Sequence[Sequence[Line]], path: Path) -> None:
 
 
 def main() -> None:
-    """Do the study and write its page and its picture."""
+    """Run the study; write its page and its picture."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--finest", type=int, default=8, choices=(2, 4, 6, 8))
     parser.add_argument("--out", type=Path, default=Path("docs"))
@@ -335,7 +338,7 @@ def main() -> None:
     studies = []
     for model in models():
         studies.append(study(model, counts))
-        print(model.name, [f"{line.sag:.3f}" for line in studies[-1]], flush=True)
+        print(model.name, [f"{row.sag:.3f}" for row in studies[-1]], flush=True)
     arguments.out.mkdir(parents=True, exist_ok=True)
     (arguments.out / "mesh_study.md").write_text(as_markdown(studies), encoding="utf-8")
     draw(studies, arguments.out / "mesh_study.png")

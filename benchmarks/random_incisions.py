@@ -1,9 +1,11 @@
-"""Random incisions by the thousand: PYTHONPATH=. python benchmarks/random_incisions.py [--motion].
+"""Random incisions, as many as are asked for, and what becomes of the mesh.
 
-Each is made in a moving body that is out of shape, along a surface of any kind, and the body is
-then looked at: links, volumes, stars, boundary, volume, mass, momentum. `--motion`: by a blade that
-is moved through a body at rest and feels it, which takes some seconds each. The meshes of others
-are cut too where SCALPEL_SIM_TEST_MESHES names their folder. Run it from the repository.
+Usage: PYTHONPATH=. python benchmarks/random_incisions.py [--runs N] [--motion], in the repository
+
+Each incision is made in a moving, deformed body along a random surface. Then the mesh is checked:
+links, volumes, stars, boundary, total volume, mass, momentum. With `--motion` a blade moves through
+a body at rest and interacts with it, which takes some seconds each. Published meshes are cut too
+where SCALPEL_SIM_TEST_MESHES names their folder.
 """
 
 import argparse
@@ -25,7 +27,7 @@ KINDS = (*incisions.KINDS, "two that cross", "three planes")
 
 
 def meshes() -> dict[str, Callable[[int], TetrahedralMesh]]:
-    """Return what makes a mesh for a seed."""
+    """Return functions that make a mesh from a seed."""
     made: dict[str, Callable[[int], TetrahedralMesh]] = {
         "jittered grid": partial(bodies.jittered_grid, 5),
         "Delaunay, 10 degrees": partial(bodies.body_centred, 4),
@@ -37,7 +39,7 @@ def meshes() -> dict[str, Callable[[int], TetrahedralMesh]]:
 
 
 def cuts_of(kind: str, mesh: TetrahedralMesh, seed: int) -> list[Incision]:
-    """Return the surfaces of one run."""
+    """Return the incisions of one run."""
     if kind == "three planes":
         return incisions.crossing_planes(mesh, seed)
     if kind == "two that cross":
@@ -50,7 +52,7 @@ def cuts_of(kind: str, mesh: TetrahedralMesh, seed: int) -> list[Incision]:
 
 
 def expected_pieces(mesh: str, kind: str) -> int | None:
-    """Return into how many pieces the body falls, if that is known: a banana may fall into many."""
+    """Return the number of pieces after the cut, or None where it is not known in advance."""
     if mesh in bodies.FILES or kind == "two that cross":
         return None
     if kind == "three planes":
@@ -59,13 +61,15 @@ def expected_pieces(mesh: str, kind: str) -> int | None:
 
 
 def main() -> None:
-    """Run and print a row for each mesh and kind, and what went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=18, help="of each kind in each mesh")
-    parser.add_argument("--first", type=int, default=0, help="seed")
-    parser.add_argument("--motion", action="store_true", help="by a blade that feels the tissue")
-    parser.add_argument("--meshes", default="", help="only those whose name holds this")
-    parser.add_argument("--kinds", default="", help="only those whose name holds this")
+    """Run, and print a row for each mesh and each kind of surface, and what went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=18, help="incisions of each kind in each mesh")
+    parser.add_argument("--first", type=int, default=0, help="first seed")
+    parser.add_argument(
+        "--motion", action="store_true", help="cut with a blade that interacts with the tissue"
+    )
+    parser.add_argument("--meshes", default="", help="only those whose name contains this")
+    parser.add_argument("--kinds", default="", help="only those whose name contains this")
     given = parser.parse_args()
 
     table = Table("mesh", "kind", "runs", "exceptions", "violations", "pieces as expected",

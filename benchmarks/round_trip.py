@@ -1,11 +1,12 @@
-"""Times a step over TCP against the same step in process: python benchmarks/round_trip.py.
+"""Times a step over TCP beside the same step in process.
 
-The tissue is small and lives in a second process, as with `scalpel-sim serve`. First the link
-alone, with the smallest question that there is: how many pieces the body has. Then steps: at rest
-without a blade, with a blade that hangs above, with one that it holds, whose contacts travel too;
-and all with a key. What the link adds to a step includes what it costs the step that its data have
-left the cache, for the other process has used it since. Run it on an idle machine, from the
-repository.
+Usage: PYTHONPATH=. python benchmarks/round_trip.py, on an idle machine
+
+The tissue is small and runs in a second process, as with `scalpel-sim serve`. First the link alone
+is timed, with the smallest request: the number of pieces. Then steps: without a blade, with a blade
+above the tissue, and with a blade in the tissue, whose contacts are sent too; each with and without
+a key. The time that the link adds to a step includes cache misses, since the other process has used
+the cache in between.
 """
 
 import subprocess
@@ -20,18 +21,18 @@ from bridge import InProcessLink, TcpLink, TissueLink, serve
 from tissue import BladeSegment, BladeSweep, FloatArray, Tissue, block
 
 DT = 1e-4
-"""[s]. One Runge-Kutta step of the cell."""
+"""Time step [s]: one Runge-Kutta step of the cell."""
 N_WARM_UP = 200
 N_STEPS = 4_000
 MICROSECONDS = 1e6
 SIDE = 0.01
-"""Of the cell [m]."""
+"""Side of the cell [m]."""
 KEY = bytes(range(32))
 WITH_KEY = "with a key"
 
 
 def upright(y: float, z: float) -> BladeSegment:
-    """Return an edge over the middle of the cell that faces along y."""
+    """Return an upright edge in the middle of the cell that faces along y."""
     tip = np.array([0.4 * SIDE, y, z])
     return BladeSegment(tip, tip + np.array([0.0, 0.0, 3.0 * SIDE]), np.array([0.0, 1.0, 0.0]))
 
@@ -56,7 +57,7 @@ def main() -> None:
         above, within = upright(0.5 * SIDE, SIDE), upright(0.3 * SIDE, -SIDE)
         report("link alone", {name: times(link.n_pieces) for name, link in links.items()})
         report("no blade", {name: times(stepping(link, None)) for name, link in links.items()})
-        for what, pose in (("a blade above", above), ("a blade held", within)):
+        for what, pose in (("blade above", above), ("blade inside", within)):
             for link in links.values():
                 draw_in(link, pose)
             sweep = BladeSweep(pose, pose)
@@ -78,7 +79,7 @@ def cell() -> Tissue:
 
 
 def draw_in(link: TissueLink, pose: BladeSegment) -> None:
-    """Bring the blade to a pose from in front of the cell."""
+    """Move the blade to a pose from in front of the cell."""
     before = None
     for y in np.linspace(-0.1 * SIDE, pose.tip[1], 200):
         shift = np.array([0.0, y - pose.tip[1], 0.0])
@@ -88,12 +89,12 @@ def draw_in(link: TissueLink, pose: BladeSegment) -> None:
 
 
 def stepping(link: TissueLink, sweep: BladeSweep | None) -> Callable[[], object]:
-    """Return what does a step."""
+    """Return a function that takes one step."""
     return lambda: link.step(sweep, DT)
 
 
 def times(ask: Callable[[], object]) -> FloatArray:
-    """Return how long each answer took [µs], shape (N_STEPS,)."""
+    """Return the time of each call [µs], shape (N_STEPS,)."""
     for _ in range(N_WARM_UP):
         ask()
     taken = np.empty(N_STEPS)
@@ -105,7 +106,7 @@ def times(ask: Callable[[], object]) -> FloatArray:
 
 
 def report(what: str, taken: dict[str, FloatArray]) -> None:
-    """Print median and 99th percentile of each link, and what it adds to the step itself."""
+    """Print median and 99th percentile of each link, and what it adds to the time in process."""
     alone = np.median(taken["in process"])
     for name, values in taken.items():
         median, p99 = np.percentile(values, [50, 99])

@@ -6,6 +6,7 @@ from .core.array_types import BoolArray as BoolArray
 from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray
 from .core.jit import cache_directory as cache_directory
+from .core.jit import kernel as kernel
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
@@ -88,6 +89,7 @@ __all__ = [
     "calibrated",
     "components",
     "fixed_nodes",
+    "kernel",
     "liver_lobe",
     "pieces_of",
     "read_mesh",

@@ -1,4 +1,4 @@
-"""The blocks of cells that kernels, scaling and peers are measured on, from small to large."""
+"""The blocks of tissue that benchmarks measure on, from 576 to 1,000,188 tetrahedra."""
 
 from itertools import combinations
 from typing import NamedTuple
@@ -13,9 +13,10 @@ _Cells = tuple[int, int, int]
 CELL = 0.01
 """Side of a cell [m]."""
 JITTER = 0.1
-"""How far inner nodes are off the grid, in cells: no two tetrahedra are alike, as in an organ."""
+"""Largest displacement of an inner node from the grid, in cells: no two tetrahedra are alike, as in
+an organ."""
 SEED = 1998
-"""Of the jitter: the same blocks for everybody."""
+"""Seed of the jitter: every run measures the same blocks."""
 
 BLOCKS: dict[int, _Cells] = {
     576: (4, 4, 6),
@@ -27,52 +28,56 @@ BLOCKS: dict[int, _Cells] = {
     600_000: (40, 50, 50),
     1_000_188: (49, 54, 63),
 }
-"""Cells along x, y and z by the number of tetrahedra."""
+"""Number of cells along x, y and z, by the number of tetrahedra."""
 
 
-def block_mesh(n_tetrahedra: int) -> TetrahedralMesh:
-    """Return the block of so many tetrahedra, one of `BLOCKS`."""
+def jittered_block(n_tetrahedra: int) -> TetrahedralMesh:
+    """Return the block of that many tetrahedra, one of `BLOCKS`."""
     cells = BLOCKS[n_tetrahedra]
     mesh = block(cells, [CELL * n for n in cells])
     off = np.random.default_rng(SEED).uniform(-JITTER, JITTER, mesh.positions.shape) * CELL
-    on_skin = on_sides(mesh.positions, (0, 1, 2))
-    return TetrahedralMesh(mesh.positions + np.where(on_skin[:, None], 0.0, off), mesh.tetrahedra)
+    on_surface = _is_on_sides(mesh.positions, (0, 1, 2))
+    positions = mesh.positions + np.where(on_surface[:, None], 0.0, off)
+    return TetrahedralMesh(positions, mesh.tetrahedra)
 
 
-def held(mesh: TetrahedralMesh) -> BoolArray:
-    """Return the nodes on the sides across x and y: the body sags between them."""
-    return on_sides(mesh.positions, (0, 1))
+def held_nodes(mesh: TetrahedralMesh) -> BoolArray:
+    """Return which nodes are held, shape (n_nodes,): those on the sides across x and y.
+
+    The body sags between them.
+    """
+    return _is_on_sides(mesh.positions, (0, 1))
 
 
-def on_sides(positions: FloatArray, axes: tuple[int, ...]) -> BoolArray:
-    """Return the nodes on the sides across these axes."""
+def _is_on_sides(positions: FloatArray, axes: tuple[int, ...]) -> BoolArray:
+    """Return which nodes lie on the sides of the block across these axes."""
     along = positions[:, axes]
     near = 0.5 * JITTER * CELL
     low, high = along < along.min(axis=0) + near, along > along.max(axis=0) - near
     return np.asarray(np.any(low | high, axis=1))
 
 
-class _Edges(NamedTuple):
-    """The edges of a mesh, and what springs along them and masses at their ends follow from."""
+class MeshEdges(NamedTuple):
+    """The edges of a mesh, with what the springs along them and the nodal masses follow from."""
 
     nodes: IntArray
-    """The two of each edge, shape (n_edges, 2)."""
+    """The two nodes of each edge, shape (n_edges, 2)."""
     lengths: FloatArray
-    """[m], shape (n_edges,)."""
+    """Length of each edge [m], shape (n_edges,)."""
     volumes: FloatArray
-    """Of the tetrahedra around each edge together [m3], shape (n_edges,)."""
+    """Total volume of the tetrahedra around each edge [m3], shape (n_edges,)."""
     node_volumes: FloatArray
-    """A quarter of each tetrahedron around a node [m3], shape (n_nodes,)."""
+    """A quarter of the volume of the tetrahedra around each node [m3], shape (n_nodes,)."""
 
 
-def edges_of(mesh: TetrahedralMesh) -> _Edges:
+def mesh_edges(mesh: TetrahedralMesh) -> MeshEdges:
     """Return the edges of a mesh."""
     corners = mesh.positions[mesh.tetrahedra]
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0
     pairs = [mesh.tetrahedra[:, list(pair)] for pair in combinations(range(4), 2)]
     nodes, edge = np.unique(np.sort(np.vstack(pairs), axis=1), axis=0, return_inverse=True)
     ends = mesh.positions[nodes]
-    return _Edges(
+    return MeshEdges(
         nodes,
         np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1),
         np.bincount(edge.ravel(), np.tile(volumes, len(pairs))).astype(np.float64),
@@ -80,11 +85,11 @@ def edges_of(mesh: TetrahedralMesh) -> _Edges:
     )
 
 
-def up_to(sizes: tuple[int, ...], largest: int | None) -> tuple[int, ...]:
-    """Return those sizes that are not larger.
+def sizes_up_to(sizes: tuple[int, ...], largest: int | None) -> tuple[int, ...]:
+    """Return the sizes that are not above the largest one wanted; None: all of them.
 
     Raises:
-        UsageError: none is left.
+        UsageError: no size is left.
     """
     if largest is None:
         return sizes

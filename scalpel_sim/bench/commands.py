@@ -1,4 +1,4 @@
-"""The commands `scalpel-sim bench ...`: measure, print a table, keep and compare the figures."""
+"""The commands `scalpel-sim bench ...`: measure, print a table, save and compare the results."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,184 +13,203 @@ from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import UsageError
 
 if TYPE_CHECKING:  # `--help` should not wait for it
-    from scalpel_sim.bench.results import Findings, Results
+    from scalpel_sim.bench.results import BenchmarkResult, SavedResults
 
 MOST_ROUNDS = 1000
-"""More is a slip of the keyboard."""
-SHORT = 20_250
+"""More rounds are taken for a typing error."""
+SHORT_LARGEST = 20_250
 """Largest body of the short set [tetrahedra]."""
 
 bench = App(
     name="bench",
-    help="Measure the program on this machine: warm, in rounds in which cases take turns.",
+    help="Measure the program on this machine: warm, in rounds in which the cases take turns.",
 )
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Measuring:
-    """How it is measured."""
+class BenchOptions:
+    """Options that all benchmarks have."""
 
     runs: int = 5
-    "Rounds; in each of them every case has a turn."
+    "Rounds; in each of them every case has one turn."
     save: Path | None = None
-    "Also write the figures as JSON to this file."
+    "Write the results to this JSON file too."
     compare: Path | None = None
-    "Compare with the figures in this file, which --save wrote."
+    "Compare with the results in this file, which --save wrote."
 
 
-Largest = Annotated[int | None, Parameter(help="Leave out bodies of more tetrahedra than this.")]
+Largest = Annotated[int | None, Parameter(help="Omit bodies of more tetrahedra than this.")]
 
-Measure = Callable[[Watch], "Findings"]
+Benchmark = Callable[[Watch], "BenchmarkResult"]
 
 
 @bench.default
-def short(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
-    """A short set: the kernels in small bodies, a scene, and what the machine could do at best."""
-    from scalpel_sim.bench import kernels, roofline, scenes
+def bench_short_set(
+    *,
+    options: BenchOptions = BenchOptions(),
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Run a short set: the kernels in small bodies, one scene, and the limits of the machine."""
+    from scalpel_sim.bench.kernels import measure_kernels
+    from scalpel_sim.bench.roofline import measure_roofline
+    from scalpel_sim.bench.scenes import measure_scenes
 
     _run(
         [
-            lambda watch: kernels.measure(measuring.runs, SHORT, watch),
-            lambda watch: scenes.measure(measuring.runs, ["slab"], watch),
-            lambda watch: roofline.measure(measuring.runs, SHORT, watch),
+            lambda watch: measure_kernels(options.runs, SHORT_LARGEST, watch),
+            lambda watch: measure_scenes(options.runs, ["slab"], watch),
+            lambda watch: measure_roofline(options.runs, SHORT_LARGEST, watch),
         ],
-        measuring,
+        options,
         printing,
     )
 
 
-@bench.command
-def scenes(
-    *names: str, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()
+@bench.command(name="scenes")
+def bench_scenes(
+    *names: str,
+    options: BenchOptions = BenchOptions(),
+    printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Whole runs of the scenes: time of a frame, and of each stage of it.
+    """Run whole scenes: time of a frame, and of each of its stages.
 
     Args:
-        names: organ, slab, grid2, grid7; all of them if not given.
+        names: organ, slab, grid2, grid7; without a name all of them.
     """
-    from scalpel_sim.bench import scenes as benchmark
+    from scalpel_sim.bench.scenes import checked_scene_names, measure_scenes
 
-    chosen = benchmark.check_names(names)
-    _run([lambda watch: benchmark.measure(measuring.runs, chosen, watch)], measuring, printing)
+    chosen = checked_scene_names(names)
+    _run([lambda watch: measure_scenes(options.runs, chosen, watch)], options, printing)
 
 
-@bench.command
-def kernels(
+@bench.command(name="kernels")
+def bench_kernels(
     *,
     largest: Largest = None,
-    measuring: Measuring = Measuring(),
+    options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Forces, steps, a cut step and the search for contact, in 576 to 60,000 tetrahedra."""
-    from scalpel_sim.bench import kernels as benchmark
+    """Time forces, steps, a cut step and contact detection in 576 to 60,000 tetrahedra."""
+    from scalpel_sim.bench.kernels import measure_kernels
 
-    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, printing)
+    _run([lambda watch: measure_kernels(options.runs, largest, watch)], options, printing)
 
 
-@bench.command
-def scaling(
+@bench.command(name="scaling")
+def bench_scaling(
     *,
     largest: Largest = None,
-    measuring: Measuring = Measuring(),
+    options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """What a step, and a local frame, cost in bodies of 576 to 1,000,000 tetrahedra."""
-    from scalpel_sim.bench import local_frame
-    from scalpel_sim.bench import scaling as benchmark
+    """Time a step, and a local frame, in bodies of 576 to 1,000,000 tetrahedra."""
+    from scalpel_sim.bench.local_frame import measure_local_frames
+    from scalpel_sim.bench.scaling import measure_scaling
 
     _run(
         [
-            lambda watch: benchmark.measure(measuring.runs, largest, watch),
-            lambda watch: local_frame.measure(measuring.runs, largest, watch),
+            lambda watch: measure_scaling(options.runs, largest, watch),
+            lambda watch: measure_local_frames(options.runs, largest, watch),
         ],
-        measuring,
+        options,
         printing,
     )
 
 
-@bench.command
-def roofline(
+@bench.command(name="roofline")
+def bench_roofline(
     *,
     largest: Largest = None,
-    measuring: Measuring = Measuring(),
+    options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """Bandwidth and arithmetic of this machine, and the share of them that a step uses."""
-    from scalpel_sim.bench import roofline as benchmark
+    """Measure bandwidth and arithmetic of this machine, and the share of them that a step uses."""
+    from scalpel_sim.bench.roofline import measure_roofline
 
-    _run([lambda watch: benchmark.measure(measuring.runs, largest, watch)], measuring, printing)
+    _run([lambda watch: measure_roofline(options.runs, largest, watch)], options, printing)
 
 
-@bench.command
-def peers(
+@bench.command(name="peers")
+def bench_peers(
     *,
     largest: Largest = None,
     python: Path | None = None,
-    measuring: Measuring = Measuring(),
+    options: BenchOptions = BenchOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
-    """MuJoCo flex, Newton and Rapier in the same rounds as ours, as far as they are installed.
+    """Time MuJoCo flex, Newton and Rapier in turns with this engine, where they are installed.
 
     Args:
-        python: The Python of an environment that has them, where this one has not.
+        python: The Python of an environment that has the engines that this one lacks.
     """
-    from scalpel_sim.bench import peers as benchmark
+    from scalpel_sim.bench.peer_benchmark import measure_peers
 
-    _run(
-        [lambda watch: benchmark.measure(measuring.runs, largest, python, watch)],
-        measuring,
-        printing,
+    _run([lambda watch: measure_peers(options.runs, largest, python, watch)], options, printing)
+
+
+@bench.command(name="table1")
+def bench_table1(
+    *,
+    options: BenchOptions = BenchOptions(),
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Cut the three grids of the paper's Table 1 by each scheme, beside the paper's figures."""
+    from scalpel_sim.bench.table1 import measure_table1
+
+    _run([lambda watch: measure_table1(options.runs, watch=watch)], options, printing)
+
+
+@bench.command(name="cut")
+def bench_cut_steps(
+    *,
+    options: BenchOptions = BenchOptions(),
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Time a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
+    from scalpel_sim.bench.cut import measure_cut_steps
+
+    _run([lambda watch: measure_cut_steps(options.runs, watch=watch)], options, printing)
+
+
+def _run(benchmarks: Sequence[Benchmark], options: BenchOptions, printing: PrintOptions) -> None:
+    """Run benchmarks; print, save and compare their results."""
+    from scalpel_sim.bench.machine import load_average
+    from scalpel_sim.bench.results import (
+        collect_results,
+        load_results,
+        results_as_json,
+        save_results,
     )
-
-
-@bench.command
-def table1(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
-    """The three grids of the paper's Table 1, with its own scheme and ours, beside its figures."""
-    from scalpel_sim.bench import table1 as benchmark
-
-    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, printing)
-
-
-@bench.command
-def cut(*, measuring: Measuring = Measuring(), printing: PrintOptions = PrintOptions()) -> None:
-    """The cost of a cut step in bodies of 1,000, 10,000 and 100,000 tetrahedra."""
-    from scalpel_sim.bench import cut as benchmark
-
-    _run([lambda watch: benchmark.measure(measuring.runs, watch=watch)], measuring, printing)
-
-
-def _run(benchmarks: Sequence[Measure], measuring: Measuring, printing: PrintOptions) -> None:
-    """Measure, and say, keep and compare what was found."""
-    from scalpel_sim.bench.machine import load as machine_load
-    from scalpel_sim.bench.results import as_json, load, results_of, save
     from scalpel_sim.cli.run_setup import load_kernels
     from scalpel_sim.output.run_folder import check_file
 
-    if not 1 <= measuring.runs <= MOST_ROUNDS:
-        raise UsageError(f"--runs is {measuring.runs}; it must be from 1 to {MOST_ROUNDS}")
-    before = None if measuring.compare is None else load(measuring.compare)
-    if measuring.save is not None:
-        check_file(measuring.save, ".json", "--save")
-    load_at_start = machine_load()
+    if not 1 <= options.runs <= MOST_ROUNDS:
+        raise UsageError(f"--runs is {options.runs}; it must be from 1 to {MOST_ROUNDS}")
+    before = None if options.compare is None else load_results(options.compare)
+    if options.save is not None:
+        check_file(options.save, ".json", "--save")
+    load_at_start = load_average()
     with log_to_stderr(printing), watching(printing) as watch:
         load_kernels(printing)
         found = [measure(watch) for measure in benchmarks]
-    results = results_of(found, load_at_start)
-    text = as_json(results)
-    if measuring.save is not None:
-        save(measuring.save, text)
+    results = collect_results(found, load_at_start)
+    text = results_as_json(results)
+    if options.save is not None:
+        save_results(options.save, text)
     if printing.json:
         print(text)
     elif not printing.quiet:
         _print(found, results, before)
 
 
-def _print(found: Sequence["Findings"], results: "Results", before: "Results | None") -> None:
-    """Print what was found, and how it compares."""
+def _print(
+    found: Sequence["BenchmarkResult"], results: "SavedResults", before: "SavedResults | None"
+) -> None:
+    """Print the results, and their comparison with those of another run."""
     from rich.console import Console
 
-    from scalpel_sim.bench.compare import is_busy, show
+    from scalpel_sim.bench.compare import is_busy, print_comparison
 
     console = Console()
     for each in found:
@@ -202,4 +221,4 @@ def _print(found: Sequence["Findings"], results: "Results", before: "Results | N
             style="dim",
         )
     if before is not None:
-        show(before, results, console)
+        print_comparison(before, results, console)

@@ -1,10 +1,10 @@
-"""What a cut step costs as the body grows around it, while the blade does the same to it.
+"""The cost of a cut step in bodies of different size in which the blade makes the same cut.
 
-Three blocks of the same cells, of some 1,000, 10,000 and 100,000 tetrahedra, get the same slit in
+Three blocks of the same cells, of about 1,000, 10,000 and 100,000 tetrahedra, get the same slit in
 the middle of their upper side. Every node is held, so that the blade meets the same tetrahedra in
-each: what differs is only how much body there is around. A cut step is the paper's CD and GC:
-search, splitting, un-gluing, and the springs and masses that change; RX, which must move all nodes,
-is no part of it.
+each block, and only the size of the body around it differs. A cut step is the paper's CD and GC:
+collision detection, subdivision, separation, and the springs and masses that change. RX, which must
+move all nodes, is not part of it.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench.results import Figure, Findings, of_times
+from scalpel_sim.bench.results import BenchmarkResult, Measurement, Quantity, summarise_times
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
@@ -24,77 +24,80 @@ if TYPE_CHECKING:
 
 _Cells = tuple[int, int, int]
 
-CELLS: tuple[_Cells, ...] = ((5, 6, 6), (11, 12, 13), (25, 26, 26))
-"""Of the blocks along x, y and z: 1,080, 10,296 and 101,400 tetrahedra."""
+CUT_BLOCKS: tuple[_Cells, ...] = ((5, 6, 6), (11, 12, 13), (25, 26, 26))
+"""Cells of the blocks along x, y and z: 1,080, 10,296 and 101,400 tetrahedra."""
 _CELL = 5e-3
 """Side of a cell [m]."""
-SLIT = 3.5
+_SLIT_CELLS = 3.5
 """Length of the slit [cells]."""
 _DEPTH, _ABOVE = 3.37, 2.0
-"""How far the edge reaches below the upper side, and above [cells]."""
+"""How far the edge reaches below the upper side, and above it [cells]."""
 _ASIDE = 0.37
-"""Distance of the slit from the grid's planes [cells]: none of it runs along faces that are
-there."""
+"""Distance of the slit from the planes of the grid [cells]: no part of it runs along existing
+faces."""
 _STEP = 2.5e-4
-"""Way of the blade in a step [m]: 0.25 m/s at 1 kHz, fast for a hand."""
+"""Displacement of the blade in a step [m]: 0.25 m/s at 1 kHz, fast for a hand."""
 _DT = 1e-3
-"""[s]."""
-_SHARP = Material(toughness=1.0)
-"""The blade hardly drags: it cuts where it passes."""
+"""Time step [s]."""
+_MATERIAL = Material(toughness=1.0)
+"""Material of so little toughness that the blade hardly drags it along and cuts where it passes."""
 
 _US_PER_S = 1e6
 
 
-class Slit(NamedTuple):
-    """What cutting one block cost, step by step."""
+class SlitSteps(NamedTuple):
+    """What the steps cost that cut the slit into one block."""
 
     n_tetrahedra: int
-    """Before the cut."""
+    """Number of tetrahedra before the cut."""
     steps: FloatArray
     """Wall time of each step in which the mesh changed [s]."""
     splits: FloatArray
-    """Tetrahedra split in each of them: each split leaves one more than there were."""
+    """Number of tetrahedra split in each of those steps: each split adds one tetrahedron."""
     idle: FloatArray
-    """Wall time of each step with the blade in the tissue in which nothing was split [s]."""
+    """Wall time of each step with the blade in the tissue that split nothing [s]."""
 
 
 class CutCost(NamedTuple):
-    """Cost of cutting one block, medians over runs; times in seconds of wall time."""
+    """The cost of cutting one block, medians over rounds; wall times in seconds."""
 
     n_tetrahedra: int
-    """Before the cut."""
+    """Number of tetrahedra before the cut."""
     n_split: int
-    """Tetrahedra that were split."""
+    """Number of tetrahedra that were split."""
     n_steps: int
-    """Steps in which the mesh changed."""
+    """Number of steps in which the mesh changed."""
     step_mean: float
     """Mean of those steps [s], the occasional growth of arrays included."""
     step_longest: float
-    """[s]."""
+    """Longest of those steps [s]."""
     idle_median: float
     """Median of the steps in which nothing was split [s]."""
     per_split: float
-    """Time of the steps that split, for each split tetrahedron [s]."""
+    """Time of the steps that split, per split tetrahedron [s]."""
 
 
-def measure(n_rounds: int, blocks: Sequence[_Cells] = CELLS, watch: Watch = SILENT) -> Findings:
-    """Return the cost for each block, over so many rounds, in which blocks take turns."""
-    slits = slits_of(n_rounds, blocks, watch)
-    return Findings(_figures(slits), [], partial(print_costs, list(map(cost_of, slits))))
+def measure_cut_steps(
+    n_rounds: int, blocks: Sequence[_Cells] = CUT_BLOCKS, watch: Watch = SILENT
+) -> BenchmarkResult:
+    """Cut each block once in each round; blocks take turns."""
+    slits = cut_slits(n_rounds, blocks, watch)
+    costs = [median_cost(each) for each in slits]
+    return BenchmarkResult(_measurements(slits), [], partial(print_costs, costs))
 
 
-def slits_of(
-    n_rounds: int, blocks: Sequence[_Cells] = CELLS, watch: Watch = SILENT
-) -> list[list[Slit]]:
+def cut_slits(
+    n_rounds: int, blocks: Sequence[_Cells] = CUT_BLOCKS, watch: Watch = SILENT
+) -> list[list[SlitSteps]]:
     """Return what each round cost, for each block."""
-    _run(blocks[0])  # the kernels are loaded, and the processor is awake
+    _cut_slit(blocks[0])  # loads the kernels and wakes the processor
     watch.begin(n_rounds * len(blocks))
     rounds = [[_turn(cells, watch) for cells in blocks] for _ in range(n_rounds)]
     return [list(slits) for slits in zip(*rounds, strict=True)]
 
 
-def cost_of(slits: Sequence[Slit]) -> CutCost:
-    """Return the median of each figure over the rounds; counts are the same in all."""
+def median_cost(slits: Sequence[SlitSteps]) -> CutCost:
+    """Return the median of each cost over the rounds; the counts are the same in all rounds."""
     first = slits[0]
     return CutCost(
         n_tetrahedra=first.n_tetrahedra,
@@ -107,22 +110,18 @@ def cost_of(slits: Sequence[Slit]) -> CutCost:
     )
 
 
-def _figures(blocks: Sequence[Sequence[Slit]]) -> list[Figure]:
-    """Return what a cut step, a split, and a step without a split cost: every step is a sample."""
-    figures = []
+def _measurements(blocks: Sequence[Sequence[SlitSteps]]) -> list[Measurement]:
+    """Return the time of a cut step, of a split, and of a step without a split, in each block."""
+    measured = []
     for slits in blocks:
         for case, samples in (
             ("cut step", [s.steps for s in slits]),
             ("split tetrahedron", [s.steps / s.splits for s in slits]),
             ("blade moves, nothing split", [s.idle for s in slits]),
         ):
-            figures.append(
-                of_times(
-                    "cut", case, slits[0].n_tetrahedra, "time", "µs", samples,
-                    clock=WALL.name, convert=lambda s: _US_PER_S * s,
-                )
-            )  # fmt: skip
-    return figures
+            quantity = Quantity("cut", case, slits[0].n_tetrahedra, "time", "µs", WALL.name)
+            measured.append(summarise_times(quantity, samples, lambda s: _US_PER_S * s))
+    return measured
 
 
 def print_costs(costs: Sequence[CutCost], console: "Console") -> None:
@@ -144,45 +143,45 @@ def print_costs(costs: Sequence[CutCost], console: "Console") -> None:
         )
     console.print(table)
     console.print(
-        f"The same slit in each block: {SLIT:g} x {_DEPTH:g} cells of {_CELL * 1e3:g} mm, "
-        f"{_STEP * 1e3:g} mm a step. A cut step splits tetrahedra; its time is CD + GC, search, "
-        "splitting, un-gluing, masses and springs, without relaxation; the share is that of the "
-        "smallest block. A split leaves one tetrahedron more. In an idle step the blade moves on "
-        "in the tissue, and nothing is split.",
+        f"The same slit in each block: {_SLIT_CELLS:g} x {_DEPTH:g} cells of {_CELL * 1e3:g} mm, "
+        f"{_STEP * 1e3:g} mm a step. A cut step splits tetrahedra; its time is CD + GC: collision "
+        "detection, subdivision, separation, masses and springs, without relaxation. Share: of "
+        "the time in the smallest block. A split adds one tetrahedron. In an idle step the blade "
+        "moves on in the tissue and nothing is split.",
         style="dim",
     )
 
 
-def _turn(cells: _Cells, watch: Watch) -> Slit:
-    """Cut one fresh block, and say so."""
-    slit = _run(cells)
+def _turn(cells: _Cells, watch: Watch) -> SlitSteps:
+    """Cut one new block and report the turn."""
+    slit = _cut_slit(cells)
     watch.tick(f"cut in {slit.n_tetrahedra:,} tetrahedra")
     return slit
 
 
-def _run(cells: _Cells) -> Slit:
-    """Cut one fresh block."""
+def _cut_slit(cells: _Cells) -> SlitSteps:
+    """Cut the slit into one new block."""
     mesh = block(cells, [_CELL * n for n in cells])
     held = np.ones(len(mesh.positions), dtype=bool)
-    tissue = Tissue(mesh, _SHARP, fixed=held, gravity=(0.0, 0.0, 0.0))
+    tissue = Tissue(mesh, _MATERIAL, fixed=held, gravity=(0.0, 0.0, 0.0))
     before = _edge(cells, 0.0)
     taken: list[float] = []
     sizes = [tissue.n_tetrahedra]
     with no_garbage_collection():
-        for i in range(1, round(SLIT * _CELL / _STEP) + 1):
+        for i in range(1, round(_SLIT_CELLS * _CELL / _STEP) + 1):
             after = _edge(cells, i * _STEP)
             result = tissue.step(BladeSweep(before, after), _DT)
             taken.append(result.profile.collision + result.profile.topology)
             sizes.append(result.n_tetrahedra)
             before = after
     seconds, splits = np.array(taken), np.diff(np.array(sizes, dtype=np.float64))
-    return Slit(sizes[0], seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
+    return SlitSteps(sizes[0], seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
 
 
-def _edge(cells: _Cells, way: float) -> BladeSegment:
-    """Return the upright edge, so far [m] along the slit, which is in the middle of the block."""
+def _edge(cells: _Cells, distance: float) -> BladeSegment:
+    """Return the upright edge at a distance [m] along the slit in the middle of the block."""
     x = _CELL * (cells[0] // 2 + _ASIDE)
-    y = _CELL * (cells[1] // 2 - SLIT / 2) + way
+    y = _CELL * (cells[1] // 2 - _SLIT_CELLS / 2) + distance
     top = _CELL * cells[2]
     return BladeSegment(
         np.array([x, y, top - _DEPTH * _CELL]),

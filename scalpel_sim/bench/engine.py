@@ -1,15 +1,15 @@
-"""The engine's inner loops, one at a time: the only file here that knows how they are called."""
+"""The engine's inner loops, one at a time: the only file here that reaches inside `tissue`."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import block_mesh, held
-from scalpel_sim.bench.traffic import Traffic, traffic
+from scalpel_sim.bench.blocks import held_nodes, jittered_block
 from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
 from tissue.contact.resolve import note_all_positions, resolve
 from tissue.contact.state import REBUILD
 from tissue.core.jit import kernel
+from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.elasticity.finite_elements import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
@@ -17,72 +17,73 @@ from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
 from tissue.tissue import NOWHERE
 
-DT = 1e-3
-"""Time step [s]: that of a haptic loop."""
+FRAME_DT = 1e-3
+"""Time step of a frame [s]: that of a haptic loop."""
 
-STIFFNESS = 3e3
+YOUNG_MODULUS = 3e3
 """Young's modulus of the blocks [Pa]: so soft that in cells of 10 mm a step of 1 ms is stable under
-every explicit scheme that is measured here, those of the peers too."""
+every explicit scheme that is measured here, those of other engines too."""
 POISSON_RATIO: dict[Law, float] = {"springs": 0.25, "neo_hookean": 0.3}
-"""What springs have without a volume term; what peers are given under their law of tetrahedra."""
+"""Poisson's ratio under each law: that of springs without a volume term, and what other engines get
+under their laws for tetrahedra."""
 DENSITY = 1e3
-"""[kg/m3]."""
+"""Density [kg/m3]."""
 _TOUGHNESS = 5.0
-"""[J/m2]: for an engine that warns of tissue too tough for its mesh. Nothing is cut here."""
-LAWS: tuple[Law, ...] = ("springs", "neo_hookean")
-"""Each is measured."""
+"""Toughness [J/m2], so low that the engine does not warn of too coarse a mesh; nothing is cut."""
+
+LAW_NAMES: dict[Law, str] = {"springs": "springs", "neo_hookean": "neo-Hookean"}
+"""The laws that are measured, and their names in the tables."""
+
+VECTOR_LENGTH: int = WIDTH
+"""Numbers in one of the engine's vectors."""
 
 
-def material(law: Law, *, is_damped: bool = True) -> Material:
-    """Return what the blocks are made of, damped as by default or not along edges."""
-    made = Material(
-        young_modulus=STIFFNESS,
+def block_material(law: Law, *, is_damped: bool = True) -> Material:
+    """Return the material of the blocks, with the default damping or with none along edges."""
+    material = Material(
+        young_modulus=YOUNG_MODULUS,
         density=DENSITY,
         toughness=_TOUGHNESS,
         law=law,
         poisson_ratio=POISSON_RATIO[law],
     )
-    return made if is_damped else replace(made, retardation_time=0.0)
+    return material if is_damped else replace(material, retardation_time=0.0)
 
 
-class Loops:
-    """A block of so many tetrahedra, and the loops that make it move.
+class EngineLoops:
+    """A block of tissue, and the loops that advance it.
 
-    Each method does its loop `n` times, as `timing.Case` wants it.
+    Each method runs its loop `n` times, as `timing.Case` asks for.
 
     Args:
-        n_tetrahedra: How many.
-        law: Of what.
+        mesh: The block.
+        law: Law of elasticity.
         is_damped: Whether there are dampers along the edges.
-        is_averaged: Whether volumes are averaged around nodes, as the engine has it, or kept in
-            each tetrahedron, as peers have it.
+        is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
+            each tetrahedron, as other engines do.
     """
 
     def __init__(
         self,
-        n_tetrahedra: int,
+        mesh: TetrahedralMesh,
         law: Law = "springs",
         *,
         is_damped: bool = True,
         is_averaged: bool = True,
     ) -> None:
-        mesh = block_mesh(n_tetrahedra)
-        self._is_damped = is_damped
+        material = block_material(law, is_damped=is_damped)
         self._stepper = GlobalStepper()
         self._tissue = Tissue(
-            mesh,
-            material(law, is_damped=is_damped),
-            fixed=held(mesh),
-            solver=SolverSettings(relaxation="global"),
+            mesh, material, fixed=held_nodes(mesh), solver=SolverSettings(relaxation="global")
         )
         if not is_averaged:
-            made, elasticity = material(law), self._tissue._system.elasticity
-            plain = neo_hookean(made.mu, made.lam, averaged=False)
+            elasticity = self._tissue._system.elasticity
+            plain = neo_hookean(material.mu, material.lam, averaged=False)
             arrays = elasticity.arrays
             elasticity.arrays = arrays.replaced(solid=arrays.solid.replaced(law=plain))
 
     def forces(self, n: int) -> None:
-        """Evaluate the forces on all nodes, and what they accelerate them by."""
+        """Evaluate the forces on all nodes, and the accelerations that follow."""
         system = self._tissue._system
         for _ in range(n):
             accelerations(system.context, system.stages.a1)
@@ -90,48 +91,44 @@ class Loops:
     def euler_steps(self, n: int) -> None:
         """Take steps of the symplectic Euler method: one evaluation of the forces each.
 
-        The engine has better; this is what peers do, for a comparison of like with like.
+        The engine itself steps otherwise; other engines step like this, so like is compared with
+        like.
         """
         body = self._tissue._body
         for _ in range(n):
             self.forces(1)
-            _kick_and_drift(body, self._tissue._system.stages.a1, DT)
+            _kick_and_drift(body, self._tissue._system.stages.a1, FRAME_DT)
 
     def runge_kutta_steps(self, n: int) -> None:
         """Take steps of the Runge-Kutta-Nystroem method: three evaluations of the forces each."""
-        increment = Increment(NOWHERE, n * DT, 0.0, 1.0)
+        increment = Increment(NOWHERE, n * FRAME_DT, 0.0, 1.0)
         self._stepper.take_steps(self._tissue._system, increment, n)
 
     def frames(self, n: int) -> None:
-        """Let the body live through time steps, all included but a blade."""
+        """Advance the body by whole frames, without a blade."""
         for _ in range(n):
-            self._tissue.step(None, DT)
+            self._tissue.step(None, FRAME_DT)
 
     @property
-    def n_substeps(self) -> int:
-        """Runge-Kutta steps that stability needs in one time step."""
-        return self._tissue.step(None, DT).n_substeps
-
-    @property
-    def traffic(self) -> Traffic:
-        """What a Runge-Kutta step of the springs must move and compute."""
-        lengths = self._tissue._system.elasticity.arrays.springs.count[: self._tissue.n_nodes]
-        return traffic(lengths.tolist(), is_damped=self._is_damped)
+    def springs_per_node(self) -> list[int]:
+        """Number of springs at each node."""
+        counts = self._tissue._system.elasticity.arrays.springs.count[: self._tissue.n_nodes]
+        return [int(count) for count in counts]
 
     @property
     def positions(self) -> FloatArray:
-        """Where the nodes are [m], shape (n_nodes, 3)."""
+        """Positions of the nodes [m], shape (n_nodes, 3)."""
         return self._tissue.snapshot().positions
 
 
-class Touching:
-    """Two blocks of which one lies on the other, and the search for what touches."""
+class TouchingBlocks:
+    """Two blocks, one of which lies on the other, and their contact detection and resolution."""
 
-    FALL = 100
-    """Time steps that the upper one has to come to rest."""
+    N_SETTLING = 100
+    """Frames in which the upper block comes to rest."""
 
     def __init__(self, n_tetrahedra: int) -> None:
-        lower = block_mesh(n_tetrahedra)
+        lower = jittered_block(n_tetrahedra)
         height = float(np.ptp(lower.positions[:, 2]))
         upper = lower.positions + np.array([0.0, 0.0, height])
         mesh = TetrahedralMesh(
@@ -139,28 +136,31 @@ class Touching:
             np.vstack([lower.tetrahedra, lower.tetrahedra + len(upper)]),
         )
         fixed = np.zeros(len(mesh.positions), dtype=bool)
-        fixed[: len(upper)] = held(lower)
-        self._tissue = Tissue(mesh, material("springs"), fixed=fixed)
-        for _ in range(self.FALL):
-            self._tissue.step(None, DT)
+        fixed[: len(upper)] = held_nodes(lower)
+        self._tissue = Tissue(mesh, block_material("springs"), fixed=fixed)
+        for _ in range(self.N_SETTLING):
+            self._tissue.step(None, FRAME_DT)
 
     @property
     def n_contacts(self) -> int:
-        """Contacts that press."""
+        """Number of contacts that press."""
         return self._tissue._system.contact.arrays.n_pressing
 
     def searches(self, n: int) -> None:
-        """Look for all pairs that may touch, as where faces have moved by the margin."""
+        """Search all candidate pairs again, as after faces have moved by the margin, and resolve.
+
+        The steps of `checks` are part of it.
+        """
         for _ in range(n):
             self._tissue._system.contact.arrays.stale = REBUILD
             self.checks(1)
 
     def checks(self, n: int) -> None:
-        """Look at the pairs that were found, and keep them apart, as in every Runge-Kutta step."""
+        """Test the candidate pairs and resolve contacts, as in every Runge-Kutta step."""
         contact, body = self._tissue._system.contact.arrays, self._tissue._body
         for _ in range(n):
             note_all_positions(contact, body)
-            resolve(contact, body, DT)
+            resolve(contact, body, FRAME_DT)
 
 
 @kernel
@@ -169,3 +169,32 @@ def _kick_and_drift(body: Body, accelerations: FloatArray, dt: float) -> None:
         for c in range(3):
             body.velocities[i, c] += dt * accelerations[i, c]
             body.positions[i, c] += dt * body.velocities[i, c]
+
+
+@kernel
+def triad_pass(a: FloatArray, b: FloatArray, c: FloatArray, n: int) -> None:
+    """Compute a = b + s c over whole arrays, `n` times, with another `s` each time."""
+    for k in range(n):
+        s = 1.0 / (k + 1.0)
+        for i in range(len(a)):
+            a[i] = b[i] + s * c[i]
+
+
+@kernel
+def multiply_and_add(values: FloatArray, n: int) -> None:
+    """Multiply eight vectors and add to them, `n` times; `values` has eight vectors."""
+    a, b = load_lanes(values, 0), load_lanes(values, WIDTH)
+    c, d = load_lanes(values, 2 * WIDTH), load_lanes(values, 3 * WIDTH)
+    e, f = load_lanes(values, 4 * WIDTH), load_lanes(values, 5 * WIDTH)
+    g, h = load_lanes(values, 6 * WIDTH), load_lanes(values, 7 * WIDTH)
+    factor, term = lanes(0.5), lanes(1.0)
+    for _ in range(n):
+        a = a * factor + term
+        b = b * factor + term
+        c = c * factor + term
+        d = d * factor + term
+        e = e * factor + term
+        f = f * factor + term
+        g = g * factor + term
+        h = h * factor + term
+    store_lanes(values, 0, a + b + c + d + e + f + g + h)

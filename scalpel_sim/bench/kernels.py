@@ -1,75 +1,66 @@
-"""The engine's loops one by one: forces, steps, a cut step, and the search for contact."""
+"""The engine's loops one by one: forces, steps, a cut step, and contact."""
 
-from collections.abc import Callable
 from functools import partial
 
-from scalpel_sim.bench import cut
-from scalpel_sim.bench.blocks import up_to
-from scalpel_sim.bench.engine import LAWS, Loops, Touching
-from scalpel_sim.bench.results import Figure, Findings, of_times
-from scalpel_sim.bench.tables import print_figures
-from scalpel_sim.bench.timing import CPU, Case, interleaved
+from scalpel_sim.bench.blocks import jittered_block, sizes_up_to
+from scalpel_sim.bench.cut import CUT_BLOCKS, measure_cut_steps
+from scalpel_sim.bench.engine import LAW_NAMES, EngineLoops, TouchingBlocks
+from scalpel_sim.bench.results import BenchmarkResult, Measurement, Quantity, summarise_times
+from scalpel_sim.bench.tables import print_measurements
+from scalpel_sim.bench.timing import CPU, Case, time_in_turns
 from scalpel_sim.bench.watch import SILENT, Watch
+from tissue import FloatArray
 
 _SIZES = (576, 5_400, 20_250, 60_000)
-"""Of the blocks [tetrahedra]."""
-TOUCHING = 5_400
-"""Of each of the two blocks that touch."""
+"""Sizes of the blocks [tetrahedra]."""
+TOUCHING_SIZE = 5_400
+"""Size of each of the two blocks that touch [tetrahedra]."""
 _NS_PER_S, _US_PER_S = 1e9, 1e6
 
-NAMES = {"springs": "springs", "neo_hookean": "neo-Hookean"}
+_ABOUT = (
+    "ns/tet: ns per tetrahedron. Blocks of jittered cells of 10 mm, held on four sides; one "
+    "thread. CPU: CPU time. Forces: one evaluation, dampers included. A Runge-Kutta step evaluates "
+    "forces three times and dampers four times. The time step includes everything that is done in "
+    "1 ms without a blade."
+)
 
 
-def measure(n_rounds: int, largest: int | None = None, watch: Watch = SILENT) -> Findings:
+def measure_kernels(
+    n_rounds: int, largest: int | None = None, watch: Watch = SILENT
+) -> BenchmarkResult:
     """Time every loop, at each size up to the largest."""
-    sizes = up_to(_SIZES, largest)
+    sizes = sizes_up_to(_SIZES, largest)
     cases: list[Case] = []
-    figures: list[Callable[[list], Figure]] = []
+    quantities: list[Quantity] = []
     for size in sizes:
-        for law in LAWS:
-            loops = Loops(size, law)
+        for law, law_name in LAW_NAMES.items():
+            loops = EngineLoops(jittered_block(size), law)
             for what, run in (
                 ("forces", loops.forces),
                 ("Runge-Kutta step", loops.runge_kutta_steps),
                 ("time step of 1 ms", loops.frames),
             ):
-                name = f"{NAMES[law]}: {what}"
+                name = f"{law_name}: {what}"
                 cases.append(Case(f"{name}, {size:,}", run))
-                figures.append(partial(_per_tetrahedron, name, size))
-    touching = Touching(min(TOUCHING, sizes[-1]))
+                quantities.append(Quantity("kernels", name, size, "time", "ns/tet", CPU.name))
+    touching_size = min(TOUCHING_SIZE, sizes[-1])
+    touching = TouchingBlocks(touching_size)
     for name, run in (
         ("contact: search", touching.searches),
         ("contact: check of a step", touching.checks),
     ):
         cases.append(Case(name, run))
-        figures.append(partial(_whole, name, 2 * min(TOUCHING, sizes[-1])))
-    taken = interleaved(cases, n_rounds, clock=CPU, watch=watch)
-    found = [make(rounds) for make, rounds in zip(figures, taken, strict=True)]
-    found += cut.measure(n_rounds, cut.CELLS[:1], watch).figures
-    return Findings(
-        found,
-        [],
-        partial(
-            print_figures,
-            "kernels",
-            found,
-            [],
-            about="ns/tet: for each tetrahedron. Blocks of jittered cells of 10 mm, held on four "
-            "sides; one thread. CPU: what the processor spent on it. Forces: one evaluation, "
-            "dampers included. A Runge-Kutta step evaluates forces three times and dampers four "
-            "times. The time step holds all that is done in 1 ms without a blade.",
-        ),
-    )
+        quantities.append(Quantity("kernels", name, 2 * touching_size, "time", "µs", CPU.name))
+    taken = time_in_turns(cases, n_rounds, clock=CPU, watch=watch)
+    measured = [_summary(each, rounds) for each, rounds in zip(quantities, taken, strict=True)]
+    measured += measure_cut_steps(n_rounds, CUT_BLOCKS[:1], watch).measurements
+    show = partial(print_measurements, "kernels", measured, [], about=_ABOUT)
+    return BenchmarkResult(measured, [], show)
 
 
-def _per_tetrahedron(case: str, size: int, rounds: list) -> Figure:
-    return of_times(
-        "kernels", case, size, "time", "ns/tet", rounds,
-        clock=CPU.name, convert=lambda s: _NS_PER_S * s / size,
-    )  # fmt: skip
-
-
-def _whole(case: str, size: int, rounds: list) -> Figure:
-    return of_times(
-        "kernels", case, size, "time", "µs", rounds, clock=CPU.name, convert=lambda s: _US_PER_S * s
-    )
+def _summary(quantity: Quantity, rounds: list[FloatArray]) -> Measurement:
+    """Return the measurement of a loop: its whole time, or its time per tetrahedron."""
+    size = quantity.tetrahedra
+    if quantity.unit == "ns/tet" and size is not None:
+        return summarise_times(quantity, rounds, lambda s: _NS_PER_S * s / size)
+    return summarise_times(quantity, rounds, lambda s: _US_PER_S * s)

@@ -1,9 +1,9 @@
-"""A frame whose cost is that of the zone around the blade, in bodies of 6,000 to 1,000,000.
+"""The cost of a frame that is local: it depends on the zone around the blade, not on the body.
 
-The same shallow slit is cut into the upper side of each body; some dozen tetrahedra are split in a
-frame that splits any. Only what is near the blade, or moves, is relaxed: by the paper's hierarchy
-with its far nodes frozen, as printed, or by local time stepping, where what is at rest sleeps. All
-of the frame counts, whatever it is spent on.
+The same shallow slit is cut into the upper side of bodies of 6,000 to 1,000,188 tetrahedra. In a
+frame that splits any, about a dozen tetrahedra are split. Only what is near the blade, or moves, is
+relaxed: by the paper's hierarchy with its far nodes frozen, as printed, or by local time stepping,
+where what is at rest sleeps. The times are those of whole frames.
 """
 
 from collections.abc import Sequence
@@ -13,12 +13,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import BLOCKS, CELL, block_mesh, held, up_to
-from scalpel_sim.bench.engine import DT, material
-from scalpel_sim.bench.machine import memory
-from scalpel_sim.bench.memory import that_fit
-from scalpel_sim.bench.results import Figure, Findings, Skipped, of_times
-from scalpel_sim.bench.tables import compact, number, print_skipped
+from scalpel_sim.bench.blocks import BLOCKS, CELL, held_nodes, jittered_block, sizes_up_to
+from scalpel_sim.bench.engine import FRAME_DT, block_material
+from scalpel_sim.bench.machine import memory_bytes
+from scalpel_sim.bench.memory import sizes_that_fit
+from scalpel_sim.bench.results import (
+    BenchmarkResult,
+    Measurement,
+    Quantity,
+    Skipped,
+    summarise_times,
+)
+from scalpel_sim.bench.tables import compact_table, print_skipped, three_digits
 from scalpel_sim.bench.timing import CPU
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.simulation import no_garbage_collection
@@ -32,30 +38,31 @@ from tissue import (
     SolverSettings,
     Tissue,
 )
-from tissue.integrators.options import IntegratorOptions
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 _SIZES = (6_000, 60_000, 1_000_188)
-"""Of the blocks [tetrahedra]."""
+"""Sizes of the blocks [tetrahedra]."""
 _DEPTH, _ABOVE = 1.4, 2.0
-"""How far the edge reaches below the upper side, and above [cells]."""
+"""How far the edge reaches below the upper side, and above it [cells]."""
 _ASIDE = 0.37
-"""Distance of the slit from the grid's planes [cells]: none of it runs along faces that are
-there."""
+"""Distance of the slit from the planes of the grid [cells]: no part of it runs along existing
+faces."""
 _STEP = 7e-4
-"""Way of the blade in a frame [m]: a frame that splits any splits a dozen tetrahedra."""
+"""Displacement of the blade in a frame [m]: a frame that splits any splits about a dozen
+tetrahedra."""
 N_FRAMES = 40
-"""With the blade."""
+"""Frames with the blade."""
 N_AT_REST = 80
-"""Frames before it comes: the far nodes of a body at rest fall asleep."""
-_SHARP = 1.0
-"""Toughness [J/m2]: the blade hardly drags; it cuts where it passes."""
-ENTRY = 3
-"""First frames, left out: the edge comes into the body."""
+"""Frames before the blade arrives: the far nodes of a body at rest fall asleep."""
+_TOUGHNESS = 1.0
+"""Toughness [J/m2], so low that the blade hardly drags the tissue along and cuts where it
+passes."""
+N_ENTRY = 3
+"""First frames, which are not counted: the edge enters the body."""
 
-WAYS: dict[str, tuple[Law, IntegratorOptions]] = {
+RELAXATIONS: dict[str, tuple[Law, Hierarchical | LocalTimeStepping]] = {
     "hierarchical (I 64, s_max 6)": (
         "springs",
         Hierarchical(updates=64, rings=6, far="frozen"),
@@ -63,90 +70,95 @@ WAYS: dict[str, tuple[Law, IntegratorOptions]] = {
     "local, springs": ("springs", LocalTimeStepping()),
     "local, neo-Hookean": ("neo_hookean", LocalTimeStepping()),
 }
+"""Law of elasticity and relaxation, by the name in the tables."""
 _US_PER_S = 1e6
 
 _ABOUT = (
-    "Whole frames of 1 ms: search, cut, relaxation, the force on the blade, and what Python does. "
-    "Cut: frames that split tetrahedra, as many as `splits` on average. Else: the blade moves on "
-    "and splits nothing. Share: of the smallest body. CPU time of the thread. Hierarchical is the "
-    "paper's relaxation with its rings, whose far nodes stay; local is its heir, whose far nodes "
-    "sleep until they are pulled."
+    "Whole frames of 1 ms: detection, cut, relaxation, the force on the blade, and the work of "
+    "Python. Cut: frames that split tetrahedra, `splits` of them on average. Else: frames in which "
+    "the blade moves on and splits nothing. Share: of the time in the smallest body. CPU time of "
+    "the thread. Hierarchical: the paper's relaxation by rings, whose far nodes stay fixed. Local: "
+    "its successor, whose far nodes sleep until they are pulled."
 )
 
 
-class Frames(NamedTuple):
+class SlitFrames(NamedTuple):
     """What the frames of one slit cost."""
 
     cut: FloatArray
-    """CPU time of each that split tetrahedra [s]."""
+    """CPU time of each frame that split tetrahedra [s]."""
     splits: FloatArray
-    """How many each of them split."""
+    """Number of tetrahedra that each of those frames split."""
     other: FloatArray
-    """CPU time of the others with the blade in the tissue [s]."""
+    """CPU time of each other frame with the blade in the tissue [s]."""
 
 
-class Local(NamedTuple):
-    """One way to relax in one body; medians."""
+class LocalFrameCost(NamedTuple):
+    """The cost of a frame with one relaxation in one body, medians over rounds."""
 
-    way: str
+    relaxation: str
     tetrahedra: int
     splits: float
-    cut: Figure
-    other: Figure
+    """Mean number of tetrahedra split in a frame that splits any."""
+    cut: Measurement
+    other: Measurement
 
 
-def measure(
+def measure_local_frames(
     n_rounds: int,
     largest: int | None = None,
     watch: Watch = SILENT,
     sizes: Sequence[int] = _SIZES,
-) -> Findings:
-    """Cut a slit into each body up to the largest, with each way to relax, in turns."""
-    sizes, skipped = that_fit(up_to(tuple(sizes), largest), memory(), "local frame")
-    cases = [(size, way) for way in WAYS for size in sizes]
-    for law, relaxing in WAYS.values():
-        _slit(sizes[0], law, relaxing)  # the kernels are loaded
+) -> BenchmarkResult:
+    """Cut a slit into each body up to the largest, with each relaxation, in turns."""
+    fitting, skipped = sizes_that_fit(
+        sizes_up_to(tuple(sizes), largest), memory_bytes(), "local frame"
+    )
+    cases = [(size, name) for name in RELAXATIONS for size in fitting]
+    for law, relaxation in RELAXATIONS.values():
+        _cut_slit(fitting[0], law, relaxation)  # loads the kernels
     watch.begin(n_rounds * len(cases))
-    rounds: list[list[Frames]] = []
+    rounds: list[list[SlitFrames]] = []
     for _ in range(n_rounds):
         rounds.append([])
-        for size, way in cases:
-            rounds[-1].append(_slit(size, *WAYS[way]))
-            watch.tick(f"{way}, {size:,}")
-    found = [
-        _local(way, size, frames)
-        for (size, way), frames in zip(cases, zip(*rounds, strict=True), strict=True)
+        for size, name in cases:
+            rounds[-1].append(_cut_slit(size, *RELAXATIONS[name]))
+            watch.tick(f"{name}, {size:,}")
+    costs = [
+        _cost(name, size, frames)
+        for (size, name), frames in zip(cases, zip(*rounds, strict=True), strict=True)
     ]
-    figures = [figure for each in found for figure in (each.cut, each.other)]
-    return Findings(figures, skipped, partial(_print, found, skipped))
+    measured = [measurement for each in costs for measurement in (each.cut, each.other)]
+    return BenchmarkResult(measured, skipped, partial(_print, costs, skipped))
 
 
-def _slit(n_tetrahedra: int, law: Law, relaxing: IntegratorOptions) -> Frames:
-    """Cut the slit into a fresh body at rest."""
-    mesh = block_mesh(n_tetrahedra)
-    sharp = replace(material(law), toughness=_SHARP)
+def _cut_slit(
+    n_tetrahedra: int, law: Law, relaxation: Hierarchical | LocalTimeStepping
+) -> SlitFrames:
+    """Cut the slit into a new body at rest."""
+    mesh = jittered_block(n_tetrahedra)
     tissue = Tissue(
         mesh,
-        sharp,
-        fixed=held(mesh),
+        replace(block_material(law), toughness=_TOUGHNESS),
+        fixed=held_nodes(mesh),
         gravity=(0.0, 0.0, 0.0),
-        solver=SolverSettings(relaxation=relaxing),
+        solver=SolverSettings(relaxation=relaxation),
     )
     for _ in range(N_AT_REST):
-        tissue.step(None, DT)
+        tissue.step(None, FRAME_DT)
     seconds, sizes = np.zeros(N_FRAMES), np.full(N_FRAMES + 1, n_tetrahedra)
     before = _edge(n_tetrahedra, 0)
     with no_garbage_collection():
         for i in range(N_FRAMES):
             after = _edge(n_tetrahedra, i + 1)
             start = CPU.now()
-            result = tissue.step(BladeSweep(before, after), DT)
+            result = tissue.step(BladeSweep(before, after), FRAME_DT)
             seconds[i] = CPU.now() - start
             sizes[i + 1] = result.n_tetrahedra
             before = after
-    splits = np.diff(sizes).astype(np.float64)[ENTRY:]
-    seconds = seconds[ENTRY:]
-    return Frames(seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
+    splits = np.diff(sizes).astype(np.float64)[N_ENTRY:]
+    seconds = seconds[N_ENTRY:]
+    return SlitFrames(seconds[splits > 0], splits[splits > 0], seconds[splits == 0])
 
 
 def _edge(n_tetrahedra: int, frame: int) -> BladeSegment:
@@ -162,40 +174,40 @@ def _edge(n_tetrahedra: int, frame: int) -> BladeSegment:
     )
 
 
-def _local(way: str, size: int, rounds: Sequence[Frames]) -> Local:
-    """Return the figures of one way to relax in one body."""
+def _cost(name: str, size: int, rounds: Sequence[SlitFrames]) -> LocalFrameCost:
+    """Return the cost with one relaxation in one body."""
     splits = float(np.mean([each.splits.mean() for each in rounds]))
 
-    def figure(case: str, samples: Sequence[FloatArray], note: str) -> Figure:
-        return of_times(
-            "local frame", f"{way}: {case}", size, "time", "µs", samples,
-            clock=CPU.name, convert=lambda s: _US_PER_S * s, note=note,
-        )  # fmt: skip
+    def measurement(case: str, samples: Sequence[FloatArray], note: str) -> Measurement:
+        quantity = Quantity(
+            "local frame", f"{name}: {case}", size, "time", "µs", CPU.name, note=note
+        )
+        return summarise_times(quantity, samples, lambda s: _US_PER_S * s)
 
-    return Local(
-        way,
+    return LocalFrameCost(
+        name,
         size,
         splits,
-        figure("cut frame", [each.cut for each in rounds], f"{splits:.1f} tetrahedra split"),
-        figure("blade moves, nothing split", [each.other for each in rounds], ""),
+        measurement("cut frame", [each.cut for each in rounds], f"{splits:.1f} tetrahedra split"),
+        measurement("blade moves, nothing split", [each.other for each in rounds], ""),
     )
 
 
-def _print(found: Sequence[Local], skipped: Sequence[Skipped], console: "Console") -> None:
-    """Print a row for each way and body."""
-    table = compact("local frame, CPU time in µs")
+def _print(costs: Sequence[LocalFrameCost], skipped: Sequence[Skipped], console: "Console") -> None:
+    """Print a row for each relaxation and body."""
+    table = compact_table("local frame, CPU time in µs")
     table.add_column("relaxation")
     for heading in ("tetrahedra", "splits", "cut", "p95", "p99", "share", "else", "n"):
         table.add_column(heading, justify="right")
-    for each in found:
-        least = next(one for one in found if one.way == each.way)
+    for each in costs:
+        smallest = next(one for one in costs if one.relaxation == each.relaxation)
         table.add_row(
-            each.way if each is least else "",
+            each.relaxation if each is smallest else "",
             f"{each.tetrahedra:,}",
             f"{each.splits:.1f}",
-            *map(number, (each.cut.median, each.cut.p95, each.cut.p99)),
-            f"{each.cut.median / least.cut.median:.2f}",
-            number(each.other.median),
+            *map(three_digits, (each.cut.median, each.cut.p95, each.cut.p99)),
+            f"{each.cut.median / smallest.cut.median:.2f}",
+            three_digits(each.other.median),
             f"{each.cut.n:,}",
         )
     console.print(table)

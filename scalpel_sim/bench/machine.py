@@ -1,66 +1,68 @@
-"""What a benchmark has to know of the machine: processor, caches, free memory."""
+"""Facts about this machine that benchmarks depend on: processor, caches, memory, load."""
 
 import os
 import platform
 from pathlib import Path
 from typing import Any, NamedTuple
 
-CACHES = Path("/sys/devices/system/cpu/cpu0/cache")
-"""Where Linux describes them."""
+_CACHE_FOLDER = Path("/sys/devices/system/cpu/cpu0/cache")
+"""Where Linux describes the caches."""
 
 
-class Caches(NamedTuple):
-    """Sizes in bytes: of the core's own two levels, and of the level that cores share."""
+class CacheSizes(NamedTuple):
+    """Sizes of the caches [bytes]: the core's own two levels, and the level that cores share."""
 
     l1: int
     l2: int
     l3: int
 
 
-USUAL = Caches(32 << 10, 1 << 20, 32 << 20)
-"""Where the system does not say."""
+_USUAL_SIZES = CacheSizes(32 << 10, 1 << 20, 32 << 20)
+"""Taken where the system does not describe its caches."""
 
 
-def description() -> dict[str, Any]:
-    """Return what figures depend on besides versions."""
+def describe_machine() -> dict[str, Any]:
+    """Return the facts, besides versions, that measurements depend on."""
     return {
-        "processor": processor(),
+        "processor": processor_name(),
         "cores": os.cpu_count(),
-        "memory_bytes": memory("MemTotal"),
-        "caches_bytes": caches()._asdict(),
+        "memory_bytes": memory_bytes("MemTotal"),
+        "caches_bytes": cache_sizes()._asdict(),
     }
 
 
-def processor() -> str:
-    """Return what the processor calls itself."""
+def processor_name() -> str:
+    """Return the name of the processor."""
     named = _values(Path("/proc/cpuinfo"), "model name")
     return named[0] if named else platform.processor() or platform.machine()
 
 
-def memory(what: str = "MemAvailable") -> int | None:
-    """Return so many bytes of memory, or None where the system does not say."""
-    found = _values(Path("/proc/meminfo"), what)
+def memory_bytes(entry: str = "MemAvailable") -> int | None:
+    """Return an entry of the system's memory table [bytes], or None where there is no table."""
+    found = _values(Path("/proc/meminfo"), entry)
     return 1024 * int(found[0].split()[0]) if found else None
 
 
-def caches() -> Caches:
-    """Return the sizes of the caches; usual ones where the system does not say."""
+def cache_sizes() -> CacheSizes:
+    """Return the sizes of the caches; usual sizes where the system does not say."""
     sizes: dict[int, int] = {}
-    for folder in sorted(CACHES.glob("index*")):
+    for folder in sorted(_CACHE_FOLDER.glob("index*")):
         try:
-            kind, level, size = (
+            content, level, size = (
                 (folder / name).read_text(encoding="ascii").strip()
                 for name in ("type", "level", "size")
             )
         except OSError:
             continue
-        if kind != "Instruction" and size.endswith("K"):
+        if content != "Instruction" and size.endswith("K"):
             sizes[int(level)] = 1024 * int(size[:-1])
-    return Caches(*(sizes.get(level, usual) for level, usual in zip((1, 2, 3), USUAL, strict=True)))
+    return CacheSizes(
+        *(sizes.get(level, usual) for level, usual in zip((1, 2, 3), _USUAL_SIZES, strict=True))
+    )
 
 
-def load() -> float:
-    """Return how many programs ran in the last minute on average; 0 where nobody knows."""
+def load_average() -> float:
+    """Return the mean number of running programs in the last minute; 0 where it is unknown."""
     return os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
 
 

@@ -7,18 +7,18 @@ from scalpel_sim.bench.results import Skipped
 BYTES_PER_TETRAHEDRON = 2_000
 """Memory that a body takes while it is made; measured, and rounded up."""
 SHARE_OF_MEMORY = 0.6
-"""Of what is free, that all bodies together may take: others need some too."""
+"""Share of the free memory that all bodies together may take: other programs need some too."""
 
 
-def that_fit(
+def sizes_that_fit(
     sizes: Sequence[int], available: int | None, benchmark: str, n_of_each: int = 1
 ) -> tuple[tuple[int, ...], list[Skipped]]:
-    """Return the sizes that fit together into the free memory, and why others do not.
+    """Return the sizes whose bodies fit together into the free memory, and why others do not.
 
     Args:
-        sizes: Of the bodies, from small to large.
-        available: Free memory [bytes]; None where the system does not tell: then all fit.
-        benchmark: That wants them.
+        sizes: Numbers of tetrahedra, from small to large.
+        available: Free memory [bytes]; None where it is unknown: then all sizes fit.
+        benchmark: Name of the benchmark that makes the bodies.
         n_of_each: Bodies of each size.
     """
     fit: list[int] = []
@@ -29,8 +29,8 @@ def that_fit(
             fit.append(size)
         else:
             reason = (
-                f"with the smaller bodies it needs {needed / 1e9:.1f} GB, and of the "
-                f"{available / 1e9:.1f} GB that are free {SHARE_OF_MEMORY:.0%} may be used"
+                f"together with the smaller bodies it needs {needed / 1e9:.1f} GB, and "
+                f"{SHARE_OF_MEMORY:.0%} of the {available / 1e9:.1f} GB of free memory may be used"
             )
             skipped.append(Skipped(benchmark, benchmark, size, reason))
     return tuple(fit), skipped

@@ -1,6 +1,6 @@
-"""One case of one engine in a process of its own, which steps when it is told to.
+"""One case of one engine in a process of its own, which steps on request.
 
-`benchmarks/peers/protocol.py` is the other side.
+`scalpel_sim.bench.peers.protocol` is the other side.
 """
 
 import json
@@ -17,57 +17,59 @@ import numpy as np
 
 from tissue import FloatArray
 
-FOLDER = Path(__file__).parents[2] / "benchmarks" / "peers"
-"""Where the engines' files are: in the repository, not in the installed package."""
+_ADAPTERS = Path(__file__).parent / "peers"
+"""Folder of the adapters. It is run by path, since the other Python need not have this package."""
 
 LONGEST_START = 300.0
-"""Seconds for an engine to import, compile and build its body; Warp compiles for a minute."""
+"""Longest time for an engine to import, compile and build its body [s]; Warp compiles for a
+minute."""
 LONGEST_TURN = 120.0
-"""Seconds for a turn: the slowest engine takes some tenths of a second a step."""
+"""Longest time for a turn [s]: the slowest engine takes some tenths of a second a step."""
 LONGEST_END = 10.0
-"""Seconds to end by itself."""
+"""Longest time to end without being killed [s]."""
 
-ONE_THREAD = {
+_ONE_THREAD = {
     name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS")
 }
+_MISSING = ("ModuleNotFoundError", "ImportError")
 
 
-class Turn(NamedTuple):
+class PeerTurn(NamedTuple):
     """What a case did in one turn."""
 
     seconds: FloatArray
-    """A step, for each sample."""
+    """CPU time per step of each sample [s]."""
     moved: float
-    """How far a node is from its place at rest at most [m]; nan where positions are not finite."""
+    """Largest displacement of a node from rest [m]; nan where positions are not finite."""
 
 
-class Failed(RuntimeError):
-    """A case that did not get going, or ended before its time."""
+class PeerError(RuntimeError):
+    """A case that could not start, or ended too early."""
 
 
-class NotInstalled(Failed):
-    """A case whose engine this Python does not have."""
+class NotInstalledError(PeerError):
+    """A case whose engine is not installed in this Python."""
 
 
 class PeerProcess:
-    """A case, built and ready to step.
+    """A case that is built and ready to step.
 
     Args:
-        script: In `FOLDER`.
-        case: As the script knows it.
-        body: File with the arrays of `protocol.Body`.
-        python: That has the engine.
-        core: To run on.
+        adapter: Name of the adapter's module in `peers`.
+        case: The case, as the adapter names it.
+        body: File with the arrays of `PeerBody`.
+        python: The Python that has the engine.
+        core: Index of the core to run on.
 
     Raises:
-        NotInstalled: the engine cannot be imported.
-        Failed: it cannot make such a body, or takes too long.
+        NotInstalledError: the engine cannot be imported.
+        PeerError: the engine cannot make this body, or takes too long.
     """
 
-    def __init__(self, script: str, case: str, body: Path, python: Path, core: int) -> None:
+    def __init__(self, adapter: str, case: str, body: Path, python: Path, core: int) -> None:
         self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (`close` closes it)
         self._process = subprocess.Popen(
-            [python, FOLDER / script, body, case, str(core)],
+            [python, _ADAPTERS / "__main__.py", adapter, body, case, str(core)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,
@@ -80,26 +82,26 @@ class PeerProcess:
             self.close()
             raise
 
-    def turn(self, seconds: float) -> Turn:
-        """Let it step for so long.
+    def turn(self, seconds: float) -> PeerTurn:
+        """Run one turn of at least this long [s].
 
         Raises:
-            Failed: it ended, or takes too long.
+            PeerError: the process ended, or takes too long.
         """
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(f"{seconds}\n")
             self._process.stdin.flush()
         except BrokenPipeError:
-            raise Failed(self._last_words()) from None
+            raise PeerError(self._last_words()) from None
         answer = self._answer(LONGEST_TURN)
         moved = answer["moved"]
-        return Turn(np.array(answer["seconds"]), np.nan if moved is None else moved)
+        return PeerTurn(np.array(answer["seconds"]), np.nan if moved is None else moved)
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         if self._process.stdin is not None and not self._process.stdin.closed:
-            self._process.stdin.close()  # its loop over our lines ends
+            self._process.stdin.close()  # its loop over the requests ends
         try:
             self._process.wait(LONGEST_END)
         except subprocess.TimeoutExpired:
@@ -110,58 +112,63 @@ class PeerProcess:
         self._errors.close()
 
     def _answer(self, seconds: float) -> dict[str, Any]:
-        """Wait for its next line."""
+        """Wait for the next line of the process."""
         stdout = self._process.stdout
         assert stdout is not None
         if not select.select([stdout], [], [], seconds)[0]:
-            raise Failed(f"it did not answer within {seconds:g} s")
+            raise PeerError(f"it did not answer within {seconds:g} s")
         line = stdout.readline()
         if not line:
             words = self._last_words()
-            kind = NotInstalled if words.startswith(_MISSING) else Failed
-            raise kind(words)
+            raise (NotInstalledError if words.startswith(_MISSING) else PeerError)(words)
         answer: dict[str, Any] = json.loads(line)
         if "failed" in answer:
-            raise Failed(" ".join(answer["failed"].split()))
+            raise PeerError(" ".join(answer["failed"].split()))
         return answer
 
     def _last_words(self) -> str:
-        """Return the last line that it wrote on standard error."""
+        """Return the last line that the process wrote on standard error."""
         code = self._process.wait()
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").split("\n")
-        said = [line.strip() for line in lines if line.strip()]
-        return said[-1] if said else f"it ended with exit code {code}"
+        written = [line.strip() for line in lines if line.strip()]
+        return written[-1] if written else f"it ended with exit code {code}"
 
 
-_MISSING = ("ModuleNotFoundError", "ImportError")
+def start_peer(
+    adapter: str, case: str, body: Path, pythons: Sequence[Path], core: int
+) -> PeerProcess:
+    """Start a case in the first of these Pythons that has its engine.
 
-
-def started(script: str, case: str, body: Path, pythons: Sequence[Path], core: int) -> PeerProcess:
-    """Return the case, in the first of these environments that has its engine.
+    Args:
+        adapter: Name of the adapter's module in `peers`.
+        case: The case, as the adapter names it.
+        body: File with the arrays of `PeerBody`.
+        pythons: Where to look for the engine, in this order.
+        core: Index of the core to run on.
 
     Raises:
-        NotInstalled: none has it.
-        Failed: one has it, and it cannot.
+        NotInstalledError: none of them has the engine.
+        PeerError: one has it, and cannot run the case.
     """
     for python in pythons[:-1]:
         try:
-            return PeerProcess(script, case, body, python, core)
-        except NotInstalled:
+            return PeerProcess(adapter, case, body, python, core)
+        except NotInstalledError:
             continue
-    return PeerProcess(script, case, body, pythons[-1], core)
+    return PeerProcess(adapter, case, body, pythons[-1], core)
 
 
-def core_to_use() -> int:
-    """Return the core to run on: the last that this process may use."""
+def last_core() -> int:
+    """Return the index of the last core that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return max(os.sched_getaffinity(0))
     return 0
 
 
 def _environment(python: Path) -> dict[str, str]:
-    """Return the environment: one thread; this Python finds what we find, another its own."""
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | ONE_THREAD
+    """Return the environment: one thread; this Python imports what this process can import."""
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | _ONE_THREAD
     if python == Path(sys.executable):
         environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     return environment

@@ -1,4 +1,4 @@
-"""The one format of what benchmarks find: figures with unit, clock and spread, and their file."""
+"""The one format of benchmark results: measurements with unit, clock and spread, and their file."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench import machine
+from scalpel_sim.bench.machine import describe_machine
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import versions
 from tissue import FloatArray
@@ -19,158 +19,162 @@ FORMAT = "scalpel-sim bench 1"
 """First entry of a results file; the number changes where older files can no longer be read."""
 
 LOWER, HIGHER, NEITHER = "lower", "higher", "neither"
-"""Which way is better."""
+"""Which values of a quantity are better."""
 
 COUNTED = "counted"
-"""The clock of what is no time."""
+"""Name of the clock of a quantity that is no time."""
 
 
-class Figure(NamedTuple):
-    """One figure that a benchmark found."""
+class Quantity(NamedTuple):
+    """What is measured, and in which unit."""
 
     benchmark: str
     case: str
-    """What was measured."""
     tetrahedra: int | None
-    """In how large a body; None where there is none."""
+    """Size of the body; None where there is no body."""
+    quantity: str
+    """Name of the quantity: `time`, `rate` and the like."""
+    unit: str
+    clock: str
+    """`CPU`, `wall`, or `counted`."""
+    better: str = LOWER
+    """`lower`, `higher`, or `neither`."""
+    note: str = ""
+    """What to know before comparing it with another."""
+
+
+class Measurement(NamedTuple):
+    """The measured values of one quantity. Its first fields are those of `Quantity`."""
+
+    benchmark: str
+    case: str
+    tetrahedra: int | None
     quantity: str
     unit: str
     clock: str
-    """CPU, wall, or `counted`."""
     better: str
-    """`lower`, `higher`, or `neither`."""
     n: int
-    """Samples in all."""
+    """Number of samples."""
     median: float
     p95: float
     """19 of 20 samples are as good as this, or better."""
     p99: float
-    """99 of 100."""
+    """99 of 100 samples are as good as this, or better."""
     lowest: float
-    """Of the medians of the rounds."""
+    """Lowest of the medians of the rounds."""
     highest: float
-    """Of the medians of the rounds."""
+    """Highest of the medians of the rounds."""
     rounds: int
+    """Number of rounds."""
     note: str = ""
-    """What to know before one compares it with another."""
 
 
 class Skipped(NamedTuple):
-    """What was not measured."""
+    """Something that was not measured."""
 
     benchmark: str
     case: str
     tetrahedra: int | None
     reason: str
-    """Why, and what would help."""
+    """Why, and what to do about it."""
 
 
-class Findings(NamedTuple):
-    """What one benchmark found."""
+class BenchmarkResult(NamedTuple):
+    """What one benchmark measured."""
 
-    figures: list[Figure]
+    measurements: list[Measurement]
     skipped: list[Skipped]
     show: Callable[["Console"], None]
-    """Prints it for a person."""
+    """Prints the result as a table."""
 
 
-class Results(NamedTuple):
-    """What a results file holds."""
+class SavedResults(NamedTuple):
+    """The content of a results file."""
 
-    figures: list[Figure]
+    measurements: list[Measurement]
     skipped: list[Skipped]
     machine: dict[str, Any]
     versions: dict[str, str]
     load: float
-    """Programs that ran on the machine in the minute before, on average."""
+    """Mean number of running programs on the machine in the minute before the start."""
 
 
-def of_times(
-    benchmark: str,
-    case: str,
-    tetrahedra: int | None,
-    quantity: str,
-    unit: str,
-    rounds: Sequence[FloatArray],
-    *,
-    clock: str,
-    better: str = LOWER,
-    convert: Callable[[float], float],
-    note: str = "",
-) -> Figure:
-    """Return the figure of samples [s] of each round.
+def summarise_times(
+    quantity: Quantity, rounds: Sequence[FloatArray], convert: Callable[[float], float]
+) -> Measurement:
+    """Return the measurement of a quantity that follows from timed samples.
 
     Args:
-        benchmark: Its name.
-        case: What was measured.
-        tetrahedra: Of the body.
-        quantity: What the figure tells.
-        unit: Of the figure.
-        rounds: Samples, an array for each round.
-        clock: What the samples are told by.
-        better: Which way.
-        convert: From seconds to the figure; falls with the time where higher is better.
-        note: What to know.
+        quantity: What was measured.
+        rounds: Samples [s], an array for each round.
+        convert: From seconds to the unit of the quantity; it falls with time where higher values
+            are better.
     """
     samples = np.concatenate(rounds)
     median, p95, p99 = (convert(float(q)) for q in np.percentile(samples, (50, 95, 99)))
     medians = [convert(float(np.median(samples))) for samples in rounds]
-    return Figure(
-        benchmark, case, tetrahedra, quantity, unit, clock, better, len(samples),
-        median, p95, p99, min(medians), max(medians), len(rounds), note,
-    )  # fmt: skip
+    return Measurement(
+        **quantity._asdict(),
+        n=len(samples),
+        median=median,
+        p95=p95,
+        p99=p99,
+        lowest=min(medians),
+        highest=max(medians),
+        rounds=len(rounds),
+    )
 
 
-def of_values(
-    benchmark: str,
-    case: str,
-    tetrahedra: int | None,
-    quantity: str,
-    unit: str,
-    values: Sequence[float],
-    *,
-    clock: str,
-    better: str,
-    note: str = "",
-) -> Figure:
-    """Return the figure of one value for each round; the worst of them are its percentiles."""
-    worst = 100.0 if better == HIGHER else 0.0
-    median, p95, p99 = (float(np.percentile(values, abs(worst - q))) for q in (50, 95, 99))
-    return Figure(
-        benchmark, case, tetrahedra, quantity, unit, clock, better, len(values),
-        median, p95, p99, float(min(values)), float(max(values)), len(values), note,
-    )  # fmt: skip
+def summarise_values(quantity: Quantity, values: Sequence[float]) -> Measurement:
+    """Return the measurement of a quantity with one value for each round."""
+    best = 100.0 if quantity.better == HIGHER else 0.0
+    median, p95, p99 = (float(np.percentile(values, abs(best - q))) for q in (50, 95, 99))
+    return Measurement(
+        **quantity._asdict(),
+        n=len(values),
+        median=median,
+        p95=p95,
+        p99=p99,
+        lowest=float(min(values)),
+        highest=float(max(values)),
+        rounds=len(values),
+    )
 
 
-def results_of(found: Sequence[Findings], load: float) -> Results:
-    """Return all that benchmarks found, with what it depends on; `load` is that at the start."""
-    return Results(
-        figures=[figure for each in found for figure in each.figures],
+def collect_results(found: Sequence[BenchmarkResult], load: float) -> SavedResults:
+    """Return the results of all benchmarks with machine and versions.
+
+    Args:
+        found: Results of the benchmarks.
+        load: Load of the machine at the start.
+    """
+    return SavedResults(
+        measurements=[measurement for each in found for measurement in each.measurements],
         skipped=[skipped for each in found for skipped in each.skipped],
-        machine=machine.description(),
+        machine=describe_machine(),
         versions=versions(),
         load=load,
     )
 
 
-def as_json(results: Results) -> str:
+def results_as_json(results: SavedResults) -> str:
     """Return results as JSON text."""
     content = {
         "format": FORMAT,
         "machine": results.machine,
         "versions": results.versions,
         "load": results.load,
-        "figures": [figure._asdict() for figure in results.figures],
+        "figures": [measurement._asdict() for measurement in results.measurements],
         "skipped": [skipped._asdict() for skipped in results.skipped],
     }
     return json.dumps(content, indent=2, allow_nan=False)
 
 
-def save(path: Path, text: str) -> None:
+def save_results(path: Path, text: str) -> None:
     """Write a results file.
 
     Raises:
-        RunError: the system refuses.
+        RunError: the file cannot be written.
     """
     try:
         path.write_text(text + "\n", encoding="utf-8")
@@ -180,11 +184,11 @@ def save(path: Path, text: str) -> None:
         ) from error
 
 
-def load(path: Path) -> Results:
+def load_results(path: Path) -> SavedResults:
     """Read a results file.
 
     Raises:
-        UsageError: it is not there, cannot be read, or is no results file of this format.
+        UsageError: the file is missing or unreadable, or is no results file of this format.
     """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -201,9 +205,9 @@ def load(path: Path) -> Results:
             f'"format": "{FORMAT}"; make one with scalpel-sim bench --save FILE'
         )
     try:
-        return Results(
-            figures=[Figure(**figure) for figure in content["figures"]],
-            skipped=[Skipped(**skipped) for skipped in content["skipped"]],
+        return SavedResults(
+            measurements=[Measurement(**each) for each in content["figures"]],
+            skipped=[Skipped(**each) for each in content["skipped"]],
             machine=content["machine"],
             versions=content["versions"],
             load=float(content["load"]),

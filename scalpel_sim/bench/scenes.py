@@ -1,12 +1,20 @@
-"""Whole runs of the scenes: what a frame of arm, bridge and tissue costs on the wall."""
+"""Whole runs of the scenes: the wall time of a frame of arm, bridge and tissue."""
 
 from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
-from scalpel_sim.bench.results import HIGHER, NEITHER, Figure, Findings, of_times, of_values
-from scalpel_sim.bench.tables import print_figures
+from scalpel_sim.bench.results import (
+    HIGHER,
+    NEITHER,
+    BenchmarkResult,
+    Measurement,
+    Quantity,
+    summarise_times,
+    summarise_values,
+)
+from scalpel_sim.bench.tables import print_measurements
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.output.recording import Recording
@@ -14,92 +22,95 @@ from scalpel_sim.output.summary import STAGES
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES, scene_called
 from scalpel_sim.simulation import Simulation
+from tissue import FloatArray
 
 _MS_PER_S = 1e3
 
 _ABOUT = (
-    "Each scene's whole stroke; no pictures, no files. A frame is 1 ms of life: arm, bridge, "
-    "search (CD), cut (GC), relaxation (RX). In the tissue: frames with the blade in it. Late: "
-    "frames that took longer than the time that they stand for. Wall time: other work on the "
-    "machine counts. Real-time factor: seconds of life a second."
+    "The whole stroke of each scene, without pictures or files. A frame simulates 1 ms: arm, "
+    "bridge, collision detection (CD), cut (GC), relaxation (RX). In the tissue: frames with the "
+    "blade in it. Late: frames that took longer than the time that they simulate. Wall time: other "
+    "work on the machine counts. Real-time factor: simulated seconds per second."
 )
 
 
-def check_names(names: Sequence[str]) -> list[str]:
-    """Return the scenes that are asked for, all if none is.
+def checked_scene_names(names: Sequence[str]) -> list[str]:
+    """Return the names of the scenes asked for, all where none is named.
 
     Raises:
-        UsageError: there is no such scene.
+        UsageError: there is no scene of that name.
     """
     return [scene_called(name).name for name in names] or list(SCENES)
 
 
-def measure(
+def measure_scenes(
     n_rounds: int, names: Sequence[str], watch: Watch = SILENT, seconds: float | None = None
-) -> Findings:
-    """Run each scene once in each round; `seconds` of it, or its whole stroke."""
-    _run(min(names, key=list(SCENES)[::-1].index), 2e-2)  # the kernels are loaded
+) -> BenchmarkResult:
+    """Run each scene once in each round.
+
+    Args:
+        n_rounds: Number of rounds.
+        names: Scenes.
+        watch: Receives the progress.
+        seconds: How long to simulate [s]; None: the whole stroke.
+    """
+    _run_scene(min(names, key=list(SCENES)[::-1].index), 2e-2)  # loads the kernels
     watch.begin(n_rounds * len(names))
     runs: dict[str, list[Recording]] = {name: [] for name in names}
     sizes: dict[str, int] = {}
     for _ in range(n_rounds):
         for name in names:
-            simulation, sizes[name] = _run(name, seconds)
+            simulation, sizes[name] = _run_scene(name, seconds)
             runs[name].append(simulation.recording)
             watch.tick(name)
-    figures = [f for name in names for f in _figures(name, sizes[name], runs[name])]
-    return Findings(figures, [], partial(print_figures, "scenes", figures, [], about=_ABOUT))
+    measured = [each for name in names for each in _measurements(name, sizes[name], runs[name])]
+    show = partial(print_measurements, "scenes", measured, [], about=_ABOUT)
+    return BenchmarkResult(measured, [], show)
 
 
-def _run(name: str, seconds: float | None) -> tuple[Simulation, int]:
-    """Do one run; return it, and the tetrahedra that it began with."""
+def _run_scene(name: str, seconds: float | None) -> tuple[Simulation, int]:
+    """Run a scene once; return the run, and the number of tetrahedra at its start."""
     simulation = prepare(SCENES[name])
     n_tetrahedra = simulation.link.describe().n_tetrahedra
     simulation.run(simulation.stroke.duration if seconds is None else seconds)
     return simulation, n_tetrahedra
 
 
-def _figures(name: str, size: int, runs: Sequence[Recording]) -> list[Figure]:
-    """Return the figures of one scene."""
+def _measurements(name: str, size: int, runs: Sequence[Recording]) -> list[Measurement]:
+    """Return the measurements of one scene."""
 
-    def of_frames(case: str, rounds: list[np.ndarray]) -> Figure:
-        return of_times(
-            "scenes", f"{name}: {case}", size, "time", "ms", rounds,
-            clock=WALL.name, convert=lambda s: _MS_PER_S * s,
-        )  # fmt: skip
+    def frame_time(case: str, rounds: list[FloatArray]) -> Measurement:
+        quantity = Quantity("scenes", f"{name}: {case}", size, "time", "ms", WALL.name)
+        return summarise_times(quantity, rounds, lambda s: _MS_PER_S * s)
 
     frames = [run.column("frame_s") for run in runs]
-    figures = [of_frames("frame", frames)]
+    measured = [frame_time("frame", frames)]
     inside = [run.column("anchored_length_m") > 0.0 for run in runs]
     if all(each.any() for each in inside):
-        figures.append(
-            of_frames("frame, blade in the tissue",
-                      [f[i] for f, i in zip(frames, inside, strict=True)])
-        )  # fmt: skip
+        with_blade = [f[i] for f, i in zip(frames, inside, strict=True)]
+        measured.append(frame_time("frame, blade in the tissue", with_blade))
     for stage, column in STAGES.items():
         if stage != "RD":
-            figures.append(of_frames(stage, [run.column(column) for run in runs]))
+            measured.append(frame_time(stage, [run.column(column) for run in runs]))
     for case, unit, better, values in (
-        ("real-time factor", "s/s", HIGHER, [_speed(run) for run in runs]),
-        ("late frames", "%", NEITHER, [_late(run) for run in runs]),
+        ("real-time factor", "s/s", HIGHER, [_real_time_factor(run) for run in runs]),
+        ("late frames", "%", NEITHER, [_late_share(run) for run in runs]),
     ):
-        figures.append(
-            of_values("scenes", f"{name}: {case}", size, case, unit, values,
-                      clock=WALL.name, better=better)
-        )  # fmt: skip
-    return figures
+        quantity = Quantity("scenes", f"{name}: {case}", size, case, unit, WALL.name, better)
+        measured.append(summarise_values(quantity, values))
+    return measured
 
 
-def _speed(run: Recording) -> float:
-    """Return how much faster than life it was."""
-    return len(run) * _frame(run) / float(run.column("frame_s").sum())
+def _real_time_factor(run: Recording) -> float:
+    """Return simulated time over wall time."""
+    return len(run) * _frame_dt(run) / float(run.column("frame_s").sum())
 
 
-def _late(run: Recording) -> float:
+def _late_share(run: Recording) -> float:
     """Return the share of frames that missed their deadline [%]."""
-    return 100.0 * float((run.column("frame_s") > _frame(run)).mean())
+    return 100.0 * float((run.column("frame_s") > _frame_dt(run)).mean())
 
 
-def _frame(run: Recording) -> float:
+def _frame_dt(run: Recording) -> float:
     """Return the simulated time of a frame [s]."""
     return float(np.diff(run.column("time_s")[:2])[0])

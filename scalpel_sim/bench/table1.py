@@ -1,7 +1,7 @@
-"""The paper's Table 1: three grids cut part of the way, by each scheme, beside the printed figures.
+"""The paper's Table 1: three grids, cut partly through by each scheme, beside the paper's figures.
 
 The whole loop runs, as in the paper: read the arm, CD, GC, RX, force to the arm, and RD, a picture
-as the live view has it. Frames count while the blade is in the tissue.
+as in the live view. Only frames with the blade in the tissue count.
 """
 
 from collections.abc import Sequence
@@ -16,10 +16,12 @@ from scalpel_sim.bench.results import (
     HIGHER,
     LOWER,
     NEITHER,
-    Figure,
-    Findings,
-    of_values,
+    BenchmarkResult,
+    Measurement,
+    Quantity,
+    summarise_values,
 )
+from scalpel_sim.bench.tables import compact_table
 from scalpel_sim.bench.timing import WALL
 from scalpel_sim.bench.watch import SILENT, Watch
 from scalpel_sim.output.recording import Recording
@@ -33,7 +35,7 @@ from scalpel_sim.viewer.messages import UPDATES_PER_SECOND
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.pictures import readings
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from tissue import block
+from tissue import FloatArray, block
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -42,80 +44,83 @@ _Cells = tuple[int, int, int]
 
 _CELL = 0.01
 """Side of a cell [m]; the paper has no lengths."""
-_WAY = np.array([[0.38, -0.4], [0.38, 1.6]])
-"""Straight through, off the planes of each grid, and on behind the body: the blade drags tissue."""
-DEPTHS = {(2, 2, 2): 0.58, (2, 4, 3): 0.58, (4, 6, 4): 0.7}
-"""How far the blade goes down, as a share of the height: part of the way, so that the paper's
-scheme splits 18, 48 and 108 tetrahedra. The paper's counts tell of 18, 48 and 110."""
+_PATH = np.array([[0.38, -0.4], [0.38, 1.6]])
+"""Path of the blade, as shares of the grid's sides: straight through, off the planes of each grid,
+and beyond the body, since the blade drags tissue along."""
+_DEPTHS = {(2, 2, 2): 0.58, (2, 4, 3): 0.58, (4, 6, 4): 0.7}
+"""Depth of the blade as a share of the height, chosen so that the paper's scheme splits 18, 48 and
+108 tetrahedra. The paper's counts imply 18, 48 and 110."""
 
 
-class Row(NamedTuple):
+class GridRow(NamedTuple):
     """One grid, cut by one scheme on this machine; medians over runs."""
 
     cells: _Cells
     scheme: str
     tetrahedra_initial: int
     tetrahedra_final: int
-    """In the paper's scheme by the paper's count, in which a tetrahedron that was split stays."""
+    """Number of tetrahedra after the cut. In the paper's scheme this is its own count, which keeps
+    tetrahedra that were split."""
     frame_rate: float
-    """Frames of 1 ms a second while the blade is in the tissue, pictures included, mean."""
+    """Mean number of frames of 1 ms per second with the blade in the tissue, pictures included."""
     percent: dict[str, float]
-    """RX, RD, GC, CD, and `other`: arm and bridge. They sum to 100 within a run."""
+    """Share of the time of RX, RD, GC, CD, and `other`: arm and bridge. They sum to 100 within a
+    run."""
     picture_ms: float
-    """What one picture costs [ms], median: the surface, and the message that shows it."""
+    """Median time of one picture [ms]: the surface, and the message that shows it."""
 
 
-def measure(n_rounds: int, schemes: Sequence[str] = SCHEMES, watch: Watch = SILENT) -> Findings:
-    """Return what each grid and scheme costs, over so many rounds, in which they take turns."""
+def measure_table1(
+    n_rounds: int, schemes: Sequence[str] = SCHEMES, watch: Watch = SILENT
+) -> BenchmarkResult:
+    """Cut each grid by each scheme once in each round, in turns."""
     cases = [(cells, scheme) for cells in TABLE_1 for scheme in schemes]
     for scheme in schemes:
-        _run(next(iter(TABLE_1)), scheme)  # every kernel is loaded
+        _cut_grid(next(iter(TABLE_1)), scheme)  # loads the kernels
     watch.begin(n_rounds * len(cases))
     rounds = [[_turn(case, watch) for case in cases] for _ in range(n_rounds)]
     runs = list(zip(*rounds, strict=True))
-    figures = [figure for each in runs for figure in _figures(each)]
-    return Findings(figures, [], partial(print_rows, [_median(each) for each in runs]))
+    measured = [measurement for each in runs for measurement in _measurements(each)]
+    return BenchmarkResult(measured, [], partial(print_rows, [_median(each) for each in runs]))
 
 
-def _turn(case: tuple[_Cells, str], watch: Watch) -> Row:
-    """Do one cut, and say so."""
-    row = _run(*case)
+def _turn(case: tuple[_Cells, str], watch: Watch) -> GridRow:
+    """Cut one grid and report the turn."""
+    row = _cut_grid(*case)
     watch.tick(f"{'x'.join(map(str, row.cells))} cells, {row.scheme}")
     return row
 
 
-def _figures(runs: Sequence[Row]) -> list[Figure]:
-    """Return the figures of one grid and scheme."""
+def _measurements(runs: Sequence[GridRow]) -> list[Measurement]:
+    """Return the measurements of one grid and scheme."""
     first = runs[0]
     case = f"{'x'.join(map(str, first.cells))} cells, {first.scheme}"
 
-    def figure(quantity: str, unit: str, values: list[float], clock: str, better: str) -> Figure:
-        size = first.tetrahedra_initial
-        return of_values("table1", case, size, quantity, unit, values, clock=clock, better=better)
+    def measurement(
+        name: str, unit: str, values: list[float], clock: str, better: str
+    ) -> Measurement:
+        quantity = Quantity(
+            "table1", case, first.tetrahedra_initial, name, unit, clock, better=better
+        )
+        return summarise_values(quantity, values)
 
+    shares = {stage: [row.percent[stage] for row in runs] for stage in first.percent}
+    finals: list[float] = [row.tetrahedra_final for row in runs]
     return [
-        figure("frames", "1/s", [r.frame_rate for r in runs], WALL.name, HIGHER),
-        figure("a picture", "ms", [r.picture_ms for r in runs], WALL.name, LOWER),
+        measurement("frames", "1/s", [row.frame_rate for row in runs], WALL.name, HIGHER),
+        measurement("a picture", "ms", [row.picture_ms for row in runs], WALL.name, LOWER),
         *(
-            figure(f"share of {stage}", "%", [r.percent[stage] for r in runs], WALL.name, NEITHER)
-            for stage in first.percent
+            measurement(f"share of {stage}", "%", values, WALL.name, NEITHER)
+            for stage, values in shares.items()
         ),
-        figure("after the cut", "tetrahedra", [r.tetrahedra_final for r in runs], COUNTED, NEITHER),
+        measurement("after the cut", "tetrahedra", finals, COUNTED, NEITHER),
     ]
 
 
-def print_rows(rows: Sequence[Row], console: "Console") -> None:
+def print_rows(rows: Sequence[GridRow], console: "Console") -> None:
     """Print the rows below the paper's."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(
-        title="Table 1 of Bielser, Maiwald, Gross (1998); RX to other in % of the time",
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        collapse_padding=True,
-        pad_edge=False,
-    )
+    title = "Table 1 of Bielser, Maiwald, Gross (1998); RX to other in % of the time"
+    table = compact_table(title)
     table.add_column("cells", no_wrap=True)
     table.add_column("scheme", no_wrap=True)
     for heading in ("before", "after", "frames/s", *STAGES, "other"):
@@ -148,54 +153,54 @@ def print_rows(rows: Sequence[Row], console: "Console") -> None:
     pictures = ", ".join(f"{row.picture_ms:.1f}" for row in rows)
     console.print(
         f"Before, after: tetrahedra. Paper 1998: as printed, {MACHINE}; the others: this machine. "
-        "RX relaxation, RD rendering, GC geometry and topology, CD collision detection; other: "
-        "here arm and bridge.\n"
-        f"A frame here is 1 ms of life. RD is what the live view costs us: {UPDATES_PER_SECOND:g} "
-        f"pictures a second of it, {pictures} ms each (surface and message; the browser draws "
-        "them elsewhere).\n"
-        "In the paper's scheme tetrahedra are counted as the paper does: 17 more for each that is "
-        "split, which stays in the count.",
+        "RX relaxation, RD rendering, GC geometry and topology, CD collision detection; other, "
+        "here: arm and bridge.\n"
+        f"A frame here simulates 1 ms. RD is the cost of the live view: {UPDATES_PER_SECOND:g} "
+        f"pictures per simulated second, {pictures} ms each (surface and message; the browser "
+        "draws them in another process).\n"
+        "The paper's scheme counts tetrahedra as the paper does: 17 more for each that is split, "
+        "which stays in the count.",
         style="dim",
     )
 
 
-def _run(cells: _Cells, scheme: str) -> Row:
-    """Do one cut."""
+def _cut_grid(cells: _Cells, scheme: str) -> GridRow:
+    """Cut one grid."""
     size = [_CELL * n for n in cells]
     scene = Scene("table1", "a grid of the paper", lambda: block(cells, size), scheme=scheme)
     tissue = make_tissue(scene)
     n_before = tissue.n_tetrahedra
-    simulation = prepare_cut(PlannedCut(scene, _WAY, DEPTHS[cells]), tissue)
-    spent_on: list[float] = []
-    simulation.pictures.append(_into_nothing(simulation, spent_on))
+    simulation = prepare_cut(PlannedCut(scene, _PATH, _DEPTHS[cells]), tissue)
+    picture_seconds: list[float] = []
+    simulation.pictures.append(_picture_timer(simulation, picture_seconds))
     simulation.run(simulation.stroke.duration)
     statistics = tissue.scheme_statistics()
     rows = _during_cut(simulation.recording)
-    seconds = {stage: float(rows[name].sum()) for stage, name in STAGES.items()}
-    total = float(rows["frame_s"].sum()) + seconds["RD"]
-    percent = {stage: 100.0 * spent / total for stage, spent in seconds.items()}
-    return Row(
+    spent = {stage: float(rows[name].sum()) for stage, name in STAGES.items()}
+    total = float(rows["frame_s"].sum()) + spent["RD"]
+    percent = {stage: 100.0 * seconds / total for stage, seconds in spent.items()}
+    return GridRow(
         cells=cells,
         scheme=scheme,
         tetrahedra_initial=n_before,
         tetrahedra_final=tissue.n_tetrahedra if statistics is None else statistics.paper_count,
         frame_rate=len(rows["frame_s"]) / total,
         percent=percent | {"other": 100.0 - sum(percent.values())},
-        picture_ms=1e3 * float(np.median(spent_on)),
+        picture_ms=1e3 * float(np.median(picture_seconds)),
     )
 
 
-def _during_cut(recording: Recording) -> dict[str, np.ndarray]:
+def _during_cut(recording: Recording) -> dict[str, FloatArray]:
     """Return the times of the frames from the first with the blade in the tissue to the last."""
     inside = np.flatnonzero(recording.column("anchored_length_m") > 0.0)
     frames = slice(inside[0], inside[-1] + 1)
     return {name: recording.column(name)[frames] for name in (*STAGES.values(), "frame_s")}
 
 
-def _into_nothing(simulation: Simulation, spent_on: list[float]) -> DrawFrame:
-    """Return what makes the live view's pictures at its rate, and shows them to nobody.
+def _picture_timer(simulation: Simulation, seconds: list[float]) -> DrawFrame:
+    """Return a callback that makes the live view's pictures at its rate and discards them.
 
-    It adds the time [s] that each takes to `spent_on`.
+    It appends the time that each takes [s] to `seconds`.
     """
     stage = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
     stage.opening(simulation.link.surface(), body_poses(simulation.arm.data))
@@ -205,13 +210,13 @@ def _into_nothing(simulation: Simulation, spent_on: list[float]) -> DrawFrame:
         if len(now.recording) % every == 0:
             start = perf_counter()
             stage.frame(now.link.surface(), body_poses(now.arm.data), readings(now))
-            spent_on.append(perf_counter() - start)
+            seconds.append(perf_counter() - start)
 
     return picture
 
 
-def _median(runs: Sequence[Row]) -> Row:
-    """Return the median of each figure; counts are the same in every run."""
+def _median(runs: Sequence[GridRow]) -> GridRow:
+    """Return the median of each number; counts are the same in every run."""
     first = runs[0]
     stages = first.percent
     return first._replace(

@@ -1,4 +1,4 @@
-"""Timing: cases take turns in rounds, so that what disturbs the machine disturbs them all alike."""
+"""Timing: cases take turns in rounds, so that a disturbance of the machine affects all alike."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -11,28 +11,28 @@ from scalpel_sim.simulation import no_garbage_collection
 from tissue import FloatArray
 
 _TURN = 0.1
-"""How long a case runs in each round [s]: long against a time slice of the system, short against
-what changes on a shared machine."""
+"""How long a case runs in each round [s]: long beside a time slice of the operating system, short
+beside the changes of load on a shared machine."""
 LEAST_SAMPLES = 3
-"""Of a case in each round, where one takes longer than its turn."""
+"""Fewest samples of a case in a round, where one sample takes longer than its turn."""
 SHORTEST_SAMPLE = 2e-4
-"""Time that a sample takes at least [s]: as many calls as it needs are timed together. Reading the
-clock takes 0.5 µs of it; with shorter samples that would be seen."""
+"""Least duration of a sample [s]: as many calls as this needs are timed together. Reading the
+clock takes 0.5 µs of it; in shorter samples that would show."""
 
 
 class Clock(NamedTuple):
-    """What time is told by."""
+    """A clock that a case is timed with."""
 
     name: str
     now: Callable[[], float]
-    """Time [s] since some moment."""
+    """Returns the time since some fixed moment [s]."""
 
 
 CPU = Clock("CPU", time.thread_time)
-"""What the processor spent on this thread: other work on the machine does not count, except that it
-takes its share of caches and memory. For kernels, which do nothing but compute."""
+"""CPU time of this thread: other work on the machine does not count, except that it takes its share
+of caches and memory. For kernels, which do nothing but compute."""
 WALL = Clock("wall", time.perf_counter)
-"""What a person waits for. For frames, whose deadline is on the wall."""
+"""Wall time, what a person waits for. For frames, whose deadline is in wall time."""
 
 
 class Case(NamedTuple):
@@ -40,10 +40,10 @@ class Case(NamedTuple):
 
     name: str
     run: Callable[[int], None]
-    """Does it so many times."""
+    """Executes the case the given number of times."""
 
 
-def interleaved(
+def time_in_turns(
     cases: Sequence[Case],
     n_rounds: int,
     *,
@@ -51,26 +51,37 @@ def interleaved(
     turn: float = _TURN,
     watch: Watch = SILENT,
 ) -> list[list[FloatArray]]:
-    """Return the seconds that each sample took a call: for each case, an array for each round.
+    """Time the cases in turns; return the seconds per call of each sample.
 
-    Every turn begins with a call that is not timed, so that the case finds the caches as it would
-    leave them. Odd rounds go backwards, so that none always comes after the same other.
+    Every turn begins with a call that is not timed, so that the case finds the caches as its own
+    last call left them. Every other round runs in reverse order, so that no case always follows
+    the same one.
+
+    Args:
+        cases: What to time.
+        n_rounds: Rounds; every case has one turn in each.
+        clock: What to time with.
+        turn: Least duration of a turn [s].
+        watch: Receives the progress.
+
+    Returns:
+        For each case one array of samples for each round.
     """
     taken: list[list[FloatArray]] = [[] for _ in cases]
-    n_calls = [calls_of_a_sample(case.run, clock) for case in cases]
+    n_calls = [calls_per_sample(case.run, clock) for case in cases]
     order = list(range(len(cases)))
     watch.begin(n_rounds * len(cases))
     with no_garbage_collection():
         for _ in range(n_rounds):
             for i in order:
-                taken[i].append(sampled(cases[i].run, n_calls[i], clock, turn))
+                taken[i].append(time_turn(cases[i].run, n_calls[i], clock, turn))
                 watch.tick(cases[i].name)
             order.reverse()
     return taken
 
 
-def calls_of_a_sample(run: Callable[[int], None], clock: Clock) -> int:
-    """Return how many calls make a sample; the first calls load and compile, and are not timed."""
+def calls_per_sample(run: Callable[[int], None], clock: Clock) -> int:
+    """Return how many calls make up a sample; the first call, which compiles, is not timed."""
     run(1)
     n_calls = 1
     while True:
@@ -82,8 +93,8 @@ def calls_of_a_sample(run: Callable[[int], None], clock: Clock) -> int:
         n_calls *= 2
 
 
-def sampled(run: Callable[[int], None], n_calls: int, clock: Clock, turn: float) -> FloatArray:
-    """Return the seconds a call in each sample of one turn."""
+def time_turn(run: Callable[[int], None], n_calls: int, clock: Clock, turn: float) -> FloatArray:
+    """Run one turn of a case; return the seconds per call of each sample."""
     run(1)
     samples: list[float] = []
     begin = clock.now()

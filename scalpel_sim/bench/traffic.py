@@ -1,83 +1,84 @@
 """What a Runge-Kutta step of springs must move and compute, counted stage by stage.
 
-Counted by hand from `tissue.elasticity.spring_forces` and `tissue.integrators.runge_kutta`, as the
-loops are written: a
-change of either is a change here. What a row gathers of its neighbours is not counted as bytes: the
-same sweep reads them anyway.
+The numbers are counted by hand from `tissue.elasticity.spring_forces` and
+`tissue.integrators.runge_kutta`, as the loops are written: a change of either is a change here.
+What a row gathers from its neighbours is not counted as bytes: the same pass over the nodes reads
+them anyway.
 """
 
 from typing import NamedTuple
 
-from tissue.core.simd import WIDTH
+from scalpel_sim.bench.engine import VECTOR_LENGTH
 
-VECTOR = 24
+VECTOR_BYTES = 24
 """Bytes of a position, velocity or force."""
-NODE = 8 + 8 + 8 + 1
-"""Bytes of a node's row (where, how long), its mass, and whether it is held."""
-ELASTIC_SLOT = 4 + 8 + 8
-"""Bytes of a place in a row: neighbour, stiffness, rest pull."""
-DAMPING_SLOT = 4 + 8
-"""Without the rest pull."""
+NODE_BYTES = 8 + 8 + 8 + 1
+"""Bytes of a node's row (start and length), its mass, and whether it is held."""
+ELASTIC_SLOT_BYTES = 4 + 8 + 8
+"""Bytes of a slot of a row: neighbour, stiffness, rest pull."""
+DAMPING_SLOT_BYTES = 4 + 8
+"""Bytes of a slot of a row without the rest pull."""
 
 
-class Sweep(NamedTuple):
-    """One stage, over all rows."""
+class StageCost(NamedTuple):
+    """What one stage of the step moves and computes, as it passes over all rows."""
 
     slot_bytes: int
-    """Of each place in a row."""
+    """Bytes of each slot of a row."""
     slot_flops: int
-    """A square root or a division counts as one."""
-    vectors: int
-    """Read or written, of each node."""
+    """Operations for each slot; a square root or a division counts as one."""
+    node_vectors: int
+    """Vectors of each node that are read or written."""
     node_flops: int
-    """Besides those of its row."""
+    """Operations for each node besides those of its row."""
 
 
 _FIRST, _LAST = (3 + 3, 34), (3 + 2, 22)
-DAMPED = (
-    Sweep(ELASTIC_SLOT, 32, *_FIRST),
-    Sweep(ELASTIC_SLOT, 32, 3 + 1 + 2, 22),
-    Sweep(DAMPING_SLOT, 25, 3 + 3 + 4, 58),
-    Sweep(ELASTIC_SLOT, 32, *_LAST),
+DAMPED_STAGES = (
+    StageCost(ELASTIC_SLOT_BYTES, 32, *_FIRST),
+    StageCost(ELASTIC_SLOT_BYTES, 32, 3 + 1 + 2, 22),
+    StageCost(DAMPING_SLOT_BYTES, 25, 3 + 3 + 4, 58),
+    StageCost(ELASTIC_SLOT_BYTES, 32, *_LAST),
 )
-"""Forces and dampers at three positions, and dampers once more at the second of them."""
-_UNDAMPED = (
-    Sweep(ELASTIC_SLOT, 18, *_FIRST),
-    Sweep(ELASTIC_SLOT, 18, 3 + 3 + 4, 70),
-    Sweep(ELASTIC_SLOT, 18, *_LAST),
+"""Forces and dampers at three positions, and dampers once more at the second position."""
+_UNDAMPED_STAGES = (
+    StageCost(ELASTIC_SLOT_BYTES, 18, *_FIRST),
+    StageCost(ELASTIC_SLOT_BYTES, 18, 3 + 3 + 4, 70),
+    StageCost(ELASTIC_SLOT_BYTES, 18, *_LAST),
 )
-"""Without dampers the second and the third acceleration are one."""
+"""Without dampers the second and the third acceleration are the same."""
 
-VECTORS_OF_A_NODE = 9
-"""Positions, velocities, and the seven of scratch: what a step touches."""
+VECTORS_PER_NODE = 9
+"""Vectors of a node that a step touches: position, velocity, and seven of scratch."""
 
 
-class Traffic(NamedTuple):
+class StepTraffic(NamedTuple):
     """What one step must move and compute."""
 
     n_springs: int
     n_slots: int
-    """Places in the rows: each spring has two, and rows are filled up to whole vectors."""
+    """Slots in the rows: each spring has two, and rows are filled up to whole vectors."""
     n_bytes: int
-    """Read and written by one step, if nothing stayed in a cache from stage to stage."""
+    """Bytes that a step reads and writes, if nothing stayed in a cache from stage to stage."""
     n_flops: int
-    """Of one step."""
+    """Operations of a step."""
     working_set: int
     """Bytes of all arrays that a step touches: the cache that holds them feeds it."""
 
 
-def traffic(row_lengths: list[int], *, is_damped: bool) -> Traffic:
-    """Return the traffic of a step of nodes with so many springs each."""
+def step_traffic(row_lengths: list[int], *, is_damped: bool) -> StepTraffic:
+    """Return the traffic of a step of nodes with these numbers of springs."""
     n_nodes = len(row_lengths)
-    n_slots = sum(-(-length // WIDTH) * WIDTH for length in row_lengths)
-    sweeps = DAMPED if is_damped else _UNDAMPED
-    return Traffic(
+    n_slots = sum(-(-length // VECTOR_LENGTH) * VECTOR_LENGTH for length in row_lengths)
+    stages = DAMPED_STAGES if is_damped else _UNDAMPED_STAGES
+    return StepTraffic(
         n_springs=sum(row_lengths) // 2,
         n_slots=n_slots,
         n_bytes=sum(
-            sweep.slot_bytes * n_slots + (VECTOR * sweep.vectors + NODE) * n_nodes
-            for sweep in sweeps
+            stage.slot_bytes * n_slots + (VECTOR_BYTES * stage.node_vectors + NODE_BYTES) * n_nodes
+            for stage in stages
         ),
-        n_flops=sum(sweep.slot_flops * n_slots + sweep.node_flops * n_nodes for sweep in sweeps),
-        working_set=ELASTIC_SLOT * n_slots + (VECTOR * VECTORS_OF_A_NODE + NODE) * n_nodes,
+        n_flops=sum(stage.slot_flops * n_slots + stage.node_flops * n_nodes for stage in stages),
+        working_set=ELASTIC_SLOT_BYTES * n_slots
+        + (VECTOR_BYTES * VECTORS_PER_NODE + NODE_BYTES) * n_nodes,
     )

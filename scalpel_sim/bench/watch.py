@@ -12,20 +12,20 @@ if TYPE_CHECKING:
 
 
 class Watch:
-    """Told how far a benchmark is; this one says nothing."""
+    """Receives the progress of a benchmark; this base class ignores it."""
 
     def begin(self, n_turns: int) -> None:
-        """Expect so many turns."""
+        """Expect this many turns."""
 
     def tick(self, name: str) -> None:
-        """Take note that a turn of the case is over."""
+        """Count one turn of the case `name` as done."""
 
 
 SILENT = Watch()
 
 
-class Bar(Watch):
-    """Shows a bar; each benchmark begins a new one."""
+class ProgressWatch(Watch):
+    """Draws a progress bar, a new one for each benchmark."""
 
     def __init__(self, progress: "Progress") -> None:
         self._progress = progress
@@ -36,13 +36,13 @@ class Bar(Watch):
         self._progress.reset(self._task, total=n_turns, description="measuring")
 
     def tick(self, name: str) -> None:
-        """Move the bar."""
+        """Advance the bar by one turn."""
         self._progress.update(self._task, advance=1, description=name, refresh=True)
 
 
 @contextmanager
 def watching(printing: PrintOptions) -> Iterator[Watch]:
-    """Yield a bar if a person is looking at one."""
+    """Yield a progress bar where standard error is a terminal, else a silent watch."""
     if printing.quiet or not sys.stderr.isatty():
         yield SILENT
         return
@@ -54,4 +54,4 @@ def watching(printing: PrintOptions) -> Iterator[Watch]:
     with Progress(
         *columns, console=Console(stderr=True), transient=True, auto_refresh=False
     ) as progress:
-        yield Bar(progress)
+        yield ProgressWatch(progress)

@@ -15,6 +15,7 @@ from scalpel_sim.bench.commands import bench
 from scalpel_sim.cli.console import log_to_stderr, print_report, progress, say, say_error
 from scalpel_sim.cli.options import (
     CONNECTION,
+    OUTPUT,
     PAGE,
     ArmOptions,
     ClientOptions,
@@ -197,7 +198,11 @@ def _serve(
 def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
     """Write a new random key to a file, for `serve --key` and, copied there, `run --key`.
 
-    Everyone who has the file can connect, so hand it over as you would a password.
+    Everyone who has the file can connect, so hand it over as you would a password. For example:
+
+    ```console
+    scalpel-sim key link.key
+    ```
 
     Args:
         file: Must not exist yet. Only you can read it.
@@ -219,8 +224,8 @@ def _materials(
     name: str | None = None,
     /,
     *,
-    write: Path | None = None,
-    force: Flag = False,
+    write: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
+    force: Annotated[Flag, Parameter(group=OUTPUT)] = False,
     printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Print the materials that --material knows, with the source of each figure.
@@ -262,7 +267,7 @@ def _figure(
     number: FigureNumber,
     /,
     *,
-    output: Path | None = None,
+    output: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
     scheme: str = "stellar",
     printing: PrintOptions = PrintOptions(),
 ) -> None:
@@ -270,6 +275,12 @@ def _figure(
 
     Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
     the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells.
+
+    For example:
+
+    ```console
+    scalpel-sim figure 12 --scheme paper --output paper12.png
+    ```
 
     Args:
         number: 10, 11 or 12.

@@ -27,7 +27,7 @@ _SOLVER = Group("Solver", sort_key=4)
 _ARM = Group("Arm", sort_key=5)
 CONNECTION = Group("Connection", sort_key=6)
 PAGE = Group("Page", sort_key=7)
-_OUTPUT = Group("Output", sort_key=8)
+OUTPUT = Group("Output", sort_key=8)
 
 
 @Parameter(name="*", group=_BODY)
@@ -93,7 +93,7 @@ class BladeOptions:
     """The blade. Single numbers override those of `--blade`."""
 
     blade: Path | None = None
-    "Take the measures of the blade from this FILE.toml; see `materials --write`."
+    "Take the measures of the blade from this FILE.toml, which `materials --write` makes."
     blade_thickness: float | None = None
     """Thickness of the blade [m]; 0: a line, as in the paper. The scenes of the paper have a line,
     all others a scalpel of 0.0004."""
@@ -150,7 +150,7 @@ class ArmOptions:
     coupling_damping: float | None = None
     "Damping of a virtual coupling [N s/m; default: twice what is needed for stability]."
     passivity: bool | None = None
-    "Damp what would give the arm energy out of nothing [default: yes]. It is counted in any case."
+    "Damp motion by which the coupling would create energy [default: yes]. It is counted anyway."
     seconds: float | None = None
     "How long to simulate [s; default: the stroke and 0.3 s more]."
 
@@ -161,12 +161,12 @@ class ClientOptions:
     """A tissue in another process."""
 
     connect: str | None = None
-    "HOST:PORT of a `scalpel-sim serve`, which holds the tissue; else it is in this process."
+    "HOST:PORT of a `scalpel-sim serve`, which holds the tissue [default: it is in this process]."
     key: Path | None = None
     "File with the key of that server [default: the key in SCALPEL_SIM_KEY, if that is set]."
 
 
-@Parameter(name="*", group=_OUTPUT)
+@Parameter(name="*", group=OUTPUT)
 @dataclass(frozen=True)
 class OutputOptions:
     """The files that a run writes."""
@@ -178,7 +178,7 @@ class OutputOptions:
     name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
 
 
-@Parameter(name="*", group=_OUTPUT)
+@Parameter(name="*", group=OUTPUT)
 @dataclass(frozen=True)
 class PrintOptions:
     """What a command prints."""

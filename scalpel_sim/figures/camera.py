@@ -1,4 +1,4 @@
-"""A camera: points in space become places on a picture."""
+"""A camera, which projects points in space to the picture."""
 
 from typing import NamedTuple
 
@@ -7,44 +7,48 @@ import numpy as np
 from tissue import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])
+"""Direction that points up in a picture."""
 
-
-FITTINGS = 4
-"""Times that a view is scaled and moved to fit: each leaves a tenth of what was off."""
+N_FIT_STEPS = 4
+"""How often a view is scaled and moved to fit. Each time a tenth of the error is left."""
 
 
 class Margins(NamedTuple):
-    """What is left free around what is shown, as shares of the picture."""
+    """Free space around the body, as fractions of the picture."""
 
     side: float
+    """Fraction of the width, on the left and on the right."""
     top: float
+    """Fraction of the height."""
     bottom: float
+    """Fraction of the height."""
 
 
 class View(NamedTuple):
-    """A way to look at things: from one point, or along one direction (`reach` is then given)."""
+    """A perspective or parallel projection."""
 
     right: FloatArray
-    """Unit vector, shape (3,)."""
+    """Unit vector to the right of the picture, shape (3,)."""
     up: FloatArray
-    """Unit vector, shape (3,)."""
+    """Unit vector to the top of the picture, shape (3,)."""
     forward: FloatArray
-    """Unit vector, shape (3,)."""
+    """Unit vector into the picture, shape (3,)."""
     eye: FloatArray
-    """Where it looks from [m], shape (3,)."""
+    """Position of the eye [m], shape (3,)."""
     scale: float
-    """Pixels for each metre: one metre ahead of the eye, or anywhere in a parallel view."""
+    """Pixels per metre, one metre ahead of the eye or anywhere in a parallel projection."""
     width: int
-    """Pixels."""
+    """Width of the picture [pixels]."""
     height: int
-    """Pixels."""
+    """Height of the picture [pixels]."""
     is_parallel: bool = False
+    """Whether the projection is parallel rather than perspective."""
 
     def project(self, points: FloatArray) -> FloatArray:
         """Return x and y [pixels] and nearness of points [m], shape (..., 3) each.
 
-        Nearness is linear across a flat triangle on the picture, and larger is nearer: 1 / distance
-        [1/m], or minus the distance [m] in a parallel view.
+        Nearness is larger for nearer points and linear across a triangle of the picture: it is
+        1 / distance [1/m], or minus the distance [m] in a parallel projection.
         """
         ahead = points - self.eye
         distance = ahead @ self.forward
@@ -54,17 +58,17 @@ class View(NamedTuple):
         return np.stack([x, y, -distance if self.is_parallel else shrink], axis=-1)
 
 
-def framing(
+def fit_view(
     points: FloatArray, towards_eye: FloatArray, width: int, height: int, margins: Margins
 ) -> View:
-    """Return a pinhole camera's view in which points [m], shape (n, 3), fill the picture.
+    """Return the perspective view in which points fill the picture up to its margins.
 
     Args:
-        points: What must be seen.
-        towards_eye: From the points' middle to the eye [m]: it looks the other way.
-        width: [pixels].
-        height: [pixels].
-        margins: What to leave free around the points.
+        points: Points that must be visible [m], shape (n, 3).
+        towards_eye: Vector from the centre of the points to the eye [m], shape (3,).
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
+        margins: Free space around the points.
     """
     free = np.array(
         [width * (1.0 - 2.0 * margins.side), height * (1.0 - margins.top - margins.bottom)]
@@ -72,7 +76,7 @@ def framing(
     down = 0.5 * height * (margins.top - margins.bottom)
     target = 0.5 * (points.min(axis=0) + points.max(axis=0))
     view = View(*_axes(-towards_eye), target + towards_eye, 1.0, width, height)
-    for _ in range(FITTINGS):
+    for _ in range(N_FIT_STEPS):
         low, high = _box(view, points)
         view = view._replace(scale=float(view.scale * (free / (high - low)).min()))
         low, high = _box(view, points)
@@ -83,13 +87,13 @@ def framing(
 
 
 def _box(view: View, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the corners of the box around points on the picture [pixels]."""
+    """Return the corners of the bounding box of the projected points [pixels]."""
     seen = view.project(points)[:, :2]
     return seen.min(axis=0), seen.max(axis=0)
 
 
-def look_along(direction: FloatArray, points: FloatArray, n_pixels: int) -> View:
-    """Return a parallel view that just holds all points [m], shape (n, 3), in a square."""
+def parallel_view(direction: FloatArray, points: FloatArray, n_pixels: int) -> View:
+    """Return the parallel view in which points [m], shape (n, 3), fill a square picture."""
     right, up, forward = _axes(direction)
     along = points @ np.stack([right, up, forward], axis=1)
     low, high = along.min(axis=0), along.max(axis=0)
@@ -101,10 +105,10 @@ def look_along(direction: FloatArray, points: FloatArray, n_pixels: int) -> View
 
 
 def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return right, up and forward of a view in that direction."""
+    """Return the unit vectors right, up and forward of a view in a direction."""
     forward = direction / np.linalg.norm(direction)
     right = np.cross(forward, UP)
-    if np.linalg.norm(right) < 1e-9:  # straight up or down: any right will do
+    if np.linalg.norm(right) < 1e-9:  # straight up or down: any direction can be right
         right = np.array([1.0, 0.0, 0.0])
     right = right / np.linalg.norm(right)
     return right, np.cross(right, forward), forward

@@ -1,4 +1,4 @@
-"""The cuts of the paper's figures, and what they look like at their moments."""
+"""The cuts of the paper's figures, and the state of body and scalpel at some moments of them."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -13,12 +13,12 @@ from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Snapshot, Surface
 
 STRETCH = 0.3
-"""How far the held sides are pulled apart, as a fraction: the paper's displacement boundary
-conditions, and enough for the cut to gape."""
+"""Strain by which the held sides are pulled apart: the paper's displacement boundary conditions,
+and enough for the cut to open."""
 REST = 0.4
-"""Time after the stroke in which the tissue swings out [s]."""
+"""Time after the stroke in which the tissue comes to rest [s]."""
 TOOL = ("blade", "stylus")
-"""Bodies of the arm that are seen in a picture; the rest of it would stand in the way."""
+"""Bodies of the arm that are drawn; the others would hide the cut."""
 
 FIGURE_10 = PlannedCut(
     replace(SCENES["slab"], stretch=STRETCH),
@@ -26,9 +26,10 @@ FIGURE_10 = PlannedCut(
     depth=0.7,
     lean=0.12,
 )
-"""Off the planes of the grid in every direction: a cut along them would split nothing."""
+"""The cut of Figures 10 and 11. It is oblique to all planes of the grid: a cut along one of them
+would split no tetrahedron."""
 FIGURE_10_MOMENTS = (0.0, 0.35, 0.65, 1.0)
-"""As shares of the stroke; the last is after the rest."""
+"""Moments of Figure 10 as fractions of the stroke; the last is after `REST`."""
 
 FIGURE_12 = (
     PlannedCut(
@@ -46,25 +47,28 @@ FIGURE_12 = (
         depth=0.7,
     ),
 )
-"""An arc and an S: the paper's "arbitrary cutting trajectories on even coarse initial meshes"."""
+"""The cuts of Figure 12, an arc and an S: the paper's "arbitrary cutting trajectories on even
+coarse initial meshes"."""
 
 
 class Moment(NamedTuple):
-    """A body and the scalpel at one instant, tissue frame."""
+    """The body and the scalpel at one moment of a cut, tissue frame."""
 
     snapshot: Snapshot
+    """State of the body."""
     surface: Surface
+    """Surface of the body."""
     tool: list[tuple[TriangleMesh, Shape]]
-    """The parts of the scalpel, tissue frame, and what they are."""
+    """Meshes of the scalpel's parts, tissue frame, and the shapes of the model that they show."""
 
 
-def by(scheme: str, cut: PlannedCut) -> PlannedCut:
-    """Return the same cut, done by that scheme."""
+def with_scheme(scheme: str, cut: PlannedCut) -> PlannedCut:
+    """Return the cut with another cutting scheme: `stellar` or `paper`."""
     return cut._replace(scene=replace(cut.scene, scheme=scheme))
 
 
 def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]:
-    """Do a cut, and return what it looks like at shares of its stroke; 1 is after the rest."""
+    """Do a cut, and return its moments at fractions of the stroke; 1 is after `REST`."""
     simulation = prepare_cut(cut)
     duration = simulation.stroke.duration
     found = []
@@ -76,7 +80,7 @@ def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]
 
 
 def _tool(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
-    """Return the scalpel as it is held now, tissue frame."""
+    """Return the meshes of the scalpel in its present pose, tissue frame, and their shapes."""
     model, poses = simulation.arm.model, body_poses(simulation.arm.data)
     frame = simulation.frame
     found = []
@@ -93,7 +97,7 @@ def _tool(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
 
 
 def _posed(mesh: TriangleMesh, pose: FloatArray) -> TriangleMesh:
-    """Return a mesh moved to a pose: position [m] and quaternion (w, x, y, z), shape (7,)."""
+    """Return a mesh at a pose: position [m] and quaternion (w, x, y, z), shape (7,)."""
     w, x, y, z = pose[3:]
     turn = np.array(
         [

@@ -1,4 +1,4 @@
-"""The paper's figures, each as one PNG: the cut is done, its moments are drawn and laid out."""
+"""The paper's figures as PNG files: the cuts are done, drawn at some moments, and laid out."""
 
 import math
 from collections.abc import Sequence
@@ -10,11 +10,18 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.figures.camera import Margins, View, framing
-from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, FIGURE_12, Moment, by, moments
-from scalpel_sim.figures.paint import Thing, paint, texture_of
+from scalpel_sim.figures.camera import Margins, View, fit_view
+from scalpel_sim.figures.cuts import (
+    FIGURE_10,
+    FIGURE_10_MOMENTS,
+    FIGURE_12,
+    Moment,
+    moments,
+    with_scheme,
+)
+from scalpel_sim.figures.mesh_drawing import draw_mesh
+from scalpel_sim.figures.rendering import SceneObject, render, texture_of
 from scalpel_sim.figures.table import table_below
-from scalpel_sim.figures.wire import draw_mesh
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.texture_mapping import map_texture
@@ -22,30 +29,31 @@ from tissue import FloatArray
 
 WHITE = (1.0, 1.0, 1.0)
 TOWARDS_EYE = np.array([0.9, -2.0, 1.9])
-"""Where the eye stands, in diagonals of the body: one looks along the cut, and into it."""
+"""Position of the eye from the body's centre, in diagonals of the body: it looks into the cut."""
 LAMP = np.array([-0.6, -0.5, 1.2])
-"""From behind the viewer's left shoulder, so that the light falls into the cut."""
+"""Direction towards the lamp, above and to the left of the eye: the light falls into the cut."""
 _STEEL = (0.80, 0.82, 0.85)
 RELIEF = 0.02
+"""Depth of the relief of skin and cut faces, in repeats of the texture."""
 _WIDTH, HEIGHT = 640, 520
-"""Of each panel [pixels]."""
+"""Width and height of each panel [pixels]."""
 WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
 _GAP = 12
-"""Between panels [pixels]."""
+"""Distance between panels [pixels]."""
 LINE = 26
 """Height of a line of text [pixels]."""
 _DOTS_PER_INCH = 150
 
 
 class Drawn(NamedTuple):
-    """What a figure shows."""
+    """Description of a figure that was drawn."""
 
     caption: str
     labels: list[str]
-    """One for each panel."""
+    """Label of each panel."""
     n_tetrahedra: list[int]
-    """In each panel."""
+    """Number of tetrahedra in each panel."""
 
 
 def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
@@ -53,8 +61,8 @@ def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
 
     Args:
         number: 10, 11 or 12.
-        path: Of the PNG.
-        scheme: How the mesh is cut.
+        path: File to write.
+        scheme: How the mesh is cut: `stellar` or `paper`.
 
     Raises:
         RunError: the file could not be written.
@@ -66,7 +74,7 @@ def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
 
 
 def _figure_10(scheme: str) -> tuple[list[FloatArray], Drawn]:
-    seen = moments(by(scheme, FIGURE_10), FIGURE_10_MOMENTS)
+    seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
     view = _view(seen, WITH_TOOL)
     panels = [_picture(view, moment, with_tool=True) for moment in seen]
     caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
@@ -74,7 +82,7 @@ def _figure_10(scheme: str) -> tuple[list[FloatArray], Drawn]:
 
 
 def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
-    seen = moments(by(scheme, FIGURE_10), FIGURE_10_MOMENTS)
+    seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
     view = _view(seen, BODY_ALONE)
     ends = [seen[0], seen[-1]]
     panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]
@@ -83,7 +91,7 @@ def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
 
 
 def _figure_12(scheme: str) -> tuple[list[FloatArray], Drawn]:
-    seen = [moments(by(scheme, cut))[-1] for cut in FIGURE_12]
+    seen = [moments(with_scheme(scheme, cut))[-1] for cut in FIGURE_12]
     panels = [_picture(_view([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
     cells = ["2 × 2 × 2 cells, ", "7 × 7 × 7 cells, "]
     return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)
@@ -96,37 +104,39 @@ def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Dra
 
 
 def _view(seen: Sequence[Moment], margins: Margins) -> View:
-    """Return the view that holds the body at all moments."""
+    """Return the view in which the body fills the picture at all moments."""
     points = np.concatenate([moment.surface.positions for moment in seen])
-    return framing(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
+    return fit_view(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
 
 
 def _diagonal(moment: Moment) -> float:
-    """Return the length of the body at rest from corner to corner [m]."""
+    """Return the diagonal of the body's bounding box at rest [m]."""
     return float(np.linalg.norm(np.ptp(moment.surface.rest_positions, axis=0)))
 
 
 def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
-    """Return the textured body on a white table, with the scalpel or without."""
+    """Return a picture of the textured body on a white table, with the scalpel or without it."""
     surface = moment.surface
     textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY)
     skin, inside = texture_of(textures.skin()), texture_of(textures.cut_face())
-    things = [Thing(textured.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
+    objects = [SceneObject(textured.skin, texture=skin, relief=RELIEF, gloss=0.35, shininess=50.0)]
     if len(textured.cut.triangles):
-        scattered = (0.12, 0.03, 0.03)  # without it a narrow cut looks black
-        cut = Thing(textured.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0)
-        things.append(cut._replace(glow=scattered))
+        scattered = (0.12, 0.03, 0.03)  # without scattered light a narrow cut looks black
+        cut = SceneObject(textured.cut, texture=inside, relief=RELIEF, gloss=0.4, shininess=50.0)
+        objects.append(cut._replace(glow=scattered))
     for mesh, shape in moment.tool if with_tool else ():
         red, green, blue = _STEEL if shape.is_blade else shape.colour[:3].tolist()
         gloss = 1.2 if shape.is_blade else 0.4
-        things.append(Thing(mesh, (red, green, blue), gloss=gloss, shininess=80.0, is_slender=True))
+        objects.append(
+            SceneObject(mesh, (red, green, blue), gloss=gloss, shininess=80.0, is_slender=True)
+        )
     bounds = np.stack([surface.positions.min(axis=0), surface.positions.max(axis=0)])
-    things.append(Thing(table_below(bounds), WHITE, catches_shadows_only=True))
-    return paint(view, things, lamp=LAMP, background=WHITE)
+    objects.append(SceneObject(table_below(bounds), WHITE, catches_shadows_only=True))
+    return render(view, objects, lamp=LAMP, background=WHITE)
 
 
 def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path) -> None:
-    """Write panels, two in a row, each with its letter and label below, and the title last."""
+    """Write the panels, two in a row, each above its letter and label, and the title below all."""
     n_rows = math.ceil(len(panels) / 2)
     width = 2 * _WIDTH + 3 * _GAP
     height = n_rows * (HEIGHT + LINE + _GAP) + 2 * LINE + 2 * _GAP

@@ -1,73 +1,89 @@
-"""Light from many directions, each with its shadow: a lamp of some width, and a bright sky."""
+"""Light from many directions with shadows: a lamp of some width, and a bright sky."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.figures.camera import View, look_along
+from scalpel_sim.figures.camera import View, parallel_view
 from scalpel_sim.figures.rasterise import rasterise
-from tissue import FloatArray
-from tissue.core.jit import kernel
+from tissue import BoolArray, FloatArray, kernel
 
 N_LAMP, N_SKY = 32, 64
-"""Directions that stand for the lamp and for the sky. Fewer, and shadows have steps."""
+"""Number of directions that stand for the lamp and for the sky. With fewer, shadows have steps."""
 LAMP_SHARE = 0.5
-"""Of all light on a surface that faces it; the rest is the sky's."""
+"""Share of the lamp in the light on a surface that faces it; the rest comes from the sky."""
 LAMP_WIDTH = 0.09
-"""Radius of the lamp seen from the body [rad]: how soft its shadows are."""
+"""Angular radius of the lamp seen from the body [rad]: it makes the edges of shadows soft."""
 MAP_PIXELS = 320
-"""Sides of each shadow map."""
+"""Side of each shadow map [pixels]."""
 BIAS = 2.5
-"""How far a point must lie behind what the light sees to be in its shadow, in pixels of the map.
-Less, and surfaces that the light grazes have stripes; more, and shadows come off their bodies."""
+"""Distance behind the surface that a light reaches at which a point is in shadow, in pixels of the
+shadow map. With less, surfaces that the light grazes have stripes; with more, shadows start away
+from their bodies."""
 _LIFT = 2.0
-"""How far off its surface a point is looked up, in pixels of the map, for the same reason."""
+"""Height above its surface at which a point is looked up in a shadow map, in pixels of the map, for
+the same reason."""
 FAINTEST = 1e-3
-"""Share of a light in a highlight below which none is seen, and none is computed."""
+"""Strength of a highlight, as a fraction of its light, below which it is not computed."""
 GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Angle [rad] that spreads points evenly over a disc or a sphere."""
 
 
 class Lights(NamedTuple):
-    """Parallel light from n directions, and how far each gets."""
+    """Parallel light from n directions, with shadow maps."""
 
     towards: FloatArray
     """Unit vectors towards the lights, shape (n, 3)."""
     strength: FloatArray
-    """Of what a surface facing all of them would get, shape (n,)."""
+    """Strength of each light, shape (n,). A surface that faced all of them would get the sum."""
     axes: FloatArray
-    """Right, up and forward of each light's view, shape (n, 3, 3)."""
+    """Right, up and forward of the view from each light, shape (n, 3, 3)."""
     eyes: FloatArray
-    """Where each view looks from [m], shape (n, 3)."""
+    """Position of the eye of each view [m], shape (n, 3)."""
     scales: FloatArray
-    """Pixels of each map for a metre, shape (n,)."""
+    """Pixels per metre of each shadow map, shape (n,)."""
     maps: FloatArray
-    """Minus the distance [m] of what each light meets, shape (n, MAP_PIXELS, MAP_PIXELS)."""
+    """Shadow maps: minus the distance [m] at which the light meets a surface, shape
+    (n, MAP_PIXELS, MAP_PIXELS)."""
 
 
-class Lit(NamedTuple):
-    """What reaches points of surfaces."""
+class SurfacePoints(NamedTuple):
+    """Points of surfaces at which the light is computed."""
+
+    positions: FloatArray
+    """Positions [m], shape (n, 3)."""
+    normals: FloatArray
+    """Unit normals with smoothing and relief, shape (n, 3)."""
+    face_normals: FloatArray
+    """Unit normals of the triangles, on the side of the eye, shape (n, 3)."""
+    to_eye: FloatArray
+    """Unit vectors towards the eye, shape (n, 3)."""
+
+
+class Illumination(NamedTuple):
+    """Light at points of surfaces."""
 
     diffuse: FloatArray
-    """Light on the surface, 1 from everywhere; shape (n_points,)."""
-    mirrored: FloatArray
-    """Light that a glossy surface throws into the eye, shape (n_points,)."""
+    """Light that falls on the surface, 1 if from everywhere; shape (n_points,)."""
+    specular: FloatArray
+    """Light that a glossy surface reflects into the eye, shape (n_points,)."""
 
 
-def lights(lamp: FloatArray, triangles: FloatArray, in_sky: np.ndarray) -> Lights:
-    """Return lamp and sky over opaque triangles [m], shape (n, 3, 3).
+def make_lights(lamp: FloatArray, triangles: FloatArray, blocks_sky: BoolArray) -> Lights:
+    """Return the lights of a lamp and of the sky, with the shadows of opaque triangles.
 
     Args:
         lamp: Direction towards the middle of the lamp, shape (3,).
-        triangles: What throws shadows.
-        in_sky: Whether each takes light of the sky away too, shape (n,). What is long and thin
-            should not: the few directions of the sky would show, as rays.
+        triangles: Corners of the triangles that cast shadows [m], shape (n, 3, 3).
+        blocks_sky: Whether each triangle casts shadows of the sky's light too, shape (n,). Long and
+            thin objects should not: the few directions of the sky would show as rays.
     """
     towards = np.concatenate([_disc_around(lamp), _sky()])
     strength = np.full(len(towards), LAMP_SHARE / N_LAMP)
     strength[N_LAMP:] = (1.0 - LAMP_SHARE) / N_SKY * 2.0  # half of the sky faces any wall
     corners = triangles.reshape(-1, 3)
-    views = [look_along(-direction, corners, MAP_PIXELS) for direction in towards]
+    views = [parallel_view(-direction, corners, MAP_PIXELS) for direction in towards]
     return Lights(
         towards,
         strength,
@@ -76,79 +92,63 @@ def lights(lamp: FloatArray, triangles: FloatArray, in_sky: np.ndarray) -> Light
         np.array([view.scale for view in views]),
         np.stack(
             [
-                _met(view, triangles if i < N_LAMP else triangles[in_sky])
+                _shadow_map(view, triangles if i < N_LAMP else triangles[blocks_sky])
                 for i, view in enumerate(views)
             ]
         ),
     )
 
 
-def light_on(
-    shining: Lights,
-    points: FloatArray,
-    normals: FloatArray,
-    flat: FloatArray,
-    to_eye: FloatArray,
-    shininess: float,
-) -> Lit:
-    """Return the light at points [m], shape (n, 3).
-
-    Args:
-        shining: The lights.
-        points: On surfaces.
-        normals: Unit vectors as smoothing and relief have them, shape (n, 3).
-        flat: Unit vectors as the triangles have them, towards the eye, shape (n, 3).
-        to_eye: Unit vectors, shape (n, 3).
-        shininess: Sharpness of highlights (Blinn and Phong's exponent).
-    """
-    lit = Lit(np.zeros(len(points)), np.zeros(len(points)))
-    _light_on(*shining, points, normals, flat, to_eye, shininess, *lit)
-    return lit
+def illuminate(lights: Lights, points: SurfacePoints, shininess: float) -> Illumination:
+    """Return the light at points; `shininess` is the exponent of highlights (Blinn and Phong)."""
+    n = len(points.positions)
+    light = Illumination(np.zeros(n), np.zeros(n))
+    _illuminate(lights, points, shininess, light)
+    return light
 
 
 @kernel
-def _light_on(
-    towards: FloatArray,
-    strength: FloatArray,
-    axes: FloatArray,
-    eyes: FloatArray,
-    scales: FloatArray,
-    maps: FloatArray,
-    points: FloatArray,
-    normals: FloatArray,
-    flat: FloatArray,
-    to_eye: FloatArray,
-    shininess: float,
-    diffuse: FloatArray,
-    mirrored: FloatArray,
+def _illuminate(
+    lights: Lights, points: SurfacePoints, shininess: float, light: Illumination
 ) -> None:
+    """Add the light of all `lights` at all `points` to `light`."""
+    positions, normals, flat, to_eye = points
+    towards, strength, axes, eyes, scales, maps = lights
     least = FAINTEST ** (1.0 / shininess)
-    for i in range(len(points)):
+    for i in range(len(positions)):
         for k in range(len(towards)):
             lx, ly, lz = towards[k, 0], towards[k, 1], towards[k, 2]
             facing = normals[i, 0] * lx + normals[i, 1] * ly + normals[i, 2] * lz
             if facing <= 0.0 or flat[i, 0] * lx + flat[i, 1] * ly + flat[i, 2] * lz <= 0.0:
                 continue
             lift = _LIFT / scales[k]
-            x = points[i, 0] + lift * flat[i, 0] - eyes[k, 0]
-            y = points[i, 1] + lift * flat[i, 1] - eyes[k, 1]
-            z = points[i, 2] + lift * flat[i, 2] - eyes[k, 2]
-            reached = strength[k] * _reaches(maps[k], axes[k], scales[k], x, y, z)
-            diffuse[i] += facing * reached
+            x = positions[i, 0] + lift * flat[i, 0] - eyes[k, 0]
+            y = positions[i, 1] + lift * flat[i, 1] - eyes[k, 1]
+            z = positions[i, 2] + lift * flat[i, 2] - eyes[k, 2]
+            reached = strength[k] * _unshadowed_share(maps[k], axes[k], scales[k], x, y, z)
+            light.diffuse[i] += facing * reached
             hx, hy, hz = lx + to_eye[i, 0], ly + to_eye[i, 1], lz + to_eye[i, 2]
             glance = normals[i, 0] * hx + normals[i, 1] * hy + normals[i, 2] * hz
             glance /= math.sqrt(hx * hx + hy * hy + hz * hz)
             if glance > least:
-                mirrored[i] += reached * glance**shininess
+                light.specular[i] += reached * glance**shininess
 
 
 @kernel
-def _reaches(
+def _unshadowed_share(
     nearness: FloatArray, axes: FloatArray, scale: float, x: float, y: float, z: float
 ) -> float:
-    """How much of a light reaches a place given from its eye, from 0 to 1.
+    """Return the share of a light that reaches a point, from 0 to 1.
 
-    Four places of the map around it, weighed: an edge of a shadow without steps.
+    The four nearest pixels of the shadow map are weighted, so that edges of shadows have no steps.
+
+    Args:
+        nearness: Shadow map of the light, shape (MAP_PIXELS, MAP_PIXELS).
+        axes: Right, up and forward of the view from the light, shape (3, 3).
+        scale: Pixels of the map per metre.
+        x: Coordinate of the point from the eye of that view [m].
+        y: Coordinate of the point from the eye of that view [m].
+        z: Coordinate of the point from the eye of that view [m].
     """
     n = len(nearness)
     u = 0.5 * n + scale * (axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z) - 0.5
@@ -165,8 +165,8 @@ def _reaches(
     return total
 
 
-def _met(view: View, triangles: FloatArray) -> FloatArray:
-    """Return minus the distance of what a light meets, -inf where it meets nothing."""
+def _shadow_map(view: View, triangles: FloatArray) -> FloatArray:
+    """Return the shadow map of a view from a light; -inf where the light meets no triangle."""
     return rasterise(view.project(triangles), view.width, view.height).nearness
 
 
@@ -186,5 +186,6 @@ def _disc_around(lamp: FloatArray) -> FloatArray:
     radius = LAMP_WIDTH * np.sqrt((np.arange(N_LAMP) + 0.5) / N_LAMP)
     turn = GOLDEN_ANGLE * np.arange(N_LAMP)
     off = (radius * np.cos(turn))[:, None] * across + (radius * np.sin(turn))[:, None] * also_across
-    towards = middle + off
-    return towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    towards: FloatArray = middle + off
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    return towards

@@ -1,36 +1,35 @@
-"""Which triangle each pixel shows: a z-buffer, so that no order of drawing can be wrong."""
+"""Rasterisation of triangles and line segments with a z-buffer."""
 
 import math
 from typing import NamedTuple
 
 import numpy as np
 
-from tissue import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue import FloatArray, IntArray, kernel
 
 _FLAT = 1e-12
-"""Twice the area [pixels squared] up to which a triangle is seen edge-on, and shows nothing."""
+"""Twice the area [pixels squared] up to which a triangle is not drawn: it is seen edge-on."""
 
 
 class Raster(NamedTuple):
-    """What a view shows."""
+    """The triangle that is visible at each pixel."""
 
     triangle: IntArray
-    """The nearest triangle at each pixel, or -1; shape (height, width)."""
+    """Index of the nearest triangle at each pixel, or -1; shape (height, width)."""
     weights: FloatArray
-    """Weights of its corners there, on the picture (not in space), shape (height, width, 3)."""
+    """Barycentric coordinates in the projected triangle (not in space), (height, width, 3)."""
     nearness: FloatArray
-    """How near it is, as `View.project` has it; -inf where there is none. Shape (height, width)."""
+    """Nearness as of `View.project`, -inf where there is no triangle; shape (height, width)."""
 
 
 def rasterise(corners: FloatArray, width: int, height: int) -> Raster:
-    """Return the nearest triangle at the middle of each pixel; of equally near ones the first.
+    """Return the nearest triangle at the centre of each pixel; of equally near ones the first.
 
     Args:
-        corners: Projected corners of the triangles, in front of the eye: x, y, nearness; shape
+        corners: Projected corners of triangles in front of the eye: x, y and nearness; shape
             (n_triangles, 3, 3).
-        width: [pixels].
-        height: [pixels].
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
     """
     raster = Raster(
         np.full((height, width), -1, dtype=np.int64),
@@ -48,20 +47,20 @@ def _rasterise(
     height, width = triangle.shape
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
-        bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
+        bx, with_scheme, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
-        twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        twice_area = (bx - ax) * (cy - ay) - (with_scheme - ay) * (cx - ax)
         if not abs(twice_area) > _FLAT:
             continue
         x_low = max(0, math.ceil(min(ax, min(bx, cx)) - 0.5))
         x_high = min(width - 1, math.floor(max(ax, max(bx, cx)) - 0.5))
-        y_low = max(0, math.ceil(min(ay, min(by, cy)) - 0.5))
-        y_high = min(height - 1, math.floor(max(ay, max(by, cy)) - 0.5))
+        y_low = max(0, math.ceil(min(ay, min(with_scheme, cy)) - 0.5))
+        y_high = min(height - 1, math.floor(max(ay, max(with_scheme, cy)) - 0.5))
         for row in range(y_low, y_high + 1):
             y = row + 0.5
             for column in range(x_low, x_high + 1):
                 x = column + 0.5
-                wa = ((bx - x) * (cy - y) - (by - y) * (cx - x)) / twice_area
+                wa = ((bx - x) * (cy - y) - (with_scheme - y) * (cx - x)) / twice_area
                 wb = ((cx - x) * (ay - y) - (cy - y) * (ax - x)) / twice_area
                 wc = 1.0 - wa - wb
                 if wa < 0.0 or wb < 0.0 or wc < 0.0:
@@ -84,15 +83,15 @@ def draw_segments(
     visible: FloatArray,
     hidden: FloatArray,
 ) -> None:
-    """Mark the pixels of straight segments: in `visible` where nothing is before them, else hidden.
+    """Mark the pixels of line segments as visible or as hidden by a surface.
 
     Args:
-        ends: Projected ends: x, y, nearness; shape (n, 2, 3).
-        nearness: Of the surfaces, shape (height, width).
-        thickness: Of the lines [pixels].
-        slack: How much nearer, as a fraction, a surface must be to hide a line: lines lie on it.
-        visible: Gets 1 there, shape (height, width).
-        hidden: Gets 1 there, shape (height, width).
+        ends: Projected ends of the segments: x, y and nearness; shape (n, 2, 3).
+        nearness: Nearness of the surfaces, shape (height, width).
+        thickness: Thickness of the lines [pixels].
+        slack: How much nearer a surface must be to hide a line, as a fraction: lines lie on it.
+        visible: Set to 1 at visible pixels of a segment, shape (height, width).
+        hidden: Set to 1 at hidden pixels of a segment, shape (height, width).
     """
     height, width = nearness.shape
     half = 0.5 * thickness

@@ -1,4 +1,4 @@
-"""The table under a body: it shows only the shadows that fall on it."""
+"""The table under a body, which shows only the shadows on it."""
 
 import numpy as np
 
@@ -6,9 +6,10 @@ from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray
 
 _REACH = 6.0
-"""Half width, in diagonals of the body: as far as its shadow can be seen."""
+"""Half width of the table in diagonals of the body: as far as its shadow can be seen."""
 N_SQUARES = 48
-"""Along each side. Those that reach behind the eye are left out, so they must be small."""
+"""Number of squares along each side. Squares that reach behind the eye are left out, so they must
+be small."""
 
 
 def table_below(bounds: FloatArray) -> TriangleMesh:

@@ -1,5 +1,5 @@
-"""`scalpel-sim validate`: the engine's forces against theory and published figures, a scene a file.
+"""`scalpel-sim validate`: the engine's forces against theory and published figures.
 
-`findings` holds what a scene finds, `block` what scenes cut and how, `scenes` their list;
-`report`, `markdown` and `pictures` show what was found.
+Each scene has a file of its own; `scenes` lists them. `block` holds the body and the strokes that
+scenes share, `findings` what a scene returns; `report`, `results` and `pictures` write it down.
 """

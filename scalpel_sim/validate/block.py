@@ -1,4 +1,4 @@
-"""What the scenes cut, and how: a block of soft material, led strokes, and what was felt."""
+"""What most scenes share: a block of soft material, strokes through it, and the record of one."""
 
 import itertools
 from collections.abc import Iterable, Sequence
@@ -11,6 +11,7 @@ from tissue import (
     BladeSegment,
     BladeShape,
     BladeSweep,
+    BoolArray,
     Energies,
     FloatArray,
     Law,
@@ -19,31 +20,30 @@ from tissue import (
     StepResult,
     TetrahedralMesh,
     Tissue,
-    Wrench,
     block,
     fixed_nodes,
 )
 
-SIZE = (0.04, 0.04, 0.02)
-"""Edges of the block [m]: across the cut, along it, and its thickness."""
-LENGTH, THICKNESS = SIZE[1], SIZE[2]
-MIDDLE = 0.0213
-"""Where the cut is led, across [m]: near the middle, and where no plane of either mesh is near. A
-cut along a plane of the mesh is easier for any method."""
-COARSE, FINE = (8, 8, 4), (12, 12, 6)
-"""Cells: edges of 5 mm, and of two thirds of that."""
+BLOCK_SIZE = (0.04, 0.04, 0.02)
+"""Sides of the block [m]: across the cut, along it, and its thickness."""
+LENGTH, THICKNESS = BLOCK_SIZE[1], BLOCK_SIZE[2]
+CUT_X = 0.0213
+"""Position of the cut across the block [m]: near the middle, and away from the planes of either
+mesh. A cut along a plane of the mesh is easier for any method."""
+COARSE_CELLS, FINE_CELLS = (8, 8, 4), (12, 12, 6)
+"""Cells of the two meshes: sides of 5 mm, and of two thirds of that."""
 DT = 1e-3
 """Time step [s]: that of a haptic loop."""
-BELOW = 0.005
-"""How far the point of an edge that cuts through is below the block [m]."""
-THROUGH = 0.03
-"""Length of such an edge [m]."""
-STEADY = (0.3 * LENGTH, 0.75 * LENGTH)
-"""Between these places of the edge [m] a cut is steady: it is in with its whole length, and the far
-side is not yet near."""
+_BELOW = 0.005
+"""How far the tip of an edge that cuts right through is below the block [m]."""
+_EDGE_LENGTH = 0.03
+"""Length of an edge that cuts right through [m]."""
+STEADY_RANGE = (0.3 * LENGTH, 0.75 * LENGTH)
+"""Positions of the edge along the block between which a cut is steady [m]: the whole edge is in the
+block, and the far side is not yet near."""
 
 
-def rubber(
+def soft_material(
     law: Law = "neo_hookean",
     *,
     young_modulus: float = 10e3,
@@ -51,7 +51,15 @@ def rubber(
     toughness: float = 20.0,
     **more: float,
 ) -> Material:
-    """Return the material of the block: as soft as an organ, nearly incompressible where it can."""
+    """Return the material of the block: as soft as an organ.
+
+    Args:
+        law: Law of elasticity.
+        young_modulus: Young's modulus [Pa].
+        poisson_ratio: Poisson's ratio; None: nearly incompressible, or 1/4 for springs.
+        toughness: Fracture toughness [J/m2].
+        more: Further arguments of `Material`.
+    """
     if poisson_ratio is None:
         poisson_ratio = 0.25 if law == "springs" else 0.45
     return Material(
@@ -65,24 +73,24 @@ def rubber(
 
 def block_tissue(
     material: Material,
-    cells: Sequence[int] = COARSE,
+    cells: Sequence[int] = COARSE_CELLS,
     *,
     held: str = "left,right",
     blade: BladeShape | None = None,
     mesh: TetrahedralMesh | None = None,
     audit: bool = False,
 ) -> Tissue:
-    """Return a block at rest, without weight.
+    """Return a block at rest, without gravity.
 
     Args:
-        material: What it is made of.
-        cells: Across the cut, along it, and through the thickness.
+        material: Material of the block.
+        cells: Cells across the cut, along it, and through the thickness.
         held: The sides that do not move.
-        blade: Its body; None for a line.
-        mesh: The block, where it is not the usual grid.
-        audit: Whether to keep the account of energy.
+        blade: Shape of the blade; None for a bare edge.
+        mesh: The mesh, where it is not the usual grid.
+        audit: Whether to keep the energy audit.
     """
-    mesh = mesh or block(cells, SIZE)
+    mesh = mesh or block(cells, BLOCK_SIZE)
     return Tissue(
         mesh,
         material,
@@ -93,98 +101,104 @@ def block_tissue(
     )
 
 
-def edge(
+def edge_at(
     tip: npt.ArrayLike,
     *,
     along: npt.ArrayLike = (0.0, 0.0, 1.0),
     forward: npt.ArrayLike = (0.0, 1.0, 0.0),
-    length: float = THROUGH,
+    length: float = _EDGE_LENGTH,
 ) -> BladeSegment:
-    """Return a cutting edge with its point at `tip` [m], upright and facing along y unless told."""
+    """Return a cutting edge.
+
+    Args:
+        tip: Position of the tip [m].
+        along: Direction from the tip to the heel; upright by default.
+        forward: Direction in which it cuts; along y by default.
+        length: Length of the edge [m].
+    """
     tip, along = np.array(tip, dtype=np.float64), np.array(along, dtype=np.float64)
     along /= np.linalg.norm(along)
     return BladeSegment(tip, tip + length * along, np.array(forward, dtype=np.float64))
 
 
-def through(
-    speed: float, *, ratio: float = 0.0, x: float = MIDDLE, begin: float = -0.003, end: float = 0.04
+def straight_cut(
+    speed: float,
+    *,
+    ratio: float = 0.0,
+    x: float = CUT_X,
+    begin: float = -0.003,
+    end: float = 0.04,
 ) -> list[BladeSegment]:
-    """Return the places of an upright edge that is led through the whole block.
+    """Return the poses of an upright edge that cuts straight through the whole block.
 
     Args:
-        speed: Across the edge [m/s].
-        ratio: Of the speed along the edge, downwards, to that: slicing.
-        x: Where the cut is [m].
-        begin: Of the edge, along the block [m].
-        end: The same.
+        speed: Speed across the edge [m/s].
+        ratio: Speed along the edge, downwards, over the speed across it: slicing.
+        x: Position of the cut across the block [m].
+        begin: First position of the edge along the block [m].
+        end: Last position of the edge along the block [m].
     """
     n = round((end - begin) / (speed * DT))
-    way = ratio * (end - begin)
-    places = np.linspace(begin, end, n + 1)
-    # An edge that is drawn down begins so high that its point has just come through at the start.
-    return [edge((x, y, -BELOW - ratio * (y - begin)), length=THROUGH + way) for y in places]
+    drawn = ratio * (end - begin)
+    positions = np.linspace(begin, end, n + 1)
+    # An edge that is drawn down begins so high that its tip is just below the block at the start.
+    return [
+        edge_at((x, y, -_BELOW - ratio * (y - begin)), length=_EDGE_LENGTH + drawn)
+        for y in positions
+    ]
 
 
-class Record(NamedTuple):
-    """What was felt on the way, a row a step."""
+class StrokeRecord(NamedTuple):
+    """What the blade met on a stroke, a row for each step."""
 
     tip: FloatArray
-    """At the end of the step [m], shape (n, 3)."""
+    """Position of the tip at the end of the step [m], shape (n, 3)."""
     force: FloatArray
-    """On the blade, averaged over the step [N], shape (n, 3)."""
-    torque: FloatArray
-    """The same about the tip [N m], shape (n, 3)."""
-    length: FloatArray
-    """Of edge in the tissue [m], shape (n,)."""
+    """Force on the blade, averaged over the step [N], shape (n, 3)."""
     area: FloatArray
-    """Of the faces cut so far [m2], shape (n,)."""
+    """Area of the faces cut so far [m2], shape (n,)."""
     work: FloatArray
-    """Of the blade so far [J], shape (n,)."""
-    accounts: FloatArray
-    """Of energy so far [J], in the order of `Energies`, shape (n, 12); (n, 0) without an audit."""
+    """Work of the blade so far [J], shape (n,)."""
+    energy_rows: FloatArray
+    """The energies so far [J], in the order of `Energies`, shape (n, 12); (n, 0) without an
+    audit."""
     last: StepResult
+    """Result of the last step."""
 
     @property
     def y(self) -> FloatArray:
-        """Where the edge is along the block [m]."""
+        """Position of the edge along the block [m], shape (n,)."""
         return self.tip[:, 1]
 
     @property
     def resistance(self) -> FloatArray:
-        """What resists its way along the block [N]."""
+        """Force against the motion along the block [N], shape (n,)."""
         return -self.force[:, 1]
 
     @property
     def energies(self) -> Energies:
-        """The account of energy at the end."""
+        """The energy audit at the end."""
         assert self.last.energies is not None, "the block has no audit"
         return self.last.energies
 
-    def of_steady(self, column: FloatArray) -> FloatArray:
+    def steady_rows(self, column: FloatArray) -> FloatArray:
         """Return the rows of a column while the cut is steady."""
-        return column[self.steady()]
+        return column[self._is_steady()]
 
-    def steady(self) -> npt.NDArray[np.bool_]:
-        """Return which rows are of a steady cut, shape (n,)."""
-        return (self.y > STEADY[0]) & (self.y < STEADY[1])
-
-
-def lead(tissue: Tissue, places: Iterable[BladeSegment], dt: float = DT) -> Record:
-    """Lead the edge from place to place, `dt` [s] from each to the next; return what was felt."""
-    results = [tissue.step(BladeSweep(t0, t1), dt) for t0, t1 in itertools.pairwise(places)]
-    return record(results)
+    def _is_steady(self) -> BoolArray:
+        """Return which rows belong to a steady cut, shape (n,)."""
+        return (self.y > STEADY_RANGE[0]) & (self.y < STEADY_RANGE[1])
 
 
-def record(results: Sequence[StepResult]) -> Record:
-    """Return the rows of what steps told."""
-    wrenches: list[Wrench] = [result.wrench for result in results]
-    return Record(
+def run_stroke(tissue: Tissue, poses: Iterable[BladeSegment], dt: float = DT) -> StrokeRecord:
+    """Move the edge from pose to pose, one step of `dt` [s] each, and record the steps."""
+    results = [tissue.step(BladeSweep(t0, t1), dt) for t0, t1 in itertools.pairwise(poses)]
+    wrenches = [result.wrench for result in results]
+    return StrokeRecord(
         tip=np.array([wrench.point for wrench in wrenches]),
         force=np.array([wrench.force for wrench in wrenches]),
-        torque=np.array([wrench.torque for wrench in wrenches]),
-        length=np.array([result.anchored_length for result in results]),
         area=np.array([result.cut_area for result in results]),
         work=np.array([result.work_of_blade for result in results]),
-        accounts=np.array([result.energies or () for result in results]),
+        energy_rows=np.array([result.energies or () for result in results]),
         last=results[-1],
     )

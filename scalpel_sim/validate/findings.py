@@ -1,4 +1,4 @@
-"""What a scene of the validation finds: figures with their bounds, curves, and the sources."""
+"""What a scene of the validation returns: checks with their bounds, plots, and references."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -6,61 +6,62 @@ from typing import NamedTuple
 from tissue import FloatArray
 
 PASS, FAIL, KNOWN = "pass", "FAIL", "known"
-"""Verdicts. `known` is a figure out of its bounds by no more than what is known and explained."""
+"""Verdicts. `known`: the value is out of its bounds by no more than a deviation that is known and
+explained."""
 
 
-class Source(NamedTuple):
-    """Who says so."""
+class Reference(NamedTuple):
+    """A publication."""
 
     citation: str
     says: str
-    """The figure, and how it was measured."""
+    """The published figure, and how it was measured."""
     is_confirmed: bool = True
-    """Whether the text was looked up and says so. If not, take it for an estimate."""
+    """Whether the text was looked up and says so. If not, the figure is an estimate."""
 
 
-class Known(NamedTuple):
-    """A figure that is known to be out of its bounds."""
+class KnownDeviation(NamedTuple):
+    """A deviation from the bounds that is known and explained."""
 
     low: float
     high: float
-    """Where it is instead. Outside of that the line fails."""
+    """The value lies between `low` and `high` instead. Beyond that the check fails."""
     why: str
 
 
-class Line(NamedTuple):
-    """One figure, and where it must lie."""
+class Check(NamedTuple):
+    """One value, and the bounds that it must lie in."""
 
     name: str
     """What was measured, and how."""
-    figure: float
+    value: float
     low: float
     high: float
     unit: str = ""
-    known: Known | None = None
+    known: KnownDeviation | None = None
 
     @property
     def verdict(self) -> str:
-        """`PASS`, `FAIL` or `KNOWN`. What is no number fails."""
-        if self.low <= self.figure <= self.high:
+        """`PASS`, `FAIL` or `KNOWN`. A value that is not a number fails."""
+        if self.low <= self.value <= self.high:
             return PASS
-        if self.known and self.known.low <= self.figure <= self.known.high:
+        if self.known and self.known.low <= self.value <= self.known.high:
             return KNOWN
         return FAIL
 
 
 class Curve(NamedTuple):
-    """A line of a plot."""
+    """A curve of a plot."""
 
     label: str
     x: FloatArray
     y: FloatArray
     is_theory: bool = False
-    """Drawn dashed, in the colour of the curve before."""
+    """Whether it is drawn dashed, in the colour of the curve before it."""
 
 
 class Band(NamedTuple):
-    """A range of y that was published, drawn as a stripe."""
+    """A published range of y, drawn as a stripe."""
 
     label: str
     low: float
@@ -68,12 +69,13 @@ class Band(NamedTuple):
 
 
 class Plot(NamedTuple):
-    """A picture of curves."""
+    """A plot of curves."""
 
     title: str
     x: str
-    """What the axis shows, with its unit."""
+    """Label of the x axis, with its unit."""
     y: str
+    """Label of the y axis, with its unit."""
     curves: Sequence[Curve]
     bands: Sequence[Band] = ()
 
@@ -81,14 +83,14 @@ class Plot(NamedTuple):
 class Findings(NamedTuple):
     """What a scene found."""
 
-    lines: list[Line]
+    checks: list[Check]
     plots: Sequence[Plot] = ()
     notes: Sequence[str] = ()
-    """What to know besides, one sentence or two each."""
+    """Further facts, one sentence or two each."""
 
 
-class Scene(NamedTuple):
-    """Something that the engine must get right."""
+class ValidationScene(NamedTuple):
+    """A simulated experiment whose outcome is known from theory or from publications."""
 
     name: str
     """One word, for `--only`."""
@@ -96,10 +98,10 @@ class Scene(NamedTuple):
     about: str
     """What is done, what is compared with what, and what it means for a user."""
     measure: Callable[[bool], Findings]
-    """Does it; the argument says whether to be quick."""
-    sources: Sequence[Source] = ()
+    """Runs the experiment; the argument says whether to run the short version."""
+    references: Sequence[Reference] = ()
 
 
 def within(share: float, of: float = 1.0) -> tuple[float, float]:
-    """Return the bounds of what may be off by that share of `of`."""
+    """Return the bounds that deviate from `of` by a share of it."""
     return of * (1.0 - share), of * (1.0 + share)

@@ -1,99 +1,100 @@
-"""Puncture and withdrawal: rise, peak, drop, plateau; then friction alone."""
+"""Puncture and withdrawal: rise, peak, drop and plateau of the force; then friction alone."""
 
 from typing import NamedTuple
 
 from scalpel_sim.validate.block import (
-    COARSE,
-    FINE,
+    COARSE_CELLS,
+    FINE_CELLS,
     THICKNESS,
-    Record,
+    StrokeRecord,
     block_tissue,
-    lead,
-    rubber,
+    run_stroke,
+    soft_material,
 )
 from scalpel_sim.validate.findings import (
+    Check,
     Curve,
     Findings,
-    Known,
-    Line,
+    KnownDeviation,
     Plot,
-    Scene,
-    Source,
+    Reference,
+    ValidationScene,
     within,
 )
-from scalpel_sim.validate.puncturing import in_and_out
+from scalpel_sim.validate.puncturing import insertion_and_withdrawal
 from tissue import BladeShape, Energies
 
-NARROW = 0.001
-"""Length of an edge all of which breaks in at once [m]: less than an element's."""
-WIDE = 0.02
-"""Length of an edge whose faces rub on what it has cut [m]."""
-_DEEP, _SPEED = 0.012, 0.05
-"""[m], [m/s]."""
+_NARROW = 0.001
+"""Length of an edge that breaks in all at once [m]: shorter than an element."""
+_WIDE = 0.02
+"""Length of an edge with faces large enough for friction [m]."""
+_DEPTH, _SPEED = 0.012, 0.05
+"""Depth of the insertion [m], and speed [m/s]."""
 _TOUGHNESS = 20.0
-"""[J/m2]."""
+"""Toughness below the skin [J/m2]."""
 _FRICTION = 0.2
+"""Coefficient of friction on the faces of the blade."""
 _NEAR = 0.10
-"""How far the peak may be off: the specification's bound."""
-DROPS = 0.7
-"""How much of the peak the force has 10 ms later at most, where skin is three times as tough as
-what is below."""
-UNZIPS = Known(
+"""Largest relative error of the peak."""
+_LARGEST_DROP_SHARE = 0.7
+"""Largest force 10 ms after the peak, as a share of the peak, where the skin is three times as
+tough as the tissue below."""
+_BREAKS_FROM_ENDS = KnownDeviation(
     0.3,
     0.9,
     "an edge wider than an element breaks in from its ends, where the skin is bent most, and not "
-    "all at once: the peak is then that of the part that holds, and on a finer mesh lower",
+    "all at once: the peak is then that of the unbroken part, and lower on a finer mesh",
 )
 
 
-class Puncture(NamedTuple):
-    """The way in, in figures."""
+class InsertionForces(NamedTuple):
+    """The forces of an insertion."""
 
-    record: Record
+    record: StrokeRecord
     peak: float
-    """[N]."""
+    """Largest force [N]."""
     plateau: float
-    """[N], on the second half of the way in."""
+    """Mean force on the second half of the insertion [N]."""
     after_peak: float
     """Force 10 steps after the peak [N]."""
     area_before: float
-    """Cut until 2 steps before the peak [m2]."""
+    """Area cut until 2 steps before the peak [m2]."""
 
 
-class Withdrawal(NamedTuple):
-    """The way out, from where the blade is loose to where it is nearly out, in figures."""
+class WithdrawalForces(NamedTuple):
+    """A withdrawal, from where the faces slide all along to where the blade is nearly out."""
 
-    back: float
-    """Mean force that holds the blade [N]."""
+    resistance: float
+    """Mean force against the withdrawal [N]."""
     area: float
-    """Cut on the way [m2]."""
-    besides: float
-    """Work of the blade besides friction, and besides what tissue took up and gave back, over the
+    """Area cut during the withdrawal [m2]."""
+    excess_work: float
+    """Work of the blade less friction and the energy that the tissue stored and damped, over the
     work of friction."""
 
 
-def stroke(length: float, skin: float, cells: tuple[int, int, int] = FINE) -> Record:
-    """Go in and out again, where the skin has `skin` times the toughness of the rest.
+def _puncture(length: float, skin: float, cells: tuple[int, int, int] = FINE_CELLS) -> StrokeRecord:
+    """Insert and withdraw an edge.
 
     Args:
-        length: Of the edge [m].
-        skin: Toughness of the skin over that of the rest.
-        cells: Of the block.
+        length: Length of the edge [m].
+        skin: Toughness of the skin over that of the tissue below.
+        cells: Cells of the block.
     """
-    material = rubber(
+    material = soft_material(
         toughness=_TOUGHNESS, skin_toughness=skin * _TOUGHNESS, blade_friction=_FRICTION
     )
     tissue = block_tissue(material, cells, held="left,right,bottom", blade=BladeShape(), audit=True)
-    return lead(tissue, in_and_out(length, _DEEP, _SPEED))
+    return run_stroke(tissue, insertion_and_withdrawal(length, _DEPTH, _SPEED))
 
 
-def way_in(record: Record) -> Puncture:
-    """Return the figures of the way in."""
+def _insertion_forces(record: StrokeRecord) -> InsertionForces:
+    """Return the forces of the insertion."""
     n = len(record.work) // 2
     force = record.force[:, 2]
     peak = int(force[:n].argmax())
-    cutting = record.accounts[max(peak - 2, 0), Energies._fields.index("cutting")]
-    return Puncture(
+    cutting = record.energy_rows[max(peak - 2, 0), Energies._fields.index("cutting")]
+    return InsertionForces(
         record,
         peak=float(force[peak]),
         plateau=float(force[n // 2 : n].mean()),
@@ -102,92 +103,107 @@ def way_in(record: Record) -> Puncture:
     )
 
 
-def way_out(record: Record) -> Withdrawal:
-    """Return the figures of the way out."""
+def _withdrawal_forces(record: StrokeRecord) -> WithdrawalForces:
+    """Return the forces of the withdrawal."""
     n = len(record.work) // 2
     first, last = n + round(0.2 * n), n + round(0.7 * n)
-    went = Energies(*(record.accounts[last] - record.accounts[first]))
-    stored = went.elastic + went.kinetic + went.held + went.damping
-    return Withdrawal(
-        back=float(-record.force[first:last, 2].mean()),
+    spent = Energies(*(record.energy_rows[last] - record.energy_rows[first]))
+    stored = spent.elastic + spent.kinetic + spent.held + spent.damping
+    return WithdrawalForces(
+        resistance=float(-record.force[first:last, 2].mean()),
         area=float(record.area[-1] - record.area[n - 1]),
-        besides=(went.work_of_blade - stored - went.friction) / went.friction,
+        excess_work=(spent.work_of_blade - stored - spent.friction) / spent.friction,
     )
 
 
-def judge_in(name: str, found: Puncture, asked: float, known: Known | None = None) -> list[Line]:
-    """Return the lines of the way in, where the peak should be `asked` [N]."""
-    lines = [
-        Line(f"{name}: peak / (toughness of the skin × edge)", found.peak / asked, *within(_NEAR),
-             known=known)
+def check_insertion(
+    name: str, found: InsertionForces, expected: float, known: KnownDeviation | None = None
+) -> list[Check]:
+    """Return the checks of an insertion.
+
+    Args:
+        name: Name of the puncture.
+        found: Its forces.
+        expected: Peak by theory [N].
+        known: Known deviation of the peak; then the peak alone is checked.
+    """
+    checks = [
+        Check(f"{name}: peak / (toughness of the skin × edge)", found.peak / expected,
+              *within(_NEAR), known=known)
     ]  # fmt: skip
     if known is None:
-        lines += [
-            Line(f"{name}: area cut before the peak", found.area_before * 1e6, 0.0, 0.0, "mm²"),
-            Line(f"{name}: plateau / peak", found.plateau / found.peak, 0.0, 0.95),
+        checks += [
+            Check(f"{name}: area cut before the peak", found.area_before * 1e6, 0.0, 0.0, "mm²"),
+            Check(f"{name}: plateau / peak", found.plateau / found.peak, 0.0, 0.95),
         ]
-    return lines
+    return checks
 
 
-def judge_out(name: str, found: Withdrawal, plateau: float) -> list[Line]:
-    """Return the lines of the way out; `plateau` is the force on the way in [N]."""
+def check_withdrawal(name: str, found: WithdrawalForces, plateau: float) -> list[Check]:
+    """Return the checks of a withdrawal; `plateau` is the force of the insertion [N]."""
     return [
-        Line(f"{name}: force that holds it back on its way out", found.back, 1e-6, plateau, "N"),
-        Line(f"{name}: area cut on its way out", found.area * 1e6, 0.0, 0.0, "mm²"),
-        Line(f"{name}: work besides friction / friction, on its way out", found.besides, -0.1, 0.1),
+        Check(f"{name}: force against the withdrawal", found.resistance, 1e-6, plateau, "N"),
+        Check(f"{name}: area cut during the withdrawal", found.area * 1e6, 0.0, 0.0, "mm²"),
+        Check(
+            f"{name}: work besides friction / friction, withdrawal", found.excess_work, -0.1, 0.1
+        ),
     ]
 
 
-def measure(quick: bool) -> Findings:
+def _measure(quick: bool) -> Findings:
     """Puncture skins of several toughnesses with a narrow edge, and one with a wide edge."""
-    lines: list[Line] = []
+    checks: list[Check] = []
     curves = []
     for skin in (3.0,) if quick else (1.5, 2.0, 3.0):
-        name = f"edge of {NARROW * 1e3:g} mm, skin × {skin:g}"
-        found = way_in(stroke(NARROW, skin))
-        lines += judge_in(name, found, skin * _TOUGHNESS * NARROW)
+        name = f"edge of {_NARROW * 1e3:g} mm, skin × {skin:g}"
+        found = _insertion_forces(_puncture(_NARROW, skin))
+        checks += check_insertion(name, found, skin * _TOUGHNESS * _NARROW)
         if skin == 3.0:
             drop = found.after_peak / found.peak
-            lines.append(Line(f"{name}: force 10 ms after the peak / peak", drop, 0.0, DROPS))
-        curves.append(_curve(name, found.record, NARROW))
-    name = f"edge of {WIDE * 1e3:g} mm, skin × 1.5"
-    record = stroke(WIDE, 1.5, COARSE if quick else FINE)
-    found = way_in(record)
+            checks.append(
+                Check(f"{name}: force 10 ms after the peak / peak", drop, 0.0, _LARGEST_DROP_SHARE)
+            )
+        curves.append(_curve(name, found.record, _NARROW))
+    name = f"edge of {_WIDE * 1e3:g} mm, skin × 1.5"
+    record = _puncture(_WIDE, 1.5, COARSE_CELLS if quick else FINE_CELLS)
+    found = _insertion_forces(record)
     if not quick:
-        lines += judge_in(name, found, 1.5 * _TOUGHNESS * WIDE, known=UNZIPS)
-    lines += judge_out(name, way_out(record), found.plateau)
-    curves.append(_curve(name, record, WIDE))
+        checks += check_insertion(name, found, 1.5 * _TOUGHNESS * _WIDE, known=_BREAKS_FROM_ENDS)
+    checks += check_withdrawal(name, _withdrawal_forces(record), found.plateau)
+    curves.append(_curve(name, record, _WIDE))
     plot = Plot(
         "Puncture and withdrawal",
         "depth of the edge [mm]",
         "force upwards / (toughness × edge)",
         curves,
     )
-    return Findings(lines, [plot])
+    return Findings(checks, [plot])
 
 
-def _curve(name: str, record: Record, length: float) -> Curve:
+def _curve(name: str, record: StrokeRecord, length: float) -> Curve:
+    """Return the curve of force over depth."""
     depth = (THICKNESS - record.tip[:, 2]) * 1e3
     return Curve(name, depth, record.force[:, 2] / (_TOUGHNESS * length))
 
 
-SCENE = Scene(
+PUNCTURE_SCENE = ValidationScene(
     name="puncture",
     title="Puncture and withdrawal",
     about=(
         "A level edge goes 12 mm into the block from above and out again. The tissue dents "
         "while the force rises; where it reaches the toughness of the skin × the edge, the skin "
-        "breaks and the force drops to that of the tissue below and the friction of the faces. On "
-        "the way out the force changes its sign, nothing is cut, and the work is that of friction."
+        "breaks and the force drops to that of the tissue below and the friction of the faces. In "
+        "the withdrawal the force changes its sign, nothing is cut, and the work is that of "
+        "friction."
     ),
-    measure=measure,
-    sources=[
-        Source(
+    measure=_measure,
+    references=[
+        Reference(
             "Jiang et al. 2014, J. Biomech. 47:3344",
             "three phases of needle insertion in tissues and a phantom: deformation, insertion, "
             "extraction",
         ),
-        Source(
+        Reference(
             "Khadem et al. 2016, doi:10.1109/LRA.2016.2528301",
             "puncture, cutting and friction as distinct events of a needle in porcine tissue",
         ),

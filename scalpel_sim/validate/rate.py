@@ -1,69 +1,89 @@
-"""What an edge costs more: at speed, and where it is blunt."""
+"""The cutting force at higher speed, and with a blunt edge."""
 
 import numpy as np
 
-from scalpel_sim.validate.block import THICKNESS, block_tissue, lead, rubber, through
-from scalpel_sim.validate.findings import Curve, Findings, Line, Plot, Scene, Source, within
+from scalpel_sim.validate.block import (
+    THICKNESS,
+    block_tissue,
+    run_stroke,
+    soft_material,
+    straight_cut,
+)
+from scalpel_sim.validate.findings import (
+    Check,
+    Curve,
+    Findings,
+    Plot,
+    Reference,
+    ValidationScene,
+    within,
+)
 from tissue import BladeShape
 
-_SLOW_TOUGHNESS, TWICE_AT, EXPONENT = 10.0, 0.1, 0.5
-"""[J/m2], [m/s]."""
+_SLOW_TOUGHNESS = 10.0
+"""Toughness of a slow cut, J0 [J/m2]."""
+_DOUBLING_SPEED = 0.1
+"""Speed at which the toughness is twice J0, v0 [m/s]."""
+_EXPONENT = 0.5
+"""Exponent n of the speed."""
 _STIFFNESS = 30e3
 """Young's modulus [Pa]."""
-RUPTURE = 1e5
-"""Work to rupture [J/m3]."""
+_WORK_TO_RUPTURE = 1e5
+"""Work to rupture, W [J/m3]."""
 _NEAR = 0.05
+"""Largest relative error of the force."""
 
 
-def toughness(speed: float) -> float:
-    """Theory [J/m2]: J0 (1 + (v / v0)^n)."""
-    return _SLOW_TOUGHNESS * (1.0 + (speed / TWICE_AT) ** EXPONENT)
+def _theory(speed: float) -> float:
+    """Return the toughness at a speed by theory [J/m2]: J0 (1 + (v / v0)^n)."""
+    return float(_SLOW_TOUGHNESS * (1.0 + (speed / _DOUBLING_SPEED) ** _EXPONENT))
 
 
-def force_at(speed: float) -> float:
-    """Cut through at that speed [m/s], and return the mean force [N]."""
-    material = rubber(
+def _force_at_speed(speed: float) -> float:
+    """Cut through the block at a speed [m/s]; return the mean force [N]."""
+    material = soft_material(
         young_modulus=_STIFFNESS,
         toughness=_SLOW_TOUGHNESS,
-        toughness_exponent=EXPONENT,
-        toughness_speed=TWICE_AT,
+        toughness_exponent=_EXPONENT,
+        toughness_speed=_DOUBLING_SPEED,
     )
-    record = lead(block_tissue(material), through(speed))
-    return float(record.of_steady(record.resistance).mean())
+    record = run_stroke(block_tissue(material), straight_cut(speed))
+    return float(record.steady_rows(record.resistance).mean())
 
 
-def force_of(radius: float) -> float:
-    """Cut through with an edge of that radius [m], and return the mean force [N]."""
-    material = rubber(young_modulus=_STIFFNESS, toughness=_SLOW_TOUGHNESS, work_to_rupture=RUPTURE)
-    thin = BladeShape(thickness=1e-5, edge_radius=radius)  # its faces push nothing apart
-    record = lead(block_tissue(material, blade=thin), through(TWICE_AT))
-    return float(record.of_steady(record.resistance).mean())
+def _force_of_edge(radius: float) -> float:
+    """Cut through the block with an edge of a radius [m]; return the mean force [N]."""
+    material = soft_material(
+        young_modulus=_STIFFNESS, toughness=_SLOW_TOUGHNESS, work_to_rupture=_WORK_TO_RUPTURE
+    )
+    thin = BladeShape(thickness=1e-5, edge_radius=radius)  # so that its faces push nothing apart
+    record = run_stroke(block_tissue(material, blade=thin), straight_cut(_DOUBLING_SPEED))
+    return float(record.steady_rows(record.resistance).mean())
 
 
-def measure(quick: bool) -> Findings:
-    """Cut at three speeds, and with edges of three radii."""
+def _measure(quick: bool) -> Findings:
+    """Cut at four speeds, and with edges of three radii."""
     speeds = np.array([0.05, 0.2] if quick else [0.02, 0.05, 0.1, 0.2])
     radii = np.array([50e-6] if quick else [0.0, 25e-6, 50e-6])
-    fast = np.array([force_at(v) for v in speeds]) / THICKNESS
-    lines = [
-        Line(f"{v * 1e3:g} mm/s: force / (toughness at that speed × depth)",
-             f / toughness(v), *within(_NEAR))
-        for v, f in zip(speeds, fast, strict=True)
-    ]  # fmt: skip
+    fast = np.array([_force_at_speed(v) for v in speeds]) / THICKNESS
+    checks = []
+    for v, force_per_depth in zip(speeds, fast, strict=True):
+        name = f"{v * 1e3:g} mm/s: force / (toughness at that speed × depth)"
+        checks.append(Check(name, force_per_depth / _theory(v), *within(_NEAR)))
     for radius in radii:
-        theory = (_SLOW_TOUGHNESS + 2.0 * radius * RUPTURE) * THICKNESS
+        theory = (_SLOW_TOUGHNESS + 2.0 * radius * _WORK_TO_RUPTURE) * THICKNESS
         name = f"edge of {radius * 1e6:g} µm: force / ((toughness + 2 r W) × depth)"
-        lines.append(Line(name, force_of(radius) / theory, *within(_NEAR)))
+        checks.append(Check(name, _force_of_edge(radius) / theory, *within(_NEAR)))
     finely = np.linspace(0.0, speeds[-1], 100)
     curves = [
         Curve("measured", speeds * 1e3, fast),
-        Curve("", finely * 1e3, np.array([toughness(v) for v in finely]), is_theory=True),
+        Curve("", finely * 1e3, np.array([_theory(v) for v in finely]), is_theory=True),
     ]
     plot = Plot("Toughness by speed", "speed [mm/s]", "force / depth [N/m = J/m²]", curves)
-    return Findings(lines, [plot])
+    return Findings(checks, [plot])
 
 
-SCENE = Scene(
+RATE_SCENE = ValidationScene(
     name="rate",
     title="Speed and bluntness of the edge",
     about=(
@@ -71,9 +91,9 @@ SCENE = Scene(
         "of the edge, J0 (1 + (v / v0)^n); and where the edge has a radius r and tissue a work to "
         "rupture W, which adds 2 r W."
     ),
-    measure=measure,
-    sources=[
-        Source(
+    measure=_measure,
+    references=[
+        Reference(
             "Zhang and Hutchens 2021, Soft Matter 17:6728",
             "the energy that cutting takes is linear in the radius of the edge; the slope is of "
             "the order of twice the work to rupture",

@@ -1,4 +1,4 @@
-"""Action and reaction: what the blade feels is what the tissue gets, in every step."""
+"""Action and reaction: in every step the force on the blade is opposite to that on the tissue."""
 
 import itertools
 from dataclasses import replace
@@ -6,85 +6,95 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.validate.block import MIDDLE, block_tissue, edge, rubber
-from scalpel_sim.validate.findings import Findings, Known, Line, Scene
+from scalpel_sim.validate.block import CUT_X, block_tissue, edge_at, soft_material
+from scalpel_sim.validate.findings import Check, Findings, KnownDeviation, ValidationScene
 from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray, Law, Tissue
 
 _LARGEST = 1e-9
-"""[N] and [N m]: the issue's bound."""
+"""Largest imbalance of forces [N] and of torques [N m]."""
 _DT = 1e-4
-"""Time step [s]: short, since the motion itself keeps moments only as well as it is stepped."""
+"""Time step [s]: short, since the time integration keeps angular momentum only to an error that
+shrinks with the step."""
 _SPEED = 0.3
-"""[m/s]."""
-HEAVY = 4000.0
-"""Density [kg/m3]: a free block of water would be pushed away and not cut."""
-MESH_TURNS = Known(
+"""Speed of the blade [m/s]."""
+_DENSITY = 4000.0
+"""Density [kg/m3]: a free block as light as water would be pushed away and not cut."""
+_MASS_MOVES = KnownDeviation(
     0.0,
     1e-3,
-    "where a cut puts nodes in, mass moves between nodes: that keeps mass and momentum to the last "
-    "bit, but the centre of mass goes a little, and angular momentum with it: by some 1e-8 N m s, "
-    "in one step of a hundred. It is not between blade and tissue",
+    "where a cut inserts nodes, mass moves between nodes: that keeps mass and momentum to the last "
+    "bit, but shifts the centre of mass a little, and with it angular momentum, by about 1e-8 "
+    "N m s, in one step of a hundred. Nothing is exchanged between blade and tissue",
 )
 
 
 class Balance(NamedTuple):
-    """What is left over of action and reaction in each step."""
+    """The imbalance of action and reaction in each step."""
 
     forces: FloatArray
-    """On the blade and on the tissue, added up [N]; shape (n,)."""
+    """Force on the blade plus force on the tissue [N], shape (n,)."""
     momentum: FloatArray
-    """Force on the blade, and change of the nodes' momentum over time [N]; shape (n,)."""
-    moment: FloatArray
-    """The same of torque and angular momentum [N m]; shape (n,)."""
+    """Force on the blade plus the rate of change of the nodes' momentum [N], shape (n,)."""
+    angular_momentum: FloatArray
+    """Torque on the blade plus the rate of change of the nodes' angular momentum [N m], shape
+    (n,)."""
     contacts: FloatArray
-    """Torque of the contacts and of the wrench at the end of the step [N m]; shape (n,)."""
+    """Torque of the contacts plus torque of the wrench at the end of the step [N m], shape (n,)."""
     mesh_changed: FloatArray
-    """Whether nodes were put in, shape (n,)."""
+    """1 where nodes were inserted, else 0, shape (n,)."""
     largest: tuple[float, float]
-    """Force [N] and torque about the origin [N m] that there were."""
+    """Largest force [N] and largest torque about the origin [N m] of all steps."""
 
 
-def wavy(n: int) -> list[BladeSegment]:
-    """Return a way through the block that swings from side to side: side load."""
+def _wavy_cut(n: int) -> list[BladeSegment]:
+    """Return `n` poses of a cut that swings from side to side: side load."""
     y = -0.003 + _SPEED * _DT * np.arange(n)
-    return [edge((MIDDLE + 0.003 * np.sin(75.0 * at), at, -0.005)) for at in y]
+    return [edge_at((CUT_X + 0.003 * np.sin(75.0 * at), at, -0.005)) for at in y]
 
 
-def cut(law: Law, n: int) -> Balance:
-    """Cut a block that nothing holds, without drag: all that changes its motion is the blade."""
-    material = rubber(law, toughness=10.0, blade_friction=0.3)
-    material = replace(material, viscous_damping=0.0, density=HEAVY)
+def cut_free_block(law: Law, n: int) -> Balance:
+    """Cut a block that nothing holds, without drag: only the blade changes its momentum.
+
+    Args:
+        law: Law of elasticity.
+        n: Number of poses of the blade.
+    """
+    material = soft_material(law, toughness=10.0, blade_friction=0.3)
+    material = replace(material, viscous_damping=0.0, density=_DENSITY)
     tissue = block_tissue(material, held="", blade=BladeShape())
-    return balance(tissue, wavy(n))
+    return _balance(tissue, _wavy_cut(n))
 
 
-def balance(tissue: Tissue, places: list[BladeSegment]) -> Balance:
-    """Lead the blade, and keep what is left over in each step."""
+def _balance(tissue: Tissue, poses: list[BladeSegment]) -> Balance:
+    """Move the blade from pose to pose; return the imbalance in each step."""
     rows, largest = [], np.zeros(2)
-    momentum, moment = _momenta(tissue)
+    momenta = _momenta(tissue)
     size = (tissue.n_nodes, tissue.n_tetrahedra, 0.0)
-    for t0, t1 in itertools.pairwise(places):
+    for t0, t1 in itertools.pairwise(poses):
         result = tissue.step(BladeSweep(t0, t1), _DT)
         wrench, contacts = result.wrench, result.contacts
         torque = wrench.torque + np.cross(wrench.point, wrench.force)
-        before, (momentum, moment) = (momentum, moment), _momenta(tissue)
-        pushes = contacts.normal_force[:, None] * contacts.normal + contacts.friction
-        turns = np.cross(contacts.point - wrench.point, pushes).sum(axis=0)
+        before, momenta = momenta, _momenta(tissue)
+        momentum_rate, angular_rate = (
+            (after - earlier) / _DT for earlier, after in zip(before, momenta, strict=True)
+        )
+        on_contacts = contacts.normal_force[:, None] * contacts.normal + contacts.friction
+        torque_of_contacts = np.cross(contacts.point - wrench.point, on_contacts).sum(axis=0)
         size_before, size = size, (result.n_nodes, result.n_tetrahedra, result.cut_area)
         rows.append(
             (
                 np.abs(wrench.force + result.force_on_tissue).max(),
-                np.abs(wrench.force + (momentum - before[0]) / _DT).max(),
-                np.abs(torque + (moment - before[1]) / _DT).max(),
-                np.abs(turns + result.wrench_t1.torque).max(),
+                np.abs(wrench.force + momentum_rate).max(),
+                np.abs(torque + angular_rate).max(),
+                np.abs(torque_of_contacts + result.wrench_t1.torque).max(),
                 size != size_before,
             )
         )
         largest = np.maximum(largest, [np.abs(wrench.force).max(), np.abs(torque).max()])
     columns = np.array(rows, dtype=np.float64).T
-    forces, of_momentum, of_moment, of_contacts, mesh_changed = columns
-    most = (float(largest[0]), float(largest[1]))
-    return Balance(forces, of_momentum, of_moment, of_contacts, mesh_changed, most)
+    forces, of_momentum, of_angular_momentum, of_contacts, mesh_changed = columns
+    peaks = (float(largest[0]), float(largest[1]))
+    return Balance(forces, of_momentum, of_angular_momentum, of_contacts, mesh_changed, peaks)
 
 
 def _momenta(tissue: Tissue) -> tuple[FloatArray, FloatArray]:
@@ -94,46 +104,47 @@ def _momenta(tissue: Tissue) -> tuple[FloatArray, FloatArray]:
     return each.sum(axis=0), np.cross(now.positions, each).sum(axis=0)
 
 
-def judge(law: str, found: Balance) -> list[Line]:
-    """Return the lines of a run."""
+def check_balance(law: str, found: Balance) -> list[Check]:
+    """Return the checks of a cut."""
     changed = found.mesh_changed > 0.0
-    in_steady = float(found.moment[~changed].max())
-    in_changed = float(found.moment[changed].max(initial=0.0))
+    in_same_mesh = float(found.angular_momentum[~changed].max())
+    in_changed_mesh = float(found.angular_momentum[changed].max(initial=0.0))
+    angular = f"{law}: torque + change of angular momentum"
     return [
-        Line(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, _LARGEST, "N"),
-        Line(f"{law}: force on blade + change of momentum", float(found.momentum.max()), 0.0,
-             _LARGEST, "N"),
-        Line(f"{law}: torque + change of angular momentum", in_steady, 0.0, _LARGEST, "N m"),
-        Line(f"{law}: the same where the mesh changes", in_changed, 0.0, _LARGEST, "N m",
-             known=MESH_TURNS),
-        Line(f"{law}: torque of contacts + wrench", float(found.contacts.max()), 0.0, _LARGEST,
-             "N m"),
+        Check(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, _LARGEST, "N"),
+        Check(f"{law}: force on blade + change of momentum", float(found.momentum.max()), 0.0,
+              _LARGEST, "N"),
+        Check(angular, in_same_mesh, 0.0, _LARGEST, "N m"),
+        Check(f"{angular}, in steps that change the mesh", in_changed_mesh, 0.0, _LARGEST, "N m",
+              known=_MASS_MOVES),
+        Check(f"{law}: torque of contacts + wrench", float(found.contacts.max()), 0.0, _LARGEST,
+              "N m"),
     ]  # fmt: skip
 
 
-def measure(quick: bool) -> Findings:
+def _measure(quick: bool) -> Findings:
     """Cut a free block under both laws, with friction and side load."""
-    lines, notes = [], []
+    checks, notes = [], []
     laws: tuple[Law, ...] = ("neo_hookean",) if quick else ("neo_hookean", "springs")
     for law in laws:
-        found = cut(law, 600 if quick else 1500)
-        lines += judge(law, found)
+        found = cut_free_block(law, 600 if quick else 1500)
+        checks += check_balance(law, found)
         force, torque = found.largest
         notes.append(
             f"{law}: up to {force:.3f} N and {torque:.4f} N m in {len(found.forces)} steps; the "
             f"mesh changed in {int(found.mesh_changed.sum())} of them"
         )
-    return Findings(lines, notes=notes)
+    return Findings(checks, notes=notes)
 
 
-SCENE = Scene(
+REACTION_SCENE = ValidationScene(
     name="reaction",
     title="Action and reaction",
     about=(
         "A block that nothing holds is cut along a wavy line by a scalpel with friction. In each "
-        "step of 0.1 ms the force and the torque on the blade are compared with what the nodes of "
-        "the block got: the change of their momentum and angular momentum, which knows nothing of "
-        "the blade. An arm that feels something else than the tissue gets is not in balance."
+        "step of 0.1 ms the force and the torque on the blade are compared with the change of the "
+        "momentum and the angular momentum of the block's nodes, which is computed without the "
+        "blade. If they differ, the arm does not feel what acts on the tissue."
     ),
-    measure=measure,
+    measure=_measure,
 )

@@ -1,4 +1,4 @@
-"""What a validation found, for a person: a table on the console, and a page of Markdown."""
+"""The report of a validation: a table on the console, and a page of Markdown."""
 
 import math
 from collections.abc import Sequence
@@ -6,107 +6,109 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
-from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Line, Source
-from scalpel_sim.validate.results import Counts, Done, counts
+from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Check, Reference
+from scalpel_sim.validate.results import SceneRun, VerdictCounts, count_verdicts
 
-STYLES = {PASS: "green", KNOWN: "yellow", FAIL: "bold red"}
-_NOT_CONFIRMED = "(not looked up: take it for an estimate)"
+_STYLES = {PASS: "green", KNOWN: "yellow", FAIL: "bold red"}
+_NOT_CONFIRMED = "(not looked up: an estimate)"
 
 
-def print_table(done: Sequence[Done], console: Console) -> None:
-    """Print every line of every scene, and how many passed."""
+def print_checks(runs: Sequence[SceneRun], console: Console) -> None:
+    """Print every check of every scene, and how many passed."""
     table = Table(title="Validation", title_justify="left")
-    for heading in ("scene", "what", "figure", "asked", ""):
-        table.add_column(heading, justify="right" if heading == "figure" else "left")
-    for each in done:
-        for i, line in enumerate(each.findings.lines):
-            name = each.scene.name if i == 0 else ""
-            verdict = f"[{STYLES[line.verdict]}]{line.verdict}[/]"
-            table.add_row(name, line.name, figure(line), asked(line), verdict)
+    for heading in ("scene", "quantity", "value", "bounds", ""):
+        table.add_column(heading, justify="right" if heading == "value" else "left")
+    for run in runs:
+        for i, check in enumerate(run.findings.checks):
+            name = run.scene.name if i == 0 else ""
+            verdict = f"[{_STYLES[check.verdict]}]{check.verdict}[/]"
+            table.add_row(name, check.name, value_text(check), bounds_text(check), verdict)
         table.add_section()
     console.print(table)
-    for why in reasons(done):
+    for why in known_reasons(runs):
         console.print(f"known: {why}", markup=False, highlight=False, soft_wrap=True)
-    console.print(summary(counts(done)))
+    console.print(verdict_sentence(count_verdicts(runs)))
 
 
-def figure(line: Line) -> str:
-    """Return the figure of a line with its unit."""
-    return f"{line.figure:.4g} {line.unit}".rstrip()
+def value_text(check: Check) -> str:
+    """Return the value of a check with its unit."""
+    return f"{check.value:.4g} {check.unit}".rstrip()
 
 
-def asked(line: Line) -> str:
-    """Return the bounds of a line."""
-    if line.low == line.high:
-        return f"{line.low:g}"
-    if math.isinf(line.high):
-        return f"at least {line.low:.4g}"
-    if line.low == 0.0:
-        return f"at most {line.high:.4g}"
-    if line.low == -line.high:
-        return f"± {line.high:.4g}"
-    return f"{line.low:.4g} to {line.high:.4g}"
+def bounds_text(check: Check) -> str:
+    """Return the bounds of a check."""
+    if check.low == check.high:
+        return f"{check.low:g}"
+    if math.isinf(check.high):
+        return f"at least {check.low:.4g}"
+    if check.low == 0.0:
+        return f"at most {check.high:.4g}"
+    if check.low == -check.high:
+        return f"± {check.high:.4g}"
+    return f"{check.low:.4g} to {check.high:.4g}"
 
 
-def summary(found: Counts) -> str:
-    """Return how it ended in a sentence."""
-    total = sum(found)
-    text = f"{found.passed} of {total} lines within their bounds"
-    if found.known:
-        text += f", {found.known} known to be out of them and explained"
-    return text + (f", {found.failed} failed." if found.failed else ".")
+def verdict_sentence(counts: VerdictCounts) -> str:
+    """Return the number of checks by verdict as a sentence."""
+    text = f"{counts.passed} of {sum(counts)} checks are within their bounds"
+    if counts.known:
+        text += f", {counts.known} deviate as known and explained"
+    return text + (f", {counts.failed} failed." if counts.failed else ".")
 
 
-def reasons(done: Sequence[Done]) -> list[str]:
-    """Return why the known lines are out of their bounds, each reason once."""
-    lines = (line for each in done for line in each.findings.lines)
-    whys = (line.known.why for line in lines if line.known and line.verdict == KNOWN)
+def known_reasons(runs: Sequence[SceneRun]) -> list[str]:
+    """Return the explanations of the known deviations, each once."""
+    checks = (check for run in runs for check in run.findings.checks)
+    whys = (check.known.why for check in checks if check.known and check.verdict == KNOWN)
     return list(dict.fromkeys(whys))
 
 
-def as_markdown(done: Sequence[Done], pictures: dict[str, list[str]], *, quick: bool) -> str:
-    """Return the report as a page.
+def validation_page(
+    runs: Sequence[SceneRun], pictures: dict[str, list[str]], *, quick: bool
+) -> str:
+    """Return the report as a page of Markdown.
 
     Args:
-        done: The scenes.
+        runs: The scenes.
         pictures: Names of the files with the plots, by name of the scene.
-        quick: Whether the short set was run, which the page then says.
+        quick: Whether the short version was run, which the page then says.
     """
     parts = [
         "# Validation\n",
         "Forces of the engine against theory and published figures. "
         f"`scalpel-sim validate{' --quick' if quick else ''}` makes this page.\n",
-        f"**{summary(counts(done))}**\n",
-        "A line is `known` where its figure is out of the bounds asked for by no more than what "
-        "is measured and explained below it; a line that is out by more has failed, and the "
-        "command then ends with exit code 1.\n",
+        f"**{verdict_sentence(count_verdicts(runs))}**\n",
+        "A check is `known` where its value is out of bounds by no more than the deviation that "
+        "is measured and explained below the table; a check that is out by more has failed, and "
+        "the command then ends with exit code 1.\n",
     ]
-    for each in done:
-        parts += _section(each, pictures.get(each.scene.name, []))
+    for run in runs:
+        parts += _section(run, pictures.get(run.scene.name, []))
     return "\n".join(parts)
 
 
-def _section(done: Done, pictures: Sequence[str]) -> list[str]:
-    scene, findings = done.scene, done.findings
+def _section(run: SceneRun, pictures: Sequence[str]) -> list[str]:
+    """Return the parts of the page on one scene."""
+    scene, findings = run.scene, run.findings
     rows = [
-        f"| {_cell(line.name)} | {figure(line)} | {asked(line)} | {line.verdict} |"
-        for line in findings.lines
+        f"| {_cell(check.name)} | {value_text(check)} | {bounds_text(check)} | {check.verdict} |"
+        for check in findings.checks
     ]
-    table = ["| what | figure | asked | |", "|---|---|---|---|", *rows]
+    table = ["| quantity | value | bounds | |", "|---|---|---|---|", *rows]
     parts = [f"## {scene.title}\n", f"{scene.about}\n", "\n".join(table) + "\n"]
-    parts += [f"Known: {why}.\n" for why in reasons([done])]
+    parts += [f"Known: {why}.\n" for why in known_reasons([run])]
     parts += [f"{note}.\n" for note in findings.notes]
     parts += [f"![{scene.title}]({name})\n" for name in pictures]
-    if scene.sources:
-        parts.append(
-            "\n".join(["Sources:\n", *(_source(source) for source in scene.sources)]) + "\n"
-        )
+    if scene.references:
+        entries = (_reference(reference) for reference in scene.references)
+        parts.append("\n".join(["Sources:\n", *entries]) + "\n")
     return parts
 
 
-def _source(source: Source) -> str:
-    mark = "" if source.is_confirmed else f" {_NOT_CONFIRMED}"
-    return f"- {source.citation}: {source.says}{mark}"
+def _reference(reference: Reference) -> str:
+    """Return a reference as an item of a list."""
+    mark = "" if reference.is_confirmed else f" {_NOT_CONFIRMED}"
+    return f"- {reference.citation}: {reference.says}{mark}"
 
 
 def _cell(text: str) -> str:

@@ -1,77 +1,79 @@
-"""All that a validation found, counted, and as JSON."""
+"""All findings of a validation: their number by verdict, and their JSON."""
 
 import json
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Findings, Line, Scene
+from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Check, Findings, ValidationScene
 
 _FORMAT = "scalpel-sim validation 1"
-"""First entry of the file; the number changes where readers of older files would stumble."""
+"""First entry of the file; the number changes where readers of older files would fail."""
 
 
-class Done(NamedTuple):
-    """A scene, and what it found."""
+class SceneRun(NamedTuple):
+    """A scene that was run."""
 
-    scene: Scene
+    scene: ValidationScene
     findings: Findings
     seconds: float
-    """That it took on this machine."""
+    """Wall time of the run on this machine [s]."""
 
 
-class Counts(NamedTuple):
-    """Lines by verdict."""
+class VerdictCounts(NamedTuple):
+    """Number of checks by verdict."""
 
     passed: int
     known: int
     failed: int
 
 
-def counts(done: Sequence[Done]) -> Counts:
-    """Return how many lines of all scenes passed, are known to be out of bounds, and failed."""
-    verdicts = [line.verdict for each in done for line in each.findings.lines]
-    return Counts(*(verdicts.count(verdict) for verdict in (PASS, KNOWN, FAIL)))
+def count_verdicts(runs: Sequence[SceneRun]) -> VerdictCounts:
+    """Return how many checks passed, deviate as known, and failed."""
+    verdicts = [check.verdict for run in runs for check in run.findings.checks]
+    return VerdictCounts(*(verdicts.count(verdict) for verdict in (PASS, KNOWN, FAIL)))
 
 
-def as_json(done: Sequence[Done], *, quick: bool, versions: dict[str, str]) -> str:
-    """Return what was found as JSON text."""
+def validation_as_json(runs: Sequence[SceneRun], *, quick: bool, versions: dict[str, str]) -> str:
+    """Return all findings as JSON text."""
     content = {
         "format": _FORMAT,
         "quick": quick,
         "versions": versions,
-        "passed": counts(done).failed == 0,
-        "counts": counts(done)._asdict(),
-        "scenes": [_scene(each) for each in done],
+        "passed": count_verdicts(runs).failed == 0,
+        "counts": count_verdicts(runs)._asdict(),
+        "scenes": [_scene_entry(run) for run in runs],
     }
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def _scene(done: Done) -> dict[str, Any]:
-    scene = done.scene
+def _scene_entry(run: SceneRun) -> dict[str, Any]:
+    """Return a scene as JSON has it."""
+    scene = run.scene
     return {
         "name": scene.name,
         "title": scene.title,
         "about": scene.about,
-        "seconds": round(done.seconds, 1),
-        "lines": [_line(line) for line in done.findings.lines],
-        "notes": list(done.findings.notes),
-        "sources": [source._asdict() for source in scene.sources],
+        "seconds": round(run.seconds, 1),
+        "lines": [_check_entry(check) for check in run.findings.checks],
+        "notes": list(run.findings.notes),
+        "sources": [reference._asdict() for reference in scene.references],
     }
 
 
-def _line(line: Line) -> dict[str, Any]:
-    """Return a line; what is no number becomes null, which JSON has."""
+def _check_entry(check: Check) -> dict[str, Any]:
+    """Return a check as JSON has it."""
     return {
-        "name": line.name,
-        "figure": _finite(line.figure),
-        "unit": line.unit,
-        "low": _finite(line.low),
-        "high": _finite(line.high),
-        "verdict": line.verdict,
-        "why": line.known.why if line.known and line.verdict == KNOWN else "",
+        "name": check.name,
+        "figure": _finite(check.value),
+        "unit": check.unit,
+        "low": _finite(check.low),
+        "high": _finite(check.high),
+        "verdict": check.verdict,
+        "why": check.known.why if check.known and check.verdict == KNOWN else "",
     }
 
 
 def _finite(number: float) -> float | None:
+    """Return a number, or None where it is not finite: JSON has no such numbers."""
     return number if math.isfinite(number) else None

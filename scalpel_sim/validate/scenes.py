@@ -3,33 +3,42 @@
 from collections.abc import Sequence
 
 from scalpel_sim.errors import unknown
-from scalpel_sim.validate import (
-    audit,
-    coupling,
-    gel,
-    liver,
-    puncture,
-    rate,
-    reaction,
-    slicing,
-    steady,
-    symmetry,
-)
-from scalpel_sim.validate.findings import Scene
+from scalpel_sim.validate.audit import AUDIT_SCENE
+from scalpel_sim.validate.coupling import COUPLING_SCENE
+from scalpel_sim.validate.findings import ValidationScene
+from scalpel_sim.validate.gel import GEL_SCENE
+from scalpel_sim.validate.liver import LIVER_SCENE
+from scalpel_sim.validate.puncture import PUNCTURE_SCENE
+from scalpel_sim.validate.rate import RATE_SCENE
+from scalpel_sim.validate.reaction import REACTION_SCENE
+from scalpel_sim.validate.slicing import SLICING_SCENE
+from scalpel_sim.validate.steady import STEADY_SCENE
+from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
 
-SCENES: dict[str, Scene] = {
-    module.SCENE.name: module.SCENE
-    for module in (steady, symmetry, rate, slicing, puncture, reaction, audit, coupling, liver, gel)
+VALIDATION_SCENES: dict[str, ValidationScene] = {
+    scene.name: scene
+    for scene in (
+        STEADY_SCENE,
+        SYMMETRY_SCENE,
+        RATE_SCENE,
+        SLICING_SCENE,
+        PUNCTURE_SCENE,
+        REACTION_SCENE,
+        AUDIT_SCENE,
+        COUPLING_SCENE,
+        LIVER_SCENE,
+        GEL_SCENE,
+    )
 }
 
 
-def chosen(names: Sequence[str]) -> list[Scene]:
-    """Return the scenes of those names; all of them where there is no name.
+def chosen_scenes(names: Sequence[str]) -> list[ValidationScene]:
+    """Return the scenes of those names; all of them where no name is given.
 
     Raises:
-        UsageError: there is none of that name; the message says which there are.
+        UsageError: there is no scene of that name; the message lists those that there are.
     """
     for name in names:
-        if name not in SCENES:
-            raise unknown("scene of the validation", name, SCENES)
-    return [scene for scene in SCENES.values() if not names or scene.name in names]
+        if name not in VALIDATION_SCENES:
+            raise unknown("scene of the validation", name, VALIDATION_SCENES)
+    return [scene for scene in VALIDATION_SCENES.values() if not names or scene.name in names]

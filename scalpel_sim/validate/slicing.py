@@ -1,78 +1,110 @@
-"""Slicing against pressing: an edge that is drawn along itself meets less in the way it goes."""
+"""Slicing against pressing: an edge that is drawn along itself needs less normal force."""
 
 import numpy as np
 
-from scalpel_sim.validate.block import THICKNESS, Record, block_tissue, lead, rubber, through
-from scalpel_sim.validate.findings import Curve, Findings, Known, Line, Plot, Scene, Source, within
+from scalpel_sim.validate.block import (
+    THICKNESS,
+    StrokeRecord,
+    block_tissue,
+    run_stroke,
+    soft_material,
+    straight_cut,
+)
+from scalpel_sim.validate.findings import (
+    Check,
+    Curve,
+    Findings,
+    KnownDeviation,
+    Plot,
+    Reference,
+    ValidationScene,
+    within,
+)
+from tissue import FloatArray
 
-TOUGHNESS = 20.0
-"""[J/m2]."""
+SLICING_TOUGHNESS = 20.0
+"""Toughness of the block [J/m2]."""
 _STIFFNESS = 30e3
 """Young's modulus [Pa]."""
 _HELD = "left,right,bottom"
-"""So that the block is not drawn down with the edge."""
+"""Sides that are held: the bottom too, so that the block is not drawn down with the edge."""
 _NEAR = 0.10
-"""How far the normal force may be off: the issue's bound for 45 degrees."""
-_SLOW, FAST = 0.02, 0.05
-"""[m/s]."""
-STICKS = Known(
+"""Largest relative error of either force."""
+_SLOW, SLICING_SPEED = 0.02, 0.05
+"""Speeds across the edge [m/s]."""
+_STICKS = KnownDeviation(
     0.9,
     1.6,
-    "an edge that is drawn along steeply and slowly sticks and slips: the mean force in the way of "
-    "the edge is then up to half above theory, the work a tenth; that along the edge is right",
+    "an edge that is drawn along steeply and slowly sticks and slips: the mean normal force is "
+    "then up to half above theory, the work a tenth; the force along the edge is right",
 )
-"""Measured at a ratio of 2 and 20 mm/s."""
+"""Deviation measured at a ratio of 2 and 20 mm/s."""
 
 
-def normal_force(toughness: float, ratio: float) -> float:
-    """Theory [N]: Fn = toughness × depth / (1 + ratio^2)."""
+def _normal_force(toughness: float, ratio: float) -> float:
+    """Return the normal force by theory [N]: toughness × depth / (1 + ratio^2)."""
     return toughness * THICKNESS / (1.0 + ratio**2)
 
 
-def cut(ratio: float, speed: float) -> Record:
-    """Cut through the block while the edge is drawn down by `ratio` of its way."""
-    material = rubber(young_modulus=_STIFFNESS, toughness=TOUGHNESS)
-    return lead(block_tissue(material, held=_HELD), through(speed, ratio=ratio))
+def cut_by_slicing(ratio: float, speed: float) -> StrokeRecord:
+    """Cut through the block with an edge that is drawn down.
+
+    Args:
+        ratio: Speed along the edge over the speed across it.
+        speed: Speed across the edge [m/s].
+    """
+    material = soft_material(young_modulus=_STIFFNESS, toughness=SLICING_TOUGHNESS)
+    return run_stroke(block_tissue(material, held=_HELD), straight_cut(speed, ratio=ratio))
 
 
-def judge(ratio: float, speed: float, record: Record, toughness: float) -> list[Line]:
-    """Return the lines of a slicing cut through a body of that toughness [J/m2]."""
-    theory = normal_force(toughness, ratio)
-    across = float(record.of_steady(record.resistance).mean())
-    along = float(record.of_steady(record.force[:, 2]).mean())
+def check_slicing(
+    ratio: float, speed: float, record: StrokeRecord, toughness: float
+) -> list[Check]:
+    """Return the checks of a slicing cut.
+
+    Args:
+        ratio: Speed along the edge over the speed across it.
+        speed: Speed across the edge [m/s].
+        record: The cut.
+        toughness: Toughness of the block [J/m2].
+    """
+    theory = _normal_force(toughness, ratio)
+    across = float(record.steady_rows(record.resistance).mean())
+    along = float(record.steady_rows(record.force[:, 2]).mean())
     name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s"
-    known = STICKS if ratio > 1.0 and speed < FAST else None
-    lines = [
-        Line(f"{name}: normal force over theory", across / theory, *within(_NEAR), known=known)
+    known = _STICKS if ratio > 1.0 and speed < SLICING_SPEED else None
+    checks = [
+        Check(f"{name}: normal force over theory", across / theory, *within(_NEAR), known=known)
     ]
     if ratio > 0.0:
         share = along / (ratio * theory)
-        lines.append(Line(f"{name}: force along the edge over theory", share, *within(_NEAR)))
-    return lines
+        checks.append(Check(f"{name}: force along the edge over theory", share, *within(_NEAR)))
+    return checks
 
 
-def measure(quick: bool) -> Findings:
-    """Press, and slice with ratios of 0.5, 1 and 2 of the speed along the edge to that across."""
+def _measure(quick: bool) -> Findings:
+    """Cut with ratios of 0, 0.5, 1 and 2 of the speed along the edge to that across it."""
     ratios = (0.0, 1.0) if quick else (0.0, 0.5, 1.0, 2.0)
-    lines: list[Line] = []
+    checks: list[Check] = []
     measured = []
     for ratio in ratios:
-        record = cut(ratio, FAST)
-        lines += judge(ratio, FAST, record, TOUGHNESS)
+        record = cut_by_slicing(ratio, SLICING_SPEED)
+        checks += check_slicing(ratio, SLICING_SPEED, record, SLICING_TOUGHNESS)
         measured.append(
             (
-                record.of_steady(record.resistance).mean(),
-                record.of_steady(record.force[:, 2]).mean(),
+                record.steady_rows(record.resistance).mean(),
+                record.steady_rows(record.force[:, 2]).mean(),
             )
         )
     if not quick:
-        lines += judge(2.0, _SLOW, cut(2.0, _SLOW), TOUGHNESS)
-    return Findings(lines, [_plot(np.array(ratios), np.array(measured))])
+        checks += check_slicing(2.0, _SLOW, cut_by_slicing(2.0, _SLOW), SLICING_TOUGHNESS)
+    return Findings(checks, [_plot(np.array(ratios), np.array(measured))])
 
 
-def _plot(ratios: np.ndarray, measured: np.ndarray) -> Plot:
+def _plot(ratios: FloatArray, measured: FloatArray) -> Plot:
+    """Return the plot of both forces over the ratio."""
     finely = np.linspace(0.0, ratios[-1], 50)
-    theory = TOUGHNESS * THICKNESS / (1.0 + finely**2)
+    theory = SLICING_TOUGHNESS * THICKNESS / (1.0 + finely**2)
     curves = [
         Curve("normal force", ratios, measured[:, 0]),
         Curve("", finely, theory, is_theory=True),
@@ -82,17 +114,18 @@ def _plot(ratios: np.ndarray, measured: np.ndarray) -> Plot:
     return Plot("Slicing", "speed along the edge / speed across it", "force [N]", curves)
 
 
-SCENE = Scene(
+SLICING_SCENE = ValidationScene(
     name="slicing",
     title="Slicing against pressing",
     about=(
-        "The edge is drawn along itself while it cuts. Work goes into area alone, so that with a "
-        "ratio xi of the two speeds the normal force is toughness × depth / (1 + xi²), and that "
-        "along the edge xi times as much: at 45 degrees (xi = 1) half, which is why one slices."
+        "The edge is drawn along itself while it cuts. All work goes into area, so that with a "
+        "ratio xi of the two speeds the normal force is toughness × depth / (1 + xi²), and the "
+        "force along the edge xi times as much: at 45 degrees (xi = 1) the normal force is half "
+        "that of pressing, which is why one slices."
     ),
-    measure=measure,
-    sources=[
-        Source(
+    measure=_measure,
+    references=[
+        Reference(
             "Atkins, Xu and Jeronimidis 2004, J. Mater. Sci. 39:2761; Atkins, PMC4843631",
             "the two forces as functions of the slice/push ratio, and experiments with cheddar "
             "and salami that follow them",

@@ -6,33 +6,39 @@ import re
 
 import pytest
 
-from scalpel_sim.bench import cut, kernels, local_frame, roofline, scaling, scenes, table1
-from scalpel_sim.bench.results import HIGHER, LOWER, NEITHER, load
+from scalpel_sim.bench.cut import CUT_BLOCKS, cut_slits, measure_cut_steps, median_cost
+from scalpel_sim.bench.kernels import measure_kernels
+from scalpel_sim.bench.local_frame import RELAXATIONS, measure_local_frames
+from scalpel_sim.bench.results import HIGHER, LOWER, NEITHER, load_results
+from scalpel_sim.bench.roofline import measure_roofline
+from scalpel_sim.bench.scaling import measure_scaling
+from scalpel_sim.bench.scenes import measure_scenes
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.table_1 import TABLE_1
+from scalpel_sim.scenes import SCHEMES
 
 
-def is_sane(figure):
-    """Whether a figure has a unit, a clock, samples, and percentiles on the bad side."""
-    assert figure.unit and figure.clock and figure.n >= figure.rounds >= 1
-    assert all(map(math.isfinite, (figure.median, figure.p95, figure.p99)))
-    assert figure.lowest <= figure.highest
-    if figure.better == LOWER:
-        assert 0.0 <= figure.median <= figure.p95 <= figure.p99
-    if figure.better == HIGHER:
-        assert figure.median >= figure.p95 >= figure.p99 > 0.0
+def is_sane(measured):
+    """Whether a measurement has a unit, a clock, samples, and percentiles on the bad side."""
+    assert measured.unit and measured.clock and measured.n >= measured.rounds >= 1
+    assert all(map(math.isfinite, (measured.median, measured.p95, measured.p99)))
+    assert measured.lowest <= measured.highest
+    if measured.better == LOWER:
+        assert 0.0 <= measured.median <= measured.p95 <= measured.p99
+    if measured.better == HIGHER:
+        assert measured.median >= measured.p95 >= measured.p99 > 0.0
     return True
 
 
-def printed(findings, capsys):
+def printed(result, capsys):
     from rich.console import Console
 
-    findings.show(Console(width=200))
+    result.show(Console(width=200))
     return capsys.readouterr().out
 
 
 def test_the_blade_does_the_same_to_a_body_however_large_it_is():
-    small, large = map(cut.cost_of, cut.slits_of(1, cut.CELLS[:2]))
+    small, large = map(median_cost, cut_slits(1, CUT_BLOCKS[:2]))
     assert large.n_tetrahedra > 9 * small.n_tetrahedra
     assert large.n_split == pytest.approx(small.n_split, rel=0.05)
     assert large.n_steps == pytest.approx(small.n_steps, abs=1)
@@ -43,9 +49,9 @@ def test_the_blade_does_the_same_to_a_body_however_large_it_is():
 
 
 def test_every_step_of_a_cut_is_a_sample():
-    found = cut.measure(2, cut.CELLS[:1])
-    assert all(map(is_sane, found.figures))
-    of = {figure.case: figure for figure in found.figures}
+    found = measure_cut_steps(2, CUT_BLOCKS[:1])
+    assert all(map(is_sane, found.measurements))
+    of = {each.case: each for each in found.measurements}
     assert of["cut step"].n == of["split tetrahedron"].n > 10
     assert of["split tetrahedron"].median < of["cut step"].median  # some are split in each
 
@@ -56,12 +62,12 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
     out = capsys.readouterr().out
     for words in ("SGI Indigo 2", "3.78", "92.2", "2,446", "stellar", "354", "pictures"):
         assert words in out
-    figures = load(file).figures
-    assert all(map(is_sane, figures))
-    assert len({figure.case for figure in figures}) == len(TABLE_1) * len(table1.SCHEMES)
-    of = {(figure.case, figure.quantity): figure.median for figure in figures}
+    measurements = load_results(file).measurements
+    assert all(map(is_sane, measurements))
+    assert len({each.case for each in measurements}) == len(TABLE_1) * len(SCHEMES)
+    of = {(each.case, each.quantity): each.median for each in measurements}
     for cells, paper in TABLE_1.items():
-        for scheme in table1.SCHEMES:
+        for scheme in SCHEMES:
             case = f"{'x'.join(map(str, cells))} cells, {scheme}"
             assert of[case, "frames"] > 10.0 * paper.frame_rate
             assert of[case, "after the cut"] > paper.tetrahedra_initial
@@ -73,9 +79,9 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
 
 
 def test_a_longer_loop_takes_longer_and_a_larger_body_takes_more_time(capsys):
-    found = kernels.measure(1, 5_400)
-    assert all(map(is_sane, found.figures))
-    of = {(figure.case, figure.tetrahedra): figure.median for figure in found.figures}
+    found = measure_kernels(1, 5_400)
+    assert all(map(is_sane, found.measurements))
+    of = {(each.case, each.tetrahedra): each.median for each in found.measurements}
     for law in ("springs", "neo-Hookean"):
         for size in (576, 5_400):
             assert of[f"{law}: forces", size] < of[f"{law}: Runge-Kutta step", size]
@@ -88,9 +94,9 @@ def test_a_longer_loop_takes_longer_and_a_larger_body_takes_more_time(capsys):
 
 
 def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
-    found = scaling.measure(1, sizes=(576, 6_000))
-    assert all(map(is_sane, found.figures))
-    of = {(f.case, f.quantity, f.tetrahedra): f.median for f in found.figures}
+    found = measure_scaling(1, sizes=(576, 6_000))
+    assert all(map(is_sane, found.measurements))
+    of = {(each.case, each.quantity, each.tetrahedra): each.median for each in found.measurements}
     for law in ("springs", "neo-Hookean"):
         step = f"{law}: Runge-Kutta step"
         for size in (576, 6_000):
@@ -100,24 +106,24 @@ def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
 
 
 def test_a_local_frame_splits_a_dozen_and_does_not_depend_on_the_body_around(capsys):
-    found = local_frame.measure(1, sizes=(6_000, 20_250))
-    assert all(map(is_sane, found.figures))
-    of = {(figure.case, figure.tetrahedra): figure for figure in found.figures}
-    for way in local_frame.WAYS:
-        small, large = (of[f"{way}: cut frame", size] for size in (6_000, 20_250))
-        splits = [float(figure.note.split()[0]) for figure in (small, large)]
+    found = measure_local_frames(1, sizes=(6_000, 20_250))
+    assert all(map(is_sane, found.measurements))
+    of = {(each.case, each.tetrahedra): each for each in found.measurements}
+    for name in RELAXATIONS:
+        small, large = (of[f"{name}: cut frame", size] for size in (6_000, 20_250))
+        splits = [float(each.note.split()[0]) for each in (small, large)]
         assert all(6.0 < n < 24.0 for n in splits)
         assert large.median < 2.0 * small.median  # 3.4 times the tetrahedra
-        assert of[f"{way}: blade moves, nothing split", 6_000].median < small.median
+        assert of[f"{name}: blade moves, nothing split", 6_000].median < small.median
     text = printed(found, capsys)
     assert "share" in text and "µs" in text
 
 
 def test_a_roofline_tells_the_limits_what_a_step_needs_and_its_share(capsys):
-    found = roofline.measure(1, 576)
-    assert all(map(is_sane, found.figures))
-    of = {figure.case: figure for figure in found.figures}
-    shares = [figure for case, figure in of.items() if case.startswith("share")]
+    found = measure_roofline(1, 576)
+    assert all(map(is_sane, found.measurements))
+    of = {each.case: each for each in found.measurements}
+    shares = [share for case, share in of.items() if case.startswith("share")]
     assert len(shares) == 3 and all(0.0 < share.median <= 100.0 for share in shares)
     (whole,) = [share for share in shares if share.case.startswith("share of the limit")]
     assert whole.median == max(share.median for share in shares)
@@ -127,9 +133,9 @@ def test_a_roofline_tells_the_limits_what_a_step_needs_and_its_share(capsys):
 
 
 def test_a_scene_tells_its_frames_and_its_stages(capsys):
-    found = scenes.measure(1, ["grid2"], seconds=0.6)
-    assert all(map(is_sane, found.figures))
-    of = {figure.case: figure for figure in found.figures}
+    found = measure_scenes(1, ["grid2"], seconds=0.6)
+    assert all(map(is_sane, found.measurements))
+    of = {each.case: each for each in found.measurements}
     assert of["grid2: frame"].n == 600 > of["grid2: frame, blade in the tissue"].n > 0
     stages = sum(of[f"grid2: {stage}"].median for stage in ("RX", "GC", "CD"))
     assert stages < of["grid2: frame"].median
@@ -146,7 +152,7 @@ def test_a_run_is_saved_and_compared_with_itself(capsys, tmp_path):
     assert command_line([*words, "--compare", str(file)]) == 0
     out = capsys.readouterr().out
     assert "Ratio: above 1 is faster now" in out and "real-time" in out
-    assert {figure.better for figure in load(file).figures} <= {LOWER, HIGHER, NEITHER}
+    assert {each.better for each in load_results(file).measurements} <= {LOWER, HIGHER, NEITHER}
 
 
 @pytest.mark.parametrize(

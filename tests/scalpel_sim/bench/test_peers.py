@@ -1,4 +1,4 @@
-"""Other engines beside ours: the same body for everyone, and honest about who did not run."""
+"""Other engines beside ours: the same body for each, and a reason for each that did not run."""
 
 import sys
 from pathlib import Path
@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from scalpel_sim.bench import peers
-from scalpel_sim.bench.blocks import block_mesh, edges_of, held
-from scalpel_sim.bench.peer_process import Failed, NotInstalled, PeerProcess
+from scalpel_sim.bench import peer_benchmark
+from scalpel_sim.bench.blocks import held_nodes, jittered_block, mesh_edges
+from scalpel_sim.bench.engine import block_material
+from scalpel_sim.bench.peer_benchmark import body_file, measure_peers
+from scalpel_sim.bench.peer_cases import OURS, OURS_SPRINGS, PEERS
+from scalpel_sim.bench.peer_process import NotInstalledError, PeerError, PeerProcess
 from tissue import Tissue
 
 HERE = Path(sys.executable)
@@ -17,13 +20,13 @@ HERE = Path(sys.executable)
 
 @pytest.fixture(scope="module")
 def body(tmp_path_factory):
-    return peers._body_file(tmp_path_factory.mktemp("peers"), 576)
+    return body_file(tmp_path_factory.mktemp("peers"), jittered_block(576))
 
 
 def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
-    mesh = block_mesh(576)
+    mesh = jittered_block(576)
     with np.load(body) as given:
-        ours = Tissue(mesh, peers.material("springs"))
+        ours = Tissue(mesh, block_material("springs"))
         assert given["masses"] == pytest.approx(ours.snapshot().masses)
         springs = ours._elasticity.arrays.springs
         row = slice(springs.first[100], springs.first[100] + springs.count[100])
@@ -33,11 +36,11 @@ def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
             springs.neighbour[row], springs.stiffness[row], strict=True
         ):
             assert theirs[frozenset((100, int(neighbour)))] == pytest.approx(stiffness)
-        assert (given["held"] == np.flatnonzero(held(mesh))).all()
+        assert (given["held"] == np.flatnonzero(held_nodes(mesh))).all()
 
 
 def test_edges_have_the_volume_around_them_and_nodes_a_quarter_of_it():
-    edges = edges_of(block_mesh(576))
+    edges = mesh_edges(jittered_block(576))
     volume = 0.04 * 0.04 * 0.06
     assert edges.node_volumes.sum() == pytest.approx(volume)
     assert edges.volumes.sum() == pytest.approx(6 * volume)  # each tetrahedron has six edges
@@ -45,11 +48,11 @@ def test_edges_have_the_volume_around_them_and_nodes_a_quarter_of_it():
 
 
 @pytest.mark.parametrize(
-    ("script", "case"),
-    [("ours.py", "springs:runge_kutta:damped"), ("mujoco_flex.py", "Euler:damped")],
+    ("adapter", "case"),
+    [("ours", "springs:runge_kutta:damped"), ("mujoco_flex", "Euler:damped")],
 )
-def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(script, case, body):
-    process = PeerProcess(script, case, body, HERE, 0)
+def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(adapter, case, body):
+    process = PeerProcess(adapter, case, body, HERE, 0)
     try:
         turn = process.turn(0.02)
     finally:
@@ -58,24 +61,33 @@ def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(script, case
     assert 1e-6 < turn.moved < 0.01  # metres: it sags, and did not explode
 
 
+def test_what_an_engine_prints_does_not_get_among_the_answers(body, tmp_path):
+    (tmp_path / "mujoco.py").write_text('print("welcome")\nraise ImportError("another MuJoCo")\n')
+    python = tmp_path / "python"
+    python.write_text(f'#!/bin/sh\nPYTHONPATH={tmp_path} exec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    with pytest.raises(NotInstalledError, match="another MuJoCo"):
+        PeerProcess("mujoco_flex", "Euler:damped", body, python, 0)
+
+
 def test_an_engine_that_is_not_there_and_one_that_cannot_are_told_apart(body, tmp_path):
     bare = tmp_path / "python"
     bare.write_text('#!/bin/sh\necho "ModuleNotFoundError: No module named newton" >&2\nexit 1\n')
     bare.chmod(0o755)
-    with pytest.raises(NotInstalled, match="newton"):
-        PeerProcess("newton_semi_implicit.py", "springs:damped", body, bare, 0)
-    with pytest.raises(Failed, match="implicit"):
-        PeerProcess("mujoco_flex.py", "implicit:damped", body, HERE, 0)
+    with pytest.raises(NotInstalledError, match="newton"):
+        PeerProcess("newton_semi_implicit", "springs:damped", body, bare, 0)
+    with pytest.raises(PeerError, match="implicit"):
+        PeerProcess("mujoco_flex", "implicit:damped", body, HERE, 0)
 
 
 def test_ratios_are_taken_in_each_round_and_what_is_missing_is_said(capsys, monkeypatch):
-    ours, theirs = peers.OURS_SPRINGS, "MuJoCo flex, Euler"
-    monkeypatch.setattr(peers, "OURS", {ours: peers.OURS[ours]})
-    chosen = {theirs: peers.PEERS[theirs], "MuJoCo flex, made up": peers.PEERS[theirs]._replace(
+    ours, theirs = OURS_SPRINGS, "MuJoCo flex, Euler"
+    monkeypatch.setattr(peer_benchmark, "OURS", {ours: OURS[ours]})
+    chosen = {theirs: PEERS[theirs], "MuJoCo flex, made up": PEERS[theirs]._replace(
         case="none:damped")}  # fmt: skip
-    monkeypatch.setattr(peers, "PEERS", chosen)
-    found = peers.measure(2, sizes=(576,))
-    of = {(figure.case, figure.quantity): figure for figure in found.figures}
+    monkeypatch.setattr(peer_benchmark, "PEERS", chosen)
+    found = measure_peers(2, sizes=(576,))
+    of = {(each.case, each.quantity): each for each in found.measurements}
     ratio = of[theirs, f"times as long as {ours}"]
     assert ratio.n == 2 and ratio.lowest <= ratio.median <= ratio.highest
     assert ratio.median == pytest.approx(
@@ -86,3 +98,14 @@ def test_ratios_are_taken_in_each_round_and_what_is_missing_is_said(capsys, monk
     found.show(Console(width=200))
     out = capsys.readouterr().out
     assert "what differs" in out and "not measured: MuJoCo flex, made up" in out and "ms" in out
+
+
+def test_an_engine_that_is_not_installed_is_named_with_what_installs_it(monkeypatch):
+    name = "Newton springs"
+    monkeypatch.setattr(peer_benchmark, "OURS", {})
+    monkeypatch.setattr(peer_benchmark, "PEERS", {name: PEERS[name]._replace(adapter="absent")})
+    found = measure_peers(1, sizes=(576,))
+    assert found.measurements == []
+    (skipped,) = found.skipped
+    assert skipped.reason.startswith("Newton is not installed here: pip install newton")
+    assert "--python" in skipped.reason

@@ -5,41 +5,54 @@ import json
 import numpy as np
 import pytest
 
-from scalpel_sim.bench.compare import FASTER, SAME, SLOWER, TOO_FEW, compared
+from scalpel_sim.bench.compare import (
+    FASTER,
+    NOT_COMPARED,
+    SAME,
+    SLOWER,
+    TOO_FEW,
+    compare_measurements,
+)
 from scalpel_sim.bench.results import (
     FORMAT,
     HIGHER,
     LOWER,
     NEITHER,
-    Findings,
+    BenchmarkResult,
+    Quantity,
     Skipped,
-    as_json,
-    load,
-    of_times,
-    of_values,
-    results_of,
+    collect_results,
+    load_results,
+    results_as_json,
+    summarise_times,
+    summarise_values,
 )
 from scalpel_sim.errors import UsageError
 
 
-def figure(rounds, case="step", better=LOWER, convert=lambda seconds: 1e6 * seconds):
-    return of_times("made", case, 576, "time", "µs", [np.array(r) for r in rounds], clock="CPU",
-                    better=better, convert=convert)  # fmt: skip
+def measured(rounds, case="step", better=LOWER, convert=lambda seconds: 1e6 * seconds):
+    quantity = Quantity("made", case, 576, "time", "µs", "CPU", better)
+    return summarise_times(quantity, [np.array(r) for r in rounds], convert)
+
+
+def rate(tetrahedra, values):
+    quantity = Quantity("made", "frames", tetrahedra, "rate", "1/s", "wall", HIGHER)
+    return summarise_values(quantity, values)
 
 
 def run(seconds, n_rounds=5, spread=0.02):
     """Five rounds of samples around so many seconds, each with a median of its own."""
     around = seconds * (1.0 + spread * np.linspace(-1.0, 1.0, n_rounds))
-    return figure([[0.99 * s, s, 1.01 * s] for s in around])
+    return measured([[0.99 * s, s, 1.01 * s] for s in around])
 
 
 def verdict(before, now):
-    (comparison,) = compared([before], [now])
+    (comparison,) = compare_measurements([before], [now])
     return comparison.verdict
 
 
-def test_a_figure_has_the_median_and_the_slow_samples_and_how_far_the_rounds_are_apart():
-    made = figure([np.linspace(1e-6, 100e-6, 100), np.full(3, 2e-6)])
+def test_a_measurement_has_the_median_and_the_slow_samples_and_how_far_the_rounds_are_apart():
+    made = measured([np.linspace(1e-6, 100e-6, 100), np.full(3, 2e-6)])
     assert made.median == pytest.approx(np.median([*range(1, 101), 2, 2, 2]))
     assert 90.0 < made.p95 < made.p99 < 100.0
     assert (made.lowest, made.highest) == (pytest.approx(2.0), pytest.approx(50.5))
@@ -47,25 +60,24 @@ def test_a_figure_has_the_median_and_the_slow_samples_and_how_far_the_rounds_are
 
 
 def test_of_a_rate_the_slow_samples_are_the_low_ones():
-    made = figure([np.linspace(1.0, 2.0, 101)], better=HIGHER, convert=lambda s: 100.0 / s)
+    made = measured([np.linspace(1.0, 2.0, 101)], better=HIGHER, convert=lambda s: 100.0 / s)
     assert made.p99 < made.p95 < made.median
-    assert of_values("made", "rate", None, "rate", "1/s", [1.0, 2.0, 9.0], clock="wall",
-                     better=HIGHER).p99 < 2.0  # fmt: skip
+    assert rate(None, [1.0, 2.0, 9.0]).p99 < 2.0
 
 
 def test_what_is_saved_is_read_again_to_the_last_bit(tmp_path):
     skipped = Skipped("made", "large", 10**6, "too large for this memory")
-    before = results_of([Findings([run(1.23456789e-6)], [skipped], print)], 0.25)
+    before = collect_results([BenchmarkResult([run(1.23456789e-6)], [skipped], print)], 0.25)
     file = tmp_path / "before.json"
-    file.write_text(as_json(before))
-    assert load(file) == before
+    file.write_text(results_as_json(before))
+    assert load_results(file) == before
     assert before.machine["processor"] and before.versions["numba"]
 
 
 def test_a_slowdown_is_found():
     assert verdict(run(1e-6), run(1.3e-6)) == SLOWER
     assert verdict(run(1.3e-6), run(1e-6)) == FASTER
-    (comparison,) = compared([run(1e-6)], [run(2e-6)])
+    (comparison,) = compare_measurements([run(1e-6)], [run(2e-6)])
     assert comparison.ratio == pytest.approx(0.5)
 
 
@@ -76,18 +88,17 @@ def test_what_lies_within_the_spread_gets_no_verdict():
 
 
 def test_a_higher_rate_is_faster_and_a_share_is_neither():
-    slow, fast = (
-        of_values("made", "frames", 48, "rate", "1/s", [rate] * 5, clock="wall", better=HIGHER)
-        for rate in (10.0, 20.0)
-    )
+    slow, fast = (rate(48, [value] * 5) for value in (10.0, 20.0))
     assert verdict(slow, fast) == FASTER
-    assert compared([slow], [fast])[0].ratio == pytest.approx(2.0)
-    assert verdict(slow._replace(better=NEITHER), fast._replace(better=NEITHER)) == "no time"
+    assert compare_measurements([slow], [fast])[0].ratio == pytest.approx(2.0)
+    assert verdict(slow._replace(better=NEITHER), fast._replace(better=NEITHER)) == NOT_COMPARED
 
 
-def test_only_the_same_case_in_the_same_body_is_compared():
-    assert compared([figure([[1.0]], case="another")], [figure([[1.0]])]) == []
-    assert compared([figure([[1.0]])._replace(tetrahedra=48)], [figure([[1.0]])]) == []
+def test_only_the_same_case_in_the_same_body_is_compare_measurements():
+    assert compare_measurements([measured([[1.0]], case="another")], [measured([[1.0]])]) == []
+    assert (
+        compare_measurements([measured([[1.0]])._replace(tetrahedra=48)], [measured([[1.0]])]) == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -106,4 +117,4 @@ def test_a_file_that_is_none_is_refused_by_name(content, expected, tmp_path):
     if content is not None:
         file.write_text(content)
     with pytest.raises(UsageError, match=f"before.json.*{expected}"):
-        load(file)
+        load_results(file)

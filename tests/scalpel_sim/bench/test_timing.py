@@ -2,7 +2,7 @@
 
 import pytest
 
-from scalpel_sim.bench.timing import LEAST_SAMPLES, SHORTEST_SAMPLE, Case, Clock, interleaved
+from scalpel_sim.bench.timing import LEAST_SAMPLES, SHORTEST_SAMPLE, Case, Clock, time_in_turns
 
 
 class Made:
@@ -26,7 +26,7 @@ class Made:
 
 def test_every_sample_is_the_time_of_one_call():
     made = Made()
-    slow, fast = interleaved(
+    slow, fast = time_in_turns(
         [made.case("slow", 0.05), made.case("fast", 1e-6)], 3, clock=made.clock, turn=0.02
     )
     assert len(slow) == len(fast) == 3
@@ -38,7 +38,7 @@ def test_every_sample_is_the_time_of_one_call():
 
 def test_calls_that_are_too_short_to_time_are_timed_together():
     made = Made()
-    ((samples,),) = interleaved([made.case("short", 1e-5)], 1, clock=made.clock, turn=0.01)
+    ((samples,),) = time_in_turns([made.case("short", 1e-5)], 1, clock=made.clock, turn=0.01)
     assert len(samples) * 32 * 1e-5 == pytest.approx(0.01, rel=0.05)
     assert 32 * 1e-5 >= SHORTEST_SAMPLE > 16 * 1e-5
 
@@ -46,6 +46,6 @@ def test_calls_that_are_too_short_to_time_are_timed_together():
 def test_cases_take_turns_and_every_other_round_goes_backwards():
     made = Made()
     cases = [made.case(name, 1.0) for name in "abc"]
-    interleaved(cases, 3, clock=made.clock, turn=0.0)
+    time_in_turns(cases, 3, clock=made.clock, turn=0.0)
     turns = [name for i, name in enumerate(made.calls) if i == 0 or made.calls[i - 1] != name]
     assert "".join(turns) == "abc" + "abc" + "ba" + "bc"  # at first each is called to load

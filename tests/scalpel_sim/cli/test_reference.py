@@ -17,6 +17,10 @@ from scalpel_sim.cli.options import (
 )
 from scalpel_sim.cli.reference import command_line_reference
 
+pytestmark = pytest.mark.skipif(
+    int(version("cyclopts").partition(".")[0]) != 5, reason="other versions word the page otherwise"
+)
+
 PAGE = Path(__file__).parents[3] / "docs" / "command_line.md"
 
 GROUPS = {
@@ -38,9 +42,6 @@ def section(title: str) -> str:
     return re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", reference(), re.S | re.M).group(1)
 
 
-@pytest.mark.skipif(
-    int(version("cyclopts").partition(".")[0]) != 5, reason="other versions word the page otherwise"
-)
 def test_the_page_of_the_command_line_is_that_of_the_program():
     """If not: `python -m scalpel_sim.cli.reference > docs/command_line.md`."""
     assert PAGE.read_text(encoding="utf-8") == command_line_reference()

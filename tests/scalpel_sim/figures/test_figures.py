@@ -9,7 +9,7 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.figures import figures
 from scalpel_sim.figures.cuts import FIGURE_10, FIGURE_10_MOMENTS, moments
-from scalpel_sim.figures.wire import edges_of
+from scalpel_sim.figures.mesh_drawing import cell_edges
 
 
 @pytest.fixture
@@ -59,8 +59,8 @@ def test_figure_10_grows_from_576_tetrahedra_as_the_blade_goes_through_and_its_c
 
 
 def test_a_tetrahedron_has_six_edges_and_two_that_share_a_face_have_nine():
-    assert len(edges_of(np.array([[0, 1, 2, 3]]))) == 6
-    assert len(edges_of(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))) == 9
+    assert len(cell_edges(np.array([[0, 1, 2, 3]]))) == 6
+    assert len(cell_edges(np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))) == 9
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,14 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.validate import scenes
-from scalpel_sim.validate.findings import Findings, Line, Scene
+from scalpel_sim.validate.findings import Check, Findings, ValidationScene
 
 
 def test_a_scene_is_run_and_reported(tmp_path, capsys):
     words = ["validate", "--only", "rate", "--quick", "--out", str(tmp_path / "new")]
     assert command_line(words) == 0
     out, err = capsys.readouterr()
-    assert "3 of 3 lines within their bounds" in " ".join(out.split())
+    assert "3 of 3 checks are within their bounds" in " ".join(out.split())
     assert "1 of 1: Speed and bluntness of the edge" in err
     content = json.loads((tmp_path / "new" / "validation.json").read_text(encoding="utf-8"))
     assert content["passed"] and content["quick"]
@@ -20,14 +20,15 @@ def test_a_scene_is_run_and_reported(tmp_path, capsys):
     assert (tmp_path / "new" / "validation_rate.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_a_line_that_fails_ends_with_exit_code_1(tmp_path, capsys, monkeypatch):
-    wrong = Scene("wrong", "Wrong", "It is.", lambda quick: Findings([Line("it", 2.0, 0.0, 1.0)]))
-    monkeypatch.setitem(scenes.SCENES, "wrong", wrong)
+def test_a_check_that_fails_ends_with_exit_code_1(tmp_path, capsys, monkeypatch):
+    failing = Check("it", 2.0, 0.0, 1.0)
+    wrong = ValidationScene("wrong", "Wrong", "It is.", lambda quick: Findings([failing]))
+    monkeypatch.setitem(scenes.VALIDATION_SCENES, "wrong", wrong)
     words = ["validate", "--only", "wrong", "--json", "-q", "--out", str(tmp_path)]
     assert command_line(words) == 1
     out, err = capsys.readouterr()
     assert json.loads(out)["counts"]["failed"] == 1  # nothing else is on standard output
-    assert "1 lines are out of their bounds" in err and "validation.md" in err
+    assert "1 check is out of bounds" in err and "validation.md" in err
 
 
 @pytest.mark.parametrize(

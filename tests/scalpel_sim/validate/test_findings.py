@@ -2,13 +2,13 @@ import math
 
 import pytest
 
-from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Known, Line, within
+from scalpel_sim.validate.findings import FAIL, KNOWN, PASS, Check, KnownDeviation, within
 
-EXPLAINED = Known(0.5, 0.9, "the reason")
+EXPLAINED = KnownDeviation(0.5, 0.9, "the reason")
 
 
 @pytest.mark.parametrize(
-    ("figure", "known", "verdict"),
+    ("value", "known", "verdict"),
     [
         (1.0, None, PASS),
         (0.95, None, PASS),
@@ -22,10 +22,10 @@ EXPLAINED = Known(0.5, 0.9, "the reason")
         (math.inf, None, FAIL),
     ],
 )
-def test_a_line_passes_within_its_bounds_and_is_known_within_what_is_explained(
-    figure, known, verdict
+def test_a_check_passes_within_its_bounds_and_is_known_within_what_is_explained(
+    value, known, verdict
 ):
-    assert Line("a figure", figure, *within(0.05), known=known).verdict == verdict
+    assert Check("a value", value, *within(0.05), known=known).verdict == verdict
 
 
 def test_within_is_a_share_of_what_is_asked():

@@ -1,34 +1,45 @@
 import json
 import math
 
-from scalpel_sim.validate.findings import Findings, Known, Line, Scene, Source
-from scalpel_sim.validate.report import as_markdown, asked, figure, summary
-from scalpel_sim.validate.results import Done, as_json, counts
+from scalpel_sim.validate.findings import (
+    Check,
+    Findings,
+    KnownDeviation,
+    Reference,
+    ValidationScene,
+)
+from scalpel_sim.validate.report import (
+    bounds_text,
+    validation_page,
+    value_text,
+    verdict_sentence,
+)
+from scalpel_sim.validate.results import SceneRun, count_verdicts, validation_as_json
 
-LINES = [
-    Line("|a|: good", 1.0, 0.9, 1.1, "N"),
-    Line("bad", math.nan, 0.9, 1.1),
-    Line("odd", 2.0, 0.9, 1.1, known=Known(1.5, 2.5, "it is a Tuesday")),
+CHECKS = [
+    Check("|a|: good", 1.0, 0.9, 1.1, "N"),
+    Check("bad", math.nan, 0.9, 1.1),
+    Check("odd", 2.0, 0.9, 1.1, known=KnownDeviation(1.5, 2.5, "it is a Tuesday")),
 ]
-SCENE = Scene(
+SCENE = ValidationScene(
     "small",
     "A small scene",
     "It is about nothing",
-    lambda quick: Findings(LINES),
-    [Source("Someone 1999", "about 1"), Source("Nobody", "about 2", is_confirmed=False)],
+    lambda quick: Findings(CHECKS),
+    [Reference("Someone 1999", "about 1"), Reference("Nobody", "about 2", is_confirmed=False)],
 )
-DONE = [Done(SCENE, Findings(LINES, notes=["a note"]), 1.25)]
+RUNS = [SceneRun(SCENE, Findings(CHECKS, notes=["a note"]), 1.25)]
 
 
-def test_lines_are_counted_by_verdict():
-    assert counts(DONE) == (1, 1, 1)
-    assert summary(counts(DONE)) == (
-        "1 of 3 lines within their bounds, 1 known to be out of them and explained, 1 failed."
+def test_checks_are_counted_by_verdict():
+    assert count_verdicts(RUNS) == (1, 1, 1)
+    assert verdict_sentence(count_verdicts(RUNS)) == (
+        "1 of 3 checks are within their bounds, 1 deviate as known and explained, 1 failed."
     )
 
 
 def test_the_json_says_all_and_is_json():
-    content = json.loads(as_json(DONE, quick=True, versions={"numpy": "2"}))
+    content = json.loads(validation_as_json(RUNS, quick=True, versions={"numpy": "2"}))
     assert content["passed"] is False
     assert content["counts"] == {"passed": 1, "known": 1, "failed": 1}
     lines = content["scenes"][0]["lines"]
@@ -37,19 +48,19 @@ def test_the_json_says_all_and_is_json():
     assert lines[2]["why"] == "it is a Tuesday" and lines[0]["why"] == ""
 
 
-def test_the_page_has_every_line_reason_picture_and_source():
-    page = as_markdown(DONE, {"small": ["small.png"]}, quick=False)
+def test_the_page_has_every_check_reason_picture_and_source():
+    page = validation_page(RUNS, {"small": ["small.png"]}, quick=False)
     assert "| \\|a\\|: good | 1 N | 0.9 to 1.1 | pass |" in page
     assert "| bad | nan | 0.9 to 1.1 | FAIL |" in page
     assert "Known: it is a Tuesday." in page and "a note." in page
     assert "![A small scene](small.png)" in page
     assert "- Someone 1999: about 1\n" in page
-    assert "- Nobody: about 2 (not looked up" in page
+    assert "- Nobody: about 2 (not looked up: an estimate)" in page
 
 
-def test_bounds_read_as_what_is_asked():
-    assert asked(Line("", 0.0, 0.0, 0.0)) == "0"
-    assert asked(Line("", 0.0, 0.0, 1e-9, "N")) == "at most 1e-09"
-    assert asked(Line("", 0.0, -0.005, 0.005)) == "± 0.005"
-    assert asked(Line("", 0.0, -1.0, math.inf)) == "at least -1"
-    assert figure(Line("", 0.123456, 0.0, 1.0, "N m")) == "0.1235 N m"
+def test_bounds_read_as_words():
+    assert bounds_text(Check("", 0.0, 0.0, 0.0)) == "0"
+    assert bounds_text(Check("", 0.0, 0.0, 1e-9, "N")) == "at most 1e-09"
+    assert bounds_text(Check("", 0.0, -0.005, 0.005)) == "± 0.005"
+    assert bounds_text(Check("", 0.0, -1.0, math.inf)) == "at least -1"
+    assert value_text(Check("", 0.123456, 0.0, 1.0, "N m")) == "0.1235 N m"

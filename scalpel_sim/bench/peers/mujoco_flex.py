@@ -1,24 +1,30 @@
-"""MuJoCo's flex: tetrahedra of its own law, double precision, contact off."""
+"""MuJoCo's flex: tetrahedra under a St. Venant-Kirchhoff law, double precision, contact off."""
 
 import mujoco
-from protocol import Body, Stepper, main
+
+from .protocol import PeerBody, PeerStepper
 
 
-def make(body: Body, case: str) -> Stepper:
-    """Return the body as a flex; `case` is INTEGRATOR:DAMPING."""
+def mujoco_flex(body: PeerBody, case: str) -> PeerStepper:
+    """Return the body as a flex, ready to step.
+
+    Args:
+        body: What to simulate.
+        case: INTEGRATOR:DAMPING.
+    """
     integrator, damping = case.split(":")
     seconds = body.retardation_time if damping == "damped" else 0.0
-    model = mujoco.MjModel.from_xml_string(xml_of(body, integrator, seconds))
+    model = mujoco.MjModel.from_xml_string(_xml(body, integrator, seconds))
     data = mujoco.MjData(model)
 
     def steps(n: int) -> None:
         mujoco.mj_step(model, data, nstep=n)
 
-    return Stepper(steps, lambda: data.flexvert_xpos, mujoco.__version__)
+    return PeerStepper(steps, lambda: data.flexvert_xpos, mujoco.__version__)
 
 
-def xml_of(body: Body, integrator: str, damping: float) -> str:
-    """Return the model: one flex between held vertices, and nothing to collide with."""
+def _xml(body: PeerBody, integrator: str, damping: float) -> str:
+    """Return the model in MJCF: one flex with pinned vertices, and nothing to collide with."""
     points = " ".join(f"{x:.9g}" for x in body.positions.ravel())
     elements = " ".join(map(str, body.tetrahedra.ravel()))
     held = " ".join(map(str, body.held))
@@ -36,7 +42,3 @@ def xml_of(body: Body, integrator: str, damping: float) -> str:
         </flexcomp>
       </worldbody>
     </mujoco>"""
-
-
-if __name__ == "__main__":
-    main(make)

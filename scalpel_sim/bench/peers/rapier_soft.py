@@ -1,22 +1,28 @@
 """Rapier's soft bodies: constraints or finite elements, single precision, collision off."""
 
 import rapier3d as rapier
-from protocol import Body, Stepper, main
 
-SOLVERS = {
+from .protocol import PeerBody, PeerStepper
+
+_SOLVERS = {
     "springs": (rapier.SoftBodySolver.CONSTRAINTS, None),
     "constraints": (rapier.SoftBodySolver.CONSTRAINTS, rapier.SoftBodyCellModel.NEO_HOOKEAN),
     "fem": (rapier.SoftBodySolver.FEM, rapier.SoftBodyCellModel.NEO_HOOKEAN),
 }
 
 
-def make(body: Body, case: str) -> Stepper:
-    """Return the body; `case` is a name in SOLVERS."""
-    solver, cell_model = SOLVERS[case]
+def rapier_soft(body: PeerBody, case: str) -> PeerStepper:
+    """Return the body ready to step.
+
+    Args:
+        body: What to simulate.
+        case: `springs`, `constraints`, or `fem`.
+    """
+    solver, cell_model = _SOLVERS[case]
     world = rapier.PhysicsWorld(gravity=(0.0, 0.0, -9.81))
     world.set_num_threads(1)
     world.integration_parameters.dt = body.dt
-    world.integration_parameters.num_solver_iterations = 1  # the least that it can do; default 4
+    world.integration_parameters.num_solver_iterations = 1  # the fewest that it allows; default 4
     builder = rapier.SoftBodyBuilder(body.positions)
     if cell_model is None:
         builder = builder.edges(body.edges)
@@ -32,8 +38,4 @@ def make(body: Body, case: str) -> Stepper:
         for _ in range(n):
             world.step()
 
-    return Stepper(steps, lambda: soft.particle_positions, rapier.__version__)
-
-
-if __name__ == "__main__":
-    main(make)
+    return PeerStepper(steps, lambda: soft.particle_positions, rapier.__version__)

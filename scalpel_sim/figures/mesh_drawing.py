@@ -1,4 +1,4 @@
-"""A mesh as a drawing: its edges, pale behind its faces; the faces that a blade made are red."""
+"""A line drawing of a mesh: edges are pale behind faces, and the faces of cuts are red."""
 
 import numpy as np
 
@@ -10,22 +10,22 @@ _PAPER = (1.0, 1.0, 1.0)
 SKIN_FACE, CUT_FACE = (0.955, 0.96, 0.97), (1.0, 0.86, 0.84)
 SKIN_LINE, CUT_LINE = (0.13, 0.16, 0.22), (0.75, 0.10, 0.10)
 HIDDEN = 0.13
-"""Opacity of lines behind faces: they tell how deep the mesh goes, and do not confuse."""
+"""Opacity of lines behind faces: they show how deep the mesh goes, without confusing the eye."""
 _THICKNESS = 1.1
-"""Of the lines [pixels]."""
+"""Thickness of the lines [pixels]."""
 _SLACK = 2e-3
-"""How much nearer, as a fraction, a face must be to hide a line: lines lie on faces, and faces that
-are this thin beside their distance hide nothing that one would miss."""
+"""How much nearer a face must be to hide a line, as a fraction: lines lie on faces, which must not
+hide them."""
 
 
 def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) -> FloatArray:
     """Return a drawing of the mesh, sRGB from 0 to 1, shape (view.height, view.width, 3).
 
     Args:
-        view: What is seen.
-        body: Whose edges are drawn.
-        surface: Its faces, which hide what is behind them.
-        samples: Along each side of a pixel, against steps.
+        view: Projection to the picture.
+        body: State of the body whose edges are drawn.
+        surface: Surface of the body, which hides the edges behind it.
+        samples: Number of samples along each side of a pixel, against aliasing.
     """
     fine = view._replace(
         width=samples * view.width, height=samples * view.height, scale=samples * view.scale
@@ -40,10 +40,10 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
     image[seen] = SKIN_FACE
     image[is_cut] = CUT_FACE
 
-    of_cut = edges_of(surface.triangles[surface.is_cut])
+    of_cut = cell_edges(surface.triangles[surface.is_cut])
     groups = (
-        (edges_of(body.tetrahedra), body.positions, SKIN_LINE, False),
-        (edges_of(surface.triangles[~surface.is_cut]), surface.positions, SKIN_LINE, True),
+        (cell_edges(body.tetrahedra), body.positions, SKIN_LINE, False),
+        (cell_edges(surface.triangles[~surface.is_cut]), surface.positions, SKIN_LINE, True),
         (of_cut, surface.positions, CUT_LINE, True),
     )
     for edges, positions, colour, is_surface in groups:
@@ -52,10 +52,12 @@ def draw_mesh(view: View, body: Snapshot, surface: Surface, samples: int = 3) ->
         draw_segments(ends, raster.nearness, samples * _THICKNESS, _SLACK, visible, hidden)
         drawn = visible if is_surface else HIDDEN * np.maximum(visible, hidden)
         image += drawn[:, :, None] * (np.array(colour) - image)
-    return image.reshape(view.height, samples, view.width, samples, 3).mean(axis=(1, 3))
+    fine_pixels = image.reshape(view.height, samples, view.width, samples, 3)
+    drawing: FloatArray = fine_pixels.mean(axis=(1, 3))
+    return drawing
 
 
-def edges_of(cells: IntArray) -> IntArray:
+def cell_edges(cells: IntArray) -> IntArray:
     """Return the edges of triangles or tetrahedra, each once, shape (n_edges, 2)."""
     n = cells.shape[1]
     pairs = [cells[:, [i, j]] for i in range(n) for j in range(i + 1, n)]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.figures.camera import Margins, framing
-from scalpel_sim.figures.light import light_on, lights
-from scalpel_sim.figures.paint import Thing, paint
+from scalpel_sim.figures.camera import Margins, fit_view
+from scalpel_sim.figures.light import SurfacePoints, illuminate, make_lights
+from scalpel_sim.figures.rendering import SceneObject, render
 from scalpel_sim.figures.table import table_below
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 
@@ -24,7 +24,7 @@ def plate(height: float, half: float = 0.05) -> TriangleMesh:
 
 @pytest.mark.parametrize("towards_eye", [(0.1, -0.4, 0.3), (0.3, 0.3, 0.1), (0.0, 0.0, 0.5)])
 def test_what_is_framed_fills_the_picture_up_to_its_margins(towards_eye):
-    view = framing(BOX, np.array(towards_eye), 300, 200, Margins(side=0.1, top=0.2, bottom=0.05))
+    view = fit_view(BOX, np.array(towards_eye), 300, 200, Margins(side=0.1, top=0.2, bottom=0.05))
     low, high = (f(view.project(BOX)[:, :2], axis=0) for f in (np.min, np.max))
     assert low[0] >= 29.0 and high[0] <= 271.0
     assert low[1] >= 39.0 and high[1] <= 191.0
@@ -32,7 +32,7 @@ def test_what_is_framed_fills_the_picture_up_to_its_margins(towards_eye):
 
 
 def test_nearness_is_linear_on_the_picture():
-    view = framing(BOX, np.array([0.1, -0.4, 0.3]), 300, 200, Margins(0.1, 0.1, 0.1))
+    view = fit_view(BOX, np.array([0.1, -0.4, 0.3]), 300, 200, Margins(0.1, 0.1, 0.1))
     a, b = view.project(BOX[0]), view.project(BOX[7])
     between = view.project(np.linspace(BOX[0], BOX[7], 50))
     share = (between[:, 0] - a[0]) / (b[0] - a[0])
@@ -40,9 +40,9 @@ def test_nearness_is_linear_on_the_picture():
 
 
 def lit_below(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
-    shining = lights(LAMP, mesh.positions[mesh.triangles], np.ones(2, bool))
-    n = len(points)
-    return light_on(shining, points, *[np.tile(UP, (n, 1))] * 3, 50.0).diffuse
+    lights = make_lights(LAMP, mesh.positions[mesh.triangles], np.ones(2, bool))
+    up = np.tile(UP, (len(points), 1))
+    return illuminate(lights, SurfacePoints(points, up, up, up), 50.0).diffuse
 
 
 def test_a_plate_throws_a_shadow_below_and_none_far_beside_or_above():
@@ -60,10 +60,13 @@ def test_a_surface_does_not_shade_itself():
 
 def test_a_red_plate_on_a_white_table_is_red_with_a_shadow_and_white_far_away():
     red, table = plate(0.03), table_below(np.array([[-0.05, -0.05, 0.0], [0.05, 0.05, 0.03]]))
-    things = [Thing(red, (0.8, 0.1, 0.1)), Thing(table, WHITE, catches_shadows_only=True)]
+    objects = [
+        SceneObject(red, (0.8, 0.1, 0.1)),
+        SceneObject(table, WHITE, catches_shadows_only=True),
+    ]
     around = np.array([[-0.15, -0.15, 0.0], [0.15, 0.15, 0.03]])
-    view = framing(around, np.array([0.0, -0.3, 0.5]), 80, 60, Margins(0.05, 0.05, 0.05))
-    image = paint(view, things, lamp=np.array([-1.0, 0.0, 1.0]), background=WHITE)
+    view = fit_view(around, np.array([0.0, -0.3, 0.5]), 80, 60, Margins(0.05, 0.05, 0.05))
+    image = render(view, objects, lamp=np.array([-1.0, 0.0, 1.0]), background=WHITE)
     x, y = view.project(np.array([0.0, 0.0, 0.03]))[:2].astype(int)
     assert image[y, x, 0] > 0.6 and image[y, x, 1] < 0.3
     x, y = view.project(np.array([0.065, 0.0, 0.0]))[:2].astype(int)  # the lamp is on the left

@@ -2,17 +2,23 @@
 
 import newton
 import warp as wp
-from protocol import Body, Stepper, main
+
+from .protocol import PeerBody, PeerStepper
 
 
-def make(body: Body, case: str) -> Stepper:
-    """Return the body as springs or as neo-Hookean tetrahedra; `case` is LAW:DAMPING."""
+def newton_semi_implicit(body: PeerBody, case: str) -> PeerStepper:
+    """Return the body as springs or as neo-Hookean tetrahedra, ready to step.
+
+    Args:
+        body: What to simulate.
+        case: LAW:DAMPING.
+    """
     law, damping = case.split(":")
     seconds = body.retardation_time if damping == "damped" else 0.0
     wp.config.quiet = True
     builder = newton.ModelBuilder()
     masses = body.masses.copy()
-    masses[body.held] = 0.0  # Newton's way to hold a particle
+    masses[body.held] = 0.0  # Newton holds particles without mass
     at_rest = [(0.0, 0.0, 0.0)] * len(masses)
     builder.add_particles([tuple(x) for x in body.positions.tolist()], at_rest, masses.tolist())
     if law == "springs":
@@ -22,7 +28,7 @@ def make(body: Body, case: str) -> Stepper:
         for corners in body.tetrahedra.tolist():
             builder.add_tetrahedron(*corners, body.mu, body.lam, seconds * body.mu)
     model = builder.finalize(device="cpu")
-    model.particle_grid = None  # no particle looks for another
+    model.particle_grid = None  # no contact between particles
     solver = newton.solvers.SolverSemiImplicit(model, enable_tri_contact=False)
     states = [model.state(), model.state()]
     control = model.control()
@@ -33,8 +39,4 @@ def make(body: Body, case: str) -> Stepper:
             solver.step(states[0], states[1], control, None, body.dt)
             states.reverse()
 
-    return Stepper(steps, lambda: states[0].particle_q.numpy(), newton.__version__)
-
-
-if __name__ == "__main__":
-    main(make)
+    return PeerStepper(steps, lambda: states[0].particle_q.numpy(), newton.__version__)
