@@ -1,82 +1,154 @@
-"""What the README promises: its code runs, its commands and its files are there."""
+"""The README and the pages of docs: their code runs, their commands and links exist."""
 
 import re
+import shlex
 import tomllib
 from pathlib import Path
 
 import pytest
+from cyclopts import App
 
-from scalpel_sim.cli.app import command_line
+from scalpel_sim.cli.app import app, command_line
 from scalpel_sim.output.run_folder import RUN_FILES
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = dict(enumerate(re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)))
+README = ROOT / "README.md"
+PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+LARGEST_README = 10 * 1024
+HELPS = ("run", "view", "serve", "key", "materials", "figure", "validate", "bench peers")
+"""Commands whose `--help` has all options between them."""
 
 
-def block_about(word: str) -> str:
-    """The only block of code that has a word in it."""
-    (block,) = (code for code in BLOCKS.values() if word in code)
-    return block
+def blocks(language: str) -> list[tuple[str, str]]:
+    """Return every block of code in that language, with its page and line for a message."""
+    found = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for match in re.finditer(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+            line = text.count("\n", 0, match.start()) + 1
+            found.append((f"{page.relative_to(ROOT)}:{line}", match.group(1)))
+    return found
 
 
-def printed(code: str, capsys) -> str:
-    exec(compile(code, "README.md", "exec"), {})
-    return capsys.readouterr().out
+def commands() -> list[tuple[str, list[str]]]:
+    """Return the arguments of every `scalpel-sim` in a block of shell commands."""
+    found = []
+    for where, block in blocks("sh"):
+        for line in block.splitlines():
+            words = shlex.split(line, comments=True)
+            if "scalpel-sim" in words:
+                found.append((where, words[words.index("scalpel-sim") + 1 :]))
+    return found
+
+
+def of_page(case: tuple[str, object]) -> str:
+    return case[0]
+
+
+@pytest.fixture
+def in_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("case", blocks("python"), ids=of_page)
+def test_every_block_of_python_runs_by_itself(case, in_folder):
+    where, code = case
+    exec(compile(code, where, "exec"), {"__name__": "__main__"})
+
+
+@pytest.mark.parametrize("case", commands(), ids=lambda case: " ".join(case[1]))
+def test_every_command_is_one_that_the_program_takes(case):
+    program: App = app
+    program.parse_args(case[1], exit_on_error=False, print_error=False)
+
+
+def test_commands_and_code_are_found_at_all():
+    assert len(commands()) > 20 and len(blocks("python")) > 5
+
+
+def test_the_readme_stays_short():
+    assert len(README.read_bytes()) <= LARGEST_README
 
 
 def test_five_lines_of_python_run_a_scene(capsys):
-    assert len(BLOCKS[0].strip().splitlines()) <= 6
-    assert re.search(r"\] \d+$", printed(BLOCKS[0], capsys).strip())
+    code = next(code for where, code in blocks("python") if where.startswith("README"))
+    assert len(code.strip().splitlines()) <= 6
+    exec(compile(code, "README.md", "exec"), {})
+    assert re.search(r"\] \d+$", capsys.readouterr().out.strip())
 
 
-def test_a_tissue_attached_to_ones_own_arm_is_cut_and_felt(capsys):
-    """The section is complete: pasted into a file, it cuts a block in two."""
-    peak, area, pieces = re.search(
-        r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", printed(BLOCKS[1], capsys)
-    ).groups()
-    assert float(peak) == pytest.approx(20.0 * 0.02, rel=0.3)  # toughness times thickness
-    assert float(area) == pytest.approx(40 * 20, rel=0.1)
-    assert int(pieces) == 2
+def test_the_arm_of_the_readme_is_the_example():
+    example = (ROOT / "docs" / "examples" / "attach_mjcf.py").read_text(encoding="utf-8")
+    assert f"```python\n{example}```\n" in README.read_text(encoding="utf-8")
+    ours = [line for line in example.splitlines() if re.match("from (tissue|bridge|scalpel)", line)]
+    assert len(ours) == 3
 
 
-def test_a_body_is_cut_along_a_given_surface(capsys):
-    area, pieces = re.search(r"(\d+) mm2, (\d+) pieces", printed(BLOCKS[2], capsys)).groups()
-    assert float(area) == pytest.approx(60 * 40, rel=0.1) and int(pieces) == 2
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_a_page_shows_and_links_to_is_there(page):
+    linked = re.findall(r"\]\((?!https?:)([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    assert [path for path in linked if not (page.parent / path).exists()] == []
 
 
-def test_a_clamp_in_the_way_of_the_blade_is_met(capsys):
-    assert re.search(r"'blade, clamp': \d+", printed(block_about("clamp"), capsys))
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_sections_that_a_page_links_to_are_there(page):
+    text = page.read_text(encoding="utf-8")
+    for path, section in re.findall(r"\]\((?!https?:)([^)#]*)#([^)]+)\)", text):
+        target = (page.parent / path).read_text(encoding="utf-8") if path else text
+        titles = re.findall(r"^#+ (.*)$", target, re.MULTILINE)
+        known = {re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles}
+        assert section in known, f"{page.name}: #{section} is no section of {path or page.name}"
 
 
-def test_the_forces_of_a_step_are_there_with_the_account_of_its_energy(capsys):
-    found = printed(block_about("energies"), capsys)
-    assert float(re.search(r"press with ([\d.]+) N", found).group(1)) > 0.1
-    assert int(re.search(r"cutting took (\d+)%", found).group(1)) > 50
-    assert abs(float(re.search(r"not accounted for: (-?[\d.]+)%", found).group(1))) < 0.5
+def test_every_source_file_that_a_page_names_is_there():
+    """By its path from the root, or by the end of it: `tissue/tissue.py`, `anchors.py`."""
+    folders = ("tissue", "bridge", "scalpel_sim", "tests", "benchmarks", "docs")
+    there = {path.relative_to(ROOT).as_posix() for f in folders for path in (ROOT / f).rglob("*")}
+    ends = {"/".join(path.split("/")[-n:]) for path in there for n in range(1, path.count("/") + 2)}
+    missing = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        named = re.findall(r"`(?:python )?([\w/]+\.py|(?:tissue|bridge|scalpel_sim)/[\w/]*)", text)
+        missing += [f"{page.name}: {path}" for path in named if path.rstrip("/") not in ends]
+    assert missing == []
+
+
+def test_every_page_is_in_the_index():
+    index = (ROOT / "docs" / "README.md").read_text(encoding="utf-8")
+    folder = ROOT / "docs"
+    wanted = [*folder.glob("*.md"), *folder.glob("examples/*.py")]
+    names = {path.relative_to(folder).as_posix() for path in wanted} - {"README.md"}
+    assert {name for name in names if f"]({name})" not in index} == set()
+
+
+def test_every_picture_is_shown_on_a_page():
+    shown = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    pictures = [picture.name for picture in (ROOT / "docs").glob("*.png")]
+    assert [name for name in pictures if name not in shown] == []
 
 
 def test_every_file_that_a_run_writes_is_explained():
-    assert [name for name in RUN_FILES if f"`{name}`" not in README] == []
+    text = README.read_text(encoding="utf-8")
+    assert [name for name in RUN_FILES if f"`{name}`" not in text] == []
 
 
-def test_the_options_of_the_readme_are_those_of_the_program(capsys):
-    named = set(re.findall(r"`(--[a-z]+)", README))
+def test_the_options_that_a_page_names_are_those_of_the_program(capsys):
+    named = {
+        option
+        for page in PAGES
+        for option in re.findall(r"`(--[a-z-]+)", page.read_text(encoding="utf-8"))
+    }
     known = ""
-    for command in ("run", "view", "serve", "figure", "bench", "bench kernels", "bench peers"):
+    for command in HELPS:
         assert command_line([*command.split(), "--help"]) == 0
         known += capsys.readouterr().out
     assert named and {option for option in named if option not in known} == set()
 
 
-def test_what_the_readme_shows_and_links_to_is_there():
-    linked = re.findall(r"\]\((?!https?:)([^)#]+)\)", README)
-    assert linked and [path for path in linked if not (ROOT / path).exists()] == []
-
-
 def test_the_two_commands_of_the_readme_are_the_ones_that_the_package_offers():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert "\npip install uv && uv run scalpel-sim run\n" in README
-    assert "\npip install uv && uv run --extra test pytest\n" in README
+    text = README.read_text(encoding="utf-8")
+    assert "\npip install uv && uv run scalpel-sim run\n" in text
+    assert "\npip install uv && uv run --extra test pytest\n" in text
     assert "scalpel-sim" in project["scripts"]
     assert any(name.startswith("pytest") for name in project["optional-dependencies"]["test"])

@@ -274,7 +274,8 @@ def _figure(
     """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
 
     Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
-    the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells.
+    the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
+    frames of a cut through the organ, which is the picture of the README.
 
     For example:
 
@@ -283,8 +284,8 @@ def _figure(
     ```
 
     Args:
-        number: 10, 11 or 12.
-        output: The file [default: figure10.png (11, 12) in this folder].
+        number: 10, 11, 12 or organ.
+        output: The file [default: figure10.png (11, 12, organ) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.run_folder import check_file
@@ -296,11 +297,12 @@ def _figure(
         check_file(path, ".png", "--output")
         from scalpel_sim.cli.run_setup import load_kernels
         from scalpel_sim.figures.figures import draw_figure
+        from scalpel_sim.figures.organ import draw_organ
 
         load_kernels(printing)
         if not printing.quiet:
-            say(f"cutting and drawing Figure {number}: about half a minute")
-        drawn = draw_figure(number, path, scheme)
+            say(f"cutting and drawing figure {number}: about half a minute")
+        drawn = draw_organ(path, scheme) if number == "organ" else draw_figure(number, path, scheme)
         if printing.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
         elif not printing.quiet:

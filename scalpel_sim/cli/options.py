@@ -15,7 +15,7 @@ SceneName = Annotated[
     Parameter(help="organ (default), slab, grid2 or grid7."),
 ]
 
-FigureNumber = Annotated[Literal[10, 11, 12], Parameter(help="10, 11 or 12.")]
+FigureNumber = Annotated[Literal[10, 11, 12, "organ"], Parameter(help="10, 11, 12 or organ.")]
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option that is given or not, and has no value."""

@@ -39,7 +39,7 @@ _WIDTH, HEIGHT = 640, 520
 """Width and height of each panel [pixels]."""
 WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
-_GAP = 12
+GAP = 12
 """Distance between panels [pixels]."""
 LINE = 26
 """Height of a line of text [pixels]."""
@@ -75,15 +75,15 @@ def draw_figure(number: int, path: Path, scheme: str = "stellar") -> Drawn:
 
 def _figure_10(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
-    view = _view(seen, WITH_TOOL)
-    panels = [_picture(view, moment, with_tool=True) for moment in seen]
+    view = view_of(seen, WITH_TOOL)
+    panels = [picture(view, moment, with_tool=True) for moment in seen]
     caption = "four frames of a cut through a grid of 4 × 6 × 4 cells, pulled apart left and right"
     return panels, _drawn(caption, seen, ["", "", "", ""])
 
 
 def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = moments(with_scheme(scheme, FIGURE_10), FIGURE_10_MOMENTS)
-    view = _view(seen, BODY_ALONE)
+    view = view_of(seen, BODY_ALONE)
     ends = [seen[0], seen[-1]]
     panels = [draw_mesh(view, moment.snapshot, moment.surface) for moment in ends]
     caption = "mesh structures of the first and the last frame of Figure 10"
@@ -92,7 +92,7 @@ def _figure_11(scheme: str) -> tuple[list[FloatArray], Drawn]:
 
 def _figure_12(scheme: str) -> tuple[list[FloatArray], Drawn]:
     seen = [moments(with_scheme(scheme, cut))[-1] for cut in FIGURE_12]
-    panels = [_picture(_view([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
+    panels = [picture(view_of([moment], BODY_ALONE), moment, with_tool=False) for moment in seen]
     cells = ["2 × 2 × 2 cells, ", "7 × 7 × 7 cells, "]
     return panels, _drawn("cuts along arbitrary paths through coarse grids", seen, cells)
 
@@ -103,7 +103,7 @@ def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Dra
     return Drawn(caption, labels, counts)
 
 
-def _view(seen: Sequence[Moment], margins: Margins) -> View:
+def view_of(seen: Sequence[Moment], margins: Margins) -> View:
     """Return the view in which the body fills the picture at all moments."""
     points = np.concatenate([moment.surface.positions for moment in seen])
     return fit_view(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
@@ -114,7 +114,7 @@ def _diagonal(moment: Moment) -> float:
     return float(np.linalg.norm(np.ptp(moment.surface.rest_positions, axis=0)))
 
 
-def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
+def picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
     """Return a picture of the textured body on a white table, with the scalpel or without it."""
     surface = moment.surface
     textured = map_texture(surface, _diagonal(moment) / TILES_PER_BODY)
@@ -138,12 +138,12 @@ def _picture(view: View, moment: Moment, *, with_tool: bool) -> FloatArray:
 def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path) -> None:
     """Write the panels, two in a row, each above its letter and label, and the title below all."""
     n_rows = math.ceil(len(panels) / 2)
-    width = 2 * _WIDTH + 3 * _GAP
-    height = n_rows * (HEIGHT + LINE + _GAP) + 2 * LINE + 2 * _GAP
+    width = 2 * _WIDTH + 3 * GAP
+    height = n_rows * (HEIGHT + LINE + GAP) + 2 * LINE + 2 * GAP
     figure = Figure(figsize=(width / _DOTS_PER_INCH, height / _DOTS_PER_INCH), facecolor="white")
     for i, (panel, label) in enumerate(zip(panels, labels, strict=True)):
-        left = _GAP + (i % 2) * (_WIDTH + _GAP)
-        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + _GAP) + LINE
+        left = GAP + (i % 2) * (_WIDTH + GAP)
+        bottom = height - (i // 2 + 1) * (HEIGHT + LINE + GAP) + LINE
         axes = figure.add_axes((left / width, bottom / height, _WIDTH / width, HEIGHT / height))
         axes.imshow(panel, interpolation="none", aspect="auto")
         axes.set_axis_off()
@@ -157,7 +157,7 @@ def _lay_out(panels: list[FloatArray], labels: list[str], title: str, path: Path
         )
     figure.text(
         0.5,
-        (_GAP + LINE) / height,
+        (GAP + LINE) / height,
         f"{title}\n(after Bielser, Maiwald, Gross 1998)",
         ha="center",
         va="center",

@@ -1,0 +1,95 @@
+"""Every example of docs/examples runs from start to end, and says what its page says."""
+
+import os
+import re
+import runpy
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+FOLDER = Path(__file__).parents[1] / "docs" / "examples"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys) -> Callable[[str], str]:
+    """Run an example in a folder of its own, and return what it printed."""
+
+    def printed(name: str) -> str:
+        monkeypatch.chdir(tmp_path)
+        runpy.run_path(str(FOLDER / name), run_name="__main__")
+        return capsys.readouterr().out
+
+    return printed
+
+
+def test_no_example_is_left_out():
+    tests = "".join(
+        path.read_text(encoding="utf-8") for path in Path(__file__).parent.rglob("*.py")
+    )
+    assert [path.name for path in FOLDER.glob("*.py") if f'"{path.name}"' not in tests] == []
+
+
+def numbers(text: str) -> list[float]:
+    return [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
+
+
+def test_an_arm_of_ones_own_cuts_a_block_in_two_and_feels_its_toughness(run):
+    peak, area, pieces = re.search(
+        r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", run("attach_mjcf.py")
+    ).groups()
+    assert float(peak) == pytest.approx(20.0 * 0.02, rel=0.3)  # toughness times thickness
+    assert float(area) == pytest.approx(40 * 20, rel=0.1)
+    assert int(pieces) == 2
+
+
+def test_an_edge_that_is_led_through_a_block_meets_toughness_times_thickness(run):
+    peak, area, _, pieces = numbers(run("cut_block.py"))
+    assert peak == pytest.approx(20.0 * 0.02, rel=0.2)
+    assert area == pytest.approx(40 * 20, rel=0.1) and pieces == 2
+
+
+def test_a_body_is_cut_along_a_given_surface_and_written(run, tmp_path):
+    area, pieces = re.search(r"(\d+) mm2, (\d+) pieces", run("incise.py")).groups()
+    assert float(area) == pytest.approx(60 * 40, rel=0.1) and int(pieces) == 2
+    assert (tmp_path / "incised.vtu").stat().st_size > 10_000
+    assert (tmp_path / "incised.stl").stat().st_size > 10_000
+
+
+def test_a_stroke_from_a_file_cuts_the_slab_in_two(run):
+    area, pieces = re.search(r"cut (\d+) mm2, (\d+) pieces", run("own_stroke.py")).groups()
+    assert float(area) == pytest.approx(60 * 40, rel=0.05) and int(pieces) == 2
+
+
+def test_the_forces_of_a_step_come_with_the_account_of_its_energy(run):
+    found = run("forces.py")
+    assert float(re.search(r"press with ([\d.]+) N", found).group(1)) > 0.1
+    assert int(re.search(r"cutting took (\d+)%", found).group(1)) > 50
+    assert abs(float(re.search(r"not accounted for: (-?[\d.]+)%", found).group(1))) < 0.5
+
+
+def test_a_clamp_in_front_of_the_blade_is_met(run):
+    assert re.search(r"'blade, clamp': \d+", run("clamp.py"))
+
+
+def test_a_loose_piece_lies_on_the_floor_with_its_whole_weight(run):
+    found = run("falling_piece.py")
+    grams, height = re.search(r"([\d.]+) g lie ([\d.]+) mm", found).groups()
+    assert float(grams) == pytest.approx(8.0, rel=0.01)  # half of 16 cm3
+    assert float(height) == pytest.approx(10.0, rel=0.05)  # half of its thickness
+    assert float(re.search(r"bears ([\d.]+)", found).group(1)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_tissue_in_another_process_is_cut_in_two():
+    """A process of its own: the server is started from the file, as a user would."""
+    done = subprocess.run(
+        [sys.executable, str(FOLDER / "two_processes.py")],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+        env=os.environ | {"PYTHONPATH": str(FOLDER.parents[1])},
+    )
+    assert "cut 400 mm2, 2 pieces" in done.stdout
