@@ -70,7 +70,7 @@ class MeshEdges(NamedTuple):
     """A quarter of the volume of the tetrahedra around each node [m3], shape (n_nodes,)."""
 
 
-def mesh_edges(mesh: TetrahedralMesh) -> MeshEdges:
+def measured_edges(mesh: TetrahedralMesh) -> MeshEdges:
     """Return the edges of a mesh."""
     corners = mesh.positions[mesh.tetrahedra]
     volumes = np.linalg.det(corners[:, 1:] - corners[:, :1]) / 6.0

@@ -62,7 +62,7 @@ passes."""
 N_ENTRY = 3
 """First frames, which are not counted: the edge enters the body."""
 
-RELAXATIONS: dict[str, tuple[Law, Hierarchical | LocalTimeStepping]] = {
+BENCHED_RELAXATIONS: dict[str, tuple[Law, Hierarchical | LocalTimeStepping]] = {
     "hierarchical (I 64, s_max 6)": (
         "springs",
         Hierarchical(updates=64, rings=6, far="frozen"),
@@ -114,15 +114,15 @@ def measure_local_frames(
     fitting, skipped = sizes_that_fit(
         sizes_up_to(tuple(sizes), largest), memory_bytes(), "local frame"
     )
-    cases = [(size, name) for name in RELAXATIONS for size in fitting]
-    for law, relaxation in RELAXATIONS.values():
+    cases = [(size, name) for name in BENCHED_RELAXATIONS for size in fitting]
+    for law, relaxation in BENCHED_RELAXATIONS.values():
         _cut_slit(fitting[0], law, relaxation)  # loads the kernels
     watch.begin(n_rounds * len(cases))
     rounds: list[list[SlitFrames]] = []
     for _ in range(n_rounds):
         rounds.append([])
         for size, name in cases:
-            rounds[-1].append(_cut_slit(size, *RELAXATIONS[name]))
+            rounds[-1].append(_cut_slit(size, *BENCHED_RELAXATIONS[name]))
             watch.tick(f"{name}, {size:,}")
     costs = [
         _cost(name, size, frames)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from scalpel_sim.bench.blocks import held_nodes, jittered_block, mesh_edges, sizes_up_to
+from scalpel_sim.bench.blocks import held_nodes, jittered_block, measured_edges, sizes_up_to
 from scalpel_sim.bench.engine import (
     DENSITY,
     FRAME_DT,
@@ -152,7 +152,7 @@ def ratio_to(name: str) -> str:
 
 def body_file(folder: Path, mesh: TetrahedralMesh) -> Path:
     """Write a block for the other processes; return the file."""
-    edges = mesh_edges(mesh)
+    edges = measured_edges(mesh)
     file = folder / "body.npz"
     body = PeerBody(
         positions=mesh.positions,

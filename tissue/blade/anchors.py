@@ -4,7 +4,7 @@ The cutting edge is sampled at points b_k, each for a length l_k of edge. A samp
 anchored at a material point a_k, and a spring K (b_k - a_k) pulls the two together: the tissue
 dents first. Where the pull exceeds toughness times length, the anchor slips forward through the
 material until it does not (`tissue.blade.return_mapping`). The path of the anchors is the path of
-the cut, and the work done in slipping is the toughness times the area, exactly.
+the cut, and the work of slipping is the toughness times the area, exactly.
 """
 
 import numpy as np
@@ -19,12 +19,12 @@ from tissue.geometry.tetrahedron import Weights, interpolate
 from tissue.mesh.body import Body
 
 ANCHOR_STIFFNESS = 4.0
-"""Stiffness of an anchor per Young's modulus and length of edge. It stands for the tissue closer to
-the edge than the mesh resolves; between 4 and 12 the cutting force does not change."""
+"""Stiffness of an anchor per Young's modulus and length of edge. It stands for the tissue that is
+closer to the edge than the mesh resolves; between 4 and 12 the cutting force does not change."""
 
 FREE, ANCHORED, RETRACTED, LEFT = 0, 1, 2, 3
-"""State of a sample: out of the tissue; pulling on it; backed off from where it cut last; just
-gone out through the skin ahead, in this step."""
+"""State of a sample: FREE, outside the tissue; ANCHORED, pulling on it; RETRACTED, backed off from
+where it cut last; LEFT, out through the skin ahead in this step."""
 
 
 class Anchors(Arrays):
@@ -43,9 +43,9 @@ class Anchors(Arrays):
     at_skin: BoolArray
     """Whether the anchor is at the skin, which the edge has yet to break; shape (n,)."""
     speed: FloatArray
-    """How fast the sample of the edge moves forward in this step [m/s], shape (n,). The toughness
-    that it meets is that of a crack as fast: a crack's own speed, from one short step to the next,
-    would make the anchor stick and slip by turns."""
+    """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
+    toughness. With the speed of the anchor itself, from one short step to the next, the anchor
+    would stick and slip by turns."""
     slips: BoolArray
     """Whether the anchor slipped when slip was applied last, shape (n,)."""
     cut: FloatArray
@@ -77,7 +77,7 @@ def new_anchors(n: int, edge_length: float, young_modulus: float) -> Anchors:
 
 @kernel
 def measure_speeds(anchors: Anchors, edge: Edge, dt: float) -> None:
-    """Write how fast each sample moves forward in a time step of `dt` [s]."""
+    """Write the forward speed of each sample in a time step of `dt` [s]."""
     n = len(anchors.state)
     forward = pose_at(edge, 0.5).forward
     for k in range(n):
@@ -87,7 +87,7 @@ def measure_speeds(anchors: Anchors, edge: Edge, dt: float) -> None:
 
 @kernel
 def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int) -> Vec3:
-    """Return where the material point of anchor `k` is, with the nodes at `positions` [m]."""
+    """Return the material point of anchor `k` in the deformed body, nodes at `positions` [m]."""
     w = Weights(
         anchors.weights[k, 0], anchors.weights[k, 1], anchors.weights[k, 2], anchors.weights[k, 3]
     )
@@ -106,9 +106,9 @@ def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
 def surplus_stretch(
     anchors: Anchors, k: int, stretch: Vec3, pose: BladePose, law: ToughnessLaw
 ) -> Vec3:
-    """Return by how much the spring of an anchor is longer than what the tissue holds [m].
+    """Return the part of an anchor's stretch that is beyond its yield limit [m].
 
-    The surplus is in the plane of the blade, along the stretch; zero where the anchor holds.
+    The surplus is in the plane of the blade, along the stretch; zero below the limit.
 
     Args:
         anchors: The samples.
@@ -133,8 +133,8 @@ def stored_energy(
 ) -> float:
     """Return the energy stored in one anchor [J].
 
-    It is that of its spring as far as the tissue holds; and that of the surplus, at the force that
-    the tissue holds. The latter is spent when the anchor slips, and recoverable until then.
+    It is the energy of its spring up to the yield limit, and that of the surplus at the force of
+    the limit. The latter is spent when the anchor slips, and recoverable until then.
 
     Args:
         anchors: The samples.

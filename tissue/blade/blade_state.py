@@ -1,4 +1,4 @@
-"""`BladeState`: all that blade and tissue remember of each other between time steps."""
+"""`BladeState`: anchors, side contacts, laws and totals, which last from step to step."""
 
 import numpy as np
 
@@ -13,15 +13,15 @@ from tissue.material import Material
 from tissue.mesh.star import LARGEST_STAR
 
 SEARCH = 512
-"""Tetrahedra that the search beyond a cut face visits, at most."""
+"""Largest number of tetrahedra that the search beyond a cut face visits."""
 
 REACH = 1.0
-"""Distance from the edge up to which tissue belongs to it, per mean node size. A lip that has
-turned aside would else draw the edge into the tissue behind it."""
+"""`BladeState.reach` per mean node size. Further away, a lip that has turned aside would draw the
+edge into the tissue behind it."""
 
 
 class BladeState(Arrays):
-    """The edge's anchors, the contacts of the side faces, and what was counted."""
+    """Everything that the kernels of this package read and write."""
 
     anchors: Anchors
     """Samples of the cutting edge."""

@@ -1,7 +1,7 @@
 """The cutting edge over a time step, and the pose of the blade at one instant of it.
 
-A kernel that Python calls gets the `Edge` and an instant; it computes the pose once and passes it
-on. An instant is a fraction of the time step: 0 at its start, 1 at its end.
+An instant is a fraction of the time step: 0 at its start, 1 at its end. A kernel that Python calls
+takes the `Edge` and an instant, computes the pose once, and passes it to the kernels that it calls.
 """
 
 from typing import NamedTuple

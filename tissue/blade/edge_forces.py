@@ -22,13 +22,13 @@ def apply_edge_forces(
 ) -> None:
     """Add the forces of the anchors to those on the nodes; count impulse and work.
 
-    No anchor pulls harder than it holds, within a Runge-Kutta step either.
+    No anchor pulls harder than its yield limit, not even within a Runge-Kutta step.
 
     Args:
         blade: Its totals are written.
-        body: For the nodes of the anchors' tetrahedra.
+        body: The tissue.
         motion: Pose and motion of the blade.
-        positions: Where the nodes are [m].
+        positions: Positions of the nodes [m].
         share: Weight of this evaluation in the integral over the step; they add up to 1.
         dt: Length of the time step [s].
         external: Forces on the nodes [N], shape (capacity, 3).
@@ -49,7 +49,7 @@ def apply_edge_forces(
         for q in range(4):
             node = body.tetrahedra[anchors.tetrahedron[k], q]
             running = add_to_node(external, running, node, anchors.weights[k, q], force, seconds)
-        # The surplus is about to slip and holds nothing: without it the force points from the
+        # The surplus is about to slip and bears no force: without it the force points from the
         # anchor to the blade, so that the torques on the two cancel as well.
         at = sub(b, surplus)
         running = add_reaction(running, at, force, displacement_of(motion, at), share, seconds)

@@ -1,8 +1,8 @@
-"""Which samples of the edge are anchored: where the edge meets tissue, or beside an anchored one.
+"""Which samples of the edge are anchored, and which are free.
 
-A sample that comes into tissue by itself is anchored where it is, unless it is in a slit that is
-there already, where nothing is left to cut. A sample that backed off and then went elsewhere is
-freed.
+A free sample that enters the tissue is anchored where it is, unless it is in an existing slit,
+where nothing is left to cut. A free sample beside an anchored one is anchored as far behind the
+blade as its neighbour. A sample that backed off and then went elsewhere is freed.
 """
 
 from tissue.blade.anchors import (
@@ -49,10 +49,10 @@ def update_engagement(
     low: Vec3,
     high: Vec3,
 ) -> bool:
-    """Free what backed off elsewhere, and anchor what is beside an anchored sample.
+    """Free samples that backed off and went elsewhere, and anchor samples beside anchored ones.
 
     Returns whether a free sample is in the box of the tissue, so that `anchor_entering` is needed.
-    One call in place of three, whose overhead would exceed the work in them.
+    Three calls from Python would take longer than the work in them.
 
     Args:
         blade: The anchors are written.
@@ -119,8 +119,8 @@ def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
 def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
-    The edge trails behind the blade by the same distance along its length: a sample is in the
-    tissue if the point that far behind it is. Tissue beyond `BladeState.reach` is left alone.
+    The anchors trail behind the blade by the same distance along the edge: a sample is in the
+    tissue if the point that far behind it is. Tissue beyond `BladeState.reach` is not taken.
     """
     anchors = blade.anchors
     n = len(anchors.state)
@@ -142,7 +142,7 @@ def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose
             w = barycentric_in(p, body.rest, body.tetrahedra, t)
             here = interpolate(w, body.positions, body.tetrahedra, t)
             stretch = sub(sample_point(pose, k, n), here)
-            if norm(stretch) > blade.reach:  # the tissue there is turned unlike that of `beside`
+            if norm(stretch) > blade.reach:  # the tissue there is turned otherwise
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
             blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
@@ -159,12 +159,12 @@ def anchor_entering(
     low: Vec3,
     high: Vec3,
 ) -> None:
-    """Anchor the free samples that have come into the tissue by themselves.
+    """Anchor the free samples that have entered the tissue.
 
     Args:
         anchors: The samples.
         body: The tissue.
-        grid: Where its tetrahedra are.
+        grid: Grid that lists the tetrahedra.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
         slit_reach: Distance from a cut face up to which a point is in the slit [m] (`is_in_slit`).
@@ -212,10 +212,10 @@ def _in_box(p: Vec3, low: Vec3, high: Vec3) -> bool:
 
 @kernel
 def is_in_slit(body: Body, t: int, p: Vec3, along: Vec3, forward: Vec3, reach: float) -> bool:
-    """Return whether a point of the body at rest is beside a cut face that the blade is along.
+    """Return whether a point of the body at rest is beside a cut face parallel to the blade.
 
-    A sheet so near to a cut would be brought into the mesh as that cut: there is nothing to add,
-    and no tissue ahead that resists.
+    A new cut so near to that face would be snapped to it: there is nothing left to cut, and no
+    tissue ahead that resists.
 
     Args:
         body: The tissue.
@@ -223,7 +223,7 @@ def is_in_slit(body: Body, t: int, p: Vec3, along: Vec3, forward: Vec3, reach: f
         p: The point [m].
         along: Unit vector along the edge, in the deformed body.
         forward: Unit vector in which the edge cuts.
-        reach: Distance within which a crossing moves to nodes that are there [m].
+        reach: Distance within which crossings are snapped to existing nodes [m].
     """
     if not _near_cut(body, t):
         return False

@@ -35,14 +35,14 @@ def begin_blade_step(blade: BladeState, body: Body, edge: Edge, dt: float) -> No
     pose = pose_at(edge, 0.0)
     before = anchors_energy(anchors, body, pose, blade.toughness)
     measure_speeds(anchors, edge, dt)
-    # An edge that slows down meets less: what it holds too much, it is about to cut.
+    # A slower edge has a lower yield limit: the energy beyond it is spent on the next slip.
     after = anchors_energy(anchors, body, pose, blade.toughness)
     blade.totals.work_of_breaking += before - after
 
 
 @kernel
 def clear_blade_forces(blade: BladeState, body: Body, external: FloatArray) -> None:
-    """Set the forces on the nodes that the blade acts on to zero: the others are zero anyway."""
+    """Set the forces on the nodes that the blade acts on to zero: all others are zero."""
     clear_anchor_forces(blade.anchors, body, external)
     clear_side_forces(blade.sides, external)
 
@@ -62,9 +62,9 @@ def apply_blade_forces(
 
     Args:
         blade: Its totals are written.
-        body: For the nodes.
+        body: The tissue.
         edge: The cutting edge over the time step.
-        positions: Where the nodes are [m].
+        positions: Positions of the nodes [m].
         when: Instant, as a fraction of the time step.
         share: Weight of this evaluation in the integral over the step; they add up to 1.
         dt: Length of the time step [s].

@@ -1,4 +1,4 @@
-"""`BladeInteraction`: everything between one body and the blade, for `Tissue` to call."""
+"""`BladeInteraction`: the anchors and side contacts of one body with the blade, and the wrench."""
 
 import math
 
@@ -45,15 +45,16 @@ MOST_SAMPLES = 512
 """Samples at most, for a long blade in a fine mesh."""
 
 GRID_MARGIN = 0.5
-"""How far a node moves before it is listed for the search of contact again, per mean node size."""
+"""Distance that a node moves before its tetrahedra are listed in the grid again, per mean node
+size."""
 
 _SAME_LENGTH = 1e-3
-"""Relative change in length below which it is the same blade. Poses in single precision, or between
-two places of a turning blade, differ by less; another blade would begin another incision."""
+"""Relative change in length below which an edge counts as the same. Poses in single precision, or
+between two places of a turning blade, differ by less; another edge would begin another incision."""
 
 
 class BladeInteraction:
-    """All through which one body and the blade act on each other.
+    """The interaction of one body with the blade: anchors, side contacts, forces of both.
 
     Args:
         blade: Shape of the blade; None for a line that cuts.
@@ -69,7 +70,7 @@ class BladeInteraction:
         self._node_size = node_size
         anchors = new_anchors(2, 1.0, material.young_modulus)
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
-        """What the kernels of this package read and write; another object when arrays grow."""
+        """State for the kernels; replaced by another object when arrays grow."""
         self._has_sides = blade is not None
         self._report = new_report(self.state)
         self._edge_length = 0.0
@@ -92,17 +93,17 @@ class BladeInteraction:
         return anchored_length(self.state.anchors)
 
     def is_other_edge(self, length: float) -> bool:
-        """Return whether an edge of that length [m] is another one than the current; 0 is none."""
+        """Return whether an edge of that length [m] differs from the current one; 0 is no edge."""
         return abs(length - self._edge_length) > _SAME_LENGTH * length
 
     def replace_edge(self, length: float, body: Body, edge: Edge, when: float) -> None:
-        """Release the tissue from the current edge, and take an edge of another length.
+        """Release the anchors of the current edge, and use an edge of another length.
 
         Args:
-            length: Length of the new edge [m]; 0 for none.
+            length: Length of the new edge [m]; 0 for no edge.
             body: The tissue.
             edge: The current edge over the last time step.
-            when: Instant of it at which it is released, as a fraction of the time step.
+            when: Instant of the release, as a fraction of that time step.
         """
         release_edge(self.state, body, edge, when)
         n = math.ceil(length / self._node_size * SAMPLES_PER_NODE_SIZE) + 1
@@ -171,7 +172,7 @@ class BladeInteraction:
         box: BodyBounds,
         slit_reach: float,
     ) -> None:
-        """Anchor the samples of the edge that came into the tissue, and free those that left it.
+        """Anchor the samples of the edge that entered the tissue, and free those that left it.
 
         Args:
             body: The tissue.
@@ -180,7 +181,7 @@ class BladeInteraction:
             moved: Nodes that moved since the last search; None where all may have.
             edge: The cutting edge over the time step.
             when: Instant, as a fraction of the time step.
-            box: Box around the body; free samples may come in anywhere in it.
+            box: Box around the body, within which free samples are looked for.
             slit_reach: Distance from a cut face up to which a point is in the slit [m]
                 (`tissue.blade.engagement.is_in_slit`).
         """
@@ -199,7 +200,7 @@ class BladeInteraction:
 
     @property
     def stiffness(self) -> FloatArray:
-        """How that wrench changes with the pose of the blade, shape (6, 6); a copy."""
+        """Change of that wrench with the pose of the blade, shape (6, 6); a copy."""
         return self._report.stiffness.copy()
 
     @property

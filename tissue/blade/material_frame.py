@@ -19,8 +19,8 @@ FLATTEST = 0.05
 direction is forward in the material; the vector is then left as it is."""
 
 MOST_STRAIN = 2.0
-"""Factor by which a length in the body at rest may differ from the length now. Tissue about to part
-is stretched far more over an element; without the bound the path of the cut would leap there."""
+"""Factor by which a length in the body at rest may differ from the length now. An element that is
+about to be cut is stretched far more; without the bound the path of the cut would leap there."""
 
 
 @kernel
@@ -42,9 +42,9 @@ def to_material(body: Body, t: int, direction: Vec3) -> Vec3:
 def mean_rotation(anchors: Anchors, body: Body) -> Matrix3:
     """Return the rotation of the tissue along the edge, from the body at rest to the body now.
 
-    It is that of the mean deformation gradient of the tetrahedra that hold anchors. A single
-    tetrahedron is dented and sheared by the blade, and says little of how the blade lies to the
-    body.
+    It is the rotation of the mean deformation gradient of the tetrahedra that hold anchors. A
+    single tetrahedron is dented and sheared by the blade, and says little of how the blade lies in
+    the body.
     """
     c0 = Vec3(0.0, 0.0, 0.0)
     c1 = Vec3(0.0, 0.0, 0.0)

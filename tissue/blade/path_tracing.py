@@ -1,8 +1,9 @@
 """The path of the cutting edge through the material: from anchors to the path that is cut.
 
 The path is a chain of material points, one a sample. Samples in the tissue are at their anchors. A
-few samples more on either side reach out through the skin, so that the sheet always ends outside
-the body or at a real end of the blade; they lie from their anchored neighbour as the blade does.
+few more samples on either side reach out through the skin, so that the sheet always ends outside
+the body or at a real end of the blade; their offset from the anchored neighbour is that on the
+blade.
 """
 
 from tissue.blade.anchors import FREE, LEFT, Anchors
@@ -16,7 +17,7 @@ from tissue.geometry.tetrahedron import Matrix3
 from tissue.mesh.body import OUTER, Body, walk
 
 OUTREACH = 6
-"""Samples that the chain reaches out beyond the last one in the tissue: a mean node size. With one,
+"""Samples by which the chain extends beyond the last one in the tissue: a mean node size. With one,
 or on coarse meshes with three, a corner of the skin between two samples can stay uncut."""
 
 SMOOTHING = 6

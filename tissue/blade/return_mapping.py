@@ -39,15 +39,15 @@ class Location(NamedTuple):
     inside: bool
     """Whether the tetrahedron holds the point."""
     beyond_skin: bool
-    """Whether the skin, or the lip of an earlier cut, is between tetrahedron and point."""
+    """Whether the point is outside the body or across an earlier cut from the tetrahedron."""
 
 
 @kernel
 def locate(body: Body, visits: Visits, p: Vec3, start: int, queue: IntArray) -> Location:
     """Find the tetrahedron that holds a point of the body at rest.
 
-    Walks through faces; where a cut face stops the walk, the tetrahedra around are searched, since
-    the other lip hangs together with this one around the rim of the cut.
+    The search walks through faces. Where a cut face stops it, the tetrahedra around are searched,
+    since the other lip is connected to this one around the rim of the cut.
 
     Args:
         body: The tissue.
@@ -100,7 +100,7 @@ def set_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
         body: The tissue.
         k: The sample.
         t: Tetrahedron that holds the point, or is near it.
-        p: The point [m]; where it is outside the tetrahedron, a point of it nearby is taken.
+        p: The point [m]; outside the tetrahedron, a point of the tetrahedron nearby is taken.
     """
     w = barycentric_in(p, body.rest, body.tetrahedra, t)
     total = max(w.a, 0.0) + max(w.b, 0.0) + max(w.c, 0.0) + max(w.d, 0.0)
@@ -133,7 +133,8 @@ def relocate(blade: BladeState, body: Body, visits: Visits) -> None:
 def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
     """Slip every anchor whose pull exceeds toughness times length (return mapping).
 
-    Where the blade backed off, the anchor is retracted; where it comes back, anchored again.
+    An anchor from which the blade backs off is retracted; when the blade comes back, the anchor
+    pulls again.
     """
     anchors, totals = blade.anchors, blade.totals
     n = len(anchors.state)
@@ -149,7 +150,7 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
             anchors.state[k] = FREE if is_far else RETRACTED
             continue
         if anchors.state[k] == RETRACTED:
-            if abs(dot(stretch, pose.along)) > blade.reach:  # it comes back elsewhere
+            if abs(dot(stretch, pose.along)) > blade.reach:  # the blade came back elsewhere
                 anchors.state[k] = FREE
                 continue
             totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
@@ -161,7 +162,7 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
 def _slip_anchor(
     blade: BladeState, body: Body, visits: Visits, k: int, stretch: Vec3, pose: BladePose
 ) -> None:
-    """Slip anchor `k` along its stretch [m] until the tissue holds it; count the work."""
+    """Slip anchor `k` along its stretch [m] back to the yield limit; count the work."""
     anchors, totals, law = blade.anchors, blade.totals, blade.toughness
     in_plane = axpy(-dot(stretch, pose.normal), pose.normal, stretch)
     distance = norm(in_plane)
@@ -174,7 +175,7 @@ def _slip_anchor(
         return
     before = stored_energy(anchors, k, stretch, pose, law)
     spent = held_toughness(anchors, k, law) * across * surplus
-    anchors.at_skin[k] = False  # what is broken holds no more than the rest of the tissue
+    anchors.at_skin[k] = False  # once broken, the skin is no tougher than the rest
     slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
     a = anchor_position(anchors, body, body.positions, k)
     _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
@@ -183,7 +184,7 @@ def _slip_anchor(
         totals.work_of_cutting += spent
         totals.released += before - spent
         return
-    # Where the tissue is very distorted an anchor slips less far than it was told to.
+    # Where the tissue is very distorted an anchor slips less far than asked.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area

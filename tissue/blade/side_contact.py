@@ -10,11 +10,12 @@ it in three contact points each; a point that is within the blade is pressed out
 with A the area that the point stands for, seen along the normal of the blade. The force on the
 tissue is -dU/dx: outwards, and forwards where the profile rises, so that a wedge pays for what it
 parts. Friction is a spring of the same stiffness along the face that yields at Coulomb's limit
-(stiction below it), or above by a viscous part. Both act at one point: action is reaction.
+(stiction below it), plus a viscous part. Pressure and friction act at one point, on the tissue and
+on the blade: action is reaction.
 
-A cut opens in the mesh up to an element behind the edge, where the blade has its full thickness. A
-point that is first found within the blade meets the bevel there and then: its profile begins with
-where it is and rises with the slope of the bevel. Else the wedge would push from nothing.
+A cut opens in the mesh up to an element behind the edge, where the blade has its full thickness. At
+a point that is within the blade when it is first found, the profile begins at the point and rises
+from there with the slope of the bevel. Otherwise the blade would push at once with its full depth.
 """
 
 from typing import NamedTuple
@@ -33,8 +34,8 @@ from tissue.mesh.faces import OUTWARD
 
 SIDE_STIFFNESS = 2.0
 """Stiffness of a side face of the blade, as pressure per depth, over Young's modulus per node size.
-It stands for the tissue nearer to the face than the mesh resolves, as that of an anchor does. With
-4 the Runge-Kutta steps of a fine mesh were half as many again."""
+It stands for the tissue that is closer to the face than the mesh resolves. With 4 the Runge-Kutta
+steps of a fine mesh were half as many again."""
 
 POINTS = 3
 """Contact points of a face, each for a third of its area: exact for linear pressure."""
@@ -42,11 +43,11 @@ CORNER, OTHER = 2.0 / 3.0, 1.0 / 6.0
 """Weights of a contact point: of its own corner, and of the other two."""
 
 END_SLOPE = 0.5
-"""Slope of the blade's back and ends against its plane. With steeper ends the tissue would leave
-them within one step, and stability would ask for shorter steps."""
+"""Slope of the blade's back and ends against its plane. Steeper ends would release the tissue
+within one step, and need shorter steps."""
 
 SEARCH_MARGIN = 0.5
-"""How far from the blade faces of the tissue are listed, per mean node size: twice as far as the
+"""Distance from the blade up to which faces are found, per mean node size: twice as far as the
 blade moves between two searches."""
 
 _FACES_AT_FIRST = 64
@@ -62,18 +63,19 @@ class ContactStates(Arrays):
     """Area of each contact point, seen along the normal of the blade [m2]; shape (capacity,)."""
     energy: FloatArray
     """Energy stored between face and blade, by pressure and friction [J]; shape (capacity,)."""
-    delay: FloatArray
-    """By how much the bevel begins late [m], shape (capacity, 3)."""
+    bevel_shift: FloatArray
+    """Height by which the bevel is shifted, for points first found within the blade [m]; shape
+    (capacity, 3)."""
     stuck_along: FloatArray
     """Distance from the tip at which friction would be zero [m], shape (capacity, 3)."""
     stuck_behind: FloatArray
     """Distance behind the edge at which friction would be zero [m], shape (capacity, 3)."""
     sliding_speed: FloatArray
-    """How fast the point slid when sliding was applied last [m/s], shape (capacity, 3)."""
+    """Speed of the point when sliding was applied last [m/s], shape (capacity, 3)."""
 
 
 class SideContacts(Arrays):
-    """The faces of the tissue that are near the side faces of the blade."""
+    """The faces of the tissue that are near the side faces of the blade, and the law of contact."""
 
     n_faces: IntCell
     """Number of faces."""
@@ -96,7 +98,7 @@ class SideContacts(Arrays):
     viscosity: float
     """Shear stress per sliding speed [Pa s/m]."""
     margin: float
-    """How far from the blade faces are listed [m]."""
+    """Distance from the blade up to which faces are in contact or may soon be [m]."""
     face: IntArray
     """Each face, as 4 * tetrahedron + corner opposite; shape (capacity,)."""
     node: IntArray
@@ -122,7 +124,7 @@ class SideContacts(Arrays):
 def new_side_contacts(
     shape: BladeShape | None, material: Material, node_size: float, n_tetrahedra: int
 ) -> SideContacts:
-    """Return the side faces of a blade that touches nothing; None is a line without any."""
+    """Return the contacts of a blade that touches nothing; None is a line without side faces."""
     thin = shape is None
     return SideContacts(
         n_faces=0,
@@ -156,7 +158,7 @@ def _rows(capacity: int) -> dict[str, np.ndarray | ContactStates]:
 
 
 def _new_states(capacity: int) -> ContactStates:
-    of_points = ("delay", "stuck_along", "stuck_behind", "sliding_speed")
+    of_points = ("bevel_shift", "stuck_along", "stuck_behind", "sliding_speed")
     return ContactStates(
         side=np.zeros(capacity),
         area=np.zeros(capacity),
@@ -193,7 +195,7 @@ class Profile(NamedTuple):
 
 
 class Penetration(NamedTuple):
-    """How deep a contact point is within the blade."""
+    """Depth of a contact point within the blade."""
 
     slope_along: float
     """Slope of the blade's outline along the edge."""
@@ -207,11 +209,11 @@ class FrictionStretch(NamedTuple):
     """Stretch of the friction spring at a contact point."""
 
     along: float
-    """Stretch along the edge that friction holds [m]."""
+    """Stretch along the edge, up to the friction limit [m]."""
     behind: float
-    """Stretch behind the edge that friction holds [m]."""
+    """Stretch away from the edge, up to the friction limit [m]."""
     surplus: float
-    """By how much the spring is longer than what friction holds [m]."""
+    """Length of the stretch beyond the friction limit [m]."""
 
 
 class ContactForces(NamedTuple):
@@ -225,13 +227,13 @@ class ContactForces(NamedTuple):
 
 @kernel
 def blade_profile(
-    sides: SideContacts, length: float, delay: float, at: BladeCoordinates
+    sides: SideContacts, length: float, bevel_shift: float, at: BladeCoordinates
 ) -> Profile:
     """Return the outline of a blade whose edge is of that length [m], at a point.
 
-    `delay` [m]: by how much the bevel begins late there.
+    `bevel_shift` [m] is the height by which the bevel is shifted there.
     """
-    best = Profile(0.0, sides.slope, sides.slope * at.behind + delay)
+    best = Profile(0.0, sides.slope, sides.slope * at.behind + bevel_shift)
     if sides.half_thickness < best.height:
         best = Profile(0.0, 0.0, sides.half_thickness)
     back = END_SLOPE * (sides.height - at.behind)
@@ -248,7 +250,7 @@ def blade_profile(
 
 @kernel
 def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) -> Vec3:
-    """Return where contact point `q` of row `i` is, with the nodes at `positions` [m]."""
+    """Return the position of contact point `q` of row `i`, with the nodes at `positions` [m]."""
     node = sides.node
     p = scale(CORNER, vec3(positions, node[i, q]))
     p = axpy(OTHER, vec3(positions, node[i, (q + 1) % 3]), p)
@@ -259,16 +261,16 @@ def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) ->
 def penetration(
     sides: SideContacts, length: float, i: int, q: int, at: BladeCoordinates
 ) -> Penetration:
-    """Return how deep a contact point is within the blade.
+    """Return the depth of a contact point within the blade.
 
     Args:
         sides: The side contacts.
         length: Length of the edge [m].
         i: Row of the face.
         q: Contact point of the face.
-        at: Where the contact point is.
+        at: Position of the contact point.
     """
-    outline = blade_profile(sides, length, sides.states.delay[i, q], at)
+    outline = blade_profile(sides, length, sides.states.bevel_shift[i, q], at)
     depth = outline.height - sides.states.side[i] * at.across
     return Penetration(outline.slope_along, outline.slope_behind, depth)
 
@@ -277,13 +279,13 @@ def penetration(
 def friction_stretch(
     sides: SideContacts, i: int, q: int, at: BladeCoordinates, normal_force: float
 ) -> FrictionStretch:
-    """Return the stretch of the friction spring at a contact point, as far as friction holds it.
+    """Return the stretch of the friction spring at a contact point, cut off at the friction limit.
 
     Args:
         sides: The side contacts.
         i: Row of the face.
         q: Contact point of the face.
-        at: Where the contact point is.
+        at: Position of the contact point.
         normal_force: Force that presses the point [N].
     """
     states = sides.states
@@ -311,8 +313,8 @@ def contact_forces(
         pose: Pose of the blade.
         i: Row of the face.
         q: Contact point of the face.
-        at: Where the contact point is.
-        inside: How deep it is within the blade.
+        at: Position of the contact point.
+        inside: Depth of the point within the blade.
     """
     stiffness = sides.stiffness * sides.states.area[i]
     push = stiffness * inside.depth
@@ -327,7 +329,7 @@ def contact_forces(
 
 @kernel
 def sides_energy(sides: SideContacts) -> float:
-    """Return the energy stored between the side faces and the tissue, when they slid last [J]."""
+    """Return the energy stored in the side contacts when sliding was applied last [J]."""
     energy = 0.0
     for i in range(sides.n_faces):
         energy += sides.states.energy[i]

@@ -46,7 +46,7 @@ def apply_side_forces(
     Args:
         blade: Its totals are written.
         motion: Pose and motion of the blade.
-        positions: Where the nodes are [m].
+        positions: Positions of the nodes [m].
         share: Weight of this evaluation in the integral over the step; they add up to 1.
         dt: Length of the time step [s].
         external: Forces on the nodes [N], shape (capacity, 3).
@@ -100,12 +100,12 @@ def _force_at(sides: SideContacts, pose: BladePose, i: int, q: int, at: BladeCoo
 def apply_sliding(
     blade: BladeState, pose: BladePose, positions: FloatArray, seconds: float
 ) -> None:
-    """Slide the contact points whose friction is above its limit, and count the work.
+    """Slide the contact points whose friction exceeds its limit, and count the work.
 
     Args:
         blade: Side contacts and totals are written.
         pose: Pose of the blade.
-        positions: Where the nodes are [m].
+        positions: Positions of the nodes [m].
         seconds: Time since sliding was applied last [s].
     """
     sides, totals = blade.sides, blade.totals
@@ -137,7 +137,7 @@ def apply_sliding(
 def _slide_point(
     sides: SideContacts, i: int, q: int, at: BladeCoordinates, normal_force: float, seconds: float
 ) -> None:
-    """Move where a point is stuck as far as friction does not hold it, by the implicit step.
+    """Move the point where friction would be zero, by an implicit step.
 
     stiffness (stretch - slide) = friction limit + viscosity slide / seconds, solved for the slide.
     """
@@ -169,8 +169,8 @@ def clear_side_forces(sides: SideContacts, external: FloatArray) -> None:
 def add_side_stiffness(sides: SideContacts, stiffness: FloatArray) -> None:
     """Add the rows of the side contacts to `stiffness` [N/m], shape (capacity, 3).
 
-    Of `stiffness` x is used. Across the face and along it a point has one stiffness; a slope adds
-    its share.
+    Only x of `stiffness` is used. The stiffness of a contact point is the same across the face and
+    along it; a slope adds its share.
     """
     more = 1.0 + max(sides.slope, END_SLOPE) ** 2
     for i in range(sides.n_faces):

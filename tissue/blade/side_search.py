@@ -24,10 +24,10 @@ from tissue.mesh.point_location import TetrahedronGrid, cell_along
 from tissue.mesh.star import Visits
 
 LEAST_COSINE = 0.5
-"""Cosine of the angle between the normals of a face and of the blade, for a face that is beside the
-blade. The edge presses the others, such as the skin that it goes through. With 0.05 that skin, once
-tilted by three degrees, was pressed aside whole: the force on a blade rose by a third to a half
-while it went in."""
+"""Least cosine of the angle between the normals of blade and face for a face that is beside the
+blade. Other faces, such as the skin that the edge goes through, are pressed by the edge. With 0.05
+that skin, once tilted by three degrees, was pressed aside whole: the force on a blade rose by a
+third to a half while it went in."""
 
 
 @kernel
@@ -89,13 +89,13 @@ def find_faces(
 ) -> bool:
     """Find the open faces near the blade; return False if there is no room for them.
 
-    Where there is none the old contacts stay as they were.
+    Where there is no room the contacts stay as they were.
 
     Args:
         blade: Its side contacts are written.
         body: The tissue.
         visits: For searches.
-        grid: Where its tetrahedra are.
+        grid: Grid that lists the tetrahedra.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
     """
@@ -117,9 +117,10 @@ def find_faces(
 
 @kernel
 def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, low: Vec3, high: Vec3) -> bool:
-    """Write which cells the box from `low` to `high` [m] meets; return whether they were others.
+    """Write which cells the box from `low` to `high` [m] meets; return whether that changed.
 
-    Or whether they list others now. A blade moves for many steps within the same cells.
+    Cells that list other tetrahedra than before count as changed. A blade often stays within the
+    same cells for many steps.
     """
     cells = sides.cells
     are_others = sides.n_around < 0
@@ -199,8 +200,8 @@ def _replace_faces(blade: BladeState, body: Body, pose: BladePose, n: int) -> No
         face = sides.found[i]
         _write_nodes(sides, body, row, face)
         old = sides.row_before[i]
-        # What is pressed keeps its side and area: to measure a lip that trembles again in each step
-        # gave it energy, a tenth of what the blade did in an organ.
+        # A face in contact keeps its side and area: measuring a trembling lip again in each step
+        # gave it energy, a tenth of the work of the blade in an organ.
         if old >= 0 and before.energy[old] > 0.0:
             _copy_face(before, states, old, row)
         elif not _measure_face(sides, body, pose, row):
@@ -229,7 +230,7 @@ def _copy_face(source: ContactStates, target: ContactStates, i: int, j: int) -> 
 @kernel
 def _copy_point(source: ContactStates, target: ContactStates, i: int, j: int, q: int) -> None:
     """Copy the state of point `q` from row `i` of `source` to row `j` of `target`."""
-    target.delay[j, q] = source.delay[i, q]
+    target.bevel_shift[j, q] = source.bevel_shift[i, q]
     target.stuck_along[j, q] = source.stuck_along[i, q]
     target.stuck_behind[j, q] = source.stuck_behind[i, q]
     target.sliding_speed[j, q] = source.sliding_speed[i, q]
@@ -262,10 +263,10 @@ def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: 
     """Begin a contact point of a new face where it is."""
     states = sides.states
     at = blade_coordinates(pose, contact_point(sides, body.positions, row, q))
-    states.delay[row, q] = 0.0
+    states.bevel_shift[row, q] = 0.0
     if penetration(sides, pose.length, row, q, at).depth > 0.0:
         # The outline of the bevel is moved to where the point is.
-        states.delay[row, q] = states.side[row] * at.across - sides.slope * at.behind
+        states.bevel_shift[row, q] = states.side[row] * at.across - sides.slope * at.behind
     states.stuck_along[row, q] = at.along
     states.stuck_behind[row, q] = at.behind
     states.sliding_speed[row, q] = 0.0

@@ -1,4 +1,4 @@
-"""The energy that cutting takes: per area, more of it at speed, and more to break the skin."""
+"""The energy that cutting takes per area: more at speed, and more until the skin is broken."""
 
 from tissue.blade_shape import BladeShape
 from tissue.core.jit import kernel

@@ -1,8 +1,8 @@
 """The wrench of the tissue on the blade: mean of a step, and at its end with its derivatives.
 
-The wrench at the end, its stiffness and the contacts behind it follow from the same points, those
-of `tissue.blade.forces`. Force and torque of each contact act at one point on both sides, so that
-they cancel to the last bit but rounding.
+The wrench at the end, its stiffness and the contacts follow from the same points as the forces
+(`tissue.blade.forces`). Each force acts at one point on tissue and blade, so that forces and
+torques cancel but for rounding.
 """
 
 import numpy as np
@@ -120,12 +120,12 @@ def _report_edge(
         force = scale(anchors.stiffness[k], sub(stretch, surplus))
         lever = sub(sub(b, surplus), about)
         _add_force(report, lever, force)
-        # What slips pulls no harder when it is pulled farther.
+        # An anchor that slips pulls no harder when it is pulled farther.
         in_plane = axpy(-dot(stretch, pose.normal), pose.normal, stretch)
         free = scale(1.0 if anchors.slips[k] else 0.0, in_plane)
         _add_stiffness(report, lever, anchors.stiffness[k], free)
         across = dot(force, forward)
-        at = sub(b, surplus)  # where the force acts: the contacts add up to the torque as well
+        at = sub(b, surplus)  # where the force acts: torques of the contacts add up too
         _add_contact(report, at, forward, across, axpy(-across, forward, force), anchors.cut[k])
 
 

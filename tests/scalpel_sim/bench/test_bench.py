@@ -8,7 +8,7 @@ import pytest
 
 from scalpel_sim.bench.cut import CUT_BLOCKS, cut_slits, measure_cut_steps, median_cost
 from scalpel_sim.bench.kernels import measure_kernels
-from scalpel_sim.bench.local_frame import RELAXATIONS, measure_local_frames
+from scalpel_sim.bench.local_frame import BENCHED_RELAXATIONS, measure_local_frames
 from scalpel_sim.bench.results import HIGHER, LOWER, NEITHER, load_results
 from scalpel_sim.bench.roofline import measure_roofline
 from scalpel_sim.bench.scaling import measure_scaling
@@ -109,7 +109,7 @@ def test_a_local_frame_splits_a_dozen_and_does_not_depend_on_the_body_around(cap
     found = measure_local_frames(1, sizes=(6_000, 20_250))
     assert all(map(is_sane, found.measurements))
     of = {(each.case, each.tetrahedra): each for each in found.measurements}
-    for name in RELAXATIONS:
+    for name in BENCHED_RELAXATIONS:
         small, large = (of[f"{name}: cut frame", size] for size in (6_000, 20_250))
         splits = [float(each.note.split()[0]) for each in (small, large)]
         assert all(6.0 < n < 24.0 for n in splits)

@@ -8,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from scalpel_sim.bench import peer_benchmark
-from scalpel_sim.bench.blocks import held_nodes, jittered_block, mesh_edges
+from scalpel_sim.bench.blocks import held_nodes, jittered_block, measured_edges
 from scalpel_sim.bench.engine import block_material
 from scalpel_sim.bench.peer_benchmark import body_file, measure_peers
 from scalpel_sim.bench.peer_cases import OURS, OURS_SPRINGS, PEERS
@@ -40,7 +40,7 @@ def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
 
 
 def test_edges_have_the_volume_around_them_and_nodes_a_quarter_of_it():
-    edges = mesh_edges(jittered_block(576))
+    edges = measured_edges(jittered_block(576))
     volume = 0.04 * 0.04 * 0.06
     assert edges.node_volumes.sum() == pytest.approx(volume)
     assert edges.volumes.sum() == pytest.approx(6 * volume)  # each tetrahedron has six edges

@@ -1,4 +1,4 @@
-"""The edge anchors: what holds, what slips, and that action is reaction."""
+"""The edge anchors: which are set, when they slip, and that action is reaction."""
 
 import numpy as np
 import pytest
@@ -31,8 +31,6 @@ from tissue.blade.return_mapping import locate, set_anchor, slip_anchors
 from tissue.blade.toughness import toughness_law_of
 from tissue.core.vec3 import Vec3, vec3
 from tissue.cutting.blade_path import new_path
-from tissue.geometry.polar_decomposition import nearest_rotation
-from tissue.geometry.tetrahedron import Matrix3
 from tissue.mesh.body import CUT, OUTER, build_body, walk
 from tissue.mesh.point_location import build_grid
 from tissue.mesh.star import no_visits
@@ -42,11 +40,11 @@ pytestmark = pytest.mark.kernel
 BLOCK = block((2, 4, 2), (0.02, 0.04, 0.02))
 STIFF, TOUGH = 10e3, 20.0
 BOX = (Vec3(0.0, 0.0, 0.0), Vec3(0.02, 0.04, 0.02))
-"""Lowest and highest corner of it [m]."""
+"""Lowest and highest corner of the block [m]."""
 
 N = 5
 REACH = 0.005
-"""How far the tissue that the edge may hold is from it [m]."""
+"""`BladeState.reach` [m]."""
 
 
 def edge_at(y, x=0.011, z=0.001, length=0.016):
@@ -117,7 +115,7 @@ def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     held.blade = held.blade.replaced(anchors=anchors)
     totals = held.pull(edge_at(-0.001))
     assert is_zero(totals)
-    assert totals.work_of_blade == 0.0
+    assert totals.work_of_blade == totals.work_of_cutting == totals.released == 0.0
     assert not held.forces.any()
 
 
@@ -166,9 +164,9 @@ def test_slipping_further_costs_toughness_times_area(held):
     """Past the threshold, an advance of 1 um over the whole edge dissipates J l 1 um."""
     for i in range(4000):
         held.slip(edge_at(0.009 + i * 1e-6))
-    way = 4000e-6 - 1e-6 - THRESHOLD
+    slipped = 4000e-6 - 1e-6 - THRESHOLD
     work = held.blade.totals.work_of_cutting
-    assert work == pytest.approx(TOUGH * 0.016 * way, rel=2e-3)
+    assert work == pytest.approx(TOUGH * 0.016 * slipped, rel=2e-3)
 
 
 def test_a_pull_across_the_flat_never_slips(held):
@@ -178,7 +176,7 @@ def test_a_pull_across_the_flat_never_slips(held):
     assert held.blade.totals.work_of_cutting == 0.0
 
 
-def test_a_blade_that_backs_off_feels_nothing_and_bites_again_where_it_was(held):
+def test_a_blade_that_backs_off_pulls_nothing_and_is_anchored_again_where_it_was(held):
     before = held.anchors.rest.copy()
     held.slip(edge_at(0.009 - 0.001))
     assert (held.anchors.state == RETRACTED).all()
@@ -194,7 +192,7 @@ def test_a_blade_that_backs_off_and_goes_aside_beyond_reach_is_free(held):
 
 
 @pytest.mark.parametrize(("first", "goes_on"), [(N - 1, True), (0, False)])
-def test_the_path_of_a_sample_let_go_goes_on_beside_one_that_holds_and_else_begins_anew(
+def test_the_path_of_a_freed_sample_goes_on_beside_an_anchored_one_and_else_begins_again(
     held, first, goes_on
 ):
     path = new_path(N)
@@ -205,7 +203,7 @@ def test_the_path_of_a_sample_let_go_goes_on_beside_one_that_holds_and_else_begi
     assert path.known[N - 1] == goes_on
 
 
-def test_letting_go_is_counted_as_released_energy(held):
+def test_backing_off_is_counted_as_released_energy(held):
     held.slip(edge_at(0.009 - 0.001))
     stiffness = 4.0 * STIFF * 0.016
     assert held.blade.totals.released == pytest.approx(0.5 * stiffness * 0.001**2, rel=1e-9)
@@ -247,7 +245,7 @@ def test_forces_are_cleared_where_anchors_were(held):
     assert not held.forces.any()
 
 
-def test_the_blade_works_force_times_way(held):
+def test_the_work_of_the_blade_is_force_times_displacement(held):
     tip, heel, forward = Vec3(0.011, 0.009, 0.001), Vec3(0.011, 0.009, 0.017), Vec3(0.0, 1.0, 0.0)
     to = Edge(
         tip,
@@ -302,26 +300,8 @@ def test_a_step_in_a_squashed_tetrahedron_stays_as_it_is(held):
     assert to_material(held.body, 0, Vec3(0.0, 0.003, 0.0)) == (0.0, 0.003, 0.0)
 
 
-def test_the_rotation_in_a_stretch_and_turn_is_the_turn():
-    turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
-    turn *= np.linalg.det(turn)
-    stretched = turn @ np.diag([1.3, 0.8, 1.1])
-    found = nearest_rotation(Matrix3(*(Vec3(*column) for column in stretched.T.tolist())))
-    np.testing.assert_allclose(np.transpose(found), turn, atol=1e-9)
-
-
-def test_the_frame_of_the_edge_is_square():
-    forward = Vec3(0.0, 1.0, 0.4)
-    tip, heel = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.02)
-    pose = pose_at(Edge(tip, heel, forward, tip, heel, forward), 0.5)
-    frame = np.array([pose.along, pose.forward, pose.normal])
-    np.testing.assert_allclose(frame @ frame.T, np.eye(3), atol=1e-15)
-    np.testing.assert_allclose(pose.forward, [0.0, 1.0, 0.0])
-    assert pose.length == pytest.approx(0.02)
-
-
 def test_a_search_goes_around_the_rim_of_a_cut(held):
-    """The block is cut at y = 20 mm but for its right half; the way leads around."""
+    """The block is cut at y = 20 mm but for its right half; the search leads around."""
     body = held.body
     rest = body.rest[body.tetrahedra]
     for t, f in np.argwhere(body.links >= 0):

@@ -1,4 +1,4 @@
-"""Beside a cut face a blade is in its slit; before the rim, below the bottom, across it: not."""
+"""A blade is in its slit beside a cut face; not before the rim, below the bottom or across it."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The path of an edge whose way is given: samples advance or wait, and find where they are."""
+"""The path of an edge that is given: samples advance or wait, and find their tetrahedra."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def begun():
     return cut, build_grid(cut.body, cut.body.rest, 0.0)
 
 
-def test_samples_go_where_they_are_told(begun):
+def test_samples_move_to_the_given_points(begun):
     cut, cells = begun
     there = at(0.3)
     prescribe_path(cut.path, cut.body, cells, there, AHEAD)
@@ -52,10 +52,10 @@ def test_samples_inside_know_a_tetrahedron_that_holds_them(begun):
         corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
         assert (corners.min(axis=0) <= cut.path.t1[k]).all()
         assert (cut.path.t1[k] <= corners.max(axis=0)).all()
-    assert cut.path.seed[2] == -1  # far above, and so is the way of its segment
+    assert cut.path.seed[2] == -1  # far above, as is what its segment sweeps
 
 
-def test_the_side_of_the_blade_is_across_its_edge_and_its_way(begun):
+def test_the_normal_of_the_blade_is_across_its_edge_and_its_motion(begun):
     cut, cells = begun
     prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
     np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)

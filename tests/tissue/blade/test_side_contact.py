@@ -1,4 +1,4 @@
-"""The faces of the blade: what they part, what they hold, and that action is reaction."""
+"""The side faces of the blade: pressure, friction, and that action is reaction."""
 
 import itertools
 import math
@@ -154,7 +154,7 @@ def test_friction_holds_below_its_limit_and_slides_above(pressed):
     assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
 
 
-def test_sliding_takes_friction_times_way(pressed):
+def test_sliding_takes_friction_times_displacement(pressed):
     pressed.slide(edge_at(0.0108))
     normal = -pressed.press(edge_at(0.0108))[0]
     for y in (0.0155, 0.0165):
@@ -193,7 +193,7 @@ def test_the_force_is_the_slope_of_the_energy(pressed):
     assert pressed.totals.released == pytest.approx(stored, rel=1e-12)
 
 
-def test_a_known_face_keeps_what_it_holds(pressed):
+def test_a_known_face_keeps_its_friction(pressed):
     edge = edge_at(0.0108)
     pressed.slide(edge)
     dragged = edge_at(0.0108, y=0.01503)
@@ -202,7 +202,7 @@ def test_a_known_face_keeps_what_it_holds(pressed):
     np.testing.assert_allclose(pressed.press(dragged), before, rtol=1e-9)
 
 
-def test_to_look_again_at_what_trembles_under_the_blade_gives_it_no_energy(pressed):
+def test_a_search_gives_no_energy_to_a_face_that_trembles_under_the_blade(pressed):
     edge = edge_at(0.0108)
     pressed.slide(edge)
     pressed.body.positions[:, 1] *= 1.1  # its faces are larger now
@@ -221,12 +221,6 @@ def test_nodes_beside_the_blade_count_as_stiffer(pressed):
     add_side_stiffness(pressed.sides, rows)
     area = POINTS * pressed.sides.states.area[pressed.rows()].sum()
     assert rows[:, 0].sum() >= pressed.sides.stiffness * area
-
-
-def test_coordinates_on_the_blade_are_those_of_its_frame(pressed):
-    at = blade_coordinates(pose_at(edge_at(0.0), 1.0), Vec3(0.002, 0.005, 0.004))
-    np.testing.assert_allclose(at[:2], [0.014, 0.01], atol=1e-15)
-    assert abs(at.across) == pytest.approx(0.002)
 
 
 def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
@@ -253,15 +247,15 @@ def test_a_blade_that_cannot_be_is_refused_by_name(wrong, why):
         BladeShape(**wrong)
 
 
-def test_a_blade_that_stays_in_its_cells_finds_what_a_search_anew_would():
+def test_a_blade_that_stays_in_its_cells_finds_what_a_new_search_would():
     """To and fro by less than a cell, into another one, and away."""
     pressed = Pressed()
     kept = build_grid(pressed.body, pressed.body.positions, 0.5e-3)
     numbers = []
     for x in (0.0115, 0.0113, 0.0109, 0.0131, 0.0045, 0.0115):
         faces = []
-        for anew in (False, True):
-            if anew:
+        for from_scratch in (False, True):
+            if from_scratch:
                 forget_cells(pressed.sides)
             pressed.find_in(kept, edge_at(x))
             faces.append(pressed.sides.face[pressed.rows()].tolist())

@@ -92,9 +92,9 @@ def test_stiffness_is_symmetric_and_positive(cut):
 def test_stiffness_is_how_the_force_changes_before_the_tissue_moves(blade, axis):
     """A shift of a micrometre sideways or along the edge, in 0.1 us: the tissue stays."""
     forces = []
-    for way in (0.0, 1e-6):
+    for distance in (0.0, 1e-6):
         tissue, result, pose = cut_to(0.01, Material(toughness=2000.0), blade)
-        shift = way * np.eye(3)[axis]
+        shift = distance * np.eye(3)[axis]
         moved = pose._replace(tip=pose.tip + shift, heel=pose.heel + shift)
         forces.append(tissue.step(BladeSweep(pose, moved), 1e-7).wrench_t1.force)
     change = (forces[1] - forces[0]) / 1e-6

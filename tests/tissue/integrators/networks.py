@@ -7,7 +7,7 @@ from tests.tissue.kernels_of import Network, elastic_of, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.hierarchical.kernels import Frame, Trails, hierarchical_frame, new_trails
+from tissue.integrators.hierarchical.kernels import FrameTimes, Trails, hierarchical_frame, new_trails
 from tissue.integrators.hierarchical.stepper import ring_steps
 from tissue.integrators.local.chebyshev import STABILISATION, chebyshev
 from tissue.integrators.local.element_subsets import find_patch, new_patch, reach_of
@@ -76,7 +76,7 @@ def frames(
     rings = rings_around(network, focus, last_ring + 1)
     trails = trails or new_trails(n_nodes)
     n_micro, every = ring_steps(Hierarchical(updates, last_ring), [0.0] * (last_ring + 2))
-    frame = Frame(span, 0.0, 1.0, n_micro, last_ring, frozen)
+    frame = FrameTimes(span, 0.0, 1.0, n_micro, last_ring, frozen)
     context = network.context
     for _ in range(n):
         hierarchical_frame(context, NOWHERE, rings, trails, every, frame)

@@ -94,7 +94,7 @@ def grown_trails(trails: Trails, n_nodes: int) -> Trails:
     return trails.replaced(**{name: grown(getattr(trails, name), n_nodes) for name in of_nodes})
 
 
-class Frame(NamedTuple):
+class FrameTimes(NamedTuple):
     """A frame of the hierarchical relaxation."""
 
     dt: float
@@ -113,7 +113,7 @@ class Frame(NamedTuple):
 
 @kernel
 def hierarchical_frame(
-    context: StepContext, edge: Edge, rings: Rings, trails: Trails, every: IntArray, frame: Frame
+    context: StepContext, edge: Edge, rings: Rings, trails: Trails, every: IntArray, frame: FrameTimes
 ) -> None:
     """Advance the body by one frame.
 

@@ -11,7 +11,7 @@ from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.focus import find_held, find_rings
 from tissue.integrators.hierarchical.kernels import (
-    Frame,
+    FrameTimes,
     grown_trails,
     hierarchical_frame,
     new_trails,
@@ -71,7 +71,7 @@ class HierarchicalStepper:
         if contact.is_awake:
             note_all_positions(contact.arrays, body)
         times = (increment.dt, increment.begin, increment.end)
-        frame = Frame(*times, n, options.rings, self._is_far_frozen)
+        frame = FrameTimes(*times, n, options.rings, self._is_far_frozen)
         rings, trails = self._rings, self._trails
         hierarchical_frame(system.context, increment.edge, rings, trails, every, frame)
         end_step(system, increment, increment.span, increment.end)

@@ -1,0 +1,33 @@
+"""The public names of the packages: listed once, all there, and loaded when they are first used."""
+
+import importlib
+import subprocess
+import sys
+
+import pytest
+
+PACKAGES = ("tissue", "bridge", "scalpel_sim")
+HEAVY = ("numba", "llvmlite", "mujoco", "matplotlib", "trimesh", "fcl")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_every_public_name_is_there(package):
+    face = importlib.import_module(package)
+    missing = [name for name in face.__all__ if getattr(face, name, None) is None]
+    assert missing == []
+    assert set(face.__all__) <= set(dir(face))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_importing_a_package_loads_nothing_heavy(package):
+    program = f"import sys, {package}; print(sorted(set({HEAVY}) & set(sys.modules)))"
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_name_that_is_not_public_is_refused(package):
+    with pytest.raises(AttributeError, match="no_such_name"):
+        importlib.import_module(package).no_such_name  # noqa: B018 - the access is the test
