@@ -238,7 +238,7 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
 
 
 def warn_of_toughness(material: Material, node_size: float) -> None:
-    """Say so where the blade strains tetrahedra more than their law can bear.
+    """Log a warning if the blade will strain tetrahedra beyond the range of their law.
 
     Args:
         material: What the body is made of.
@@ -248,8 +248,8 @@ def warn_of_toughness(material: Material, node_size: float) -> None:
     if length > TOUGHEST[material.law] * node_size:
         _log.warning(
             "toughness / young_modulus is %.1f mm, %.1f times the mean node size of %.1f mm: "
-            "tetrahedra ahead of the blade are strained beyond what law %s bears, and the cutting "
-            "force reads up to %d %% low. Use a lower toughness, a stiffer material, or %s",
+            "tetrahedra ahead of the blade are strained beyond the range of law %s, and the "
+            "cutting force reads up to %d %% low. Use a lower toughness, a stiffer material, or %s",
             length * 1e3,
             length / node_size,
             node_size * 1e3,
@@ -260,7 +260,7 @@ def warn_of_toughness(material: Material, node_size: float) -> None:
 
 
 def warn_of_ratio(material: Material) -> None:
-    """Say so where the resistance to compression makes time steps very short."""
+    """Log a warning if the resistance to compression makes time steps very short."""
     ratio = material.poisson_ratio
     if ratio > NEARLY_INCOMPRESSIBLE:
         _log.warning(

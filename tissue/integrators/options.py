@@ -1,4 +1,4 @@
-"""The ways to relax a body that a user can choose, and their settings."""
+"""Options of the integrators that a user can choose."""
 
 import math
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Hierarchical:
     in a frame. Where the steps of a ring would be too long for its stiffest node, it takes twice as
     many, or four times, and so on."""
     rings: int = 6
-    """s_max: up to which ring s, counted in edges from the tip, nodes take I 2^-s steps."""
+    """Number s_max of the last ring; nodes of ring s, s edges from the tip, take I 2^-s steps."""
     far: Far = "moved"
     """Nodes beyond. Where they are frozen, as the paper prints it, a frame costs what the rings
     cost, however large the body; but what is frozen does not come to equilibrium."""
@@ -61,7 +61,7 @@ class LocalTimeStepping:
     sleep: bool = True
     """Whether nodes at rest sleep until they are pulled, so that a step costs what moves."""
     stabilisation: float = 1.0
-    """nu of the scheme; see `tissue.integrators.local.chebyshev`."""
+    """Coefficient nu of the scheme; see `tissue.integrators.local.chebyshev`."""
 
     def __post_init__(self) -> None:
         if self.rings < 0:
@@ -80,14 +80,14 @@ BY_NAME: dict[str, IntegratorOptions] = {
     "hierarchical": Hierarchical(),
     "local": LocalTimeStepping(),
 }
-"""With the default settings."""
+"""Integrators by name, with their default settings."""
 
 
 def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> IntegratorOptions:
     """Return the settings that a name stands for, or those given, for a body of that material.
 
     Raises:
-        ValueError: there is no such way to relax, or it is not for that material.
+        ValueError: there is no such integrator, or it is not for that material.
     """
     if isinstance(choice, str):
         if choice not in BY_NAME:

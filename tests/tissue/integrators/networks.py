@@ -7,7 +7,12 @@ from tests.tissue.kernels_of import Network, elastic_of, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.hierarchical.kernels import FrameTimes, Trails, hierarchical_frame, new_trails
+from tissue.integrators.hierarchical.kernels import (
+    FrameTimes,
+    Trails,
+    hierarchical_frame,
+    new_trails,
+)
 from tissue.integrators.hierarchical.stepper import ring_steps
 from tissue.integrators.local.chebyshev import STABILISATION, chebyshev
 from tissue.integrators.local.element_subsets import find_patch, new_patch, reach_of

@@ -106,14 +106,19 @@ class FrameTimes(NamedTuple):
     n: int
     """Micro steps."""
     last_ring: int
-    """s_max: nodes further out are beyond the rings."""
+    """Number s_max of the last ring; nodes further out are beyond the rings."""
     is_far_frozen: bool
     """Whether nodes beyond the last ring stay where they are (the paper's rule)."""
 
 
 @kernel
 def hierarchical_frame(
-    context: StepContext, edge: Edge, rings: Rings, trails: Trails, every: IntArray, frame: FrameTimes
+    context: StepContext,
+    edge: Edge,
+    rings: Rings,
+    trails: Trails,
+    every: IntArray,
+    frame: FrameTimes,
 ) -> None:
     """Advance the body by one frame.
 
@@ -304,9 +309,16 @@ def ring_frequencies(
     is_far_frozen: bool,
     out: FloatArray,
 ) -> None:
-    """Write the largest bound on w^2 [1/s2] of the nodes in each ring to `out`.
+    """Write the largest bound on w^2 [1/s2] of the nodes in each ring.
 
-    Shape (last_ring + 2,); last that of all nodes beyond, 0 where they are frozen.
+    Args:
+        body: For the nodes.
+        frequency_squared: Bound on w^2 of each node [1/s2], shape (capacity,).
+        rings: The rings.
+        last_ring: Number of the last ring.
+        is_far_frozen: Whether nodes beyond the last ring stay where they are.
+        out: Bound of each ring, shape (last_ring + 2,); last the bound of all nodes beyond, 0 where
+            they are frozen.
     """
     for s in range(last_ring + 2):
         out[s] = 0.0

@@ -30,8 +30,8 @@ from tissue.mesh.moved_nodes import Moved, grown_moved, none_moved, note_moved
 class HierarchicalStepper:
     """The paper's hierarchical relaxation as an `Integrator`.
 
-    The focus is the tetrahedron that the blade holds nearest to its tip; when it has let go, the
-    one that it held last.
+    The focus is the anchored tetrahedron nearest to the tip of the blade; without an anchor, the
+    focus before it.
 
     Args:
         options: Updates, rings, and the fate of nodes beyond.

@@ -1,6 +1,6 @@
 """Coefficients of stabilised leap-frog local time stepping (Grote, Michel and Sauter 2021).
 
-A macro step of length H takes p substeps. With e the way of a node from where it is at the begin,
+A macro step of length H takes p substeps. With e the displacement of a node since the begin,
 r its acceleration there, and T the Chebyshev polynomials:
 
     d = 1 + nu / p^2        w = 2 T_p'(d) / T_p(d)
@@ -18,7 +18,8 @@ from tissue.core.array_types import FloatArray
 from tissue.core.structs import Arrays
 
 STABILISATION = 1.0
-"""nu. At 0 the plain scheme (Diaz and Grote 2009) is unstable at many steps far below the limit.
+"""Default of nu. At 0 the plain scheme (Diaz and Grote 2009) is unstable at many steps far below
+the limit.
 At 0.05 it is stable up to the limit of the coarse zone as long as strains are small; a body without
 any damping, strained by 6 % about a zone 16 times as stiff, still exploded at 0.5, and did not at
 1. That costs a quarter more substeps than 0 would."""
@@ -31,11 +32,11 @@ class Chebyshev(Arrays):
     """Coefficients for each substep m from 0 to p - 1, each of shape (p,)."""
 
     onward: FloatArray
-    """Of e_m."""
+    """Factor of e_m."""
     back: FloatArray
-    """Of e_{m-1}."""
+    """Factor of e_{m-1}."""
     push: FloatArray
-    """Of H^2 r(e_m)."""
+    """Factor of H^2 r(e_m)."""
     weight: FloatArray
     """Weight of r(e_m) in the mean over the macro step; they add up to 1."""
     limit: float

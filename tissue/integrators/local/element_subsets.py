@@ -66,21 +66,21 @@ def reach_of(elastic: Elastic) -> int:
 
 
 @kernel
-def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, feeling: int) -> None:
-    """List what to evaluate where nodes moved, for the forces on nodes that feel it.
+def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, affected: int) -> None:
+    """List what to evaluate where nodes moved, for the forces that this changes.
 
     Args:
         patch: Written.
         elastic: For the rows of the tetrahedra around nodes.
         rings: Ring 0 and, for the pressures, ring 1.
-        moving: Up to which of these rings volumes are needed around the nodes.
-        feeling: Up to which of these rings forces are needed around the nodes.
+        moving: Last of these rings around whose nodes volumes are needed.
+        affected: Last of these rings around whose nodes forces are needed.
     """
     patch.n_volumes = patch.n_pressures = patch.n_forces = 0
     if not elastic.has_tetrahedra:
         return
     solid = elastic.solid
-    patch.n_forces = _blocks_around(patch, solid, rings, feeling, patch.forces)
+    patch.n_forces = _blocks_around(patch, solid, rings, affected, patch.forces)
     if has_averaged_volumes(solid):
         patch.n_volumes = _blocks_around(patch, solid, rings, moving, patch.volumes)
         for k in range(rings.n_found):

@@ -1,8 +1,9 @@
 """Local time stepping: small elements take substeps, their neighbours do not (heir of section 5.2).
 
 Leap-frog with steps of H for the whole body, and p substeps for the fine nodes: those whose
-frequency bound, with what the blade adds, exceeds what H bears; and the rings around the blade that
-were asked for. It differs from the paper's hierarchy in that both ends of a spring see each other
+frequency bound, with what the blade adds, is too high for H; and the rings around the blade that
+the options ask for. It differs from the paper's hierarchy in that both ends of a spring see each
+other
 at the same times: linear momentum is kept to rounding, the equilibrium is that of all nodes moved
 together, the order is 2.
 

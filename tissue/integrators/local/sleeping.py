@@ -1,7 +1,7 @@
 """Sleeping: nodes at rest are not moved until something pulls on them.
 
 An awake node moves. A watched node is asleep beside one that is awake: it does not move, but its
-acceleration is looked at, and wakes it. All others are asleep and cost nothing, so that a step
+acceleration is computed, and wakes it. All others are asleep and cost nothing, so that a step
 costs what the nodes in the list cost, however large the body is.
 
 A sleeping node is held in its place. The force that this takes is at most its mass times
@@ -25,8 +25,9 @@ ASLEEP, WATCHED, AWAKE = 0, 1, 2
 
 SLEEP_ACCELERATION = 0.1
 """Net acceleration below which a node may fall asleep [m/s2]: a hundredth of that of its weight.
-Larger: bodies come to rest visibly short of equilibrium, and what is pressed feels held by what
-sleeps around it. Smaller: the waves of a cut keep a large body awake; of 51,000 nodes 400 ms after
+Larger: bodies come to rest visibly short of equilibrium, and what is pressed is held by the
+nodes asleep around it. Smaller: the waves of a cut keep a large body awake; of 51,000 nodes 400 ms
+after
 a slit of 40 ms 50,000 were awake at 0.01, 33,000 at 0.05, 5,000 at 0.25."""
 
 WAKE_ACCELERATION = 2.0 * SLEEP_ACCELERATION
@@ -94,7 +95,15 @@ def wake(activity: Activity, body: Body, springs: Springs, node: int) -> None:
 
 @kernel
 def wake_each(activity: Activity, body: Body, springs: Springs, nodes: IntArray, n: int) -> None:
-    """Wake the first `n` of `nodes`."""
+    """Wake the first `n` of `nodes`.
+
+    Args:
+        activity: The list of awake and watched nodes.
+        body: For the fixed nodes.
+        springs: The rows of neighbours.
+        nodes: Nodes to wake.
+        n: Number of them.
+    """
     for i in range(n):
         wake(activity, body, springs, nodes[i])
 

@@ -102,7 +102,7 @@ def plan_steps(
 
 @kernel
 def coarse_limit(h: float, retardation_time: float) -> float:
-    """Highest bound on w^2 [1/s2] that a step of `h` [s] bears where dampers lag by half a step.
+    """Return the largest w^2 [1/s2] for which a step of `h` [s] is stable, dampers lagging by half.
 
     The exact limit of x'' = -w^2 (x + b x') is (w h)^2 / 4 + w^2 b h / 2 = 1.
     """
@@ -111,9 +111,9 @@ def coarse_limit(h: float, retardation_time: float) -> float:
 
 @kernel
 def n_substeps(frequency_squared: float, h: float, substep_limits: FloatArray) -> int:
-    """Substeps of a step of `h` [s] that bear frequencies up to that, w^2 [1/s2]; see `chebyshev`.
+    """Return the substeps for which a step of `h` [s] is stable up to that w^2 [1/s2].
 
-    One more than there may be where that many do not suffice.
+    See `chebyshev`. One more than allowed where the allowed number does not suffice.
     """
     p = 1
     phase = math.sqrt(frequency_squared) * h
@@ -131,10 +131,15 @@ def find_bounds(
     zone: Zone,
     scratch: FloatArray,
 ) -> None:
-    """Write the bounds of the listed nodes to `zone.bound` [1/s2], with what the blade adds.
+    """Write the bound on w^2 of each listed node to `zone.bound` [1/s2], with what the blade adds.
 
-    All nodes that it acts on are listed, but for those that are fixed. `scratch`: see
-    `add_blade_frequency`.
+    Args:
+        body: For masses.
+        elastic: Bounds of the body alone.
+        blade: The blade; all free nodes that it acts on are listed.
+        activity: The listed nodes.
+        zone: Its bounds are written.
+        scratch: Scratch of shape (capacity, 3), zero at the nodes that the blade acts on.
     """
     for k in range(activity.n_listed):
         zone.bound[activity.listed[k]] = elastic.frequency_squared[activity.listed[k]]
@@ -143,9 +148,14 @@ def find_bounds(
 
 @kernel
 def find_near(body: Body, springs: Springs, blade: BladeState, zone: Zone, n_rings: int) -> int:
-    """Write the nodes that the blade acts on, and rings around, to `zone.fine`; return how many.
+    """Write the free nodes that the blade acts on, and around, to `zone.fine`; return how many.
 
-    Only those that can move.
+    Args:
+        body: For the fixed nodes.
+        springs: The rows of neighbours.
+        blade: What acts on the nodes.
+        zone: Written.
+        n_rings: Number of rings of neighbours around those nodes.
     """
     rings = zone.rings
     if not find_held(rings, body, blade):
@@ -161,9 +171,14 @@ def find_near(body: Body, springs: Springs, blade: BladeState, zone: Zone, n_rin
 
 @kernel
 def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, limit: float) -> None:
-    """Make the nodes near the blade, and those above the limit [1/s2], the fine ones.
+    """Make the nodes near the blade, and the stiff ones, the fine nodes.
 
-    `n_near` is what `find_near` returned; those are awake.
+    Args:
+        elastic: Forces inside the body.
+        activity: The listed nodes; those near the blade are awake.
+        zone: Its rings and tetrahedra are written.
+        n_near: Number of nodes that `find_near` wrote.
+        limit: Bound on w^2 above which an awake node is fine [1/s2].
     """
     rings = zone.rings
     begin_search(rings)
@@ -182,7 +197,7 @@ def find_zone(elastic: Elastic, activity: Activity, zone: Zone, n_near: int, lim
 def find_listed_patch(patch: Patch, elastic: Elastic, activity: Activity, around: Rings) -> None:
     """List what to evaluate for the forces on all listed nodes; `around` is scratch.
 
-    One ring beyond them takes part: what sleeps there has a pressure that they feel.
+    One ring beyond them takes part: the pressure of nodes asleep there acts on them.
     """
     if not elastic.has_tetrahedra:
         return
