@@ -17,34 +17,36 @@ _DT = 1e-3
 """Length of a frame [s]: 1 kHz, the rate of a haptic device."""
 
 LEAN = 0.25
-"""How far the blade leans sideways, per height: so that it meets tetrahedra in all ways, while an
-upright one could follow a plane of the grid."""
+"""Sideways lean of the blade per height, so that it crosses tetrahedra in all orientations; upright
+it could follow a plane of the grid."""
 
 AHEAD = 0.1
-"""Where the blade starts, before the front of the block, per depth of it."""
+"""Distance of the start of the blade from the front of the block, per depth of the block."""
 
 _STAGES = {
     "CD": ("collision", "active tetrahedra, crossed edges"),
-    "GC": ("topology", "insertion, marking, un-gluing"),
+    "GC": ("topology", "insertion of nodes, separation"),
     "RX": ("relaxation", "forces, anchors, Runge-Kutta"),
 }
 """The paper's names of the stages (Table 1)."""
 
 
 class CutThrough(NamedTuple):
-    """What a cut left, and each of its frames."""
+    """A body that was cut, and each frame of the cut."""
 
     tissue: Tissue
+    """The body after the cut."""
     results: list[StepResult]
+    """The result of each frame."""
     n_tetrahedra: int
-    """Before the cut."""
+    """Number of tetrahedra before the cut."""
 
 
 def cut_through(mesh: TetrahedralMesh, steps: int) -> CutThrough:
-    """Cut a body, held at its left and right, from front to back.
+    """Cut a body that is held at its left and right, from front to back.
 
-    The blade gets behind the body in that many frames, and goes on at the same speed for at most as
-    many again while it drags tissue along.
+    The blade passes the back of the body in `steps` frames. It continues at the same speed for at
+    most as many again while it drags tissue along.
     """
     tissue = Tissue(mesh, fixed=fixed_nodes(mesh, "left,right"))
     before = tissue.n_tetrahedra
@@ -70,7 +72,7 @@ def _blade(low: FloatArray, high: FloatArray, y: float) -> BladeSegment:
 
 
 def _report(cut: CutThrough) -> str:
-    """Return the table: time per stage and frame, and what the cut left."""
+    """Return a table: time per stage and frame, and the result of the cut."""
     results = cut.results
     times = {
         name: np.array([getattr(r.profile, f) for r in results]) for name, (f, _) in _STAGES.items()

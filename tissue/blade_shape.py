@@ -1,10 +1,10 @@
-"""The blade as a body: a wedge behind the cutting edge, with a back, a point and a heel."""
+"""The body of the blade: a wedge behind the cutting edge, with a back, a point and a heel."""
 
 import math
 from dataclasses import dataclass, fields
 
 STEEPEST_BEVEL = math.radians(60.0)
-"""A wedge that opens by more than this to each side presses as a bar does, and cuts no more."""
+"""Largest angle of a bevel: a blunter wedge presses like a bar and does not cut."""
 
 
 @dataclass(frozen=True)
@@ -20,11 +20,11 @@ class BladeShape:
     """
 
     thickness: float = 0.4e-3
-    """[m]."""
+    """Thickness of the blade [m]."""
     bevel_angle: float = math.radians(10.0)
-    """Between each bevel and the plane of the blade, half of the angle of the wedge [rad]."""
+    """Angle between each bevel and the plane of the blade, half of that of the wedge [rad]."""
     height: float = 6e-3
-    """From the edge to the back [m]."""
+    """Distance from the edge to the back [m]."""
     edge_radius: float = 1e-6
     """Radius of the edge itself [m]: a new scalpel has about 1 um, a used one several. Tissue that
     meets a blunt edge is strained to rupture over its width: see `Material.work_to_rupture`."""
@@ -53,10 +53,10 @@ class BladeShape:
 
     @property
     def slope(self) -> float:
-        """How fast each bevel rises, per length behind the edge."""
+        """Rise of each bevel per length behind the edge."""
         return math.tan(self.bevel_angle)
 
     @property
     def bevel_length(self) -> float:
-        """From the edge to where the blade has its full thickness [m]."""
+        """Distance from the edge to where the blade has its full thickness [m]."""
         return 0.5 * self.thickness / self.slope

@@ -1,6 +1,6 @@
-"""Which nodes to hold: sides of the body, boxes, half-spaces, lists.
+"""Displacement boundary conditions: nodes of sides, boxes, half-spaces and lists.
 
-Masks of shape (n_nodes,), for the paper's displacement boundary conditions.
+All functions return masks of shape (n_nodes,).
 """
 
 import difflib
@@ -42,17 +42,17 @@ On an ellipsoid that is a cap of 44 % of its width.
 """
 
 DEPTH_GROWTH = 1.25
-"""A coarse round side that holds no three nodes off a line is deepened by this factor at a time."""
+"""Factor by which a round side is deepened until it holds three nodes off a line."""
 
 MIN_SPREAD = 1e-3
-"""Three nodes are off a line if they spread across it by this fraction of how they spread along."""
+"""Spread of nodes across a line, over that along it, from which they count as off the line."""
 
 _ROUNDING = 1e-9
-"""Nodes this close to a box or a plane, in units of the body's extent, are on it."""
+"""Distance from a box or a plane at which nodes are on it, in units of the body's extent."""
 
 
 def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
-    """Return the nodes that the text `specification` names.
+    """Return a mask of the nodes that the text `specification` names.
 
     Args:
         mesh: The body.
@@ -71,13 +71,12 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
 
 
 def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
-    """Return the boundary nodes of the sides in `names`, together.
+    """Return a mask of the boundary nodes of all sides in `names`.
 
-    left and right are the low and the high end of x, front and back of y, bottom and top of z.
-    Of a flat side these are the nodes in its plane, exactly; of a round one those less than
-    `_DEPTH`
-    of the body's extent deep, and deeper where those would not hold the body: three nodes that are
-    not on a line.
+    left and right are the low and the high end of x, front and back of y, bottom and top of z. A
+    flat side is the nodes in its plane, exactly. A round side is the nodes less than `_DEPTH` of
+    the body's extent deep, and deeper ones where these would not hold the body: three nodes off a
+    line.
 
     Raises:
         ValueError: A name is not a side.
@@ -91,7 +90,7 @@ def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
 
 
 def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) -> BoolArray:
-    """Return the nodes between the corners `low` and `high` [m], faces of the box included.
+    """Return a mask of the nodes between the corners `low` and `high` [m], faces included.
 
     Raises:
         ValueError: The corners are not finite or not in order, or no node is between them.
@@ -103,7 +102,9 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
             "each coordinate of the first corner must be the smaller"
         )
     slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
-    mask = np.all((mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1)
+    mask: BoolArray = np.all(
+        (mesh.positions >= low - slack) & (mesh.positions <= high + slack), axis=1
+    )
     if not mask.any():
         raise ValueError(
             f"no node is in the box from {_text(low)} to {_text(high)} m; {_where(mesh.positions)}"
@@ -112,9 +113,9 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
 
 
 def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLike) -> BoolArray:
-    """Return the nodes on the plane through `point` [m], and those that `normal` points to.
+    """Return a mask of the nodes on the plane through `point` [m] and beyond it along `normal`.
 
-    With a plane that touches the body and an outward normal these are the nodes on the plane.
+    If the plane touches the body and the normal points outwards, these are the nodes on the plane.
 
     Raises:
         ValueError: A value is not finite, the normal is zero, or no node is there.
@@ -124,7 +125,7 @@ def plane_nodes(mesh: TetrahedralMesh, point: npt.ArrayLike, normal: npt.ArrayLi
     if length == 0.0:
         raise ValueError("the normal of the plane is zero; it must point to the nodes to hold")
     slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
-    mask = (mesh.positions - point) @ (normal / length) >= -slack
+    mask: BoolArray = (mesh.positions - point) @ (normal / length) >= -slack
     if not mask.any():
         raise ValueError(
             f"no node is beyond the plane through {_text(point)} m with normal {_text(normal)}; "
@@ -176,14 +177,14 @@ def _one_side(
     extent = high - low
     below = (high - positions)[:, axis] if is_high else (positions - low)[:, axis]
 
-    in_plane = on_boundary & (below <= FLATNESS * extent[axis])
+    in_plane: BoolArray = on_boundary & (below <= FLATNESS * extent[axis])
     if _covered(positions, triangles[in_plane[triangles].all(axis=1)], axis) >= (
         MIN_FLAT_COVER * np.prod(np.delete(extent, axis))
     ):
         return in_plane
     depth = _DEPTH
     while True:  # ends: at depth 1 a body holds three nodes off a line, else it has no volume
-        side = on_boundary & (below <= depth * extent[axis])
+        side: BoolArray = on_boundary & (below <= depth * extent[axis])
         if _holds(positions[side]) or depth >= 1.0:
             return side
         depth *= DEPTH_GROWTH
@@ -215,7 +216,7 @@ def _box_corners(text: str) -> tuple[FloatArray, FloatArray]:
 
 
 def _point(values: npt.ArrayLike, name: str) -> FloatArray:
-    """Return three finite numbers, or say what is wrong with them."""
+    """Return three finite numbers, or raise an error that names them."""
     point = np.asarray(values, dtype=np.float64)
     if point.shape != (3,) or not np.isfinite(point).all():
         raise ValueError(f"{name} is {values!r}; it must be three finite numbers")
@@ -223,11 +224,11 @@ def _point(values: npt.ArrayLike, name: str) -> FloatArray:
 
 
 def _where(positions: FloatArray) -> str:
-    """Say where the body is."""
+    """Return a sentence that says where the body is."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     return f"the body goes from {_text(low)} to {_text(high)} m"
 
 
 def _text(point: FloatArray) -> str:
-    """Write a point for people."""
+    """Return a point as text for messages."""
     return "(" + ", ".join(f"{value:.4g}" for value in point) + ")"

@@ -1,7 +1,7 @@
-"""Path against time step: what a user asks of a cut, and what the body has become by it.
+"""How closely cuts follow the blade, against the time step: settings, and a report of the result.
 
-A cut that follows the blade closely leaves small tetrahedra, and the smallest one bounds the time
-step. Snapping and the guard trade the one against the other; the report says what it came to.
+A cut that follows the blade closely leaves small tetrahedra, and the smallest one limits the time
+step. Snapping and the guard trade the one against the other.
 """
 
 import math
@@ -9,31 +9,32 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 MOST_SNAP = 1.0
-"""Beyond a node's own size a crossing would move past its neighbours."""
+"""Largest snap: beyond a node's own size a crossing would move past its neighbours."""
 MOST_GUARD = 0.5
-"""At half the mean node size no edge of an ordinary mesh can be split any more: every cut would run
-along faces that are there, and its path could miss the blade's by an element."""
+"""Largest guard: at half the mean node size no edge of an ordinary mesh can be split. Every cut
+would run along existing faces, up to an element off the blade's path."""
 
 
 @dataclass(frozen=True)
 class CutSettings:
-    """How closely the cut follows the blade, against how small the elements get that it makes.
+    """How closely cuts follow the blade, against how small the new elements are.
 
-    In units of the mesh's mean node size (the smallest altitude of the tetrahedra around a node).
-    Larger values give larger elements and time steps, and a rougher cut.
+    Lengths are shares of the mesh's mean node size; the size of a node is the smallest altitude of
+    the tetrahedra around it. Larger values give larger elements and time steps, and a rougher cut.
 
     Raises:
         ValueError: a share is not finite, or out of its range.
     """
 
     snap: float = 0.3
-    """A crossing nearer to a node than this share of that node's size uses the node."""
+    """Distance, as a share of a node's own size, within which a crossing uses the node."""
     floor: float = 0.3
-    """... or nearer than this share of the mean node size."""
+    """Distance, as a share of the mean node size, within which a crossing uses a node in any
+    case."""
     guard: float = 0.15
-    """No altitude of a new tetrahedron is smaller than this share of the mean node size."""
+    """Least altitude of a new tetrahedron, as a share of the mean node size."""
     crumb: float = 1.0
-    """A piece smaller than this share of the mean tetrahedron is not cut loose."""
+    """Volume, as a share of the mean tetrahedron, below which a piece is not cut loose."""
 
     def __post_init__(self) -> None:
         most = {"snap": MOST_SNAP, "floor": MOST_SNAP, "guard": MOST_GUARD, "crumb": math.inf}
@@ -48,9 +49,10 @@ class CutSettings:
 
 
 class MeshMeasures(NamedTuple):
-    """What bounds the time step of a body, at one instant."""
+    """Size of a mesh and what limits its time step, at one instant."""
 
     n_tetrahedra: int
+    """Number of tetrahedra."""
     altitude: float
     """Smallest altitude of a tetrahedron, at rest [m]."""
     frequency: float
@@ -60,35 +62,36 @@ class MeshMeasures(NamedTuple):
 
 
 class CutReport(NamedTuple):
-    """Path error of the cuts so far, and what they did to elements and time step."""
+    """Path error of all cuts so far, and the elements and the time step before and after them."""
 
     n_cut_nodes: int
-    """Nodes on cut faces."""
+    """Number of nodes on cut faces."""
     path_error_mean: float
-    """Distance of the nodes on cut faces from where the blade truly passed, in the body at rest,
-    mean [m]; 0 where there is no cut."""
+    """Mean distance of the nodes on cut faces from where the blade passed, in the body at rest [m];
+    0 where there is no cut."""
     path_error_largest: float
-    """The largest [m]."""
+    """Largest distance of a node on a cut face from where the blade passed [m]."""
     node_size: float
-    """Mean node size of the body as it was given [m]: what snapping and guard are shares of."""
+    """Mean node size of the body as it was given [m], the unit of `CutSettings`."""
     guard: float
-    """Altitude that no split may go below [m]."""
+    """Least altitude that a split may leave [m]."""
     initial: MeshMeasures
-    """Before the first cut."""
+    """Measures before the first cut."""
     now: MeshMeasures
+    """Measures now."""
 
     @property
     def growth(self) -> float:
-        """Tetrahedra now for each one before."""
+        """Number of tetrahedra now over that before."""
         return self.now.n_tetrahedra / self.initial.n_tetrahedra
 
     @property
     def frequency_growth(self) -> float:
-        """Frequency bound now over before; 1 where nothing can move."""
+        """Frequency bound now over that before; 1 where no node can move."""
         return self.now.frequency / self.initial.frequency if self.initial.frequency > 0.0 else 1.0
 
     @property
     def substep_growth(self) -> float:
-        """Runge-Kutta steps that a second takes now for each one before."""
+        """Runge-Kutta steps of a second now over those before."""
         before, now = self.initial.time_step, self.now.time_step
         return before / now if math.isfinite(before) else 1.0

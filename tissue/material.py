@@ -1,4 +1,4 @@
-"""What the tissue is made of, in quantities that one can measure."""
+"""The material of the tissue, in quantities that can be measured."""
 
 import math
 from dataclasses import dataclass, fields, replace
@@ -13,8 +13,8 @@ CENTRAL_FORCE_RATIO = 0.25
 both of Lame's constants the same (Cauchy's relation), whatever the stiffnesses."""
 
 NEARLY_INCOMPRESSIBLE = 0.49
-"""Poisson's ratio above which the time step suffers: waves of compression are sqrt(1 / (1 - 2 nu))
-times as fast, 7 times at 0.49, and an explicit step must follow them."""
+"""Poisson's ratio above which the time step gets very short: waves of compression are
+sqrt(1 / (1 - 2 nu)) times as fast, 7 times at 0.49, and an explicit step must resolve them."""
 
 
 @dataclass(frozen=True)
@@ -22,35 +22,36 @@ class Material:
     """An isotropic soft tissue.
 
     Raises:
-        ValueError: a quantity is not finite, has the wrong sign, or is none that the law can have.
+        ValueError: a quantity is not finite, has the wrong sign, or is impossible under the law.
     """
 
     young_modulus: float = 10e3
     """Stiffness at small strain [Pa]."""
     density: float = 1000.0
-    """[kg/m3]."""
+    """Density [kg/m3]."""
     toughness: float = 20.0
-    """Fracture toughness: the energy that a square metre of cut costs [J/m2]."""
+    """Fracture toughness: energy per area of cut [J/m2]."""
     skin_toughness: float = 0.0
-    """What a square metre costs until the edge has broken in [J/m2]: the peak of a puncture. Less
-    than `toughness` counts as the same, no peak."""
+    """Energy per area of cut until the edge has broken the skin [J/m2]: the peak of a puncture.
+    Values below `toughness` count as equal to it: no peak."""
     toughness_exponent: float = 0.0
-    """How toughness rises with the speed v of the cut: toughness (1 + (v / toughness_speed)^n). 0
-    for a toughness that does not."""
+    """Exponent n with which toughness rises with the speed v of the cut, toughness (1 + (v /
+    toughness_speed)^n); 0 for a toughness that does not depend on speed."""
     toughness_speed: float = 0.1
-    """Speed at which toughness is twice that of a slow cut [m/s]; without effect at exponent 0."""
+    """Speed at which toughness is twice that of a slow cut [m/s]; no effect if the exponent is
+    0."""
     work_to_rupture: float = 0.0
-    """Energy that stretching a volume of it until it breaks takes [J/m3]; what a blunt edge adds,
-    see `tissue.blade_shape.BladeShape.edge_radius`."""
+    """Energy per volume that stretching to rupture takes [J/m3]; with a blunt edge it adds to the
+    toughness (`tissue.blade_shape.BladeShape.edge_radius`)."""
     blade_friction: float = 0.0
-    """Coulomb's coefficient of friction on the faces of the blade; with stiction."""
+    """Coulomb's coefficient of friction on the faces of the blade, static and sliding."""
     blade_viscosity: float = 0.0
-    """Shear stress per sliding speed on the faces of the blade, besides friction [Pa s/m]."""
+    """Shear stress per sliding speed on the faces of the blade, added to friction [Pa s/m]."""
     viscous_damping: float = 5.0
-    """Drag on every node, as the rate at which its free motion dies away [1/s]."""
+    """Drag on every node, as the rate at which free motion decays [1/s]."""
     retardation_time: float = 5e-5
-    """Penalty-based damping, along springs only: viscosity per stiffness [s] (Kelvin-Voigt). As a
-    continuum: viscosity in shear over the shear modulus `mu`, under either law."""
+    """Viscosity per stiffness of dampers along the edges [s] (Kelvin-Voigt). As a continuum:
+    viscosity in shear over the shear modulus `mu`, under either law."""
     friction: float = 0.3
     """Coulomb's coefficient of friction where cut faces, pieces and the floor touch. Fresh muscle
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
@@ -58,13 +59,12 @@ class Material:
     law: Law = "springs"
     """How forces follow from deformation."""
     poisson_ratio: float = CENTRAL_FORCE_RATIO
-    """How much a pulled body narrows, per stretch. Springs alone have 1/4 at best; above it each
-    tetrahedron also resists a change of its volume, so springs need at least 1/4. Soft tissue is
-    mostly water and hardly compressible: 0.45 to 0.49."""
+    """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
+    resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water
+    and hardly compressible: 0.45 to 0.49."""
     spring_calibration: float = 1.0
-    """Stiffness of the springs over what van Gelder's formula gives them. 1 unless a body was
-    measured on its own mesh: see `tissue.elasticity.spring_calibration.calibrated`. For the
-    springs' law only."""
+    """Stiffness of the springs over that of van Gelder's formula, under law springs only. 1 unless
+    the mesh was calibrated by `tissue.elasticity.spring_calibration.calibrated`."""
 
     def __post_init__(self) -> None:
         if self.law not in get_args(Law):
@@ -84,18 +84,17 @@ class Material:
             )
 
     def _check_ratio(self) -> None:
-        """Refuse a Poisson's ratio that this law cannot have."""
+        """Refuse a Poisson's ratio that is impossible under the law."""
         ratio = self.poisson_ratio
         if ratio >= 0.5:
             raise ValueError(
-                f"poisson_ratio is {ratio}; it must be below 0.5, where no force would change the "
-                "volume and no time step be short enough: soft tissue is simulated at 0.45 to 0.49"
+                f"poisson_ratio is {ratio}; it must be below 0.5, where no force changes the "
+                "volume and no time step is short enough. Soft tissue is simulated at 0.45 to 0.49"
             )
         if self.law == "springs" and ratio < CENTRAL_FORCE_RATIO:
             raise ValueError(
-                f"poisson_ratio is {ratio}; springs pull along the lines between nodes, and such "
-                "a body has 0.25 or, with a resistance to change of volume, more. Use "
-                "law neo_hookean, which can have 0 to below 0.5"
+                f"poisson_ratio is {ratio}; springs act along the lines between nodes, and such "
+                "a body has at least 0.25. Use law neo_hookean, which allows 0 to below 0.5"
             )
 
     @property
@@ -121,10 +120,10 @@ class Material:
 
     @property
     def volume_modulus(self) -> float:
-        """Stiffness against change of volume that springs leave to the tetrahedra [Pa]: lam - mu.
+        """Stiffness against change of volume that tetrahedra add to springs [Pa]: lam - mu.
 
-        0 at a Poisson's ratio of 1/4. Negative below, where springs are not the law. Source: Golec
-        et al. 2020 (hybrid mass-spring system with a volume term).
+        0 at a Poisson's ratio of 1/4, negative below it, where law springs is refused. Source:
+        Golec et al. 2020 (hybrid mass-spring system with a volume term).
         """
         nu = self.poisson_ratio  # exactly 0 at 1/4, which lam - mu would miss by rounding
         return self.young_modulus * (4.0 * nu - 1.0) / (2.0 * (1.0 + nu) * (1.0 - 2.0 * nu))
@@ -137,8 +136,8 @@ class Material:
     def damping_ratio(self, frequency: float) -> float:
         """Return the damping ratio of a bending or stretching mode of that frequency [Hz].
 
-        Half the loss tangent that a rheometer measures at that frequency. Drag does most at low
-        frequencies, viscosity at high ones.
+        It is half the loss tangent that a rheometer measures at that frequency. Drag dominates at
+        low frequencies, viscosity at high ones.
         """
         omega = 2.0 * math.pi * frequency
         return self.viscous_damping / (2.0 * omega) + omega * self._retardation_in_tension / 2.0
@@ -148,17 +147,18 @@ class Material:
     ) -> "Material":
         """Return this material with the damping ratio `ratio` at `frequency` [Hz], and at `up_to`.
 
-        1 is critical: the body creeps back without swinging. Choose the body's first bending mode
-        for `frequency`. The loss of soft tissue hardly depends on frequency, so that the damping
-        ratio is half its loss tangent at any; viscosity alone rises with frequency, drag falls, and
-        the two together are `ratio` at both ends of a band and less between them (Rayleigh).
+        A ratio of 1 is critical: the body returns without oscillating. Choose the body's first
+        bending mode for `frequency`. The loss tangent of soft tissue, twice the damping ratio,
+        hardly depends on frequency. Damping by viscosity rises with frequency, damping by drag
+        falls; their sum is `ratio` at both ends of a band and less between them (Rayleigh).
 
         Args:
             ratio: Damping ratio of bending and stretching.
-            frequency: Where it holds [Hz], the lower end of the band.
-            up_to: The upper end of the band [Hz], or None to leave drag away: then the ratio is
-                proportional to frequency. A high one costs nothing; a low one, or None, makes fine
-                meshes stiff in viscosity, and the time step short.
+            frequency: Lower end of the band [Hz].
+            up_to: Upper end of the band [Hz], or None to omit drag: then the ratio is proportional
+            to
+                frequency. A high end costs nothing. With a low one, or None, the viscosity of fine
+                meshes makes the time step short.
 
         Raises:
             ValueError: the ratio is negative or not finite, a frequency is not positive, or the
@@ -188,8 +188,7 @@ class Material:
     def _shear_per_tension(self) -> float:
         """Retardation time in shear over that of a bar that is pulled or bent.
 
-        Dampers along edges have one ratio of viscosity to stiffness in shear, mu, whatever the
-        Poisson's ratio; a pulled bar has the viscosity 2.5 mu per second of it, but Young's modulus
-        2 mu (1 + nu).
+        The ratio of viscosity to mu in shear does not depend on the Poisson's ratio. A pulled bar
+        has viscosity 2.5 mu per second of retardation time, and Young's modulus 2 mu (1 + nu).
         """
         return 0.8 * (1.0 + self.poisson_ratio)

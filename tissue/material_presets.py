@@ -1,7 +1,7 @@
 """Materials by name: liver, kidney, skin, fat, muscle, gelatin, silicone; with the sources.
 
-Soft tissue is measured in ways that differ by orders of magnitude, so that no figure means anything
-without how it was loaded: each one says it. What could not be traced to a measurement is marked.
+Values for soft tissue differ by orders of magnitude between methods of measurement, so each value
+states how the tissue was loaded. Values that could not be traced to a measurement are marked.
 """
 
 from typing import NamedTuple
@@ -9,41 +9,47 @@ from typing import NamedTuple
 from tissue.material import Law, Material
 
 DAMPING_BAND = (5.0, 1000.0)
-"""[Hz]. From the first bending mode of a palm-sized body to the rate of haptic devices: at both the
-presets have their damping ratio, and less between. An upper end of 200 Hz would damp 20 Hz by 0.06
-where this does by 0.05, and take three times the steps once a cut has made small tetrahedra."""
+"""Band of frequencies [Hz] at both ends of which the presets have their damping ratio, and less
+between: from the first bending mode of a palm-sized body to the rate of haptic devices. With an
+upper end of 200 Hz the ratio at 20 Hz would be 0.06, not 0.05, and once a cut has made small
+tetrahedra a second would take three times the steps."""
 
 
 class SourcedValue(NamedTuple):
-    """A number, and where it comes from."""
+    """A value of a material, and where it comes from."""
 
     value: float
-    """In SI units."""
+    """The value in SI units."""
     measured: str
-    """How it was loaded, and how much it scatters; or why it was chosen."""
+    """How the material was loaded, and the scatter; or why the value was chosen."""
     source: str
-    """Who measured it; empty for a choice of ours."""
+    """Publication of the measurement; empty for a choice of ours."""
     is_confirmed: bool = True
-    """Whether the source was looked up and says so. If not, take it for an estimate."""
+    """Whether the value was found in the source. If not, it is an estimate."""
 
 
 class Preset(NamedTuple):
     """A material by name."""
 
     name: str
+    """Name of the material."""
     about: str
+    """Description in a few words."""
     law: Law
+    """Law of the material."""
     young_modulus: SourcedValue
-    """[Pa]."""
+    """Young's modulus at small strain [Pa]."""
     poisson_ratio: SourcedValue
+    """Poisson's ratio."""
     density: SourcedValue
-    """[kg/m3]."""
+    """Density [kg/m3]."""
     toughness: SourcedValue
-    """[J/m2]."""
+    """Fracture toughness [J/m2]."""
     damping_ratio: SourcedValue
-    """Of bending and stretching, at both ends of `DAMPING_BAND`: half the loss tangent."""
+    """Damping ratio of bending and stretching at both ends of `DAMPING_BAND`: half the loss
+    tangent."""
     blade_friction: SourcedValue
-    """Coulomb's coefficient on the steel of a blade."""
+    """Coulomb's coefficient of friction on the steel of a blade."""
 
     @property
     def material(self) -> Material:

@@ -1,4 +1,4 @@
-"""Values that cross the border of the engine. Plain data, no behaviour.
+"""Plain data that the engine takes and returns: blade, mesh, results of a step, state of the body.
 
 SI units. Every vector in this package is in the tissue frame. The suffixes `_t0` and `_t1` mean
 the start and the end of a step.
@@ -19,12 +19,12 @@ CUT_COLOUR = (212, 68, 60, 255)
 
 
 class BladeSegment(NamedTuple):
-    """The cutting edge at one instant: the paper's thin line, and the way it faces."""
+    """The cutting edge at one instant: the paper's thin line, and where it faces."""
 
     tip: FloatArray
-    """Sharp end [m], shape (3,)."""
+    """Sharp end of the edge [m], shape (3,)."""
     heel: FloatArray
-    """End nearest the handle [m], shape (3,)."""
+    """End of the edge nearest the handle [m], shape (3,)."""
     forward: FloatArray
     """Unit vector across the edge, in the plane of the blade, in which it cuts; shape (3,)."""
 
@@ -33,18 +33,20 @@ class BladeSweep(NamedTuple):
     """The cutting edge at the start and at the end of a step."""
 
     t0: BladeSegment
+    """The edge at the start."""
     t1: BladeSegment
+    """The edge at the end."""
 
 
 class Wrench(NamedTuple):
     """A force and a torque, and the point they act at."""
 
     force: FloatArray
-    """[N], shape (3,)."""
+    """Force [N], shape (3,)."""
     torque: FloatArray
-    """[N m] about `point`, shape (3,)."""
+    """Torque about `point` [N m], shape (3,)."""
     point: FloatArray
-    """[m], shape (3,)."""
+    """Point at which they act [m], shape (3,)."""
 
 
 class BladeContacts(NamedTuple):
@@ -55,106 +57,111 @@ class BladeContacts(NamedTuple):
     """
 
     point: FloatArray
-    """[m], shape (n, 3)."""
+    """Points of contact [m], shape (n, 3)."""
     normal: FloatArray
-    """Unit vector out of the blade into the tissue, shape (n, 3): forward for a sample of the
-    edge, out of the face for another point."""
+    """Unit normals out of the blade into the tissue, shape (n, 3): forward at samples of the edge,
+    out of the face at other points."""
     normal_force: FloatArray
-    """Of the blade on the tissue along the normal [N], shape (n,)."""
+    """Force of the blade on the tissue along the normal [N], shape (n,)."""
     friction: FloatArray
-    """The rest of that force [N], shape (n, 3): friction, and at the edge what holds it sideways
-    and along."""
+    """Tangential force of the blade on the tissue [N], shape (n, 3): friction, and at the edge also
+    the elastic forces sideways and along it."""
     cut_area: FloatArray
     """Area that each sample of the edge has cut in this step [m2], 0 for others; shape (n,)."""
 
 
 class Energies(NamedTuple):
-    """Where the work of the blade went, since the body was made [J].
+    """The energy balance since the body was made [J].
 
     work_of_blade = change of elastic, kinetic, potential and held + damping + cutting + breaking
-    + friction + contact + topology + released + residual. Nodes that are fixed do not move, so
-    that what holds them does no work.
+    + friction + contact + topology + released + residual. Fixed nodes do not move, so their
+    supports do no work.
     """
 
     work_of_blade: float
-    """What the blade did to the tissue."""
+    """Work that the blade did on the tissue."""
     elastic: float
-    """Stored in the tissue, less what was stored at first."""
+    """Change of the elastic energy of the tissue."""
     kinetic: float
-    """The same of its motion."""
+    """Change of the kinetic energy of the tissue."""
     potential: float
-    """The same of its height."""
+    """Change of the energy of the tissue in gravity."""
     held: float
-    """Stored between blade and tissue: in what the edge holds, and the faces press."""
+    """Change of the elastic energy of the contact of edge and faces of the blade with the
+    tissue."""
     damping: float
-    """Taken by viscosity and drag."""
+    """Energy dissipated by viscosity and drag."""
     cutting: float
-    """Toughness times area."""
+    """Energy of cutting: toughness times area."""
     breaking: float
-    """What breaking the skin took beyond that."""
+    """Energy of breaking the skin beyond that of cutting."""
     friction: float
-    """Taken by sliding along the faces of the blade."""
+    """Energy dissipated by sliding along the faces of the blade."""
     contact: float
-    """Taken where the body touches itself or the floor: impacts and friction."""
+    """Energy dissipated where the body touches itself or the floor: impacts and friction."""
     topology: float
-    """What changing the mesh took: impacts of nodes that part, and, under laws other than plain
+    """Energy lost as the mesh changes: impacts of nodes that part, and, under laws other than plain
     tetrahedra, elastic energy."""
     released: float
-    """Held by what the blade let go of, and lost."""
+    """Energy of contacts that the blade released, which is lost."""
 
     @property
     def residual(self) -> float:
-        """What is not accounted for [J]: the error of the motion."""
+        """Work of the blade less all other terms [J]: the error of time integration."""
         return self.work_of_blade - sum(self[1:])
 
 
 class StageTimes(NamedTuple):
-    """Wall time of the stages of one step [s], under the names of the paper's Table 1."""
+    """Wall time of the stages of one step [s]: CD, GC and RX of the paper's Table 1."""
 
     collision: float
-    """CD: active tetrahedra and the edges that the blade crossed."""
+    """Time of CD, collision detection [s]: active tetrahedra, and edges that the blade crossed."""
     topology: float
-    """GC: insertion of nodes, marking, un-gluing, and the springs and masses that changed."""
+    """Time of GC, the change of topology [s]: insertion of nodes, separation, and the update of
+    springs, elements and masses."""
     relaxation: float
-    """RX: forces, edge anchors, Runge-Kutta."""
+    """Time of RX, relaxation [s]: forces, contact, anchors of the edge, time integration."""
 
 
 class BodyContacts(NamedTuple):
     """How the body touched itself and the floor in one step."""
 
     n_contacts: int
-    """Contacts that pressed at the end of the step: node on triangle, edge on edge, node on floor.
-    Meshes that meet node on node share one contact among several."""
+    """Number of contacts that pressed at the end of the step: node on triangle, edge on edge, node
+    on floor. Where meshes touch node on node, one contact is shared among several."""
     penetration: float
-    """Greatest depth that was left after a Runge-Kutta step [m]."""
+    """Greatest penetration that was left after a Runge-Kutta step [m]."""
     force: float
     """Sum of the normal forces between faces of the body, averaged over the step [N]."""
     force_of_floor: FloatArray
-    """What the floor does to the body, averaged over the step [N], shape (3,): from outside, unlike
-    the forces between its faces, which add up to zero."""
+    """Force of the floor on the body, averaged over the step [N], shape (3,). Unlike it, the forces
+    between the body's faces add up to zero."""
 
 
 class StepResult(NamedTuple):
-    """What one step did."""
+    """The result of one step."""
 
     wrench: Wrench
-    """What the tissue does to the blade, averaged over the step; `point` is the tip at t1."""
+    """Wrench of the tissue on the blade, averaged over the step; `point` is the tip at t1."""
     wrench_t1: Wrench
-    """The same at t1, the end of the step."""
+    """Wrench of the tissue on the blade at t1, the end of the step."""
     stiffness: FloatArray
-    """How that changes as the blade moves by a small way and turn about the point: by -stiffness
-    times (way [m], turn [rad]); shape (6, 6), symmetric and positive. Of what is between blade and
-    tissue, while the tissue itself stays: an upper bound for slower motion."""
+    """Stiffness of the contacts of blade and tissue while the tissue itself stands still, shape (6,
+    6), symmetric and positive. A small displacement [m] and rotation [rad] of the blade about the
+    point change `wrench_t1` by -stiffness times them. For slower motion it is an upper bound."""
     contacts: BladeContacts
+    """Where the blade acts on the tissue at the end of the step."""
     force_on_tissue: FloatArray
     """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
     bounds: FloatArray
-    """Lowest and highest corner of the tissue at t1 [m], shape (2, 3). Where parts of it sleep or
-    are frozen, of a box that holds it and may be a little larger."""
+    """Lowest and highest corner of a box around the tissue at t1 [m], shape (2, 3). Where parts of
+    the tissue sleep or are frozen the box may be a little larger than the tissue."""
     n_tetrahedra: int
+    """Number of tetrahedra."""
     n_nodes: int
+    """Number of nodes."""
     n_active: int
-    """How many active tetrahedra there are: those that the cutting edge passes through."""
+    """Number of active tetrahedra, through which the cutting edge passes."""
     active_point_tetrahedron: int
     """The tetrahedron that holds the tip, or -1 (paper, section 3)."""
     anchored_length: float
@@ -164,20 +171,22 @@ class StepResult(NamedTuple):
     work_of_blade: float
     """Work that the blade has done on the tissue since the start [J]."""
     work_of_cutting: float
-    """Work that slipping through the material took, since the start [J]: toughness times area."""
+    """Work of cutting since the start [J]: toughness times area."""
     n_substeps: int
     """Runge-Kutta steps taken in this step."""
     touch: BodyContacts
+    """Contacts of the body with itself and the floor."""
     profile: StageTimes
+    """Wall time of the stages."""
     energies: Energies | None
-    """Where the work went; None without an audit."""
+    """Energy balance since the body was made; None without an audit."""
 
 
 class TetrahedralMesh(NamedTuple):
-    """A mesh as it comes from a file or a generator."""
+    """A tetrahedral mesh, from a file or a generator."""
 
     positions: FloatArray
-    """[m], shape (n_nodes, 3)."""
+    """Positions of the nodes [m], shape (n_nodes, 3)."""
     tetrahedra: IntArray
     """Node indices, shape (n_tets, 4); signed volumes are positive."""
 
@@ -186,17 +195,17 @@ class Snapshot(NamedTuple):
     """The whole state of the body at one instant. Copies."""
 
     positions: FloatArray
-    """[m], shape (n_nodes, 3)."""
+    """Positions of the nodes [m], shape (n_nodes, 3)."""
     rest_positions: FloatArray
-    """[m], shape (n_nodes, 3)."""
+    """Positions of the nodes in the body at rest [m], shape (n_nodes, 3)."""
     velocities: FloatArray
-    """[m/s], shape (n_nodes, 3)."""
+    """Velocities of the nodes [m/s], shape (n_nodes, 3)."""
     masses: FloatArray
-    """[kg], shape (n_nodes,)."""
+    """Masses of the nodes [kg], shape (n_nodes,)."""
     tetrahedra: IntArray
-    """Shape (n_tets, 4)."""
+    """Node indices, shape (n_tets, 4)."""
     fixed: BoolArray
-    """Nodes that do not move, shape (n_nodes,)."""
+    """Whether each node is fixed, shape (n_nodes,)."""
 
 
 class Surface(NamedTuple):
@@ -234,7 +243,7 @@ class Chunks(NamedTuple):
     """Boxes around parts of the body, which together hold all of it. Copies."""
 
     boxes: FloatArray
-    """Lowest and highest corner of each [m], shape (n, 2, 3)."""
+    """Lowest and highest corner of each box [m], shape (n, 2, 3)."""
     fastest: float
     """Speed of the fastest node [m/s]."""
 
@@ -243,27 +252,29 @@ class Piece(NamedTuple):
     """A connected piece of the body and its mass properties; its mass is at its nodes. Copies."""
 
     n_tetrahedra: int
+    """Number of tetrahedra."""
     n_nodes: int
+    """Number of nodes."""
     is_held: bool
-    """Whether one of its nodes is fixed. A piece that is not falls."""
+    """Whether one of its nodes is fixed. A piece without a fixed node falls."""
     rest_volume: float
-    """[m3]."""
+    """Volume at rest [m3]."""
     volume: float
-    """Now [m3]."""
+    """Volume now [m3]."""
     mass: float
-    """[kg]."""
+    """Mass [kg]."""
     centre: FloatArray
     """Centre of mass [m], shape (3,)."""
     velocity: FloatArray
-    """Of the centre of mass [m/s], shape (3,)."""
+    """Velocity of the centre of mass [m/s], shape (3,)."""
     angular_momentum: FloatArray
-    """About the centre of mass [kg m2/s], shape (3,)."""
+    """Angular momentum about the centre of mass [kg m2/s], shape (3,)."""
     inertia: FloatArray
     """Tensor of inertia about the centre of mass [kg m2], shape (3, 3)."""
 
     @property
     def angular_velocity(self) -> FloatArray:
-        """That of a rigid body of this momentum and inertia [rad/s], shape (3,)."""
+        """Angular velocity of a rigid body of this momentum and inertia [rad/s], shape (3,)."""
         return np.asarray(np.linalg.lstsq(self.inertia, self.angular_momentum)[0])
 
 
@@ -273,22 +284,23 @@ class SchemeStatistics(NamedTuple):
     n_cut: int
     """Tetrahedra of the initial mesh that were split."""
     n_of_case: dict[str, int]
-    """How many of them were split by each case, A to E."""
+    """Number of tetrahedra that were split by each case, A to E."""
     paper_count: int
-    """Tetrahedra in the paper's counting, in which a parent stays: initial + 17 a split one. The
-    mesh has one less a split, since child 0 takes the place of its parent."""
+    """Tetrahedra as the paper counts them, in which parents stay: the initial ones, and 17 for each
+    split. The mesh has one less for each split, since child 0 replaces its parent."""
     n_hanging_edge_nodes: int
-    """Edges with a node, some tetrahedron around which is whole."""
+    """Edges with a node and with a tetrahedron around them that is whole."""
     n_hanging_face_nodes: int
-    """Faces with a node, the tetrahedron on one side of which is whole; and `n_own_face_nodes`."""
+    """Faces with a node and with a whole tetrahedron on one side, plus `n_own_face_nodes`."""
     n_guarded: int
-    """Split tetrahedra whose centre would have been flat or inverted, and whose face nodes were
-    drawn to the centroids."""
+    """Split tetrahedra whose centre would have been flat or inverted, so that their face nodes were
+    moved towards the centroids."""
     n_own_face_nodes: int
-    """Face nodes that the guard made for one tetrahedron alone, beside that of its neighbour."""
+    """Face nodes that the guard made for one tetrahedron alone, beside the node of its
+    neighbour."""
     n_unsupported: int
-    """Tetrahedra that were left whole because their cut edges are none of the 37 codes."""
+    """Tetrahedra that stayed whole because their cut edges are none of the 37 codes."""
     n_waiting: int
     """Tetrahedra that the blade is still in, or was when it was last seen."""
     n_ignored_crossings: int
-    """Crossings with edges of tetrahedra that were already split: each is processed only once."""
+    """Crossings of edges of tetrahedra that were split already: each is processed only once."""

@@ -173,7 +173,7 @@ class OutputOptions:
 
     out: Path | None = None
     "Folder for the files [default: out/SCENE]."
-    export: Annotated[tuple[Path, ...], Parameter(negative="")] = ()
+    export: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = ()
     """Write the body's surface after the run to this file too: .glb, .obj (pieces and cut faces by
     name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
 

@@ -28,28 +28,34 @@ from scalpel_sim.viewer.texture_mapping import map_texture
 from tissue import FloatArray
 
 WHITE = (1.0, 1.0, 1.0)
+"""Colour of table and background (sRGB)."""
 TOWARDS_EYE = np.array([0.9, -2.0, 1.9])
 """Position of the eye from the body's centre, in diagonals of the body: it looks into the cut."""
 LAMP = np.array([-0.6, -0.5, 1.2])
 """Direction towards the lamp, above and to the left of the eye: the light falls into the cut."""
 _STEEL = (0.80, 0.82, 0.85)
+"""Colour of the blade (sRGB)."""
 RELIEF = 0.02
 """Depth of the relief of skin and cut faces, in repeats of the texture."""
 _WIDTH, HEIGHT = 640, 520
 """Width and height of each panel [pixels]."""
 WITH_TOOL = Margins(side=0.05, top=0.21, bottom=0.04)
+"""Margins around the body in a picture that also shows the scalpel above it."""
 BODY_ALONE = Margins(side=0.05, top=0.05, bottom=0.05)
+"""Margins around the body in a picture without the scalpel."""
 GAP = 12
 """Distance between panels [pixels]."""
 LINE = 26
 """Height of a line of text [pixels]."""
 _DOTS_PER_INCH = 150
+"""Pixels per inch of a figure, on which only the size of its text depends."""
 
 
 class Drawn(NamedTuple):
     """Description of a figure that was drawn."""
 
     caption: str
+    """What the figure shows, in one line."""
     labels: list[str]
     """Label of each panel."""
     n_tetrahedra: list[int]

@@ -7,8 +7,11 @@ from scalpel_sim.figures.rasterise import draw_segments, rasterise
 from tissue import FloatArray, IntArray, Snapshot, Surface
 
 _PAPER = (1.0, 1.0, 1.0)
+"""Colour of the background (sRGB)."""
 SKIN_FACE, CUT_FACE = (0.955, 0.96, 0.97), (1.0, 0.86, 0.84)
+"""Colours of skin and of cut faces (sRGB)."""
 SKIN_LINE, CUT_LINE = (0.13, 0.16, 0.22), (0.75, 0.10, 0.10)
+"""Colours of edges of the skin and of edges of cut faces (sRGB)."""
 HIDDEN = 0.13
 """Opacity of lines behind faces: they show how deep the mesh goes, without confusing the eye."""
 _THICKNESS = 1.1

@@ -225,6 +225,7 @@ _WRITERS: dict[str, Callable[[Surface], bytes]] = {
     ".ply": _ply,
     ".glb": _glb,
 }
+"""Functions that return the bytes of a file, by the ending of its name."""
 
 ENDINGS = tuple(_WRITERS)
 """Endings of the file names that can be exported."""

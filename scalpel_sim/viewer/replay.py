@@ -31,6 +31,7 @@ _CAPTION = (
     "Red-brown: skin. Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact "
     "forces, magnified thirty times. Drag to turn the view, scroll to zoom."
 )
+"""Text below the heading of a replay."""
 
 
 class _Frame(NamedTuple):
@@ -39,6 +40,7 @@ class _Frame(NamedTuple):
     time: float
     """Simulated time [s]."""
     state: SceneState
+    """What the frame shows."""
 
 
 class ReplayWriter:

@@ -23,16 +23,19 @@ from scalpel_sim.output.force_parts import ForceParts
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
-# MessagePack extension types of typed arrays. Source: msgpack-lite, the decoder of meshcat.
 _EXTENSION = {"int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
+"""MessagePack extension type of each kind of typed array. Source: msgpack-lite, the decoder inside
+meshcat's viewer."""
 _JAVASCRIPT_ARRAY = {
     "int16": "Int16Array",
     "uint16": "Uint16Array",
     "uint32": "Uint32Array",
     "float32": "Float32Array",
 }
+"""JavaScript class of each kind of typed array."""
 
 INT16_MAX = 32767
+"""Largest 16-bit integer, which stands for 1 in normals and tints."""
 
 
 class Appearance(NamedTuple):
@@ -47,6 +50,7 @@ class Appearance(NamedTuple):
 
 
 NO_VECTORS = np.zeros((0, 3))
+"""An array of no vectors."""
 
 
 class Readings(NamedTuple):

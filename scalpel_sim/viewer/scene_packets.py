@@ -54,6 +54,7 @@ _WET = {
     "reflectivity": 0.06,
     "combine": ADD,
 }
+"""Properties of the material of wet tissue."""
 LIGHT_IN_A_CUT = 0x5A1216
 """Light scattered between the faces of a cut, 0xRRGGBB. Without it a narrow cut looks black."""
 
@@ -64,7 +65,9 @@ _STEEL = {
     "reflectivity": 0.7,
     "combine": MIX,
 }
+"""Properties of the material of the blade."""
 _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine": ADD}
+"""Properties of the material of painted parts."""
 
 
 class ScenePackets:

@@ -42,9 +42,10 @@ LAST_STATE_TIMEOUT = 1.0
 """Time for the pages to draw the last state before the process ends [s]."""
 
 _CAPTION = (
-    "Bright red: faces of the cut. Blue lines: contact forces. Drag to turn the view, scroll to "
-    "zoom."
+    "Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact forces, "
+    "magnified thirty times. Drag to turn the view, scroll to zoom."
 )
+"""Text below the heading of the live page."""
 
 
 class NewestState:

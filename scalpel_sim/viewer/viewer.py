@@ -27,8 +27,10 @@ CLOSE_TIMEOUT = 3.0
 """How long the viewer's process may take to end before it is killed [s]."""
 
 HIGHEST_PORT = 65535
+"""Largest port number of TCP."""
 
 _PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
+"""Program of the viewer's process."""
 
 
 class Viewer:

@@ -12,8 +12,8 @@ from tissue import Material, Tissue, block
     [
         ({"law": "spring"}, "no law is called 'spring'. Known: springs, neo_hookean"),
         ({"poisson_ratio": np.nan}, "poisson_ratio is nan"),
-        ({"poisson_ratio": 0.2}, "springs pull along the lines .* Use law neo_hookean"),
-        ({"poisson_ratio": 0.5}, "below 0.5, where no force would change the volume"),
+        ({"poisson_ratio": 0.2}, "springs act along the lines .* Use law neo_hookean"),
+        ({"poisson_ratio": 0.5}, "below 0.5, where no force changes the volume"),
         ({"poisson_ratio": -0.1, "law": "neo_hookean"}, "poisson_ratio is -0.1"),
         ({"spring_calibration": 0.0}, "spring_calibration is 0"),
         ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),

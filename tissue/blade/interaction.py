@@ -29,9 +29,10 @@ from tissue.blade.wrench import (
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray
 from tissue.cutting.blade_path import Path
+from tissue.geometry.aabb import Aabb, overlap
 from tissue.material import Material
 from tissue.mesh.body import Body
-from tissue.mesh.bounding_boxes import BodyBounds, boxes_overlap
+from tissue.mesh.bounding_boxes import BodyBounds
 from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.point_location import build_grid, list_appended, list_moved, no_grid
@@ -151,8 +152,8 @@ class BladeInteraction:
         """
         if not self._has_sides:
             return
-        if edge is None or not boxes_overlap(
-            blade_box(self.state.sides, edge, when), (box.low, box.high)
+        if edge is None or not overlap(
+            blade_box(self.state.sides, edge, when), Aabb(box.low, box.high)
         ):
             release_faces(self.state)
             return

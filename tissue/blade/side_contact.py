@@ -82,9 +82,9 @@ class SideContacts(Arrays):
     n_around: IntCell
     """Number of faces in `around`; -1 where they must be listed again."""
     n_listed: IntCell
-    """`TetrahedronGrid.counts[LISTED]` when `around` was listed."""
+    """`TetrahedronGrid.n_listed` when `around` was listed."""
     n_entries: IntCell
-    """`TetrahedronGrid.counts[ENTRIES]` when `around` was listed."""
+    """`TetrahedronGrid.n_entries` when `around` was listed."""
     half_thickness: float
     """Half the thickness of the blade [m]; 0 for a blade that is a line."""
     slope: float
@@ -118,7 +118,7 @@ class SideContacts(Arrays):
     states_before: ContactStates
     """Scratch: state of each row before a search."""
     outward: IntArray
-    """`surface.OUTWARD`."""
+    """`faces.OUTWARD`."""
 
 
 def new_side_contacts(

@@ -18,7 +18,8 @@ from tissue.blade.side_contact import (
 )
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
+from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
+from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.mesh.body import Body, is_open
 from tissue.mesh.point_location import TetrahedronGrid, cell_along
 from tissue.mesh.star import Visits
@@ -31,26 +32,22 @@ third to a half while it went in."""
 
 
 @kernel
-def blade_box(sides: SideContacts, edge: Edge, when: float) -> tuple[Vec3, Vec3]:
-    """Return the lowest and highest corner of the box in which faces are listed [m]."""
+def blade_box(sides: SideContacts, edge: Edge, when: float) -> Aabb:
+    """Return the box in which faces are listed [m]."""
     return _box_at(sides, pose_at(edge, when))
 
 
 @kernel
-def _box_at(sides: SideContacts, pose: BladePose) -> tuple[Vec3, Vec3]:
-    """Return the lowest and highest corner of the box around a blade and its margin [m]."""
-    low, high = pose.tip, pose.tip
-    half, margin = sides.half_thickness, sides.margin
+def _box_at(sides: SideContacts, pose: BladePose) -> Aabb:
+    """Return the box around a blade and its margin [m]."""
+    box = Aabb(pose.tip, pose.tip)
+    half = sides.half_thickness
     for corner in range(8):
         p = axpy(pose.length if corner & 1 else 0.0, pose.along, pose.tip)
         p = axpy(-sides.height if corner & 2 else 0.0, pose.forward, p)
         p = axpy(half if corner & 4 else -half, pose.normal, p)
-        low = Vec3(min(low.x, p.x), min(low.y, p.y), min(low.z, p.z))
-        high = Vec3(max(high.x, p.x), max(high.y, p.y), max(high.z, p.z))
-    return (
-        Vec3(low.x - margin, low.y - margin, low.z - margin),
-        Vec3(high.x + margin, high.y + margin, high.z + margin),
-    )
+        box = with_point(box, p)
+    return widened(box, sides.margin)
 
 
 @kernel
@@ -100,8 +97,7 @@ def find_faces(
         when: Instant, as a fraction of the time step.
     """
     sides, pose = blade.sides, pose_at(edge, when)
-    low, high = _box_at(sides, pose)
-    if _are_other_cells(sides, grid, low, high):
+    if _are_other_cells(sides, grid, _box_at(sides, pose)):
         sides.n_around = _list_open_faces(sides, body, visits, grid)
     if sides.n_around < 0:
         return False
@@ -116,8 +112,8 @@ def find_faces(
 
 
 @kernel
-def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, low: Vec3, high: Vec3) -> bool:
-    """Write which cells the box from `low` to `high` [m] meets; return whether that changed.
+def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
+    """Write which cells `box` [m] meets; return whether that changed.
 
     Cells that list other tetrahedra than before count as changed. A blade often stays within the
     same cells for many steps.
@@ -125,7 +121,7 @@ def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, low: Vec3, high
     cells = sides.cells
     are_others = sides.n_around < 0
     for c in range(3):
-        first, last = cell_along(grid, low[c], c), cell_along(grid, high[c], c)
+        first, last = cell_along(grid, box.low[c], c), cell_along(grid, box.high[c], c)
         are_others = are_others or cells[c] != first or cells[3 + c] != last
         cells[c], cells[3 + c] = first, last
     n_listed, n_entries = grid.n_listed, grid.n_entries

@@ -73,11 +73,17 @@ class Candidates(Arrays):
     edge_high: FloatArray
     """Highest corner of the box around each edge [m], shape (3 * capacity, 3)."""
     points: Grid
+    """Nodes of active faces by their references."""
     triangles: Grid
+    """Active faces by their boxes."""
     edges: Grid
+    """Edges that are to be paired by their boxes."""
     search: Search
+    """Scratch of searches in the grids."""
     point_triangle: Pairs
+    """Pairs of a node and a triangle."""
     edge_edge: Pairs
+    """Pairs of edges."""
 
 
 def new_candidates(n_nodes: int, capacity: int, size: float) -> Candidates:

@@ -2,7 +2,8 @@
 
 First all that did are found, with every node where it is; then they are taken one by one, in the
 order of their nodes, tested once more and corrected. So the result does not depend on the order of
-the search; and of several pairs that say the same, where node meets node, only the first is taken.
+the search; and of several pairs that describe one contact, where node meets node, only the first
+is taken.
 """
 
 from typing import NamedTuple

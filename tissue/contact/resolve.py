@@ -52,9 +52,15 @@ def note_positions(contact: ContactState, body: Body, nodes: IntArray, n: int) -
 
 @kernel
 def resolve(contact: ContactState, body: Body, seconds: float) -> bool:
-    """Undo what went through what in a Runge-Kutta step of that length; False if there is no room.
+    """Detect interpenetration in a Runge-Kutta step, and correct positions and velocities.
 
-    Make room then, and call again: it continues where it stopped.
+    Args:
+        contact: Written.
+        body: Positions and velocities are written.
+        seconds: Length of the step [s].
+
+    Returns:
+        Whether there was room. Make room if not, and call again: it continues where it stopped.
     """
     contacts = contact.contacts
     if contact.has_begun == 0:

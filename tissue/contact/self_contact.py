@@ -3,10 +3,10 @@
 Lips of a cut, pieces, and the floor: no node goes through a triangle, no edge through an edge.
 Before the first face is cut, in a body of one piece without a floor, contact costs nothing.
 
-A contact is what went through, from outside to inside, between two Runge-Kutta steps. So nodes of
-one body that lie close under a triangle of it are never mistaken for contact, nothing passes
-unseen at any speed as long as it moves less than its own element in a step, and what overlaps from
-the start is left alone rather than torn apart.
+Sides are in contact where one went through the other, from outside to inside, in a Runge-Kutta
+step. So nodes of one body that lie close under a triangle of it are never mistaken for contact,
+nothing passes unseen at any speed as long as it moves less than its own element in a step, and what
+overlaps from the start is left alone rather than torn apart.
 """
 
 from typing import Any
@@ -44,7 +44,7 @@ tested more often; smaller: more nodes are tested one by one."""
 _TOLERANCE = 1e-4
 """Distance that counts as none, and correction at which Gauss-Seidel ends, per mean node size: a
 third of a micrometre in an organ. Smaller: where lips of one cut lie node on node, each node
-presses on all triangles around the other, which say the same, and all iterations are always done;
+presses on all triangles around the other, one contact many times, and iterations never end early;
 at 1e-6 a body with 3,000 contacts had 5,000, for less than shows. Larger: nodes that are pressed
 tremble."""
 

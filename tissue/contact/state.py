@@ -55,7 +55,9 @@ class ContactState(Arrays):
     signs: FloatArray
     """Scratch of `simd_prefilter`, shape (4 * capacity of pairs,)."""
     point_hits: Hits
+    """Scratch: nodes that went through triangles."""
     edge_hits: Hits
+    """Scratch: edges that went through edges."""
     friction: float
     """Coefficient of friction."""
     floor: float

@@ -1,1 +1,13 @@
-"""Ground of the engine: the compiler, structs of arrays, points and vectors of eight doubles."""
+"""Ground of the engine; only these modules import numba and llvmlite.
+
+In the order in which they are best read:
+
+    array_types    types of arrays, by what they hold
+    jit            the decorator that compiles kernels
+    vec3           points and vectors of three numbers
+    structs        structs of arrays that a kernel gets as one pointer
+    hash_table     a hash table in arrays
+    simd           vectors of eight doubles
+    simd_gather    gathers of such vectors from arrays
+    stage_clock    times of the stages CD, GC and RX of a step
+"""

@@ -6,5 +6,5 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 SlotArray = npt.NDArray[np.int32]
-"""Indices that the loops of the 1 kHz read: half the bytes."""
+"""Indices in 32 bits, which the inner loops read: half the bytes."""
 BoolArray = npt.NDArray[np.bool_]

@@ -19,7 +19,7 @@ _DIGEST = hashlib.sha256(b"".join(source.read_bytes() for source in _SOURCES)).h
 
 
 FLAGS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "nogil": True}
-"""What every kernel is compiled with: see `kernel`."""
+"""Flags with which every kernel is compiled; `kernel` gives the reasons."""
 
 
 def cache_directory() -> Path:
@@ -36,18 +36,19 @@ def is_compiling() -> bool:
 def kernel(function: F) -> F:
     """Compile `function` and keep the binary on disk.
 
-    Kernels work on arrays and plain numbers. They never raise and never allocate, which is why
-    they run without Numba's reference counting (`_nrt`): with it a cut step costs three times as
-    much, because every call of a helper counts the references of every array it passes on.
+    Kernels work on arrays and plain numbers. They never raise and never allocate, so they run
+    without Numba's reference counting (`_nrt`): with it a cut step costs three times as much,
+    because every call of a helper counts the references of every array it passes on.
     `error_model="numpy"` makes 1/0 an inf instead of an exception.
     """
     return _compiled(function, FLAGS)
 
 
 def inlined(function: F) -> F:
-    """Compile as `kernel`, and always as a part of the caller.
+    """Compile as `kernel` does, but always as a part of the caller.
 
-    For what runs once a node in each stage of a step: as calls they took a third of its time.
+    For functions that run once a node in each stage of a step: as calls they took a third of its
+    time.
     """
     return _compiled(function, FLAGS | {"forceinline": True})
 
@@ -68,15 +69,15 @@ def _compiled(function: F, flags: dict[str, Any]) -> F:
 def _compile_once(dispatcher: Any) -> None:
     """Let calls with constants share the binary of calls with variables.
 
-    Numba compiles a function anew for each constant that another kernel passes to it: a third of
+    Numba compiles a function again for each constant that another kernel passes to it: a third of
     the engine's compile time, for code that is inlined anyway.
     """
-    resolve = dispatcher.get_call_template
+    resolve, plain = dispatcher.get_call_template, cast(Any, unliteral)
 
     def resolve_variables(arguments: Any, keywords: Any) -> Any:
         return resolve(
-            tuple(unliteral(a) for a in arguments),
-            {name: unliteral(a) for name, a in keywords.items()},
+            tuple(plain(a) for a in arguments),
+            {name: plain(a) for name, a in keywords.items()},
         )
 
     dispatcher.get_call_template = resolve_variables

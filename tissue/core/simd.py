@@ -1,9 +1,9 @@
-"""Vectors of eight doubles (`Lanes`) inside kernels, for the loops that the 1 kHz rests on.
+"""Vectors of eight doubles (`Lanes`) inside kernels, for the inner loops of the forces.
 
-LLVM does not vectorise a gather over the neighbours of a node by itself. Here the kernel says so:
-it reads as for one neighbour, but each value is a vector of eight. On a machine with narrower
-registers LLVM splits each operation in two or four. A `Point` is x, y, z of one node in a vector
-of four.
+LLVM does not vectorise a gather over the neighbours of a node by itself. Here the kernel does so
+explicitly: it reads as for one neighbour, but each value is a vector of eight. On a machine with
+narrower registers LLVM splits each operation in two or four. A `Point` is x, y, z of one node in a
+vector of four.
 
 Each function is also a plain Python function on NumPy arrays, which runs when the JIT is off: the
 tests compare the two. `+ - * /` work on both.
@@ -26,10 +26,10 @@ WIDTH = 8
 """Doubles in a vector: one cache line, and one AVX-512 register."""
 
 Lanes = Any
-"""In Python an array of eight doubles; in a kernel one vector. It stands in for a float, so that a
-`Vec3` of them is eight points, and the functions of `tissue.core.vec3` work on eight at a time."""
+"""Eight doubles: in Python an array, in a kernel one vector. It replaces a float, so that a `Vec3`
+of them is eight points, and the functions of `tissue.core.vec3` work on eight at a time."""
 Point = np.ndarray
-"""In Python x, y, z and a 0; in a kernel one vector of four."""
+"""A point as x, y, z and a 0: in Python an array, in a kernel one vector of four."""
 
 
 @kernel
@@ -39,7 +39,7 @@ def filled(n: int) -> int:
 
 
 def aligned(n: int, dtype: type = np.float64) -> np.ndarray:
-    """Return zeros that begin with a cache line: a vector across two lines loads at half speed."""
+    """Return `n` zeros aligned to a cache line: a vector across two lines loads at half speed."""
     line = 64 // np.dtype(dtype).itemsize
     memory: np.ndarray = np.zeros(n + line, dtype)
     skip = -memory.ctypes.data % 64 // memory.itemsize
@@ -47,7 +47,7 @@ def aligned(n: int, dtype: type = np.float64) -> np.ndarray:
 
 
 def room_for_points(n: int) -> FloatArray:
-    """Return zeros of shape (n, 3) with one more double behind them: see `eight_points`."""
+    """Return zeros of shape (n, 3) with one more double behind them, which `eight_points` reads."""
     return np.zeros(3 * n + 1)[:-1].reshape(n, 3)
 
 
@@ -61,7 +61,7 @@ class LanesType(types.Type):
 
 LANES = LanesType(WIDTH)
 POINT = LanesType(4)
-_THREE = types.UniTuple(LANES, 3)
+_THREE = cast(Any, types).UniTuple(LANES, 3)
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 _POINT = ir.VectorType(ir.DoubleType(), 4)
 _XYZ = ir.Constant(ir.VectorType(ir.IntType(1), 4), [1, 1, 1, 0])
@@ -74,12 +74,16 @@ _I64 = ir.IntType(64)
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, fe_type: LanesType) -> None:
-        super().__init__(manager, fe_type, ir.VectorType(ir.DoubleType(), fe_type.width))
+        vector = ir.VectorType(ir.DoubleType(), fe_type.width)
+        cast(Any, super()).__init__(manager, fe_type, vector)
+
+
+_Function = Callable[..., Any]
 
 
 def _compiled(
-    function: Callable, *kinds: Any, result: types.Type = LANES
-) -> Callable[[Callable], Callable]:
+    function: _Function, *kinds: Any, result: types.Type = LANES
+) -> Callable[[_Function], _Function]:
     """Give `function`, on arguments of these kinds, the code that the decorated one builds.
 
     It is called with the builder, the numba types of the arguments, and their values.
@@ -89,7 +93,7 @@ def _compiled(
         return isinstance(argument, kind) if isinstance(kind, type) else argument == kind
 
     @type_callable(function)
-    def _types(_: Any) -> Callable:
+    def _types(_: Any) -> _Function:
         def typer(*arguments: types.Type) -> types.Type | None:
             if len(arguments) == len(kinds) and all(map(fits, kinds, arguments)):
                 return result
@@ -100,9 +104,8 @@ def _compiled(
         cast(Any, typer).__signature__ = Signature(parameters)  # Numba folds arguments by it
         return typer
 
-    def register(build: Callable) -> Callable:
-        @lower_builtin(function, *kinds)
-        def _lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    def register(build: _Function) -> _Function:
+        def lower(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             arguments = [
                 _Array(context, builder, kind, value) if isinstance(kind, types.Array) else value
                 for kind, value in zip(signature.args, values, strict=True)
@@ -110,6 +113,7 @@ def _compiled(
             made = build(builder, *arguments)
             return context.get_dummy_value() if made is None else made
 
+        cast(Any, lower_builtin)(function, *kinds)(lower)
         return build
 
     return register
@@ -137,7 +141,7 @@ def _shuffled(builder: Any, a: Any, b: Any, order: Any) -> Any:
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(_I32, len(lanes)), lanes))
 
 
-def _operator(function: Callable, instruction: str, kind: LanesType) -> None:
+def _operator(function: _Function, instruction: str, kind: LanesType) -> None:
     @_compiled(function, kind, kind, result=kind)
     def _build(builder: Any, a: Any, b: Any) -> Any:
         # A product and a sum may become one instruction that rounds once: faster, and no less
@@ -188,7 +192,7 @@ def _store(builder: Any, array: _Array, i: Any, values: Any) -> None:
 
 
 def square_root(a: Lanes) -> Lanes:
-    """Return the square root of each."""
+    """Return the square roots of eight numbers."""
     return np.sqrt(a)
 
 
@@ -262,8 +266,8 @@ def _spread(builder: Any, a: Any) -> Any:
 def eight_points(points: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
     """Return x, y and z of rows `of[i]` to `of[i + 7]` of an array of shape (n, 3).
 
-    Of each four doubles are read, which the array must have room for: see `room_for_points`. To
-    read three takes a tenth longer for a force.
+    Four doubles are read for each point, for which the array must have room (`room_for_points`).
+    With three a force takes a tenth longer.
     """
     rows = points[of[i : i + WIDTH]]
     return rows[:, 0].copy(), rows[:, 1].copy(), rows[:, 2].copy()
@@ -296,7 +300,7 @@ def _declared(module: Any, name: str, kind: Any) -> Any:
 
 
 def summed(x: Lanes, y: Lanes, z: Lanes) -> Point:
-    """Return the point whose coordinates are the sums of eight: neighbours first, as in a tree."""
+    """Return the point whose coordinates are the sums of eight numbers, neighbours first."""
     pairs = np.stack([x, y, z]).reshape(3, 4, 2).sum(axis=2)
     halves = pairs[:, :2] + pairs[:, 2:]
     return np.array([*(halves[:, 0] + halves[:, 1]), 0.0])

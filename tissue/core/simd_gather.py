@@ -1,6 +1,7 @@
-"""Gathers between nodes and blocks of eight tetrahedra, and the largest of what is gathered.
+"""Gathers between nodes and blocks of eight tetrahedra, and their largest entry.
 
-As in `tissue.core.simd` each is also a plain Python function, which runs when the JIT is off.
+As in `tissue.core.simd` each function is also a plain Python function, which runs when the JIT is
+off.
 """
 
 import operator
@@ -69,7 +70,7 @@ def _sum_of_eight_points(builder: Any, values: _Array, of: _Array, i: Any) -> An
 
 
 def larger(a: Lanes, b: Lanes) -> Lanes:
-    """Return the larger of each two; `b` where there is none."""
+    """Return the larger of `a` and `b` in each lane; `b` where they cannot be compared (NaN)."""
     return np.where(a > b, a, b)
 
 
@@ -79,7 +80,7 @@ def _larger(builder: Any, a: Any, b: Any) -> Any:
 
 
 def largest(a: Lanes) -> float:
-    """Return the largest of eight."""
+    """Return the largest of eight numbers."""
     return float(a.max())
 
 

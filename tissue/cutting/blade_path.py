@@ -11,7 +11,7 @@ from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.exact_predicates import Lattice, nearest
 from tissue.geometry.tetrahedron import nearest_on_segment, normalised
 
-SAME_WAY = 0.7
+LEAST_ALIGNMENT = 0.7
 """Cosine of the angle between the normal of the path and that of the blade's flat; below it the
 blade's is used."""
 
@@ -37,8 +37,7 @@ class Path(Arrays):
     """Whether each sample is part of the chain at the end of the step, shape (n,)."""
     known: BoolArray
     """Whether each sample was part of the chain in the step before, so that its `t1` is where it
-    was
-    then; shape (n,)."""
+    was then; shape (n,)."""
     linked: BoolArray
     """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
     boxes: IntArray
@@ -79,7 +78,7 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
     normal = normalised(cross(vec3(path.forward, k), along))
     # Where samples have slipped past each other the normal of the path is of no use.
     sideways = vec3(path.sideways, 0)
-    if dot(normal, sideways) < SAME_WAY:
+    if dot(normal, sideways) < LEAST_ALIGNMENT:
         normal = sideways
     return Plane(nearest_on_segment(tip, vec3(path.t1, k + 1), p), normal)
 
@@ -91,8 +90,7 @@ class Nearest(NamedTuple):
     """Segment of the edge, -1 where the edge spans nothing."""
     along: float
     """Foot of the given point on the segment's line: 0 at its first sample, 1 at its second.
-    Outside
-    that range the point is beyond an end of the segment."""
+    Outside that range the point is beyond an end of the segment."""
 
 
 @kernel

@@ -4,11 +4,21 @@ Paper, section 3. In each step the active tetrahedra are found again from those 
 anchors, through faces: the cost is proportional to the number of tetrahedra along the blade.
 """
 
+from tissue.core.hash_table import (
+    HashTable,
+    clear_table,
+    fill_slot,
+    first_slot,
+    hash_of,
+    is_filled,
+    next_slot,
+)
 from tissue.core.jit import kernel
-from tissue.core.vec3 import cross, dot, sub, vec3
+from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.cutting.cut_surface import on_sheet
 from tissue.cutting.workspace import Cut
+from tissue.geometry.aabb import Aabb, overlap, segment_box, tetrahedron_box
 from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
 from tissue.mesh.body import CUT, behind, n_behind
 
@@ -102,26 +112,11 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
 def _note_segments(cut: Cut, t: int, n: int) -> bool:
     """Note which segments' boxes overlap that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.scratch.segments
-    grid = body.lattice_rest
-    a = body.tetrahedra[t, 0]
-    b = body.tetrahedra[t, 1]
-    c = body.tetrahedra[t, 2]
-    d = body.tetrahedra[t, 3]
-    low_x = min(min(grid[a, 0], grid[b, 0]), min(grid[c, 0], grid[d, 0]))
-    low_y = min(min(grid[a, 1], grid[b, 1]), min(grid[c, 1], grid[d, 1]))
-    low_z = min(min(grid[a, 2], grid[b, 2]), min(grid[c, 2], grid[d, 2]))
-    high_x = max(max(grid[a, 0], grid[b, 0]), max(grid[c, 0], grid[d, 0]))
-    high_y = max(max(grid[a, 1], grid[b, 1]), max(grid[c, 1], grid[d, 1]))
-    high_z = max(max(grid[a, 2], grid[b, 2]), max(grid[c, 2], grid[d, 2]))
+    box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
     first = -1
     last = -2
-    boxes = path.boxes
     for k in range(len(path.linked) - 1):
-        if not path.linked[k]:
-            continue
-        if boxes[k, 0] > high_x or boxes[k, 1] > high_y or boxes[k, 2] > high_z:
-            continue
-        if boxes[k, 3] < low_x or boxes[k, 4] < low_y or boxes[k, 5] < low_z:
+        if not path.linked[k] or not overlap(_swept_box(path, k), box):
             continue
         if first < 0:
             first = k
@@ -132,12 +127,19 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
 
 
 @kernel
+def _swept_box(path: Path, k: int) -> Aabb:
+    """Return the box of the quad that segment `k` sweeps, on the lattice."""
+    boxes = path.boxes
+    return Aabb(
+        Vec3(boxes[k, 0], boxes[k, 1], boxes[k, 2]), Vec3(boxes[k, 3], boxes[k, 4], boxes[k, 5])
+    )
+
+
+@kernel
 def find_crossings(cut: Cut) -> None:
     """Find the edges of active tetrahedra that the swept edge crosses, each tested once."""
-    body, scratch, visits = cut.body, cut.scratch, cut.visits
-    visits.epoch += 1
-    epoch = visits.epoch
-    mask = len(scratch.hash_keys) - 1
+    body, scratch = cut.body, cut.scratch
+    clear_table(scratch.tested)
     scratch.n_crossings = 0
     for i in range(scratch.n_active):
         if scratch.segments[i, 0] < 0:
@@ -147,37 +149,32 @@ def find_crossings(cut: Cut) -> None:
             for q in range(p + 1, 4):
                 a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
                 b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
-                key = (a << 32) | b
-                # Fibonacci hashing: 2^64 / golden ratio, as a signed number.
-                slot = ((key * -7046029254386353131) >> 40) & mask
-                while scratch.hash_stamps[slot] == epoch and scratch.hash_keys[slot] != key:
-                    slot = (slot + 1) & mask
-                if scratch.hash_stamps[slot] != epoch:
-                    scratch.hash_stamps[slot] = epoch
-                    scratch.hash_keys[slot] = key
+                if _add_tested(scratch.tested, a, b):
                     # Another tetrahedron around the edge may list more segments, but those that
                     # can cross the edge itself are listed by all of them.
                     _cross_edge(cut, a, b, scratch.segments[i, 0], scratch.segments[i, 1])
 
 
 @kernel
+def _add_tested(tested: HashTable, a: int, b: int) -> bool:
+    """Add edge ab to the edges tested; return False if it is among them."""
+    key = (a << 32) | b
+    slot = first_slot(tested, hash_of(a, b, 0, 0))
+    while is_filled(tested, slot):
+        if tested.item[slot] == key:
+            return False
+        slot = next_slot(tested, slot)
+    fill_slot(tested, slot, key)
+    return True
+
+
+@kernel
 def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
     """Note where one of segments `first` to `last`, swept, crosses edge ab."""
     body, path, scratch = cut.body, cut.path, cut.scratch
-    grid = body.lattice_rest
-    low_x = min(grid[a, 0], grid[b, 0])
-    low_y = min(grid[a, 1], grid[b, 1])
-    low_z = min(grid[a, 2], grid[b, 2])
-    high_x = max(grid[a, 0], grid[b, 0])
-    high_y = max(grid[a, 1], grid[b, 1])
-    high_z = max(grid[a, 2], grid[b, 2])
-    boxes = path.boxes
+    box = segment_box(body.lattice_rest, a, b)
     for k in range(first, last + 1):
-        if not path.linked[k]:
-            continue
-        if boxes[k, 0] > high_x or boxes[k, 1] > high_y or boxes[k, 2] > high_z:
-            continue
-        if boxes[k, 3] < low_x or boxes[k, 4] < low_y or boxes[k, 5] < low_z:
+        if not path.linked[k] or not overlap(_swept_box(path, k), box):
             continue
         at = _crossing_of_quad(path, cut, a, b, k)
         n = scratch.n_crossings
@@ -215,8 +212,7 @@ def _crossing_fraction(cut: Cut, a: int, b: int, k: int, ahead: bool, on_lattice
     """Return the unrounded fraction along ab at which a triangle that segment `k` sweeps cuts it.
 
     The lattice decides whether it does. The point itself is computed from unrounded positions,
-    since
-    the lattice resolves a few millionths of the body only.
+    since the lattice resolves a few millionths of the body only.
 
     Args:
         cut: Body and path.

@@ -12,6 +12,7 @@ from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.cutting.snapping import insert_in_face
 from tissue.cutting.workspace import Cut
+from tissue.geometry.aabb import Aabb, overlap, tetrahedron_box
 from tissue.geometry.exact_predicates import LatticePoint, lattice_point, pierces
 from tissue.mesh.body import local_index
 from tissue.mesh.star import star
@@ -51,13 +52,13 @@ class LineSegment(NamedTuple):
     """A straight line through the body at rest."""
 
     start: LatticePoint
-    """Its start on the lattice."""
+    """Start of the line on the lattice."""
     stop: LatticePoint
-    """Its end on the lattice."""
+    """End of the line on the lattice."""
     origin: Vec3
-    """Its start [m]."""
+    """Start of the line [m]."""
     direction: Vec3
-    """The vector from start to end [m]."""
+    """Vector from start to end [m]."""
 
 
 @kernel
@@ -156,7 +157,7 @@ def _earlier_event(cut: Cut, t: int, line: LineSegment, after: float, best: Even
     for f in range(4):
         link = body.links[t, f]
         if link >= 0 and link // 4 < t:
-            continue  # asked from the other side, unless that one is not active: then it is far
+            continue  # its neighbour tests it, unless that is not active and so far away
         a = body.tetrahedra[t, (f + 1) % 4]
         b = body.tetrahedra[t, (f + 2) % 4]
         c = body.tetrahedra[t, (f + 3) % 4]
@@ -183,17 +184,11 @@ def _earlier_event(cut: Cut, t: int, line: LineSegment, after: float, best: Even
 @kernel
 def _is_beyond(cut: Cut, t: int, line: LineSegment) -> bool:
     """Return whether the boxes of a tetrahedron and a line are apart."""
-    grid, nodes = cut.body.lattice_rest, cut.body.tetrahedra
-    for x in range(3):
-        low = min(line.start[x], line.stop[x])
-        high = max(line.start[x], line.stop[x])
-        p = grid[nodes[t, 0], x]
-        q = grid[nodes[t, 1], x]
-        r = grid[nodes[t, 2], x]
-        s = grid[nodes[t, 3], x]
-        if min(min(p, q), min(r, s)) > high or max(max(p, q), max(r, s)) < low:
-            return True
-    return False
+    body, p, q = cut.body, line.start, line.stop
+    low = Vec3(min(p.x, q.x), min(p.y, q.y), min(p.z, q.z))
+    high = Vec3(max(p.x, q.x), max(p.y, q.y), max(p.z, q.z))
+    box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
+    return not overlap(box, Aabb(low, high))
 
 
 @kernel

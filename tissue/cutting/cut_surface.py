@@ -88,15 +88,17 @@ def touch(sheet: CutSheet, node: int) -> None:
 @kernel
 def on_sheet(sheet: CutSheet, node: int) -> bool:
     """Return whether `node` lies on the sheet of the current incision."""
-    return sheet.node_stamp[node] == sheet.number and sheet.offset[node] >= 0.0
+    is_on: bool = sheet.node_stamp[node] == sheet.number and sheet.offset[node] >= 0.0
+    return is_on
 
 
 @kernel
 def past_offset(sheet: CutSheet, node: int) -> float:
     """Return the largest distance of `node` from an earlier sheet that it lies on [m], or -1."""
+    offset: float = sheet.past_offset[node]
     if sheet.node_stamp[node] != sheet.number:
-        return max(sheet.past_offset[node], sheet.offset[node])
-    return sheet.past_offset[node]
+        offset = max(sheet.past_offset[node], sheet.offset[node])
+    return offset
 
 
 @kernel
@@ -104,7 +106,8 @@ def side_of(sheet: CutSheet, node: int) -> int:
     """Return the side that `node` was found on in this incision, or 0."""
     if sheet.node_stamp[node] != sheet.number:
         return 0
-    return sheet.side[node]
+    side: int = sheet.side[node]
+    return side
 
 
 @kernel
@@ -120,7 +123,8 @@ def decided_side(sheet: CutSheet, t: int) -> int:
     """Return the side decided for tetrahedron `t` in this incision, or 0."""
     if sheet.tetrahedron_stamp[t] != sheet.number:
         return 0
-    return sheet.tetrahedron_side[t]
+    side: int = sheet.tetrahedron_side[t]
+    return side
 
 
 @kernel
@@ -132,7 +136,7 @@ def decide_side(sheet: CutSheet, t: int, side: int) -> None:
 
 @kernel
 def put_on_sheet(sheet: CutSheet, node: int, offset: float) -> None:
-    """Put `node` on the sheet, `offset` from where the sheet truly is [m]."""
+    """Put `node` on the sheet; `offset` is its distance from the true sheet [m]."""
     touch(sheet, node)
     sheet.offset[node] = offset
     sheet.nodes[sheet.n_nodes] = node

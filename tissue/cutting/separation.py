@@ -28,7 +28,7 @@ CRUMB_TETRAHEDRA = 16
 @kernel
 def open_sheet(cut: Cut) -> None:
     """Cut the faces on the sheet, and double their nodes."""
-    _mark(cut)
+    _mark_faces(cut)
     _keep_crumbs(cut)
     change = cut.change
     for i in range(change.n_faces):
@@ -46,32 +46,32 @@ def close_sheet(cut: Cut) -> None:
     """Cut what remains along the whole sheet: by now the sides of all its nodes are known."""
     sheet = cut.sheet
     for i in range(sheet.n_nodes):
-        _mark_star(cut, sheet.nodes[i])
+        _mark_faces_at_node(cut, sheet.nodes[i])
     open_sheet(cut)
 
 
 @kernel
-def _mark_star(cut: Cut, node: int) -> None:
+def _mark_faces_at_node(cut: Cut, node: int) -> None:
     around = cut.scratch.around_too
     n = star(cut.body, cut.visits, node, cut.body.node_tetrahedron[node], around)
     for i in range(n):
-        _mark_around(cut, around[i])
+        _mark_faces_of(cut, around[i])
 
 
 @kernel
-def _mark(cut: Cut) -> None:
+def _mark_faces(cut: Cut) -> None:
     """Cut every face between the two sides: near the blade, behind it, and at new nodes."""
     scratch, change = cut.scratch, cut.change
     for i in range(scratch.n_active):
-        _mark_around(cut, scratch.active[i])
+        _mark_faces_of(cut, scratch.active[i])
     for i in range(scratch.n_previous):  # by now the sides of all their nodes are known
-        _mark_around(cut, scratch.previous[i])
+        _mark_faces_of(cut, scratch.previous[i])
     for i in range(change.n_flagged):
-        _mark_star(cut, change.flagged[i])
+        _mark_faces_at_node(cut, change.flagged[i])
 
 
 @kernel
-def _mark_around(cut: Cut, t: int) -> None:
+def _mark_faces_of(cut: Cut, t: int) -> None:
     body, sheet, change = cut.body, cut.sheet, cut.change
     n_on = 0
     for k in range(4):
@@ -270,7 +270,8 @@ def _outside_of_piece(cut: Cut, row: int, epoch: int) -> int:
     second_in = seen[faces[row, 2]] == epoch
     if first_in == second_in:
         return -1
-    return faces[row, 2] if first_in else faces[row, 0]
+    outside: int = faces[row, 2] if first_in else faces[row, 0]
+    return outside
 
 
 @kernel

@@ -8,7 +8,7 @@ import math
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
-from tissue.cutting.blade_path import SAME_WAY, plane_at
+from tissue.cutting.blade_path import LEAST_ALIGNMENT, plane_at
 from tissue.cutting.cut_surface import note_side, on_sheet, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
@@ -61,7 +61,7 @@ def _is_on_parallel_cut(cut: Cut, node: int) -> bool:
             b = vec3(body.rest, body.tetrahedra[t, (f + 2) % 4])
             c = vec3(body.rest, body.tetrahedra[t, (f + 3) % 4])
             normal = normalised(cross(sub(b, a), sub(c, a)))
-            if abs(dot(normal, sideways)) >= SAME_WAY:
+            if abs(dot(normal, sideways)) >= LEAST_ALIGNMENT:
                 return True
     return not any_face
 
@@ -84,12 +84,13 @@ def sort_crossings(cut: Cut) -> None:
 
 @kernel
 def _comes_first(cut: Cut, i: int, j: int) -> bool:
-    scratch = cut.scratch
-    if scratch.crossing_at[i, 1] != scratch.crossing_at[j, 1]:
-        return scratch.crossing_at[i, 1] < scratch.crossing_at[j, 1]
-    if scratch.crossing[i, 0] != scratch.crossing[j, 0]:
-        return scratch.crossing[i, 0] < scratch.crossing[j, 0]
-    return scratch.crossing[i, 1] < scratch.crossing[j, 1]
+    ranks, nodes = cut.scratch.crossing_at, cut.scratch.crossing
+    is_first: bool = nodes[i, 1] < nodes[j, 1]
+    if ranks[i, 1] != ranks[j, 1]:
+        is_first = ranks[i, 1] < ranks[j, 1]
+    elif nodes[i, 0] != nodes[j, 0]:
+        is_first = nodes[i, 0] < nodes[j, 0]
+    return is_first
 
 
 @kernel
@@ -155,7 +156,8 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
 def _explained(cut: Cut, node: int, distance: float, length: float) -> bool:
     """Return whether an on-sheet node, that far from the sheet, explains a crossing of its edge."""
     allowance = max(EXPLAINED_SHARE * length, snap_distance(cut, node))
-    return distance <= EXPLAINED * cut.sheet.offset[node] + allowance
+    is_near: bool = distance <= EXPLAINED * cut.sheet.offset[node] + allowance
+    return is_near
 
 
 @kernel

@@ -84,7 +84,6 @@ class StellarScheme:
         """Make room for that many nodes and tetrahedra."""
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
-        self._scratch.hash_stamps[:] = 0
         self._cut = None
 
     def statistics(self, body: Body) -> SchemeStatistics | None:

@@ -85,7 +85,7 @@ def _pick(i: int, a: int, b: int, c: int) -> int:
 @kernel
 def _mix(values: FloatArray, a: int, b: int, c: int, w: Vec3, x: int) -> float:
     """Return component `x` of a field at weights `w` of nodes a, b and, unless it is -1, c."""
-    value = w.x * values[a, x] + w.y * values[b, x]
+    value: float = w.x * values[a, x] + w.y * values[b, x]
     if c >= 0:
         value += w.z * values[c, x]
     return value

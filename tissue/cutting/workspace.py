@@ -3,6 +3,7 @@
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.hash_table import HashTable, new_hash_table
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import dot, sub, vec3
@@ -42,8 +43,7 @@ class CutScratch(Arrays):
     active: IntArray
     """Active tetrahedra, which the swept edge passes through; shape (CHANGES,)."""
     segments: IntArray
-    """First and last segment of the edge that each active tetrahedron may touch, shape (CHANGES,
-    2)."""
+    """First and last segment of the edge near each active tetrahedron, shape (CHANGES, 2)."""
     n_active: IntCell
     """Number of active tetrahedra."""
     previous: IntArray
@@ -71,10 +71,8 @@ class CutScratch(Arrays):
     """Order in which crossings are handled, shape (CROSSINGS,)."""
     n_crossings: IntCell
     """Number of crossed edges."""
-    hash_keys: IntArray
-    """Edges tested, by their two nodes, shape (HASH_SLOTS,)."""
-    hash_stamps: IntArray
-    """Search that wrote each slot, shape (HASH_SLOTS,)."""
+    tested: HashTable
+    """Edges tested in this search, each as a number made of its two nodes."""
 
 
 class Cut(Arrays):
@@ -107,14 +105,13 @@ def new_cut_scratch(n_tetrahedra: int) -> CutScratch:
         crossing_at=np.zeros((CROSSINGS, 2)),
         order=np.zeros(CROSSINGS, np.int64),
         n_crossings=0,
-        hash_keys=np.zeros(HASH_SLOTS, np.int64),
-        hash_stamps=np.zeros(HASH_SLOTS, np.int64),
+        tested=new_hash_table(HASH_SLOTS),
     )
 
 
 @kernel
 def flag(cut: Cut, node: int) -> None:
-    """Put `node` on the sheet, and note that."""
+    """Put `node` on the sheet, and list it in `change.flagged`."""
     sheet = cut.sheet
     if not on_sheet(sheet, node):
         p = vec3(cut.body.rest, node)

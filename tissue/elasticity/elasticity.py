@@ -1,4 +1,4 @@
-"""`Elasticity` owns what forces inside a body follow from; it follows the cuts."""
+"""`Elasticity`: the arrays from which the forces inside a body are computed, kept true to cuts."""
 
 import numpy as np
 
@@ -29,15 +29,15 @@ ROOM_FOR_SPRINGS = 1 << 16
 
 
 class Elasticity:
-    """The rows of a body, and a bound on its frequencies.
+    """Springs and elements of a body, and a bound on its frequencies.
 
     Args:
-        material: What it is made of.
+        material: What the body is made of.
         body: The body; its masses are written.
         visits: For searches.
-        is_tight: Whether the bound of tetrahedra is brought near the truth. The Runge-Kutta method
-            does not want it: near its limit it damps the fastest modes by itself, which no account
-            of the energy sees (0.7 % of the work of a blade that presses and lets go).
+        is_tight: Whether the bound of tetrahedra is brought near the truth. Not for the Runge-Kutta
+            method: near its limit it damps the fastest modes by itself, which no account of the
+            energy includes (0.7 % of the work of a blade that presses and withdraws).
     """
 
     def __init__(
@@ -59,16 +59,25 @@ class Elasticity:
         self._is_tight = is_tight
         self._solid_frequency_squared = 0.0
         self.frequency_squared = 0.0
-        """Bound on the square of every angular frequency so far [1/s2]."""
+        """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
         self.damper_frequency_squared = 0.0
-        """The same of springs alone, whose stiffness the dampers have, whatever the law [1/s2]."""
+        """Bound on the square of the frequencies of springs alone so far [1/s2]. The dampers have
+        the stiffness of springs under either law."""
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
     ) -> None:
-        """Write anew what the tetrahedra that changed, and their `n` nodes, enter into."""
+        """Update springs, elements and bounds after a cut.
+
+        Args:
+            body: The body; masses of the touched nodes are written.
+            visits: For searches.
+            change: The tetrahedra that changed.
+            nodes: Nodes, of which the first `n` are the nodes of those tetrahedra.
+            n: How many these are.
+        """
         self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
 
     @property
@@ -79,8 +88,8 @@ class Elasticity:
     def strained_frequency_squared(self, body: Body) -> float:
         """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
 
-        It takes as long as a tenth of a Runge-Kutta step. To look at a part of them in each frame
-        is not enough: a lip that snaps back from the blade doubles its length in 2 ms.
+        It takes a tenth of the time of a Runge-Kutta step. To test only a part of the tetrahedra in
+        each frame is not enough: a lip that snaps back from the blade doubles its length in 2 ms.
         """
         if not self._has_solid:
             return 0.0
@@ -147,7 +156,7 @@ class Elasticity:
 
 
 def _law_of(material: Material) -> EnergyDensity | None:
-    """Return what the tetrahedra resist; None where the springs do it all."""
+    """Return the energy density of the tetrahedra; None where springs alone are elastic."""
     if material.law == "neo_hookean":
         return neo_hookean(material.mu, material.lam)
     if material.volume_modulus > 0.0:

@@ -1,4 +1,4 @@
-"""What is stored in the body, and what damping takes."""
+"""Energies stored in the body, and the power that damping dissipates."""
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -43,7 +43,16 @@ def dissipated_power(
     velocities: FloatArray,
     scratch: FloatArray,
 ) -> float:
-    """Return the power that viscosity and drag dissipate at that motion [W]."""
+    """Return the power that viscosity and drag dissipate [W].
+
+    Args:
+        body: Masses and fixed nodes.
+        elastic: The dampers.
+        surroundings: Drag and retardation time.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        scratch: Overwritten; shaped as positions.
+    """
     time = surroundings.retardation_time
     power = 0.0
     for node in range(body.n_nodes):

@@ -1,7 +1,7 @@
 """Tetrahedra as elements of a solid: their rest shapes, and a row of corners for each node.
 
 The force on a node is the sum over its row, in order: a gather, no scatter, no race. After a cut
-only the tetrahedra that changed and the rows of the nodes that it touched are written anew.
+only the changed tetrahedra and the rows of touched nodes are written again.
 
 With linear shape functions N_k and positions x_k the deformation gradient F is the sum of
 x_k (grad N_k)^T. All that the law needs of the rest shape is the volume V and, for |F|^2, the six
@@ -9,8 +9,8 @@ numbers V grad N_i . grad N_j: with d_i = x_i - x_0,
 
     V |F|^2 = sum over i, j = 1..3 of (V grad N_i . grad N_j) d_i . d_j
 
-Tetrahedra come in blocks of eight: block b holds tetrahedra 8 b to 8 b + 7, and of each quantity
-there are eight in a row, one of each, so that one vector holds them.
+Tetrahedra are stored in blocks of eight: block b holds tetrahedra 8 b to 8 b + 7, and the eight
+values of each quantity stand in a row, so that one vector holds them.
 """
 
 import numpy as np
@@ -24,17 +24,18 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
 OWN_SHARE = 0.2
-"""Share of the volume term beside springs that acts on each tetrahedron by itself. Averaged volumes
-do not see one tetrahedron fold while its neighbours swell, and springs do not mind: without it some
-4 % were inside out in a block at half its height, with it none; springs alone fold at 0.8 of the
-height. Bending locks a little: a bar of four cells deflects 0.68 of theory, not 0.73."""
+"""Share of the volume term beside springs that acts on each tetrahedron by itself. Where one
+tetrahedron folds while its neighbours swell, averaged volumes do not change, and springs resist
+little: at 0 some 4 % were inverted in a block at half its height, with this share none; springs
+alone fold at 0.8 of the height. Bending locks a little: a bar of four cells deflects 0.68 of
+theory, not 0.73."""
 
 VOLUME, PER_VOLUME = 6, 7
-"""Places in a row of `Solid.shape`; before them grad products 11, 22, 33, 12, 13, 23."""
+"""Quantities of `Solid.shape`: V and 1/V. Before them are the gradient products 11, 22, 33, 12, 13
+and 23."""
 
 STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_stars` asks for a larger pool; more than any one row needs."""
-
 
 LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""
@@ -45,25 +46,27 @@ class EnergyDensity(Arrays):
 
     W = mu/2 (|F|^2 - 3) - mu/2 log(|F|^2 + 1) + lam/2 (J - a)^2
 
-    It is defined for J <= 0 as well: a tetrahedron turned inside out comes back. The last term is
-    taken of J in each tetrahedron, of J averaged over the tetrahedra around each node (Bonet and
-    Burton 1998), which does not lock where tissue is nearly incompressible, or a part of each.
+    It is defined for J <= 0 as well: an inverted tetrahedron recovers. J of the last term is that
+    of each tetrahedron, or the average over the tetrahedra around each node (Bonet and Burton
+    1998), which does not lock where tissue is nearly incompressible, or a part of the term takes
+    each.
     """
 
     mu: float
-    """[Pa]. 0 where springs carry the shear."""
+    """Shear modulus of the law [Pa], 0 where springs carry the shear."""
     lam_of_tetrahedra: float
     """The part of lam that acts on J of each tetrahedron [Pa]."""
     lam_of_nodes: float
-    """The part that acts on J averaged over the tetrahedra around each node [Pa]."""
+    """The part of lam that acts on J averaged over the tetrahedra around each node [Pa]."""
     a: float
     """J at which the last term is 0: 1 + 3 mu / (4 lam), so that the body at rest is at rest."""
 
 
 class Solid(Arrays):
-    """Every tetrahedron and the star of every node. Rows beyond the body's counts are room."""
+    """Every tetrahedron and the star of every node. Rows beyond the body's counts are spare."""
 
     law: EnergyDensity
+    """The law of the tetrahedra."""
     nodes: SlotArray
     """Nodes of each tetrahedron, in blocks of four rows of eight (`node_place`)."""
     shape: FloatArray
@@ -72,40 +75,41 @@ class Solid(Arrays):
     first: IntArray
     """Where each node's row begins in the pool, shape (nodes,)."""
     room: IntArray
-    """Slots that the row has, shape (nodes,)."""
+    """Slots reserved for each node's row, shape (nodes,)."""
     count: IntArray
-    """Tetrahedra around the node, shape (nodes,). A row is filled up to a multiple of eight slots
-    with places where there is always 0."""
+    """Tetrahedra around each node, shape (nodes,). Its row is padded to a multiple of eight slots
+    with places that always hold 0."""
     around: SlotArray
-    """Place in `volume` of each tetrahedron around the node, in order; shape (pool,)."""
+    """Place in `volume` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
     corner: SlotArray
-    """Place in `forces` of the force on that corner of it that is the node, shape (pool,)."""
+    """Place in `forces` of the force on the corner of each slot, shape (pool,)."""
     node_volume: FloatArray
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray
-    """Of each node in the bound on frequencies [1/kg^0.5]: see `solid_frequency`."""
+    """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency_bound`), shape
+    (nodes,)."""
     weighed: FloatArray
-    """Mass of each node when it was given that weight [kg]."""
+    """Mass of each node when it was given that weight [kg], shape (nodes,)."""
     dilatation: FloatArray
-    """Of each node, for that bound [N/m3/kg^0.5]: see `solid_frequency`."""
+    """Term of the averaged volume of each node in that bound [N/m3/kg^0.5], shape (nodes,)."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
     ring: FloatArray
-    """Scratch of `solid_frequency`, shape (LARGEST_RING, 3)."""
+    """Scratch of `frequency_bound`: sums at the nodes of a star, shape (LARGEST_RING, 3)."""
     ring_nodes: IntArray
-    """Scratch of `solid_frequency`, shape (LARGEST_RING,)."""
+    """Scratch of `frequency_bound`: the nodes of a star, shape (LARGEST_RING,)."""
     listed: IntArray
-    """Scratch of `solid_frequency`, shape (nodes,)."""
+    """Nodes whose bound was written by the last call of `frequency_bound`, shape (nodes,)."""
     raised: IntArray
-    """Scratch of `solid_frequency`, shape (nodes,)."""
+    """Scratch of `frequency_refinement`: nodes given a larger weight, shape (nodes,)."""
     used: IntCell
     """Number of slots of the pool in use."""
     every: IntArray
-    """0, 1, 2 ...: the list of all blocks, or of all nodes or tetrahedra."""
+    """The list 0, 1, 2 ... of all blocks, of all nodes, or of all tetrahedra."""
     volume: FloatArray
     """Scratch: signed volume of tetrahedron t now [m3] at 8 + t; the first eight are 0."""
     growth: FloatArray
-    """Scratch of `strained`: how far tetrahedron t is stretched, at 8 + t."""
+    """Scratch of `strained_frequency`: growth of the faces of tetrahedron t, at 8 + t."""
     pressure: FloatArray
     """Scratch: lam (J - a) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
@@ -131,7 +135,7 @@ def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
 
     Args:
         modulus: What springs leave to it, lam - mu.
-        averaged: Whether all but `OWN_SHARE` of it acts on averaged volumes; if not, nothing does.
+        averaged: Whether all but `OWN_SHARE` of it acts on averaged volumes; if not, none of it.
     """
     return _law(0.0, modulus, 1.0, averaged, OWN_SHARE)
 
@@ -142,10 +146,10 @@ def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0
 
 
 def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
-    """Return empty rows for that many nodes and tetrahedra."""
+    """Return empty rows with room for that many nodes, tetrahedra and slots."""
     capacity = WIDTH * n_blocks(n_tetrahedra)
     shape = aligned(8 * capacity)
-    shape[:] = 1.0  # of tetrahedra not in use: any, so that nothing is divided by 0
+    shape[:] = 1.0  # for tetrahedra not in use: any value that avoids division by 0
     return Solid(
         law=law,
         nodes=aligned(4 * capacity, np.int32),
@@ -184,7 +188,7 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
 
 
 def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
-    """Return the slots that rows of that many nodes and tetrahedra take, and as many to spare."""
+    """Return the slots that rows of that many nodes and tetrahedra take, twice over."""
     return 2 * (4 * n_tetrahedra + WIDTH * n_nodes) + STAR_POOL_MARGIN
 
 
@@ -214,7 +218,7 @@ def corner_place(t: int, k: int) -> int:
 
 @kernel
 def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> None:
-    """Write the shapes of the first `n` of `tetrahedra` anew."""
+    """Write the rest shapes of the first `n` of `tetrahedra`."""
     for i in range(n):
         t = tetrahedra[i]
         for k in range(4):
@@ -246,10 +250,17 @@ def rest_normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
 def build_stars(
     solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int, around: IntArray
 ) -> int:
-    """Write the rows of the first `n` of `nodes` anew; return how many it wrote.
+    """Write the rows of the first `n` of `nodes`; return how many were written.
 
-    Fewer than `n` means that the pool is full: give it room and go on from there. The shapes of the
-    tetrahedra around them must be up to date. `around` is scratch of shape (LARGEST_STAR,).
+    If fewer than `n` were, the pool is full: enlarge it and continue from there.
+
+    Args:
+        solid: Rows are written; the shapes of the tetrahedra around the nodes are up to date.
+        body: The body.
+        visits: For searches.
+        nodes: The nodes.
+        n: How many of them.
+        around: Scratch, shape (LARGEST_STAR,).
     """
     for i in range(n):
         if solid.used + STAR_POOL_MARGIN > len(solid.corner):
@@ -283,11 +294,13 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
 
 @kernel
 def tetrahedron_of_slot(solid: Solid, slot: int) -> int:
-    """Return the tetrahedron that a slot of a row names."""
-    return solid.around[slot] - WIDTH
+    """Return the tetrahedron of a slot of a row."""
+    t: int = solid.around[slot] - WIDTH
+    return t
 
 
 @kernel
 def corner_of_slot(solid: Solid, slot: int) -> int:
-    """Return which of its four nodes the node is."""
-    return solid.corner[slot] // (3 * WIDTH) % 4
+    """Return which of the four corners of its tetrahedron a slot of a row is."""
+    corner: int = solid.corner[slot] // (3 * WIDTH) % 4
+    return corner

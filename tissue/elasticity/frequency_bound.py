@@ -1,4 +1,4 @@
-"""A bound on the angular frequencies of a solid at rest, node by node: what limits the time step.
+"""A bound on the angular frequencies of a solid at rest, at each node: it limits the time step.
 
 Each energy is a square |sum of L_a u_a|^2 over the nodes a of a tetrahedron, or, where volumes are
 averaged, over those of all tetrahedra around a node. For any positive numbers r_a
@@ -10,10 +10,9 @@ sum u_b . N_b u_b: no mode is faster than the largest w^2 = |N_b| / m_b. It is I
 point masses, with the mass of a node shared among the elements around it.
 
 With r_a = |L_a| / sqrt(m_a) the bound is 10 to 45 % above the truth on meshes after cuts;
-`tissue.elasticity.frequency_refinement` finds better numbers where it is highest. That of each
-tetrahedron by itself
-with a quarter of its own mass, 2 c_p sqrt(sum of 1 / altitude^2), is up to 7 times above: a sliver
-has next to no mass, but it shares its nodes with tetrahedra that have.
+`tissue.elasticity.frequency_refinement` finds better r_a where it is highest. The bound of each
+tetrahedron by itself with a quarter of its own mass, 2 c_p sqrt(sum of 1 / altitude^2), is up to 7
+times above: a sliver has next to no mass, but it shares its nodes with tetrahedra that have.
 
 A fixed node does not move: it counts as infinitely heavy.
 """
@@ -35,19 +34,26 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 STALE = 2.0
-"""Mass over the one that its weight is of, or the inverse, at which a node gets another weight. Any
-weight is right, that of the mass now is near the best; but another weight changes the bound two
-rings further. Nodes that were split again and again made the bound twice too high without."""
+"""Factor by which the mass of a node may differ from the mass that its weight was computed from.
+Any weight gives a bound, and that of the mass now is near the best; but another weight changes the
+bound two rings further. If weights never change, nodes that were split several times make the bound
+twice too high."""
 
 
 @kernel
 def bound_solid_frequencies(
     solid: Solid, body: Body, visits: Visits, nodes: IntArray, n: int
 ) -> int:
-    """Write the bound on w^2 at the first `n` of `nodes`, and at others that feel them, anew.
+    """Write the bound on w^2 at `nodes`, and at others that depend on them; return at how many.
 
-    Return at how many; they are listed in `solid.listed`. The rows and the masses of `nodes` must
-    be up to date.
+    These nodes are listed in `solid.listed`.
+
+    Args:
+        solid: Bounds and weights are written; the rows of `nodes` are up to date.
+        body: Masses, which are up to date, and fixed nodes.
+        visits: For searches.
+        nodes: The nodes.
+        n: How many of them.
     """
     listed, n_listed = solid.listed, 0
     for i in range(n):
@@ -61,10 +67,17 @@ def bound_solid_frequencies(
 
 @kernel
 def bound_around(solid: Solid, body: Body, visits: Visits, listed: IntArray, n: int) -> int:
-    """Write the bound of the first `n` of `listed`, and of their neighbours, anew.
+    """Write the bound at the first `n` of `listed` and at their neighbours, which are appended.
 
-    The neighbours are appended; return how many it lists now. What depends on a weight that changed
-    is within the first `n`.
+    Args:
+        solid: Bounds are written.
+        body: Masses and fixed nodes.
+        visits: For searches.
+        listed: Nodes, the first `n` of which include all whose dilatation term has changed.
+        n: How many of them.
+
+    Returns:
+        How many nodes are listed now.
     """
     if solid.law.lam_of_nodes != 0.0:
         for i in range(n):
@@ -77,7 +90,7 @@ def bound_around(solid: Solid, body: Body, visits: Visits, listed: IntArray, n: 
 
 @kernel
 def _reweighted(solid: Solid, body: Body, node: int) -> bool:
-    """Return whether the node got another weight."""
+    """Give a node another weight if its mass has changed much; return whether it did."""
     if body.fixed[node]:
         return False
     mass = body.masses[node]
@@ -90,7 +103,15 @@ def _reweighted(solid: Solid, body: Body, node: int) -> bool:
 
 @kernel
 def with_these(visits: Visits, listed: IntArray, n_listed: int, nodes: IntArray, n: int) -> int:
-    """Add the first `n` of `nodes` to a list unless they are there; return how many it has."""
+    """Add nodes to a list unless they are in it; return its length.
+
+    Args:
+        visits: For marks.
+        listed: The list.
+        n_listed: Its length.
+        nodes: Nodes to add.
+        n: How many of them.
+    """
     _mark_listed(visits, listed, n_listed)
     for i in range(n):
         n_listed = _list(visits, listed, n_listed, nodes[i])
@@ -99,7 +120,7 @@ def with_these(visits: Visits, listed: IntArray, n_listed: int, nodes: IntArray,
 
 @kernel
 def with_neighbours(solid: Solid, visits: Visits, listed: IntArray, n: int) -> int:
-    """Add the neighbours of the first `n` nodes, all there are, to a list; return how many then."""
+    """Add the neighbours of the `n` nodes of a list to it; return its new length."""
     _mark_listed(visits, listed, n)
     n_listed = n
     for i in range(n):
@@ -120,7 +141,7 @@ def _mark_listed(visits: Visits, listed: IntArray, n: int) -> None:
 
 @kernel
 def _list(visits: Visits, listed: IntArray, n: int, node: int) -> int:
-    """Add a node to a list of `n` unless it is marked; return how many it has."""
+    """Add a node to a list of length `n` unless it is marked; return its new length."""
     if visits.nodes[node] == visits.epoch:
         return n
     visits.nodes[node] = visits.epoch
@@ -130,7 +151,7 @@ def _list(visits: Visits, listed: IntArray, n: int, node: int) -> int:
 
 @kernel
 def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> None:
-    """Write the sum of r_b of the averaged volume of a node, per what |L_b| is without lam.
+    """Write the factor of the averaged volume of a node in the bounds of the nodes around it.
 
     The averaged volume V_a J changes by the sum of C_b . u_b, C_b = sum of V grad N_b / 4 over the
     tetrahedra around node a. Its energy is lam / (2 V_a) times the square of that.
@@ -172,7 +193,8 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     if weight == 0.0:
         return 0.0
     mu = 0.75 * solid.law.mu
-    # What of lam is not averaged, at small strain. Where it is negative, less of it is still above.
+    # The part of lam that is not averaged, at small strain. Where it is negative it is limited: the
+    # bound still holds.
     lam = max(solid.law.lam_of_tetrahedra - 5.0 / 6.0 * mu, -2.0 / 3.0 * mu)
     averaged = solid.law.lam_of_nodes != 0.0
     isotropic, stiffness = 0.0, nothing_symmetric()
@@ -204,4 +226,5 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
         if length > 0.0:
             c = solid.dilatation[solid.ring_nodes[i]] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
-    return (isotropic + largest_eigenvalue(stiffness)) / body.masses[node]
+    bound: float = (isotropic + largest_eigenvalue(stiffness)) / body.masses[node]
+    return bound

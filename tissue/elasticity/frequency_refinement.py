@@ -1,13 +1,13 @@
 """Weights with which the highest bound on the frequencies of a solid is near the truth.
 
 The bound of `tissue.elasticity.frequency_bound` holds for any positive weights x of the nodes, as
-the largest
-ratio (B x)_b / x_b does for a matrix B without negative entries, whose own largest eigenvalue is
-the least there is (Collatz and Wielandt). The power iteration x <- B x lowers that ratio in each
-round; here only nodes near the worst take part, for no other sets the time step. A mode that is
-fast lives on one or two nodes, and they are given a larger share of it than their masses say.
+the largest ratio (B x)_b / x_b does for a matrix B without negative entries, whose own largest
+eigenvalue is the least such ratio (Collatz and Wielandt). The power iteration x <- B x lowers the
+ratio in each round. Here only nodes near the worst take part, since the others do not limit the
+time step. A fast mode is concentrated on one or two nodes, which get a larger weight than by their
+mass.
 
-On an organ after cuts that brings the bound from 1.28 to 1.06 times the highest frequency there is.
+On an organ after cuts that lowers the bound from 1.28 to 1.06 times the highest frequency.
 """
 
 from tissue.core.jit import kernel
@@ -17,30 +17,30 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 ROUNDS = 6
-"""Rounds at most. In the organ they get within 2 % of the least bound there is."""
+"""Rounds at most. In the organ the result is within 2 % of the least possible bound."""
 
 NEAR_WORST = 0.64
-"""Bound on w^2 over the highest, above which a node is weighed anew. Nearer to 1 takes more rounds,
-further from it more nodes."""
+"""Share of the highest bound on w^2 above which a node gets another weight. Nearer to 1 takes more
+rounds, further from it more nodes."""
 
 WORTH_IT = 0.98
-"""A round that leaves more than that of the highest bound on w^2 is the last: in a regular mesh all
-nodes are alike, and there is nothing to gain."""
+"""Ratio of the highest bound on w^2 after and before a round above which the round is the last: in
+a regular mesh all nodes are alike, and there is nothing to gain."""
 
 
 @kernel
 def tighten(solid: Solid, body: Body, visits: Visits, n_listed: int, allowed: float) -> int:
-    """Weigh the worst of the first `n_listed` of `solid.listed` anew, until they are `allowed`.
+    """Change the weights of the worst nodes of `solid.listed` until their bounds are `allowed`.
 
     Args:
         solid: Weights and bounds are written.
         body: For the masses.
         visits: For searches.
-        n_listed: Nodes whose bound may be above `allowed`; other nodes are not.
-        allowed: Bound on w^2 that the body has elsewhere [1/s2]: to lower it further is no use.
+        n_listed: Nodes listed; the bound of other nodes is not above `allowed`.
+        allowed: Bound on w^2 that the rest of the body has [1/s2]; lower bounds are of no use.
 
     Returns:
-        How many nodes `solid.listed` has with those whose bound has changed.
+        Length of `solid.listed` with all nodes whose bound has changed.
     """
     listed, raised = solid.listed, solid.raised
     worst = _worst(solid, n_listed)

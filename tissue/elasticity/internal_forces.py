@@ -1,7 +1,7 @@
-"""What makes tissue elastic and viscous, and the force on a node that follows from it.
+"""Elastic and viscous forces on a node.
 
-Springs along the edges, tetrahedra as elements of a solid, or both: the law of the material says
-which. Dampers lie along the edges under either law.
+The law of the material decides whether springs along the edges, tetrahedra as elements of a solid,
+or both are elastic. Dampers lie along the edges under either law.
 """
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -17,10 +17,12 @@ from tissue.mesh.body import Body
 
 
 class Elastic(Arrays):
-    """All that forces inside the body follow from."""
+    """All that forces inside the body are computed from."""
 
     springs: Springs
+    """Springs along the edges; the dampers have their stiffness."""
     solid: Solid
+    """Tetrahedra as elements; empty where springs alone are elastic."""
     has_springs: IntCell
     """1 if springs along the edges pull, else 0."""
     has_tetrahedra: IntCell
@@ -57,7 +59,15 @@ def internal_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Return the force of the body on one of its nodes, elastic and viscous [N], after `deform`."""
+    """Return the elastic and viscous force on a node [N], after `deform` at the same positions.
+
+    Args:
+        elastic: Springs and elements.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness of the dampers [s].
+    """
     springs = elastic.springs
     total = point_of(0.0, 0.0, 0.0)
     if not elastic.has_springs:
@@ -80,13 +90,21 @@ def viscous_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Return the viscous part of the force on a node [N]; it is linear in the velocities."""
+    """Return the viscous part of the force on a node [N], which is linear in the velocities.
+
+    Args:
+        elastic: The dampers.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness of the dampers [s].
+    """
     return damping_force(elastic.springs, node, positions, velocities, retardation_time)
 
 
 @kernel
 def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
-    """Write the bound at the first `n` of `nodes`: two stiffnesses together bound their sum."""
+    """Write the bound on w^2 at the first `n` of `nodes`: that of springs plus that of elements."""
     for i in range(n):
         node = nodes[i]
         bound = 0.0
@@ -99,7 +117,7 @@ def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
 
 @kernel
 def elastic_energy(elastic: Elastic, body: Body) -> float:
-    """Return the elastic energy of the body as it is, less that at rest [J]."""
+    """Return the elastic energy of the body now, less that at rest [J]."""
     energy = 0.0
     if elastic.has_springs:
         energy += spring_energy(elastic.springs, body)

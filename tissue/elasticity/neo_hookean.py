@@ -9,8 +9,8 @@ and the cofactors n_1 = d_2 x d_3, n_2 = d_3 x d_1, n_3 = d_1 x d_2, the forces 
 the tetrahedron, or the mean of those at its nodes, where J is averaged over the tetrahedra around
 the node: the exact gradient of the energy either way.
 
-Three loops, each over any list: volumes of blocks, pressures of nodes, forces of blocks; then the
-force on a node is the sum over its row. Threads may share a loop, each a part of its list.
+Three loops, each over a list: volumes of blocks, pressures of nodes, forces of blocks; then the
+force on a node is the sum over its row. Threads may share a loop, each taking a part of its list.
 """
 
 import math
@@ -49,11 +49,19 @@ def solid_forces(
     nodes: IntArray,
     n_nodes: int,
 ) -> None:
-    """Do all three loops, over the first of `blocks` and of `nodes`: see `solid_force`.
+    """Run all three loops, so that `solid_force` gives the force on a node.
 
-    For forces on some nodes only, `blocks` are those of the tetrahedra around them; and where
-    volumes are averaged, `nodes` are the nodes of those tetrahedra, and `solid.volume` is up to
-    date around all of these.
+    For the forces on some nodes only, `blocks` are those of the tetrahedra around them. Where
+    volumes are averaged, `nodes` are then the nodes of those tetrahedra, and `solid.volume` must be
+    up to date around all of these.
+
+    Args:
+        solid: Volumes, pressures and forces are written.
+        positions: Positions of the nodes [m].
+        blocks: Blocks of tetrahedra.
+        n_blocks: How many of them.
+        nodes: Nodes whose pressure is needed.
+        n_nodes: How many of them.
     """
     if has_averaged_volumes(solid):
         volumes(solid, positions, blocks, 0, n_blocks)
@@ -79,7 +87,15 @@ def has_averaged_volumes(solid: Solid) -> bool:
 
 @kernel
 def volumes(solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, end: int) -> None:
-    """Write the signed volumes in `blocks[begin:end]` at `positions` [m] to `solid.volume`."""
+    """Write the signed volumes of tetrahedra to `solid.volume`.
+
+    Args:
+        solid: Written.
+        positions: Positions of the nodes [m].
+        blocks: Blocks of tetrahedra.
+        begin: First block, as an index in `blocks`.
+        end: End of the blocks.
+    """
     for i in range(begin, end):
         block = blocks[i]
         d1, d2, d3 = edges(solid, positions, block)
@@ -99,7 +115,15 @@ def pressures(solid: Solid, nodes: IntArray, begin: int, end: int) -> None:
 def corner_forces(
     solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, end: int
 ) -> None:
-    """Write the forces on the corners of `blocks[begin:end]` to `solid.forces`."""
+    """Write the forces on the corners of tetrahedra to `solid.forces`.
+
+    Args:
+        solid: Written; volumes and pressures are up to date where volumes are averaged.
+        positions: Positions of the nodes [m].
+        blocks: Blocks of tetrahedra.
+        begin: First block, as an index in `blocks`.
+        end: End of the blocks.
+    """
     law = solid.law
     for i in range(begin, end):
         block = blocks[i]
@@ -181,7 +205,7 @@ def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
 
 @inlined
 def _volume_around(solid: Solid, node: int) -> float:
-    """Return a quarter of each tetrahedron around the node, as `volumes` left them [m3]."""
+    """Return a quarter of the volume of the tetrahedra around a node, from `solid.volume` [m3]."""
     total = 0.0
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
@@ -226,7 +250,8 @@ def _gradient_squared(solid: Solid, positions: FloatArray, t: int) -> float:
         + solid.shape[shape_place(t, 4)] * dot(d1, d3)
         + solid.shape[shape_place(t, 5)] * dot(d2, d3)
     )
-    return (squares + 2.0 * products) * solid.shape[shape_place(t, PER_VOLUME)]
+    squared: float = (squares + 2.0 * products) * solid.shape[shape_place(t, PER_VOLUME)]
+    return squared
 
 
 @kernel

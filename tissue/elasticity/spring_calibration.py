@@ -1,10 +1,10 @@
-"""What springs on a given mesh are really like, and springs that are as stiff as asked for.
+"""The elastic constants of springs on a given mesh, and springs as stiff as asked for.
 
 No choice of stiffnesses makes springs along the edges of an irregular mesh an exact elastic body
 (Baudet et al. 2009 for van Gelder's): they are off by some 20 % in Young's modulus, have a
 Poisson's ratio of their own, and are stiffer along some directions than along others. How much
-depends on the mesh, so it is measured on the mesh: in six unit strains at small amplitude, as one
-would test a specimen of the material inside.
+depends on the mesh, so it is measured on the mesh: in six unit strains at small amplitude, as a
+specimen would be tested.
 """
 
 from dataclasses import replace
@@ -36,14 +36,14 @@ STRAINS = np.stack([_unit_strain(*pair) for pair in PAIRS])
 that strains are vectors of an orthonormal basis and the stiffness is a matrix in it."""
 
 SOLVED = 1e-9
-"""Relative residual at which the interior counts as at rest: the moduli are then right to 1e-8 or
-better, far below what a mesh leaves undecided."""
+"""Relative residual at which the interior counts as at rest: the moduli are then exact to 1e-8 or
+better, far below the error of a mesh."""
 
 CALIBRATED = 1e-4
-"""Relative error in Young's modulus that calibration leaves."""
+"""Largest relative error in Young's modulus after calibration."""
 
 MOST_TRIALS = 30
-"""Trials after which calibration gives up; with the secant method it takes four or five."""
+"""Trials of calibration at most; the secant method takes four or five."""
 
 
 class Effective(NamedTuple):
@@ -52,7 +52,7 @@ class Effective(NamedTuple):
     young_modulus: float
     """Stress over strain of a bar cut from the body along an axis [Pa]."""
     poisson_ratio: float
-    """How much the bar narrows, per stretch."""
+    """Transverse contraction of the bar over its extension."""
     zener_ratio: float
     """Shear modulus over that of an isotropic body which is as stiff along the axes: 1 if equal."""
 
@@ -63,10 +63,10 @@ class SpringError(NamedTuple):
     asked: Effective
     """The material's own constants."""
     affine: Effective
-    """Every node follows the strain, and shear is prevented: the bound from above."""
+    """Constants if every node follows the strain and shear is prevented: an upper bound."""
     relaxed: Effective
-    """The surface follows the strain, the nodes inside settle, and the bar may shear: as springs
-    behave in the engine."""
+    """Constants if the surface follows the strain, nodes inside are in equilibrium, and the bar may
+    shear: as springs behave in the engine."""
     softest: float
     """Young's modulus along the softest direction, relaxed [Pa]."""
     stiffest: float
@@ -79,14 +79,14 @@ class SpringError(NamedTuple):
 
 
 def spring_error(mesh: TetrahedralMesh, material: Material) -> SpringError:
-    """Return what the material's springs, with their volume term, are like on this mesh.
+    """Return the elastic constants of the material's springs, with their volume term, on this mesh.
 
-    Exact for the given mesh, up to `SOLVED`. It takes a second for 5,000 tetrahedra. For the
-    neo-Hookean law too, whose tetrahedra have no error: an affine strain is a strain.
+    Exact for the given mesh, up to `SOLVED`. It takes a second for 5,000 tetrahedra. Under the
+    neo-Hookean law there is no error.
 
     Args:
         mesh: The body at rest.
-        material: What it is meant to be.
+        material: The material asked for.
     """
     stiffness = stiffness_matrix(mesh, material)
     affine_motion = np.einsum("sij,nj->sni", STRAINS, mesh.positions).reshape(6, -1)
@@ -110,8 +110,8 @@ def calibrated(mesh: TetrahedralMesh, material: Material) -> Material:
     """Return the material with springs such that this mesh has the Young's modulus asked for.
 
     One factor on all springs (`Material.spring_calibration`), found by the secant method on the
-    relaxed modulus of `spring_error`. What springs cannot have, one Poisson's ratio for all meshes
-    and no direction, is not mended.
+    relaxed modulus of `spring_error`. The Poisson's ratio of the mesh and its anisotropy stay as
+    they are.
 
     Raises:
         ValueError: the law has no springs; or no factor gives this modulus, because the volume term

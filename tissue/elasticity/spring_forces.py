@@ -1,7 +1,7 @@
 """Forces of springs and dampers on a node: its row, eight slots at a time.
 
-Each spring is evaluated from both its ends, with the same bits, so action is reaction; what is
-summed up at a node is summed in the order of its row, by whatever thread.
+Each spring is evaluated at both its ends, with the same bits, so that action is reaction. The sum
+at a node is taken in the order of its row, on any thread.
 """
 
 from tissue.core.array_types import FloatArray
@@ -20,8 +20,8 @@ from tissue.core.simd import (
 from tissue.elasticity.springs import Springs
 
 NO_LENGTH = 1e-300
-"""Added to squared lengths [m2]: far below any, it keeps slots that hold no spring, and nodes that
-coincide, from a division by zero."""
+"""Added to squared lengths [m2], far below any: it prevents division by zero in slots without a
+spring and between nodes that coincide."""
 
 
 @inlined
@@ -47,7 +47,15 @@ def damping_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Return the force of the dampers along springs on a node [N]: retardation time times k l'."""
+    """Return the force of the dampers on a node [N]: retardation time times k l' along each spring.
+
+    Args:
+        springs: The rows.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness [s].
+    """
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     fx = fy = fz = lanes(0.0)
@@ -71,7 +79,15 @@ def elastic_and_damping_force(
     velocities: FloatArray,
     retardation_time: float,
 ) -> Point:
-    """Return the sum of `elastic_force` and `damping_force` in one pass over the row [N]."""
+    """Return the sum of `elastic_force` and `damping_force` [N], in one pass over the row.
+
+    Args:
+        springs: The rows.
+        node: The node.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        retardation_time: Viscosity per stiffness [s].
+    """
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     time, one = lanes(retardation_time), lanes(1.0)

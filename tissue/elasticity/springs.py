@@ -1,10 +1,10 @@
-"""Masses at nodes and springs along edges, as one row of neighbours a node.
+"""Masses at nodes and springs along edges, as one row of neighbours for each node.
 
-Each spring stands in the rows of both its ends, so that the force on a node is a gather: no
-scatter, no race, the same bits for any number of threads. The rows follow from the tetrahedra
-around the node alone; after a cut only the rows of the nodes that it touched are written anew.
-A row is filled up to a multiple of eight with springs of no stiffness from the node to itself, so
-that forces are evaluated eight at a time (`spring_forces`).
+Each spring is in the rows of both its ends, so that the force on a node is a gather: no scatter, no
+race, the same bits for any number of threads. A row depends only on the tetrahedra around its node;
+after a cut only the rows of touched nodes are written again. A row is padded to a multiple of eight
+with springs without stiffness from the node to itself, so that forces are evaluated eight at a time
+(`spring_forces`).
 
 Stiffness of an edge (van Gelder): k = E * (volume of the tetrahedra around it) / (rest length)^2.
 Pull of a spring on its ends: k (l - l0).
@@ -31,22 +31,23 @@ SPRING_POOL_MARGIN = LARGEST_STAR + WIDTH
 
 
 class Springs(Arrays):
-    """The rows, and what follows from them for each node."""
+    """Rows of springs in one pool, and bounds on the frequency of each node."""
 
     first: IntArray
     """Where each node's row begins in the pool, shape (capacity,)."""
     room: IntArray
-    """Slots that the row has, shape (capacity,)."""
+    """Slots reserved for each node's row, shape (capacity,)."""
     count: IntArray
-    """Slots that it uses, shape (capacity,)."""
+    """Slots that each node's row uses, shape (capacity,)."""
     neighbour: SlotArray
-    """Other end of the spring, shape (pool,)."""
+    """Other end of each spring, shape (pool,)."""
     stiffness: FloatArray
-    """k [N/m], shape (pool,)."""
+    """Stiffness k of each spring [N/m], shape (pool,)."""
     rest_pull: FloatArray
-    """k times rest length [N], shape (pool,)."""
+    """Stiffness times rest length of each spring [N], shape (pool,)."""
     stiffness_per_mass: FloatArray
-    """Largest eigenvalue of the stiffness that holds the node in place, per mass [1/s2]."""
+    """Largest eigenvalue of the stiffness of all springs at each node, per mass [1/s2], shape
+    (capacity,)."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (capacity,)."""
     used: IntCell
@@ -88,10 +89,19 @@ def build_rows(
     young_modulus: float,
     around: IntArray,
 ) -> int:
-    """Write the rows and masses of the first `n` of `nodes` anew; return how many it wrote.
+    """Write the rows and masses of the first `n` of `nodes`; return how many were written.
 
-    Fewer than `n` means that the pool is full: give it room and go on from there. `around` is
-    scratch of shape (LARGEST_STAR,).
+    If fewer than `n` were, the pool is full: enlarge it and continue from there.
+
+    Args:
+        body: Masses are written.
+        visits: For searches.
+        springs: Rows are written.
+        nodes: The nodes.
+        n: How many of them.
+        density: Density of the tissue [kg/m3].
+        young_modulus: Young's modulus in van Gelder's formula [Pa].
+        around: Scratch, shape (LARGEST_STAR,).
     """
     for i in range(n):
         if springs.used + SPRING_POOL_MARGIN > len(springs.neighbour):
@@ -166,18 +176,19 @@ def _stiffness_per_mass(body: Body, springs: Springs, node: int) -> float:
         d = sub(vec3(body.rest, springs.neighbour[slot]), here)
         c = springs.stiffness[slot] / (d.x * d.x + d.y * d.y + d.z * d.z)
         stiffness = add_square(stiffness, c, d)
-    return largest_eigenvalue(stiffness) / body.masses[node]
+    stiffness_per_mass: float = largest_eigenvalue(stiffness) / body.masses[node]
+    return stiffness_per_mass
 
 
 @kernel
 def bound_frequencies(body: Body, springs: Springs, nodes: IntArray, n: int) -> None:
     """Write the bound on w^2 at the first `n` of `nodes`, whose rows are up to date.
 
-    Let every spring have a share of the mass of each end, in proportion to its stiffness: of node a
-    k / s_a, where s_a is the largest eigenvalue of S_a. Then the mass is more than used up in no
-    direction, and by Irons' theorem no mode of the body is faster than the fastest of the springs
-    alone, with its masses: w^2 = k (s_a / (k m_a) + s_b / (k m_b)) = s_a / m_a + s_b / m_b.
-    A fixed node is as one of infinite mass.
+    Every spring is given a share of the mass of each end, in proportion to its stiffness: the share
+    k / s_a of node a, where s_a is the largest eigenvalue of S_a. In no direction do the shares add
+    up to more than the mass. So by Irons' theorem no mode of the body is faster than the fastest
+    spring alone with its masses: w^2 = k (s_a / (k m_a) + s_b / (k m_b)) = s_a / m_a + s_b / m_b. A
+    fixed node counts as infinitely heavy.
     """
     for i in range(n):
         node = nodes[i]

@@ -1,4 +1,4 @@
-"""The body at small strain, as matrices: what calibration and comparison with theory need.
+"""The body at small strain as matrices, for calibration and comparison with theory.
 
 The forces of the engine are nonlinear and never stored as a matrix. Here is their derivative at
 rest, assembled with NumPy: force = -K displacement, exactly that of the engine's kernels to first
@@ -20,7 +20,7 @@ from tissue.elasticity.finite_elements import OWN_SHARE
 from tissue.material import Material
 from tissue.types import TetrahedralMesh
 
-if TYPE_CHECKING:  # imported where it is used: half a second that no cut has to wait for
+if TYPE_CHECKING:  # imported where it is used: it takes half a second
     from scipy.sparse import csr_array
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
@@ -28,25 +28,25 @@ _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 
 LOCAL_DILATATION = 5.0 / 6.0
 """Share of mu that the law of Smith, de Goes and Kim takes from the dilatation of the tetrahedron
-itself and gives back to that which is averaged: the two cancel where dilatation is uniform."""
+itself and adds to the averaged dilatation: the two cancel where dilatation is uniform."""
 
 
 class EdgeSprings(NamedTuple):
     """The springs of a mesh, each once."""
 
     ends: IntArray
-    """Nodes, the lower first, shape (n_springs, 2)."""
+    """Nodes at the ends of each spring, the lower first, shape (n_springs, 2)."""
     stiffness: FloatArray
-    """[N/m], shape (n_springs,)."""
+    """Stiffness of each spring [N/m], shape (n_springs,)."""
 
 
 class Gradients(NamedTuple):
-    """What differentiates over the tetrahedra of a mesh."""
+    """Gradients of the linear shape functions of the tetrahedra of a mesh, and volumes."""
 
     shape: FloatArray
     """Gradients of the four shape functions [1/m], shape (n_tets, 4, 3)."""
     volume: FloatArray
-    """[m3], shape (n_tets,)."""
+    """Volumes [m3], shape (n_tets,)."""
 
 
 def gradients(mesh: TetrahedralMesh) -> Gradients:
@@ -82,7 +82,7 @@ def stiffness_matrix(
 
     Args:
         mesh: The body at rest.
-        material: What it is made of, and under which law.
+        material: What the body is made of, with its law.
         averaged: Whether dilatation is averaged over nodes, as in the engine; False for plain
             linear tetrahedra, which lock (for comparison).
     """
@@ -106,8 +106,8 @@ def _of_springs(mesh: TetrahedralMesh, springs: EdgeSprings) -> "csr_array":
     """Return the sum of k u u^T, u the unit vector along each spring."""
     ends, stiffness = springs
     span = mesh.positions[ends[:, 1]] - mesh.positions[ends[:, 0]]
-    way = span / np.linalg.norm(span, axis=1, keepdims=True)
-    signed = np.stack([-way, way], axis=1)  # elongation per displacement of the two ends
+    unit = span / np.linalg.norm(span, axis=1, keepdims=True)
+    signed = np.stack([-unit, unit], axis=1)  # elongation per displacement of the two ends
     return _squared(_rows(ends, signed, len(mesh.positions)), stiffness)
 
 
@@ -118,7 +118,7 @@ def _own_dilatation(mesh: TetrahedralMesh) -> "csr_array":
 
 
 def _mean_dilatation(mesh: TetrahedralMesh) -> "csr_array":
-    """Return the same with the dilatation averaged over the tetrahedra around each node [m]."""
+    """Return the Hessian of the sum over nodes of V (div u)^2 / 2, div u averaged at each [m]."""
     from scipy.sparse import csr_array
 
     shape, volume = gradients(mesh)
@@ -148,7 +148,7 @@ def _of_shear(mesh: TetrahedralMesh, mu: float) -> "csr_array":
 
 
 def _at_nodes(mesh: TetrahedralMesh, shares: FloatArray) -> FloatArray:
-    """Return what the corners of tetrahedra add up to at each node."""
+    """Return the sum at each node of the shares of the corners of tetrahedra, shape (n_nodes,)."""
     n_nodes = len(mesh.positions)
     return np.asarray(
         np.bincount(mesh.tetrahedra.ravel(), weights=shares, minlength=n_nodes), float

@@ -1,10 +1,10 @@
-"""How fast tetrahedra swing as they are deformed now: a bound on frequencies beside that at rest.
+"""A bound on the frequencies of tetrahedra as they are deformed now, beside the bound at rest.
 
 Where a tetrahedron is stretched, its faces grow, and pressure acts on a larger face: the stiffness
 against a change of volume grows as the square of the area of the face opposite the node that moves.
-The shear part of the law never gets stiffer than at rest. So w^2 is taken to be that at rest times
-the largest growth of the square of a face, or 1. For random deformations up to twice the length and
-half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the true w^2.
+The shear part of the law never gets stiffer than at rest. So the bound on w^2 is that at rest times
+the largest growth of the square of a face, at least 1. For random deformations up to twice the
+length and half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 times the true w^2.
 """
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -21,7 +21,15 @@ from tissue.elasticity.neo_hookean import edges, shape_of
 def strained_frequency(
     elastic: Elastic, positions: FloatArray, blocks: IntArray, begin: int, end: int
 ) -> float:
-    """Return the largest bound on w^2 at `positions` in `blocks[begin:end]` [1/s2]."""
+    """Return the largest bound on w^2 of tetrahedra as they are deformed [1/s2].
+
+    Args:
+        elastic: The bounds at rest.
+        positions: Positions of the nodes [m].
+        blocks: Blocks of tetrahedra.
+        begin: First block, as an index in `blocks`.
+        end: End of the blocks.
+    """
     nodes = elastic.solid.nodes
     worst = lanes(0.0)
     for i in range(begin, end):
@@ -49,9 +57,15 @@ def strain_frequencies(
     nodes: IntArray,
     n: int,
 ) -> None:
-    """Write the bound at the first `n` of `nodes` as they are now to `elastic.frequency_squared`.
+    """Write the bound on w^2 at nodes as they are deformed to `elastic.frequency_squared`.
 
-    `blocks` hold the tetrahedra around them.
+    Args:
+        elastic: Written.
+        positions: Positions of the nodes [m].
+        blocks: Blocks that hold the tetrahedra around the nodes.
+        n_blocks: How many of them.
+        nodes: The nodes.
+        n: How many of them.
     """
     solid = elastic.solid
     for i in range(n_blocks):
@@ -70,7 +84,7 @@ def strain_frequencies(
 
 @inlined
 def _growth(solid: Solid, positions: FloatArray, block: int) -> Lanes:
-    """Return the growth of the square of the face of each of eight tetrahedra that grew most."""
+    """Return the largest growth of the square of a face of eight tetrahedra, at least 1."""
     d1, d2, d3 = edges(solid, positions, block)
     n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
     n0 = add(n1, add(n2, n3))

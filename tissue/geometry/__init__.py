@@ -1,1 +1,10 @@
-"""Geometry of points, boxes and tetrahedra, without a mesh."""
+"""Geometry without a mesh.
+
+In the order in which they are best read:
+
+    tetrahedron             volumes, altitudes, barycentric weights, 3 x 3 matrices
+    aabb                    boxes whose sides are parallel to the axes
+    exact_predicates        decisions on integer coordinates, without rounding
+    polar_decomposition     the rotation in a deformation
+    connected_components    connected components of a graph
+"""

@@ -1,9 +1,12 @@
-"""`Aabb`: a box whose sides are parallel to the axes."""
+"""`Aabb`: a box whose sides are parallel to the axes.
+
+Lengths are in metres, or in units of the lattice where boxes are made of whole numbers.
+"""
 
 import math
 from typing import NamedTuple
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, store, vec3
 
@@ -12,9 +15,9 @@ class Aabb(NamedTuple):
     """An axis-aligned box."""
 
     low: Vec3
-    """Lowest corner [m]."""
+    """Lowest corner."""
     high: Vec3
-    """Highest corner [m]."""
+    """Highest corner."""
 
 
 @kernel
@@ -35,7 +38,7 @@ def with_point(box: Aabb, p: Vec3) -> Aabb:
 
 @kernel
 def widened(box: Aabb, margin: float) -> Aabb:
-    """Return a box that is larger by `margin` [m] on each side."""
+    """Return a box that is larger by `margin` on each side."""
     low, high = box.low, box.high
     return Aabb(
         Vec3(low.x - margin, low.y - margin, low.z - margin),
@@ -46,19 +49,16 @@ def widened(box: Aabb, margin: float) -> Aabb:
 @kernel
 def overlap(one: Aabb, other: Aabb) -> bool:
     """Whether two boxes have a point in common, if only on their sides."""
-    return (
-        one.low.x <= other.high.x
-        and other.low.x <= one.high.x
-        and one.low.y <= other.high.y
-        and other.low.y <= one.high.y
-        and one.low.z <= other.high.z
-        and other.low.z <= one.high.z
-    )
+    if one.low.x > other.high.x or one.high.x < other.low.x:
+        return False
+    if one.low.y > other.high.y or one.high.y < other.low.y:
+        return False
+    return not (one.low.z > other.high.z or one.high.z < other.low.z)
 
 
 @kernel
 def overlap_within(one: Aabb, other: Aabb, margin: float) -> bool:
-    """Whether a box overlaps the other once that is larger by `margin` [m] on each side."""
+    """Whether a box overlaps the other once that is larger by `margin` on each side."""
     return overlap(one, widened(other, margin))
 
 
@@ -73,3 +73,41 @@ def store_box(low: FloatArray, high: FloatArray, i: int, box: Aabb) -> None:
     """Write the corners of a box to rows `i` of two arrays, shape (n, 3)."""
     store(low, i, box.low)
     store(high, i, box.high)
+
+
+@kernel
+def segment_box(points: FloatArray | IntArray, a: int, b: int) -> Aabb:
+    """Return the box around rows `a` and `b` of an array of points, shape (n, 3)."""
+    return Aabb(
+        Vec3(
+            min(points[a, 0], points[b, 0]),
+            min(points[a, 1], points[b, 1]),
+            min(points[a, 2], points[b, 2]),
+        ),
+        Vec3(
+            max(points[a, 0], points[b, 0]),
+            max(points[a, 1], points[b, 1]),
+            max(points[a, 2], points[b, 2]),
+        ),
+    )
+
+
+@kernel
+def tetrahedron_box(points: FloatArray | IntArray, tetrahedra: IntArray, t: int) -> Aabb:
+    """Return the box around tetrahedron `t`, whose nodes are rows of an array of points."""
+    x_low, x_high = _extent(points, tetrahedra, t, 0)
+    y_low, y_high = _extent(points, tetrahedra, t, 1)
+    z_low, z_high = _extent(points, tetrahedra, t, 2)
+    return Aabb(Vec3(x_low, y_low, z_low), Vec3(x_high, y_high, z_high))
+
+
+@kernel
+def _extent(
+    points: FloatArray | IntArray, tetrahedra: IntArray, t: int, axis: int
+) -> tuple[float, float]:
+    """Return the least and the greatest coordinate of tetrahedron `t` along an axis."""
+    p = points[tetrahedra[t, 0], axis]
+    q = points[tetrahedra[t, 1], axis]
+    r = points[tetrahedra[t, 2], axis]
+    s = points[tetrahedra[t, 3], axis]
+    return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))

@@ -1,11 +1,9 @@
-"""Exact geometric predicates: on which side of a plane is a point, does a segment pierce a
-triangle.
+"""Exact geometric predicates: the side of a plane, whether a segment pierces a triangle.
 
 Decisions are taken on integer coordinates. A `Lattice` covers the body at rest with 2^18 points
 along its longest side; a determinant of coordinate differences below 2^20 fits an int64, so its
-sign is exact.
-Zero counts as positive, and a line is always tested with its ends in the same order, so that all
-elements that share an edge, a face or a line get the same answer.
+sign is exact. Zero counts as positive, and a line is always tested with its ends in the same order,
+so that all elements that share an edge, a face or a line get the same answer.
 """
 
 from typing import NamedTuple

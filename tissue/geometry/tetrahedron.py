@@ -1,5 +1,4 @@
-"""Geometry of tetrahedra: volumes, altitudes, barycentric weights, nearest points, 3 x 3
-matrices."""
+"""Geometry of tetrahedra: volumes, altitudes, barycentric weights, and 3 x 3 matrices."""
 
 import math
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The bytes of a file, read piece by piece, where every piece must be there before it is taken."""
+"""The bytes of a file, read piece by piece; errors name the line of a piece that is missing."""
 
 import re
 import warnings
@@ -11,7 +11,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.mesh.validation import MeshError
 
 MAX_SHOWN = 40
-"""An error quotes this many characters of what it found."""
+"""Characters that an error quotes at most."""
 
 
 class ByteReader:
@@ -20,7 +20,7 @@ class ByteReader:
     def __init__(self, data: bytes) -> None:
         self.data = data
         self.at = 0
-        """The next byte to be read."""
+        """Index of the next byte to be read."""
 
     def fail(self, message: str, at: int | None = None) -> NoReturn:
         """Raise a `MeshError` that names the line of byte `at`, by default the next one."""
@@ -103,7 +103,7 @@ class ByteReader:
 
 
 def count_in(reader: ByteReader, text: str, what: str, at: int | None = None) -> int:
-    """Read a number of things, which cannot be negative, nor more than the file has bytes."""
+    """Return a number of things, which cannot be negative nor exceed the bytes of the file."""
     try:
         count = int(text)
     except ValueError:
@@ -118,20 +118,20 @@ def count_in(reader: ByteReader, text: str, what: str, at: int | None = None) ->
 
 
 def shown(text: bytes | str) -> str:
-    """Quote the beginning of what was found."""
+    """Return the beginning of a text in quotes, for messages."""
     if isinstance(text, bytes):
         text = text[: MAX_SHOWN + 1].decode("latin-1")
     return "nothing" if not text else repr(text[:MAX_SHOWN]) + ("..." * (len(text) > MAX_SHOWN))
 
 
 def as_floats(values: npt.NDArray[np.generic]) -> FloatArray:
-    """Return an own copy in double precision."""
+    """Return a copy in double precision."""
     with np.errstate(invalid="ignore"):  # a signalling NaN in single precision
         return values.astype(np.float64)
 
 
 def as_ints(values: npt.NDArray[np.generic]) -> IntArray:
-    """Return an own copy as 64-bit whole numbers; what is too large becomes the largest."""
+    """Return a copy as 64-bit whole numbers; larger ones become the largest."""
     if values.dtype.kind == "u" and values.dtype.itemsize == 8:
         values = np.minimum(values, np.iinfo(np.int64).max)
     return values.astype(np.int64)

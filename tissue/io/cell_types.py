@@ -1,4 +1,4 @@
-"""Cells of many kinds, and whether the tetrahedra among them are all that one needs."""
+"""Types of cells, and a clear error where a mesh is not made of tetrahedra with four nodes."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -10,30 +10,32 @@ from tissue.mesh.validation import MeshError
 
 
 class CellType(NamedTuple):
-    """A kind of cell."""
+    """A type of cell."""
 
     name: str
-    """In the plural."""
+    """Name in messages, in the plural."""
     dimension: int
+    """Dimension: 0 for points to 3 for volumes."""
     n_nodes: int
-    """0: varies."""
+    """Number of nodes; 0 where it varies."""
 
 
 def expect_tetrahedra(
-    counts: Mapping[int, int], kinds: Mapping[int, CellType], tetrahedron: int
+    counts: Mapping[int, int], cell_types: Mapping[int, CellType], tetrahedron: int
 ) -> None:
-    """Make sure that there are tetrahedra; points, lines and triangles beside them are ignored.
+    """Raise an error unless there are tetrahedra and no other volumes; other cells are ignored.
 
     Args:
-        counts: How many cells there are of each kind.
-        kinds: The format's numbers of kinds.
-        tetrahedron: The number of the tetrahedron with four nodes.
+        counts: Number of cells of each type, by the format's number of the type.
+        cell_types: The types of cells by the format's numbers.
+        tetrahedron: The format's number of the tetrahedron with four nodes.
 
     Raises:
         MeshError: There are none, or there are other volumes, which would leave holes.
     """
     named = {
-        number: kinds.get(number, CellType(f"cells of type {number}", 3, 0)) for number in counts
+        number: cell_types.get(number, CellType(f"cells of type {number}", 3, 0))
+        for number in counts
     }
     found = ", ".join(f"{counts[number]} {named[number].name}" for number in sorted(counts))
     volumes = [n for n in counts if named[n].dimension == 3 and n != tetrahedron]
@@ -55,16 +57,16 @@ def expect_tetrahedra(
 def uniform_records(
     flat: IntArray, start: int, stride: int, columns: list[int], most: int
 ) -> IntArray:
-    """Return the records from `start` on that agree with the first in `columns`.
+    """Return the records from `start` on that agree with the first one in `columns`.
 
-    Files list cells one by one, each with its kind and size; nearly always the next is like this.
+    Files list cells one by one, each with its type and size, and mostly many of the same in a row.
 
     Args:
-        flat: The records one after another.
-        start: Where the first begins.
-        stride: Its length.
-        columns: The entries of a record that say its kind and size.
-        most: Take no more records than this.
+        flat: The records, one after another.
+        start: Where the first one begins.
+        stride: The length of a record.
+        columns: The entries of a record that hold its type and size.
+        most: Number of records to return at most.
 
     Returns:
         Shape (n_records, stride), or empty where `flat` ends within the first.

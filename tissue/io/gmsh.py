@@ -1,4 +1,4 @@
-"""Gmsh files (`.msh`) of any supported version: the header, and who reads the rest."""
+"""Gmsh files (`.msh`): the header, and the choice of the reader of that version."""
 
 from tissue.io.byte_reader import ByteReader, shown
 from tissue.io.gmsh_1_and_2 import read_gmsh_1, read_gmsh_2

@@ -1,4 +1,4 @@
-"""Gmsh 1.0 (text) and 2.0 to 2.2 (text and binary): every node and element stands by itself."""
+"""Gmsh 1.0 (text) and 2.0 to 2.2 (text and binary): one record for each node and element."""
 
 import numpy as np
 
@@ -67,12 +67,12 @@ def _elements_as_text(
     """Read elements as records of whole numbers.
 
     Args:
-        source: At the line that says how many elements there are.
-        pattern: What ends them.
-        end_name: The same for people.
-        n_before: How many numbers a record has before what has variable length.
-        at_size: Where in the record it says how many there are: of nodes (version 1), of tags
-            before the nodes (version 2).
+        reader: At the line that says how many elements there are.
+        pattern: Regular expression of the line that ends them.
+        end_name: Name of that line in messages.
+        n_before: How many numbers a record has before its part of variable length.
+        at_size: Index in the record of the length of that part: the number of nodes (version 1),
+            or of tags before the nodes (version 2).
     """
     at = reader.at
     n_elements = count_in(reader, reader.line_with_text(), "elements", at)
@@ -84,15 +84,15 @@ def _elements_as_text(
         if start + n_before > len(flat):
             reader.fail(f"expected {n_elements} elements, found {n_read}", at)
         number, size = int(flat[start + 1]), int(flat[start + at_size])
-        kind = element_type(reader, number, at)
+        cell_type = element_type(reader, number, at)
         n_tags = size if at_size == 2 else 0
-        if n_tags < 0 or (at_size == 4 and size != kind.n_nodes):
-            reader.fail(f"{here} ({kind.name}): its number of tags or nodes is {size}", at)
-        stride = n_before + n_tags + kind.n_nodes
+        if n_tags < 0 or (at_size == 4 and size != cell_type.n_nodes):
+            reader.fail(f"{here} ({cell_type.name}): its number of tags or nodes is {size}", at)
+        stride = n_before + n_tags + cell_type.n_nodes
         records = uniform_records(flat, start, stride, [1, at_size], n_elements - n_read)
         if not len(records):
             reader.fail(f"expected {n_elements} elements, found {n_read} and a part of one", at)
-        elements.add(number, records[:, stride - kind.n_nodes :])
+        elements.add(number, records[:, stride - cell_type.n_nodes :])
         start, n_read = start + records.size, n_read + len(records)
     if start != len(flat):
         reader.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
@@ -120,22 +120,22 @@ def _elements_in_binary(reader: ByteReader, byte_order: str) -> Elements:
     while n_read < n_elements:
         header = reader.binary(3, byte_order + "i4", "numbers before a group of elements")
         number, n_here, n_tags = (int(entry) for entry in header)
-        kind = element_type(reader, number)
+        cell_type = element_type(reader, number)
         if not 0 < n_here <= n_elements - n_read or n_tags < 0:
             reader.fail(
                 f"expected at most {n_elements - n_read} elements more, found a group of {n_here} "
                 f"with {n_tags} tags each"
             )
-        stride = 1 + n_tags + kind.n_nodes
-        flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {kind.name}")
-        elements.add(number, as_ints(flat).reshape(n_here, stride)[:, stride - kind.n_nodes :])
+        stride = 1 + n_tags + cell_type.n_nodes
+        flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {cell_type.name}")
+        elements.add(number, as_ints(flat).reshape(n_here, stride)[:, stride - cell_type.n_nodes :])
         n_read += n_here
     _expect_end(reader, "$EndElements")
     return elements
 
 
 def _expect_end(reader: ByteReader, name: str) -> None:
-    """Fail if what was counted is not what is there."""
+    """Fail unless the next line is `name`: there is more than was counted."""
     at = reader.at
     line = reader.line_with_text()
     if line != name:

@@ -1,4 +1,4 @@
-"""Gmsh 4.1, text and binary: nodes and elements stand in blocks, one an entity of the geometry."""
+"""Gmsh 4.1, text and binary: nodes and elements in blocks, one for each entity of the geometry."""
 
 from typing import Protocol
 
@@ -21,7 +21,7 @@ def read_gmsh_4(reader: ByteReader, byte_order: str) -> TetrahedralMesh:
 
 
 class _Section(Protocol):
-    """Numbers of a section in their order, whatever way they are written."""
+    """The numbers of a section in their order, written as text or in binary."""
 
     reader: ByteReader
 
@@ -45,7 +45,7 @@ def _section(reader: ByteReader, name: str, byte_order: str) -> _Section:
 
 
 class _Text:
-    """Numbers written as text."""
+    """The numbers of a section that is written as text."""
 
     def __init__(self, reader: ByteReader, name: str) -> None:
         self.reader = reader
@@ -79,7 +79,7 @@ class _Text:
 
 
 class _Binary:
-    """Numbers as the computer that wrote them holds them."""
+    """The numbers of a section that is written in binary."""
 
     def __init__(self, reader: ByteReader, name: str, byte_order: str) -> None:
         self.reader = reader
@@ -133,9 +133,11 @@ def _elements(section: _Section) -> Elements:
     for _ in range(n_blocks):
         _, _, number = section.ints(3, "numbers before a block of elements").tolist()
         (n_here,) = _counts(section, 1, "elements in a block")
-        kind = element_type(section.reader, number)
-        width = 1 + kind.n_nodes
-        records = section.sizes(n_here * width, f"numbers of {kind.name}").reshape(n_here, width)
+        cell_type = element_type(section.reader, number)
+        width = 1 + cell_type.n_nodes
+        records = section.sizes(n_here * width, f"numbers of {cell_type.name}").reshape(
+            n_here, width
+        )
         elements.add(number, records[:, 1:])
         found += n_here
     section.end()
@@ -145,8 +147,8 @@ def _elements(section: _Section) -> Elements:
 
 
 def _counts(section: _Section, count: int, what: str) -> list[int]:
-    """Take numbers of things, which cannot be negative."""
-    counts = section.sizes(count, what).tolist()
+    """Take `count` numbers of things, which cannot be negative."""
+    counts: list[int] = section.sizes(count, what).tolist()
     if min(counts) < 0:
         section.reader.fail(f"expected the number of {what}, found {min(counts)}")
     return counts

@@ -1,4 +1,4 @@
-"""Gmsh's kinds of elements, and nodes by their tags."""
+"""Gmsh's types of elements, and nodes by their tags."""
 
 import numpy as np
 
@@ -48,14 +48,14 @@ _CELL_TYPES = {
 
 
 class Elements:
-    """The elements read so far: how many of each kind, and the nodes of the tetrahedra."""
+    """The elements read so far: their number by type, and the nodes of the tetrahedra."""
 
     def __init__(self) -> None:
         self._counts: dict[int, int] = {}
         self._tetrahedra: list[IntArray] = []
 
     def add(self, number: int, node_tags: IntArray) -> None:
-        """Take elements of one kind, with the tags of their nodes, shape (n_elements, n_nodes)."""
+        """Add elements of one type, with the tags of their nodes, shape (n_elements, n_nodes)."""
         if len(node_tags):
             self._counts[number] = self._counts.get(number, 0) + len(node_tags)
         if number == _TETRAHEDRON:
@@ -65,7 +65,7 @@ class Elements:
         """Return the tetrahedra between nodes with `tags`, shape (n_nodes,), at `positions`.
 
         Raises:
-            MeshError: There are no tetrahedra, a tag is there twice, or none has it.
+            MeshError: There are no tetrahedra, a tag occurs twice, or no node has the tag.
         """
         expect_tetrahedra(self._counts, _CELL_TYPES, _TETRAHEDRON)
         wanted = np.concatenate(self._tetrahedra)
@@ -73,7 +73,7 @@ class Elements:
         in_order = tags[order]
         twice = np.flatnonzero(in_order[1:] == in_order[:-1])
         if twice.size:
-            raise MeshError(f"node {in_order[twice[0]]} is there twice")
+            raise MeshError(f"node {in_order[twice[0]]} occurs twice")
         at = np.searchsorted(in_order, wanted)
         at[at == len(tags)] = 0
         missing = in_order[at] != wanted if len(tags) else np.ones(wanted.shape, dtype=bool)
@@ -86,7 +86,7 @@ class Elements:
 
 
 def element_type(reader: ByteReader, number: int, at: int | None = None) -> CellType:
-    """Return a kind of element by its number, or fail."""
+    """Return the type of element with Gmsh's number `number`, or fail at byte `at`."""
     if number not in _CELL_TYPES:
         reader.fail(f"expected a type of element that Gmsh knows, found {number}", at)
     return _CELL_TYPES[number]

@@ -21,21 +21,22 @@ READERS: dict[str, Callable[[bytes], TetrahedralMesh]] = {
     ".vtk": read_vtk,
     ".vtu": read_vtu,
 }
-"""Suffix to reader."""
+"""Reader of the files with each suffix."""
 
 SURFACE_SUFFIXES = (".stl", ".obj", ".ply", ".off", ".vtp", ".gltf", ".glb", ".3mf")
-"""Files that hold surfaces only."""
+"""Suffixes of files that hold surfaces only."""
 
 RENUMBER_FROM = 100_000
-"""Tetrahedra from which on another order pays. Smaller bodies stay in the cache in any order; at
-600,000 a step of a body in random order, as mesh generators leave it, takes 1.7 times as long."""
+"""Tetrahedra from which another order pays. Smaller bodies stay in the cache in any order; at
+600,000 a step of a body in random order, as mesh generators write it, takes 1.7 times as long."""
 
 MAX_FILE_BYTES = 2**31
-"""A larger file holds tens of millions of tetrahedra, which no computer cuts while one waits."""
+"""Size of the largest file [bytes]: a larger one holds tens of millions of tetrahedra, too many to
+cut at an interactive rate."""
 
 
 def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMesh:
-    """Read a tetrahedral mesh, and make sure that it is sound.
+    """Read a tetrahedral mesh, and check it.
 
     Reads Gmsh 1.0, 2.0 to 2.2 and 4.1 (`.msh`), VTK legacy (`.vtk`) and VTK XML (`.vtu`) files, as
     text and binary. Points, lines and triangles in the file are ignored. From `RENUMBER_FROM`
@@ -71,7 +72,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float = 1.0) -> TetrahedralMe
 
 
 def _reader(path: Path) -> Callable[[bytes], TetrahedralMesh]:
-    """Return what reads files with this suffix."""
+    """Return the reader of files with that suffix."""
     suffix = path.suffix.lower()
     if suffix in READERS:
         return READERS[suffix]
@@ -84,7 +85,7 @@ def _reader(path: Path) -> Callable[[bytes], TetrahedralMesh]:
 
 
 def _contents(path: Path) -> bytes:
-    """Return the bytes of a file, or say why there are none."""
+    """Return the bytes of a file, or raise an error that says why there are none."""
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
@@ -106,7 +107,7 @@ def _contents(path: Path) -> bytes:
 
 
 def _other_content(data: bytes) -> str:
-    """Say what a file is that no reader understood, where that is plain to see, else ""."""
+    """Return what a file is instead of a mesh, where its first bytes show that, else ""."""
     start = data[:200].lstrip().lower()
     if start.startswith((b"<!doctype html", b"<html")):
         return f"expected a mesh, found a web page: {shown(data.strip())}"

@@ -1,4 +1,4 @@
-"""VTK's kinds of cells, and the tetrahedra among cells in one list of nodes."""
+"""VTK's types of cells, and the tetrahedra among cells in one list of nodes."""
 
 import numpy as np
 
@@ -47,7 +47,7 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
     """Return the nodes of the tetrahedra, shape (n_tets, 4).
 
     Args:
-        types: Kind of each cell, shape (n_cells,).
+        types: VTK's type of each cell, shape (n_cells,).
         starts: Where in `flat` the nodes of each cell begin, shape (n_cells,).
         sizes: How many nodes each cell has, shape (n_cells,).
         flat: The nodes of all cells, one cell after another.
@@ -70,4 +70,5 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
     wrong = np.flatnonzero(is_tetrahedron & (sizes != 4))
     if wrong.size:
         raise MeshError(f"cell {wrong[0]} is a tetrahedron with {sizes[wrong[0]]} nodes, not 4")
-    return flat[starts[is_tetrahedron][:, None] + np.arange(4)]
+    tetrahedra: IntArray = flat[starts[is_tetrahedron][:, None] + np.arange(4)]
+    return tetrahedra

@@ -13,7 +13,7 @@ from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
 MAX_RATIO = 1100
-"""No file holds more numbers than this many times its bytes: zlib shrinks to 1/1032 at best."""
+"""Numbers per byte of the file at most: zlib compresses to 1/1032 at best."""
 
 _APPENDED = re.compile(rb"<AppendedData\b[^>]*>\s*_")
 _APPENDED_END = b"</AppendedData"
@@ -43,7 +43,7 @@ def read_vtu(data: bytes) -> TetrahedralMesh:
 
 
 def _apart(data: bytes) -> tuple[bytes, bytes]:
-    """Return the XML, and the appended data, which may be any bytes and upset XML."""
+    """Return the XML, and the appended data, which may be any bytes and is no valid XML."""
     start = _APPENDED.search(data)
     if start is None:
         return data, b""

@@ -29,22 +29,22 @@ _DTYPES = {
 """VTK's names of types."""
 
 LZMA_MEMORY = 2**28
-"""What unpacking may take at most [bytes]; VTK's writers need a tenth of it."""
+"""Memory that unpacking may take at most [bytes]; VTK's writers need a tenth of it."""
 
 
 class Encoding(NamedTuple):
     """How a file writes numbers."""
 
     byte_order: str
-    """"<" or ">"."""
+    """Order of bytes, "<" or ">"."""
     header_dtype: str
     """Type of the sizes that stand before the data."""
     compressor: str
-    """VTK's name of it, or ""."""
+    """VTK's name of the compressor, or ""."""
     appended: bytes
-    """What follows the underscore in `<AppendedData>`."""
+    """The bytes after the underscore in `<AppendedData>`."""
     appended_is_raw: bool
-    """Else it is in base 64."""
+    """Whether the appended data is in binary, not in base 64."""
 
 
 def decoded(
@@ -53,7 +53,7 @@ def decoded(
     """Return the `count` numbers of a `<DataArray>`, which messages call `name`.
 
     Raises:
-        MeshError: They are not there.
+        MeshError: The array does not hold them.
     """
     dtype = _DTYPES.get(element.get("type", ""))
     if dtype is None:

@@ -8,6 +8,7 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, vec3
+from tissue.geometry.aabb import Aabb, with_point
 from tissue.mesh.body import Body
 from tissue.types import Chunks
 
@@ -16,8 +17,7 @@ TETRAHEDRA_EACH = 64
 organ has 85, 15 mm wide."""
 MOST_CHUNKS = 512
 """Chunks at most, since a client searches all of their boxes a thousand times a second. A large
-body
-has larger chunks."""
+body has larger chunks."""
 
 
 class BodyBounds(NamedTuple):
@@ -55,17 +55,10 @@ def bounds_after_motion(body: Body, nodes: IntArray, n: int, before: BodyBounds)
 
 @inlined
 def _with(box: BodyBounds, p: Vec3) -> BodyBounds:
-    low = Vec3(min(box.low.x, p.x), min(box.low.y, p.y), min(box.low.z, p.z))
-    high = Vec3(max(box.high.x, p.x), max(box.high.y, p.y), max(box.high.z, p.z))
+    low, high = with_point(Aabb(box.low, box.high), p)
     # A comparison with nan is false: min and max would overlook it.
     is_finite = box.is_finite and math.isfinite(p.x + p.y + p.z)
     return BodyBounds(low, high, is_finite)
-
-
-def boxes_overlap(one: tuple[Vec3, Vec3], other: tuple[Vec3, Vec3]) -> bool:
-    """Return whether two boxes, of lowest and highest corner each, have a point in common."""
-    lows, highs = zip(one[0], other[0], strict=True), zip(one[1], other[1], strict=True)
-    return all(max(low) <= min(high) for low, high in zip(lows, highs, strict=True))
 
 
 class ChunkNodes(NamedTuple):
@@ -119,4 +112,5 @@ def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
     largest = 0.0
     for node in range(body.n_nodes):
         largest = max(largest, v[node, 0] ** 2 + v[node, 1] ** 2 + v[node, 2] ** 2)
-    return np.sqrt(largest)
+    speed: float = np.sqrt(largest)
+    return speed

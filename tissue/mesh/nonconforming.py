@@ -1,5 +1,4 @@
-"""Nonconforming faces: one large face that meets six small ones, and the hanging nodes between
-them.
+"""Nonconforming faces: one large face that meets six small ones; the nodes between them hang.
 
 The paper's scheme splits a tetrahedron and leaves its neighbour whole: the new nodes on their
 common face hang. Both sides of such a face have the same link, HANGING or less, which names a row
@@ -33,8 +32,7 @@ class Hanging(Arrays):
     first: IntArray
     """First entry of each node's list: 4 * tetrahedron + local node; shape (node capacity,)."""
     next: IntArray
-    """Next entry of the same list, at the place of each entry; shape (4 * tetrahedron
-    capacity,)."""
+    """Next entry of the list, by entry; shape (4 * tetrahedron capacity,)."""
 
 
 def nothing_hanging() -> Hanging:

@@ -12,6 +12,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
+from tissue.geometry.aabb import Aabb, overlap, tetrahedron_box, widened
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits, star
@@ -153,9 +154,10 @@ def list_moved(
 
 @kernel
 def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int) -> bool:
-    x0, x1 = _cell_range(body, positions, grid, t, 0)
-    y0, y1 = _cell_range(body, positions, grid, t, 1)
-    z0, z1 = _cell_range(body, positions, grid, t, 2)
+    box = widened(tetrahedron_box(positions, body.tetrahedra, t), grid.margin)
+    x0, x1 = cell_along(grid, box.low.x, 0), cell_along(grid, box.high.x, 0)
+    y0, y1 = cell_along(grid, box.low.y, 1), cell_along(grid, box.high.y, 1)
+    z0, z1 = cell_along(grid, box.low.z, 2), cell_along(grid, box.high.z, 2)
     if grid.n_entries + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
         return False
     for i in range(x0, x1 + 1):
@@ -168,25 +170,6 @@ def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, 
                 grid.following[at] = grid.head[cell]
                 grid.head[cell] = at
     return True
-
-
-@kernel
-def _extent(body: Body, positions: FloatArray, t: int, c: int) -> tuple[float, float]:
-    """Return the least and the greatest coordinate of tetrahedron `t` along axis `c` [m]."""
-    p = positions[body.tetrahedra[t, 0], c]
-    q = positions[body.tetrahedra[t, 1], c]
-    r = positions[body.tetrahedra[t, 2], c]
-    s = positions[body.tetrahedra[t, 3], c]
-    return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
-
-
-@kernel
-def _cell_range(
-    body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int, c: int
-) -> tuple[int, int]:
-    """Return the first and last cell along axis `c` that the widened box of `t` overlaps."""
-    low, high = _extent(body, positions, t, c)
-    return cell_along(grid, low - grid.margin, c), cell_along(grid, high + grid.margin, c)
 
 
 @kernel
@@ -207,12 +190,13 @@ def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: 
     j = cell_along(grid, p.y, 1)
     k = cell_along(grid, p.z, 2)
     found = -1
+    box = Aabb(p, p)
     at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
     while at >= 0:
         t = grid.entry[at]
-        is_candidate = (found < 0 or t < found) and _meets_box(body, positions, t, p, p)
         if (
-            is_candidate
+            (found < 0 or t < found)
+            and overlap(tetrahedron_box(positions, body.tetrahedra, t), box)
             and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0
         ):
             found = t
@@ -238,16 +222,8 @@ def tetrahedron_in_box(
             for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):
                 at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
                 while at >= 0:
-                    if _meets_box(body, positions, grid.entry[at], low, high):
-                        return grid.entry[at]
+                    t: int = grid.entry[at]
+                    if overlap(tetrahedron_box(positions, body.tetrahedra, t), Aabb(low, high)):
+                        return t
                     at = grid.following[at]
     return -1
-
-
-@kernel
-def _meets_box(body: Body, positions: FloatArray, t: int, low: Vec3, high: Vec3) -> bool:
-    for c in range(3):
-        smallest, largest = _extent(body, positions, t, c)
-        if smallest > high[c] or largest < low[c]:
-            return False
-    return True

@@ -192,8 +192,8 @@ def _refuse_wrong_extent(positions: FloatArray, warnings: list[str]) -> None:
         )
     if extent < MIN_EXTENT:
         raise MeshError(
-            f"extent {extent:.4g} m, under {MIN_EXTENT:g} m: in what units is it? "
-            "--scale is what one of them is in metres"
+            f"extent {extent:.4g} m, under {MIN_EXTENT:g} m: is it in another unit? "
+            "--scale is that unit in metres"
         )
     if extent > USUAL_EXTENT:
         warnings.append(f"extent {extent:.4g} m: millimetres? use --scale 0.001")
@@ -216,7 +216,8 @@ def _refuse_repeated(tetrahedra: IntArray) -> None:
 def signed_volumes(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
     """Return the volumes [m3], shape (n_tets,); positive where abc turns left seen from d."""
     a, b, c, d = (positions[tetrahedra[:, k]] for k in range(4))
-    return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+    volumes: FloatArray = np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
+    return volumes
 
 
 def quality(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
@@ -228,7 +229,8 @@ def quality(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
     for i, j in ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)):
         squares += ((positions[tetrahedra[:, i]] - positions[tetrahedra[:, j]]) ** 2).sum(axis=1)
     lengths = np.maximum(np.sqrt(squares / 6.0), np.finfo(np.float64).tiny ** (1 / 3))
-    return 6.0 * np.sqrt(2.0) * signed_volumes(positions, tetrahedra) / lengths**3
+    shape: FloatArray = 6.0 * np.sqrt(2.0) * signed_volumes(positions, tetrahedra) / lengths**3
+    return shape
 
 
 def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> None:
@@ -257,7 +259,7 @@ def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
     inverted = signed_volumes(positions, tetrahedra) < 0.0
     if inverted.all():
         warnings.append(
-            f"all {len(tetrahedra)} tetrahedra turn right (negative volumes); turned them"
+            f"all {len(tetrahedra)} tetrahedra were inverted (negative volumes): reordered nodes"
         )
         return tetrahedra[:, [0, 1, 3, 2]]
     if inverted.any():
@@ -301,7 +303,8 @@ def _face(tetrahedra: IntArray, half: int) -> list[int]:
 def _is_even(tetrahedra: IntArray, halves: IntArray) -> BoolArray:
     """Return whether sorting the face's nodes takes an even number of swaps, for each face."""
     a, b, c = np.take_along_axis(tetrahedra[halves // 4], OUTWARD[halves % 4], axis=1).T
-    return (a < b) ^ (b < c) ^ (a < c)
+    is_even: BoolArray = (a < b) ^ (b < c) ^ (a < c)
+    return is_even
 
 
 def _with_stars_joined(

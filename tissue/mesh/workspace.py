@@ -3,11 +3,11 @@
 from tissue.mesh.body import Body
 
 PASS_NODES = 256
-"""Nodes that one pass of a cut step puts on the sheet at most; a step that needs more is done in
-several passes. Un-gluing them notes some 50 tetrahedra each, which must fit into `CHANGES`."""
+"""Nodes that one pass of a cut step puts on the sheet at most; a step that needs more takes several
+passes. Doubling a node changes some 50 tetrahedra, which must fit into `CHANGES`."""
 
 SPARE_NODES = 4 * PASS_NODES
-"""Room for nodes that a pass leaves for un-gluing: no node falls into more than a few copies."""
+"""Room that a pass leaves for doubled nodes: no node becomes more than a few."""
 
 ROOM_FOR_TETRAHEDRA = 1 << 12
 """Free tetrahedra that a pass of a cut step begins with; more are made between passes."""

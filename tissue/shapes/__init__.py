@@ -1,1 +1,8 @@
-"""Bodies made from numbers: blocks, and a lobe of a liver."""
+"""Bodies made from numbers.
+
+In the order in which they are best read:
+
+    block                  a rectangular block of cells
+    liver_lobe             a lobe of a liver, whose mesh comes with the package
+    isosurface_stuffing    fill an implicit shape with tetrahedra
+"""

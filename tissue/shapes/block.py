@@ -11,7 +11,7 @@ from tissue.core.array_types import IntArray
 from tissue.types import TetrahedralMesh
 
 MAX_TETRAHEDRA = 50_000_000
-"""A larger grid would take tens of gigabytes; it is a slip of the keyboard, not a wish."""
+"""Tetrahedra of the largest block: a larger one would take tens of gigabytes."""
 
 
 def block(

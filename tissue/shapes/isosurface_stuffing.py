@@ -21,12 +21,13 @@ ImplicitFunction = Callable[[FloatArray], FloatArray]
 """Points [m], shape (n, 3), to values, shape (n,): positive inside, negative outside."""
 
 ALPHA_LONG = 0.24999
-"""A surface point nearer to an end of a long edge than this fraction of it draws the end to it."""
+"""Fraction of a long edge within which a surface point moves the end of the edge onto itself."""
 ALPHA_SHORT = 0.41189
-"""The same for short edges. The pair is the paper's optimum for meshes of one size."""
+"""Fraction of a short edge within which a surface point moves the end of the edge onto itself. The
+pair is the paper's optimum for meshes of one size."""
 
 MAX_LATTICE_POINTS = 20_000_000
-"""More would take tens of gigabytes."""
+"""Lattice points of the largest lattice: a larger one would take tens of gigabytes."""
 
 BISECTIONS = 50
 """Halvings of an edge in the search for the surface: down to rounding."""
@@ -37,7 +38,7 @@ INSIDE, ON, OUTSIDE = 1, 0, -1
 def stuff(
     implicit_function: ImplicitFunction, bounds: npt.ArrayLike, spacing: float
 ) -> TetrahedralMesh:
-    """Return a mesh of the inside of `implicit_function`.
+    """Return a tetrahedral mesh of the inside of `implicit_function`.
 
     Args:
         implicit_function: The shape. It should be smooth at the scale of `spacing`.
@@ -45,8 +46,8 @@ def stuff(
         spacing: Edge of a lattice cell [m]; a tetrahedron inside has a twelfth of its volume.
 
     Raises:
-        ValueError: The box or the spacing makes no sense, or the shape is not within the box, or
-            nothing of it is found.
+        ValueError: The box or the spacing makes no sense, the shape is not within the box, or it
+            holds no point of the lattice.
     """
     lattice = _lattice(*_checked_box(bounds, spacing), spacing)
     values = np.asarray(implicit_function(lattice.points), dtype=np.float64)
@@ -60,7 +61,7 @@ def stuff(
 
     edges = lattice.edges[signs[lattice.edges].prod(axis=1) < 0]
     cuts = _surface_points(implicit_function, lattice.points, edges, signs)
-    points, signs, is_left = _drawn_to_surface(lattice.points, signs, edges, cuts)
+    points, signs, is_left = _moved_to_surface(lattice.points, signs, edges, cuts)
     edges, cuts = edges[is_left], cuts[is_left]
 
     tetrahedra = _cut_off(lattice.tetrahedra, signs, edges, len(points))
@@ -79,10 +80,10 @@ class _Lattice(NamedTuple):
     is_outermost: npt.NDArray[np.bool_]
     """Whether the point is on the surface of the lattice, shape (n_points,)."""
     tetrahedra: IntArray
-    """Shape (n_tets, 4). The long edges are those from 0 to 1 and from 2 to 3. Of the ends of each
-    the first is even, which settles how neighbours cut a face that both share."""
+    """Node indices, shape (n_tets, 4). The long edges go from node 0 to 1 and from 2 to 3. The
+    first end of each is even, which decides how neighbours cut a face that both share."""
     edges: IntArray
-    """Shape (n_edges, 2), lower index first."""
+    """Ends of the edges, the lower index first, shape (n_edges, 2)."""
 
 
 def _checked_box(bounds: npt.ArrayLike, spacing: float) -> tuple[FloatArray, IntArray]:
@@ -111,10 +112,12 @@ def _lattice(lowest: FloatArray, cells: IntArray, spacing: float) -> _Lattice:
     )
 
     def corner(index: IntArray) -> IntArray:
-        return np.ravel_multi_index(tuple(index.T), tuple(cells + 1))
+        nodes: IntArray = np.ravel_multi_index(tuple(index.T), tuple(cells + 1))
+        return nodes
 
     def centre(index: IntArray) -> IntArray:
-        return len(corners) + np.ravel_multi_index(tuple(index.T), tuple(cells))
+        nodes: IntArray = len(corners) + np.ravel_multi_index(tuple(index.T), tuple(cells))
+        return nodes
 
     # Each face between two cells has four tetrahedra: both centres, and two corners side by side.
     tetrahedra = []
@@ -154,16 +157,16 @@ def _surface_points(
     return 0.5 * (inner + outer)
 
 
-def _drawn_to_surface(
+def _moved_to_surface(
     points: FloatArray, signs: IntArray, edges: IntArray, cuts: FloatArray
 ) -> tuple[FloatArray, IntArray, npt.NDArray[np.bool_]]:
-    """Move each lattice point that is too near to a cut to the nearest such.
+    """Move each lattice point that is too near to a cut of its edges to the nearest such cut.
 
-    One after another: the edges of a point on the surface are cut no more, which may spare its
-    neighbours.
+    One point after another: the edges of a point on the surface are no longer cut, so that its
+    neighbours may stay where they are.
 
     Returns:
-        Points and signs after that, and which of `edges` are still cut.
+        Points and signs after the moves, and which of `edges` are still cut.
     """
     points, signs = points.copy(), signs.copy()
     is_cut = np.ones(len(edges), dtype=bool)
@@ -191,7 +194,7 @@ _Vertex = tuple[int, int]
 
 
 def _cut_off(tetrahedra: IntArray, signs: IntArray, edges: IntArray, n_points: int) -> IntArray:
-    """Return the tetrahedra inside, of any orientation; cut k is node `n_points` + k."""
+    """Return the tetrahedra inside, of either orientation; cut k is node `n_points` + k."""
     tetrahedra = tetrahedra[(signs[tetrahedra] > 0).any(axis=1)]
     keys = edges[:, 0] * n_points + edges[:, 1]  # sorted, for the edges are
     patterns = signs[tetrahedra]

@@ -12,20 +12,21 @@ from tissue.shapes.isosurface_stuffing import stuff
 from tissue.types import TetrahedralMesh
 
 MESH_FILE = Path(__file__).with_name("liver_lobe.npz")
+"""The mesh that comes with the package."""
 
 HALF_LENGTH = 0.045
-"""From the middle to the ends, along x [m]."""
+"""Length from the middle to the ends, along x [m]."""
 HALF_WIDTH = 0.029
-"""From the middle to the front and the back, along y [m]."""
+"""Width from the middle to the front and the back, along y [m]."""
 HALF_HEIGHT = 0.0163
-"""From the middle to the top and the bottom, along z [m]."""
+"""Height from the middle to the top and the bottom, along z [m]."""
 
 SPACING = 0.0063
 """Edge of a lattice cell [m]: gives some 5,000 tetrahedra, and five across the height."""
 
 
 def inside_lobe(points: FloatArray) -> FloatArray:
-    """Return how deep `points`, shape (n, 3), are inside the lobe, shape (n,): 1 to 0, then below.
+    """Return how deep `points` [m], shape (n, 3), are inside the lobe: 1 to 0, negative outside.
 
     A flat egg: high and wide at the left, tapering to the right, thick along the back and thin
     along the front, domed above and hollow below, with the notch between two lobes in its front.
@@ -37,7 +38,8 @@ def inside_lobe(points: FloatArray) -> FloatArray:
     notch = 0.9 * np.exp(-(((u - 0.46) / 0.15) ** 2) - ((v + 1.0) / 0.5) ** 2)
     hollow = 0.3 * np.exp(-((u / 0.55) ** 2) - (v / 0.6) ** 2)
     raised = w / height - hollow * (w < 0.0) * np.minimum(1.0, -w)
-    return 1.0 - np.abs(u) ** 2.8 - np.abs(v / width) ** 2.3 - raised**2 - notch
+    depth: FloatArray = 1.0 - np.abs(u) ** 2.8 - np.abs(v / width) ** 2.3 - raised**2 - notch
+    return depth
 
 
 def make_mesh() -> TetrahedralMesh:

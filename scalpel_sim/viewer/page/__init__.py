@@ -8,6 +8,7 @@ from string import Template
 from scalpel_sim.errors import RunError
 
 _HERE = Path(__file__).parent
+"""Folder of the parts of the pages."""
 _BUNDLE = Path("viewer", "dist", "main.min.js")
 """Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"

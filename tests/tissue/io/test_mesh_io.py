@@ -228,7 +228,7 @@ def test_an_index_out_of_range_is_refused_by_its_tetrahedron(tmp_path):
 
 def test_a_node_that_is_there_twice_is_refused_by_its_tag(tmp_path):
     data = FILES["gmsh 1.0.msh"].replace(b"\n8 ", b"\n7 ", 1)
-    assert "node 7 is there twice" in refusal_of(tmp_path, "twice.msh", data)
+    assert "node 7 occurs twice" in refusal_of(tmp_path, "twice.msh", data)
 
 
 def test_a_broken_mesh_is_refused_under_the_name_of_its_file(tmp_path):

@@ -97,7 +97,7 @@ def test_a_mesh_whose_tetrahedra_all_turn_right_is_turned_with_a_warning():
     positions, tetrahedra = sound_block()
     result = checked(TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]))
     assert (signed_volumes(*result.mesh) > 0.0).all()
-    assert "all 48 tetrahedra turn right" in result.warnings[0]
+    assert "all 48 tetrahedra were inverted" in result.warnings[0]
 
 
 def test_a_face_shared_by_three_tetrahedra_is_refused_by_its_nodes():

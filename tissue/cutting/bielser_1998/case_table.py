@@ -2,9 +2,9 @@
 
 Entries for one code of each case are written out in the notation of Figure 7; rotating and
 reflecting them gives the others, 37 in all. An edge's node is referenced twice: AB1 by corner A,
-AB2 by B. A
-face's node is referenced three times; as printed, ABC1 belongs to corner B, ABC2 to C, ABC3 to A.
-Where a node is not doubled its references are equal, and reference 2 stands for any of them.
+AB2 by B. A face's node is referenced three times; as printed, ABC1 belongs to corner B, ABC2 to C,
+ABC3 to A. Where a node is not doubled its references are equal, and reference 2 stands for any of
+them.
 """
 
 import itertools

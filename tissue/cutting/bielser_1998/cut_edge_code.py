@@ -19,8 +19,7 @@ N_CODES = 64
 
 WHOLE, TIP, FULL = 0, 1, 2
 """State of a face: not cut; cut up to a point inside it, where the tip passed through; cut across.
-A
-face that the tip pierced and of which no edge is cut (state 3 of the paper) has no edge code."""
+A face that the tip pierced and of which no edge is cut (state 3 of the paper) has no edge code."""
 
 
 def code_of(*edges: str) -> int:

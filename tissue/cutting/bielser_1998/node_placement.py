@@ -37,8 +37,8 @@ from tissue.geometry.tetrahedron import signed_volume
 EDGE_MARGIN = 0.2
 """Least distance of a node from an end of its edge, as a share of the edge. Nodes that the tip made
 are at least half that share of the altitude away from the sides of their face, as nodes of faces
-cut across are. Nearer nodes make light, stiff springs: through an organ the highest frequency
-grew 9 to 10 times with 0.1, 6 to 9 times with 0.2, and 1.5 to 1.9 times with our own scheme."""
+cut across are. Nearer nodes make light, stiff springs: through an organ the highest frequency grew
+9 to 10 times with 0.1, 6 to 9 times with 0.2, and 1.5 to 1.9 times with our own scheme."""
 
 LIFT = 0.05
 """Share of the distance to the middle of the two corners that a cut leaves together, by which the
@@ -197,8 +197,7 @@ def _guard(table: Table, placing: Placing) -> bool:
 
     First the nodes that are free to move, together, as little as it takes. Where that is not
     enough, a node that the neighbour has placed is replaced by one for this tetrahedron alone,
-    which
-    then hangs.
+    which then hangs.
     """
     if centre_volume(table, placing.weights) >= LEAST_CENTRE:
         return False

@@ -33,9 +33,9 @@ from tissue.types import SchemeStatistics
 
 _REACH = 0.25
 """Distance from its box at which the blade has left a tetrahedron, in mean node sizes. A blade in
-soft tissue trembles; at 0, tetrahedra that it comes back into were split too early, by codes
-of fewer edges (10 of 154 in a slanted stroke through the paper's block, and it stayed in one
-piece). Between 0.25 and 1 the pieces are the same."""
+soft tissue trembles; at 0, tetrahedra that it comes back into were split too early, by codes of
+fewer edges (10 of 154 in a slanted stroke through the paper's block, and it stayed in one piece).
+Between 0.25 and 1 the pieces are the same."""
 
 GONE = -1.0
 """In place of a distance: the blade has left every tetrahedron, wherever it is."""
@@ -115,7 +115,6 @@ class PaperScheme:
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
-        self._scratch.hash_stamps[:] = 0  # stamps of searches, which are counted from 0 again
 
     def statistics(self, body: Body) -> SchemeStatistics:
         """Return counts of what was done so far."""
