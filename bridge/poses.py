@@ -65,8 +65,7 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
-    """Return a pose after a motion: translation of the tip [m] and rotation about it [rad],
-    (6,)."""
+    """Return a pose moved `by` a translation of the tip [m] and a rotation about it [rad]."""
     tip = segment.tip + by[:3]
     angle = math.hypot(*by[3:].tolist())
     if angle == 0.0:

@@ -26,8 +26,7 @@ MANY_SUBSTEPS = 200
 
 
 class _Attempts:
-    """Attempts to write files: one that fails is logged and kept, and the next is made. Enter it
-    once for each."""
+    """Attempts to write files, one for each `with`: a failed one is logged, and the next is made."""
 
     def __init__(self) -> None:
         self.errors: list[Exception] = []

@@ -57,8 +57,7 @@ class LocalModel:
 
     @property
     def stiffness(self) -> FloatArray:
-        """Stiffness at the pose of the last call of `wrench` [N/m], [N], [N m/rad], shape (6,
-        6)."""
+        """Stiffness where `wrench` was last called, shape (6, 6) [N/m], [N], [N m/rad]."""
         return _NO_STIFFNESS if self._has_left else self._stiffness
 
     def update(self, result: StepResult, last: Wrench, pose: BladeSegment) -> None:

@@ -1,5 +1,4 @@
-"""One end of a conversation: messages to frames of bytes and back, authenticated if there is a
-key."""
+"""One end of a conversation: messages to frames and back, authenticated if there is a key."""
 
 from collections.abc import Iterator
 

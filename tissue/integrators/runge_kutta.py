@@ -108,7 +108,8 @@ def acceleration(
     force = force + point(context.stages.external, node)
     gravity = point_of(*surroundings.gravity)
     free = gravity - times(surroundings.drag, point(velocities, node))
-    return free + times(1.0 / body.masses[node], force)
+    total: Point = free + times(1.0 / body.masses[node], force)
+    return total
 
 
 @kernel

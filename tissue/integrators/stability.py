@@ -44,6 +44,7 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
         return np.inf
     ratio = 0.5 * (frequency * retardation_time + viscous_damping / frequency)
     table = STABILITY_LIMIT
+    limit: float
     if ratio > table[-1, 0]:
         limit = table[-1, 1] * table[-1, 0] / ratio
     else:
