@@ -26,7 +26,7 @@ MANY_SUBSTEPS = 200
 
 
 class _Attempts:
-    """Attempts to write files, one for each `with`: a failed one is logged, and the next is made."""
+    """Attempts to write files, one a `with`: a failed one is logged, and the next is made."""
 
     def __init__(self) -> None:
         self.errors: list[Exception] = []

@@ -202,14 +202,14 @@ def _picture_timer(simulation: Simulation, seconds: list[float]) -> DrawFrame:
 
     It appends the time that each takes [s] to `seconds`.
     """
-    stage = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
-    stage.opening(simulation.link.surface(), body_poses(simulation.arm.data))
+    packets = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
+    packets.opening(simulation.link.surface(), body_poses(simulation.arm.data))
     every = round(1.0 / (UPDATES_PER_SECOND * simulation.dt))
 
     def picture(now: Simulation) -> None:
         if len(now.recording) % every == 0:
             start = perf_counter()
-            stage.frame(now.link.surface(), body_poses(now.arm.data), readings(now))
+            packets.frame(now.link.surface(), body_poses(now.arm.data), readings(now))
             seconds.append(perf_counter() - start)
 
     return picture

@@ -32,11 +32,11 @@ def readings(simulation: Simulation) -> Readings | None:
 def into_replay(replay: ReplayWriter) -> DrawFrame:
     """Return a callback that adds a simulation to a replay after each frame."""
 
-    def picture(simulation: Simulation) -> None:
+    def draw(simulation: Simulation) -> None:
         if replay.is_due(simulation.time):
             add_to(replay, simulation)
 
-    return picture
+    return draw
 
 
 def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
@@ -52,11 +52,11 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
 def into_viewer(viewer: Viewer) -> DrawFrame:
     """Return a callback that shows a simulation in a live viewer after each frame."""
 
-    def picture(simulation: Simulation) -> None:
+    def draw(simulation: Simulation) -> None:
         if viewer.is_due():
             show_in(viewer, simulation)
 
-    return picture
+    return draw
 
 
 def show_in(viewer: Viewer, simulation: Simulation) -> None:

@@ -113,7 +113,7 @@ def find_faces(
 
 @kernel
 def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
-    """Write which cells `box` [m] meets; return whether that changed.
+    """Write which cells `box` [m] overlaps; return whether that changed.
 
     Cells that list other tetrahedra than before count as changed. A blade often stays within the
     same cells for many steps.

@@ -60,7 +60,7 @@ def test_a_heavy_body_gets_fewer_frames_evenly_spread(tmp_path, monkeypatch):
     assert np.ptp(np.diff(times)) < 1e-9
 
 
-def test_a_file_is_no_larger_than_was_reckoned(tmp_path):
+def test_a_file_is_no_larger_than_estimated(tmp_path):
     write_cut(tmp_path / "few.html", n_frames=2)
     write_cut(tmp_path / "more.html", n_frames=12)
     added = (tmp_path / "more.html").stat().st_size - (tmp_path / "few.html").stat().st_size
@@ -98,7 +98,7 @@ def test_the_message_names_the_versions_of_meshcat_that_the_project_requires():
 
 
 @pytest.mark.browser
-def test_the_page_plays_the_cut_by_itself_and_asks_nobody_for_anything(tab, tmp_path):
+def test_the_page_plays_the_cut_by_itself_and_sends_no_request(tab, tmp_path):
     asked = []
     tab.on("request", lambda request: asked.append(request.url.split(":")[0]))
     write_cut(tmp_path / "replay.html")
