@@ -87,7 +87,7 @@ def main() -> int:
                     swiftest = max(swiftest, fastest(tissue))
             for _ in range(50):
                 result = tissue.step(None, DT)
-            pressed = result.touch.n_contacts
+            pressed = result.body_contacts.n_contacts
             row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps, pressed)
             spent = (thread_time() - began) / (n + 50) / DT
             table.add_row(*map(str, row), f"{spent:.2f}", f"{swiftest:.2f}")

@@ -68,7 +68,7 @@ class TissueLink(Protocol):
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
 
-    def quality(self) -> CutReport:
+    def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class InProcessLink:
         """Return the number of connected pieces."""
         return self._tissue.n_pieces()
 
-    def quality(self) -> CutReport:
+    def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
         return self._tissue.cut_report()
 

@@ -146,7 +146,7 @@ def _facts(
     with unwritten:
         end = link.snapshot()
         pieces = pieces_of(end)
-        quality = link.quality()
+        quality = link.cut_report()
         outputs.write_mesh(FINAL, end)
     return RunFacts(
         scene=body.scene,

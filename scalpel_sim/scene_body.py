@@ -35,7 +35,7 @@ def make_tissue(scene: Scene) -> Tissue:
         floor=scene.floor,
         blade=scene.blade,
         solver=SolverSettings(
-            cut=scene.quality,
+            cut=scene.cut,
             scheme=scene.scheme,
             relaxation=scene.relaxation,
             threads=scene.threads,

@@ -98,7 +98,7 @@ class Scene:
     fixed: str = "left,right"
     """Which nodes do not move: names of sides, a box, or `none`, as `tissue.fixed_nodes` takes
     them."""
-    quality: CutSettings = DEFAULT_CUT_SETTINGS
+    cut: CutSettings = DEFAULT_CUT_SETTINGS
     """How closely cuts follow the blade, against how small the elements get."""
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
@@ -186,7 +186,7 @@ class Scene:
         del found["name"], found["mesh"]
         return found | {
             "material": asdict(self.material),
-            "quality": asdict(self.quality),
+            "cut": asdict(self.cut),
             "blade": None if self.blade is None else asdict(self.blade),
         }
 
@@ -323,10 +323,10 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     if given.get("fixed", scene.fixed) != scene.fixed:
         given.setdefault("stretch", 0.0)
     of_scene = {field.name for field in fields(scene)}
-    parts = {name: given.pop(name, getattr(scene, name)) for name in ("material", "quality")}
+    parts = {name: given.pop(name, getattr(scene, name)) for name in ("material", "cut")}
     if "snap" in given:
         snap = given.pop("snap")
-        parts["quality"] = replace(parts["quality"], snap=snap, floor=snap)
+        parts["cut"] = replace(parts["cut"], snap=snap, floor=snap)
     for name, part in parts.items():
         properties = {field.name for field in fields(part)} - of_scene
         parts[name] = replace(part, **{key: given.pop(key) for key in properties & given.keys()})

@@ -126,7 +126,7 @@ class Simulation:
     ) -> None:
         """Add the frame to the recording, and to its row how long that took."""
         start = time.perf_counter()
-        stages = self.result.profile if self.bridge.answered else _NO_STEP
+        stages = self.result.stage_times if self.bridge.answered else _NO_STEP
         row = row_of(
             self.time,
             segment,

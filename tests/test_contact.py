@@ -79,7 +79,7 @@ def live(tissue: Tissue, seconds: float, every: int = 50) -> float:
         result = tissue.step(None, strokes.DT)
         if i % every == 0:
             worst = max(worst, depth_of_overlap(tissue.snapshot()))
-        worst = max(worst, result.touch.penetration)
+        worst = max(worst, result.body_contacts.penetration)
     return worst
 
 
@@ -122,8 +122,10 @@ def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pa
     )
     assert live(tissue, 1.5) < ALLOWED
     last = tissue.step(None, strokes.DT)
-    assert last.touch.n_contacts > 10
-    assert last.touch.force == pytest.approx(1.0, rel=0.25)  # faces bend: not all point upwards
+    assert last.body_contacts.n_contacts > 10
+    assert last.body_contacts.force == pytest.approx(
+        1.0, rel=0.25
+    )  # faces bend: not all point upwards
     assert speed_in_a_frame(tissue) < AT_REST
     upper = tissue.pieces()[1 if tissue.pieces()[0].is_held else 0]
     assert np.linalg.norm(upper.velocity) < 1e-3
@@ -143,12 +145,12 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     for _ in range(300):
         squeeze(tissue, 1e-5)
         worst = max(worst, live(tissue, 0.005, every=5))
-        if tissue.step(None, strokes.DT).touch.force > 1.0:
+        if tissue.step(None, strokes.DT).body_contacts.force > 1.0:
             break
     worst = max(worst, live(tissue, 0.5))
     assert worst < ALLOWED
     last = tissue.step(None, strokes.DT)
-    assert last.touch.force == pytest.approx(1.0, rel=0.2)
+    assert last.body_contacts.force == pytest.approx(1.0, rel=0.2)
     assert speed(tissue) < AT_REST
 
 
@@ -156,7 +158,7 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
 def test_freshly_cut_lips_that_nothing_presses_feel_nothing(until):
     tissue = incised(bodies.jittered(3, 0), 0.0207, until)
     for _ in range(50):
-        touch = tissue.step(None, strokes.DT).touch
+        touch = tissue.step(None, strokes.DT).body_contacts
         assert touch.force < 1e-12 and touch.penetration < 1e-12
     assert speed(tissue) < 1e-12
 
@@ -168,9 +170,9 @@ def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
     for _ in range(200):
         squeeze(tissue, 1e-5)
         for _ in range(2):
-            pressed = tissue.step(None, strokes.DT).touch.force
+            pressed = tissue.step(None, strokes.DT).body_contacts.force
     for _ in range(300):
-        pressed = tissue.step(None, strokes.DT).touch.force
+        pressed = tissue.step(None, strokes.DT).body_contacts.force
     assert pressed > 0.5
     surface = tissue.surface()
     lips = np.unique(surface.triangles[surface.is_cut])
@@ -214,8 +216,8 @@ def test_a_block_that_falls_on_the_floor_stays_on_it_and_comes_to_rest():
         result = tissue.step(None, strokes.DT)
         assert result.bounds[0, 2] > -ALLOWED
     assert speed(tissue) < AT_REST
-    assert result.touch.force_of_floor[2] == pytest.approx(0.018 * 9.81, rel=0.05)
-    assert result.touch.force == 0.0
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(0.018 * 9.81, rel=0.05)
+    assert result.body_contacts.force == 0.0
 
 
 @pytest.mark.parametrize(("degrees", "slides"), [(10.0, False), (15.0, False), (19.0, True)])
@@ -293,7 +295,7 @@ def test_crossed_beams_meet_edge_on_edge():
     edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
     assert edge.sum() == 2 and low > ridge
     for _ in range(300):
-        touch = tissue.step(None, strokes.DT).touch
+        touch = tissue.step(None, strokes.DT).body_contacts
         # The edge between the two nodes lies across the middle of an edge of the lower beam.
         assert tissue.snapshot().positions[n:][edge, 2].mean() > ridge - ALLOWED
     assert touch.n_contacts > 0
@@ -308,7 +310,7 @@ def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
     held, loose = pieces_of(tissue.snapshot())
     assert held.is_held and not loose.is_held
     assert -0.03 < loose.centre[2] < -0.015
-    assert result.touch.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
     assert np.linalg.norm(loose.velocity) < AT_REST
 
 
@@ -319,7 +321,7 @@ def test_contact_gives_the_same_bits_twice():
         )
         tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
         results = [tissue.step(None, strokes.DT) for _ in range(100)]
-        assert results[-1].touch.n_contacts > 0
+        assert results[-1].body_contacts.n_contacts > 0
         return tissue.snapshot()
 
     for one, other in zip(run(), run(), strict=True):
@@ -391,8 +393,8 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
     strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
     results = [tissue.step(None, strokes.DT) for _ in range(n_steps)]
     assert tissue.n_pieces() == 2
-    assert max(result.touch.force for result in results) > 0.0
-    assert results[-1].touch.force_of_floor[2] > 0.01
+    assert max(result.body_contacts.force for result in results) > 0.0
+    assert results[-1].body_contacts.force_of_floor[2] > 0.01
     return tissue.snapshot()
 
 

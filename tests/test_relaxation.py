@@ -187,9 +187,9 @@ def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
         result = tissue.step(None, strokes.DT)
     loose = tissue.snapshot().positions[tissue.snapshot().rest_positions[:, 0] > 0.03]
     assert loose[:, 2].min() == pytest.approx(-0.004, abs=2e-4)
-    assert result.touch.force_of_floor[2] > 0.0
+    assert result.body_contacts.force_of_floor[2] > 0.0
     weight = 9.81 * min(piece.mass for piece in tissue.pieces())
-    assert result.touch.force_of_floor[2] == pytest.approx(weight, rel=0.3)
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(weight, rel=0.3)
 
 
 def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
@@ -210,4 +210,4 @@ def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
     assert made.any()
     speed = np.linalg.norm(tissue.snapshot().velocities, axis=1).max()
     assert speed < 0.05
-    assert max(r.touch.penetration for r in results) < 1e-3
+    assert max(r.body_contacts.penetration for r in results) < 1e-3

@@ -75,7 +75,8 @@ def _report(cut: CutThrough) -> str:
     """Return a table: time per stage and frame, and the result of the cut."""
     results = cut.results
     times = {
-        name: np.array([getattr(r.profile, f) for r in results]) for name, (f, _) in _STAGES.items()
+        name: np.array([getattr(r.stage_times, f) for r in results])
+        for name, (f, _) in _STAGES.items()
     }
     frame = np.sum(list(times.values()), axis=0)
     lines = [f"{'per frame [us]':<40}{'median':>10}{'99 %':>10}"]

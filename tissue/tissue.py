@@ -332,8 +332,8 @@ class Tissue(BodyQueries):
             work_of_blade=totals.work_of_blade,
             work_of_cutting=totals.work_of_cutting,
             n_substeps=n_substeps,
-            touch=self._system.contact.touch(dt),
-            profile=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
+            body_contacts=self._system.contact.report(dt),
+            stage_times=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
             energies=self._energies(edge),
         )
 

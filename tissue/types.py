@@ -174,9 +174,9 @@ class StepResult(NamedTuple):
     """Work of cutting since the start [J]: toughness times area."""
     n_substeps: int
     """Runge-Kutta steps taken in this step."""
-    touch: BodyContacts
+    body_contacts: BodyContacts
     """Contacts of the body with itself and the floor."""
-    profile: StageTimes
+    stage_times: StageTimes
     """Wall time of the stages."""
     energies: Energies | None
     """Energy balance since the body was made; None without an audit."""

@@ -116,5 +116,7 @@ def _combined(results: Sequence[StepResult], seconds: Sequence[float]) -> StepRe
     return last._replace(
         wrench=Wrench(force, torque, last.wrench.point),
         n_substeps=sum(result.n_substeps for result in results),
-        profile=StageTimes(*np.sum([result.profile for result in results], axis=0).tolist()),
+        stage_times=StageTimes(
+            *np.sum([result.stage_times for result in results], axis=0).tolist()
+        ),
     )

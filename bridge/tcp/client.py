@@ -19,7 +19,7 @@ from bridge.tcp.messages.body import (
     unpack_surface,
 )
 from bridge.tcp.messages.chunks import LARGEST_CHUNKS, unpack_chunks
-from bridge.tcp.messages.quality import QUALITY_BYTES, unpack_quality
+from bridge.tcp.messages.cut_report import CUT_REPORT_BYTES, unpack_cut_report
 from bridge.tcp.messages.result import LARGEST_RESULT, unpack_result
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import (
@@ -107,9 +107,9 @@ class TcpLink:
         """Return the number of connected pieces."""
         return self._ask(MessageKind.PIECES, b"", PIECES_BYTES, unpack_pieces)
 
-    def quality(self) -> CutReport:
+    def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and their effect on elements and time step."""
-        return self._ask(MessageKind.QUALITY, b"", QUALITY_BYTES, unpack_quality)
+        return self._ask(MessageKind.QUALITY, b"", CUT_REPORT_BYTES, unpack_cut_report)
 
     def close(self) -> None:
         """Close the connection."""

@@ -20,7 +20,7 @@ from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT, bound_socket, format_
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
-from bridge.tcp.messages.quality import pack_quality
+from bridge.tcp.messages.cut_report import pack_cut_report
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error
@@ -269,7 +269,7 @@ class TissueServer:
         if frame.kind == MessageKind.PIECES:
             return pack_pieces(self._link.n_pieces())
         if frame.kind == MessageKind.QUALITY:
-            return pack_quality(self._link.quality())
+            return pack_cut_report(self._link.cut_report())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
     def _send(

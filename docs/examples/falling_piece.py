@@ -17,6 +17,6 @@ for _ in range(1000):  # one second
     result = tissue.step(None, 1e-3)
 
 held, loose = sorted(tissue.pieces(), key=lambda piece: not piece.is_held)
-weight, floor = 9.81 * loose.mass, result.touch.force_of_floor[2]
+weight, floor = 9.81 * loose.mass, result.body_contacts.force_of_floor[2]
 print(f"{loose.mass * 1e3:.1f} g lie {(loose.centre[2] + 0.03) * 1e3:.1f} mm above the floor")
 print(f"the floor bears {floor / weight:.2f} of their weight")

@@ -171,7 +171,7 @@ def _cut_slit(cells: _Cells) -> SlitSteps:
         for i in range(1, round(_SLIT_CELLS * _CELL / _STEP) + 1):
             after = _edge(cells, i * _STEP)
             result = tissue.step(BladeSweep(before, after), _DT)
-            taken.append(result.profile.collision + result.profile.topology)
+            taken.append(result.stage_times.collision + result.stage_times.topology)
             sizes.append(result.n_tetrahedra)
             before = after
     seconds, splits = np.array(taken), np.diff(np.array(sizes, dtype=np.float64))

@@ -56,7 +56,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "stretch",
         "gravity",
         "floor",
-        "quality",
+        "cut",
         "scheme",
         "relaxation",
         "threads",

@@ -12,7 +12,7 @@ GRID2 = SCENES["grid2"]
 def test_the_floor_of_the_scene_is_a_height_and_that_of_snapping_a_share():
     scene = changed(GRID2, floor=-0.05, snap=0.1)
     assert scene.floor == -0.05
-    assert (scene.quality.snap, scene.quality.floor) == (0.1, 0.1)
+    assert (scene.cut.snap, scene.quality.floor) == (0.1, 0.1)
 
 
 def test_properties_change_the_material_that_is_given_beside_them():

@@ -51,7 +51,7 @@ def test_the_path_error_is_how_far_the_cut_faces_are_from_where_the_blade_passed
 
 
 def test_a_cut_along_the_faces_of_the_mesh_has_no_path_error_and_no_price():
-    found = cut_at(SIZE / 2).quality()
+    found = cut_at(SIZE / 2).cut_report()
     assert found.n_cut_nodes == 2 * (CELLS + 1) ** 2
     assert found.path_error_largest < DRAG * found.node_size
     assert (found.growth, found.frequency_growth) == (1.0, pytest.approx(1.0, rel=0.5))
@@ -82,14 +82,14 @@ def test_the_smallest_altitude_is_that_of_the_thinnest_tetrahedron_and_not_below
 
 
 def test_a_body_without_a_cut_has_no_path_error_and_has_not_grown():
-    found = Tissue(MESH).quality()
+    found = Tissue(MESH).cut_report()
     assert (found.n_cut_nodes, found.path_error_mean, found.path_error_largest) == (0, 0.0, 0.0)
     assert found.initial == found.now
     assert (found.growth, found.frequency_growth, found.substep_growth) == (1.0, 1.0, 1.0)
 
 
 def test_a_body_that_cannot_move_has_a_report():
-    found = Tissue(MESH, fixed=np.ones(len(MESH.positions), bool)).quality()
+    found = Tissue(MESH, fixed=np.ones(len(MESH.positions), bool)).cut_report()
     assert found.now.frequency == 0.0 and math.isinf(found.now.time_step)
     assert (found.frequency_growth, found.substep_growth) == (1.0, 1.0)
 

@@ -173,8 +173,8 @@ def test_time_that_does_not_pass_moves_nothing(tissue):
 
 def test_a_step_says_where_its_time_went(tissue):
     results = strokes.make(tissue, strokes.slanted(MESH))
-    assert all(min(r.profile) >= 0.0 for r in results)
-    assert max(r.profile.topology for r in results) > 0.0
+    assert all(min(r.stage_times) >= 0.0 for r in results)
+    assert max(r.stage_times.topology for r in results) > 0.0
     assert results[0].n_substeps >= 1
     assert max(r.n_active for r in results) > 0
 

@@ -133,7 +133,7 @@ class SelfContact:
         arrays.penetration = 0.0
         arrays.n_pressing = 0
 
-    def touch(self, dt: float) -> BodyContacts:
+    def report(self, dt: float) -> BodyContacts:
         """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
         arrays = self.arrays
         per_second = 1.0 / dt if dt > 0.0 else 0.0

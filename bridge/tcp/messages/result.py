@@ -26,7 +26,7 @@ def pack_result(result: StepResult) -> bytes:
 
     The contacts, of any number, and the energies, which are optional, come last.
     """
-    touch, contacts, energies = result.touch, result.contacts, result.energies
+    touch, contacts, energies = result.body_contacts, result.contacts, result.energies
     head = _HEAD.pack(
         result.n_tetrahedra,
         result.n_nodes,
@@ -42,7 +42,7 @@ def pack_result(result: StepResult) -> bytes:
         result.work_of_cutting,
         touch.penetration,
         touch.force,
-        *result.profile,
+        *result.stage_times,
     )
     # One call for all arrays: each one by itself takes as long as the rest of the message.
     arrays = np.concatenate(
@@ -109,8 +109,8 @@ def unpack_result(payload: bytes) -> StepResult:
         work_of_blade=head[10],
         work_of_cutting=head[11],
         n_substeps=n_substeps,
-        touch=BodyContacts(n_touching, head[12], head[13], floats[63:66]),
-        profile=StageTimes(*head[14:]),
+        body_contacts=BodyContacts(n_touching, head[12], head[13], floats[63:66]),
+        stage_times=StageTimes(*head[14:]),
         energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
     )
 

@@ -87,8 +87,8 @@ class Wall:
             work_of_blade=self._work,
             work_of_cutting=0.0,
             n_substeps=1,
-            touch=BodyContacts(0, 0.0, 0.0, np.zeros(3)),
-            profile=StageTimes(0.0, 0.0, 0.0),
+            body_contacts=BodyContacts(0, 0.0, 0.0, np.zeros(3)),
+            stage_times=StageTimes(0.0, 0.0, 0.0),
             energies=None,
         )
 

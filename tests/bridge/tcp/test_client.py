@@ -43,7 +43,7 @@ def cut(link, upright):
     results = []
     for i in range(250):
         bridge.step(upright(0.009, -0.002 + 0.05 * DT * i), DT)
-        result = bridge.result._replace(profile=None)
+        result = bridge.result._replace(stage_times=None)
         results.append(result._replace(contacts=BladeContacts(*map(np.copy, result.contacts))))
     return results
 
@@ -61,8 +61,8 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert bits(here.surface()) == bits(link.surface())
     assert bits(here.chunks()) == bits(link.chunks())
     assert here.n_pieces() == link.n_pieces()
-    assert bits(here.quality()) == bits(link.quality())
-    assert link.quality().n_cut_nodes > 0
+    assert bits(here.cut_report()) == bits(link.cut_report())
+    assert link.cut_report().n_cut_nodes > 0
 
 
 def test_every_client_finds_the_tissue_as_at_the_start(server, upright):

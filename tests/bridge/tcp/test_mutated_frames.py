@@ -53,7 +53,7 @@ def answers(address, stream):
 
 def what_it_did(frame):
     """Return what a step did, without the time that it took."""
-    return bits(unpack_result(frame.payload)._replace(profile=None))
+    return bits(unpack_result(frame.payload)._replace(stage_times=None))
 
 
 def resident_bytes(process):

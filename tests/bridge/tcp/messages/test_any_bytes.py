@@ -15,7 +15,7 @@ from bridge.tcp.messages.body import (
     unpack_surface,
 )
 from bridge.tcp.messages.chunks import pack_chunks, unpack_chunks
-from bridge.tcp.messages.quality import pack_quality, unpack_quality
+from bridge.tcp.messages.cut_report import pack_cut_report, unpack_cut_report
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error, unpack_description, unpack_error
@@ -40,7 +40,7 @@ def real_messages():
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
         "pieces": (pack_pieces(1), unpack_pieces),
-        "quality": (pack_quality(tissue.cut_report()), unpack_quality),
+        "quality": (pack_cut_report(tissue.cut_report()), unpack_cut_report),
         "description": (pack_description(described), unpack_description),
         "error": (pack_error("no blade"), unpack_error),
     }

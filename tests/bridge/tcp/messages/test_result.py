@@ -50,8 +50,8 @@ def results(draw):
         work_of_blade=draw(any_float),
         work_of_cutting=draw(any_float),
         n_substeps=draw(counts),
-        touch=BodyContacts(draw(counts), draw(any_float), draw(any_float), vectors[6]),
-        profile=StageTimes(*draw(st.tuples(any_float, any_float, any_float))),
+        body_contacts=BodyContacts(draw(counts), draw(any_float), draw(any_float), vectors[6]),
+        stage_times=StageTimes(*draw(st.tuples(any_float, any_float, any_float))),
         energies=draw(st.none() | st.builds(Energies, *[any_float] * len(Energies._fields))),
     )
 

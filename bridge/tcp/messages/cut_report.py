@@ -6,13 +6,13 @@ from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import CutReport, MeshMeasures
 
-_QUALITY = struct.Struct("<10d3q")
-QUALITY_BYTES = _QUALITY.size
+_CUT_REPORT = struct.Struct("<10d3q")
+CUT_REPORT_BYTES = _CUT_REPORT.size
 
 
-def pack_quality(report: CutReport) -> bytes:
+def pack_cut_report(report: CutReport) -> bytes:
     """Return a reply: the floats of a report in the order of its fields, then its integers."""
-    return _QUALITY.pack(
+    return _CUT_REPORT.pack(
         report.path_error_mean,
         report.path_error_largest,
         report.node_size,
@@ -25,15 +25,15 @@ def pack_quality(report: CutReport) -> bytes:
     )
 
 
-def unpack_quality(payload: bytes) -> CutReport:
+def unpack_cut_report(payload: bytes) -> CutReport:
     """Return the report in a reply.
 
     Raises:
         MessageError: the length is wrong, a number is negative or NaN, or there is no tetrahedron.
     """
-    if len(payload) != _QUALITY.size:
-        raise MessageError(f"a quality report of {len(payload)} bytes; wanted {_QUALITY.size}")
-    numbers = _QUALITY.unpack(payload)
+    if len(payload) != _CUT_REPORT.size:
+        raise MessageError(f"a quality report of {len(payload)} bytes; wanted {_CUT_REPORT.size}")
+    numbers = _CUT_REPORT.unpack(payload)
     n_cut_nodes, n_initial, n_now = numbers[10:]
     check_counts(n_cut_nodes, min(n_initial, n_now) - 1)
     if not all(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bridge.tcp.messages.quality import pack_quality, unpack_quality
+from bridge.tcp.messages.cut_report import pack_cut_report, unpack_cut_report
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
 from tissue import CutReport, MeshMeasures
@@ -18,7 +18,7 @@ QUALITY = CutReport(
 
 
 def test_a_quality_report_arrives_bit_for_bit():
-    assert bits(unpack_quality(pack_quality(QUALITY))) == bits(QUALITY)
+    assert bits(unpack_cut_report(pack_cut_report(QUALITY))) == bits(QUALITY)
 
 
 @pytest.mark.parametrize(
@@ -33,4 +33,4 @@ def test_a_quality_report_arrives_bit_for_bit():
 )
 def test_a_quality_report_of_no_body_is_refused(change):
     with pytest.raises(MessageError):
-        unpack_quality(pack_quality(QUALITY._replace(**change)))
+        unpack_cut_report(pack_cut_report(QUALITY._replace(**change)))
