@@ -1,6 +1,5 @@
 """Cuts under the eyes of a judge: a body that moves and is out of shape, watched at every event."""
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -8,9 +7,6 @@ import numpy as np
 from tests import incisions, soundness, strokes
 from tests.incisions import Incision
 from tissue import FloatArray, Snapshot, TetrahedralMesh, Tissue
-from tissue.cutting.blade_path import Path
-from tissue.mesh.body import Body
-from tissue.mesh.star import Visits
 
 
 class WatchedTissue(Tissue):
@@ -22,9 +18,17 @@ class WatchedTissue(Tissue):
     momentum_jump = 0.0
     """The largest of any cut step, relative to the sum of mass times speed."""
 
-    def _cut(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
-        before = self.snapshot()
-        super()._cut(one_pass)
+    n_watched = 0
+    """Number of cut steps that were watched."""
+
+    def _before_cut(self) -> None:
+        self._before = self.snapshot()
+        super()._before_cut()
+
+    def _after_cut(self) -> None:
+        super()._after_cut()
+        before = self._before
+        self.n_watched += 1
         scale = float(before.masses @ np.linalg.norm(before.velocities, axis=1))
         if scale > 0.0:
             jump = soundness.momentum(self.snapshot()) - soundness.momentum(before)
@@ -70,6 +74,8 @@ def judge(before: Snapshot, tissue: WatchedTissue, lips_match: bool) -> Verdict:
     after = tissue.snapshot()
     found = soundness.faults(before, after, volume=1e-12, mass=1e-12, lips_match=lips_match)
     found += soundness.link_faults(tissue._body)
+    if tissue.n_watched == 0 and tissue.cut_report().n_cut_nodes > 0:
+        found.append("no cut step was watched")
     if tissue.momentum_jump > 1e-12:
         found.append(f"momentum jumped by {tissue.momentum_jump:.1e}")
     v_before = soundness.volumes(before.rest_positions, before.tetrahedra).sum()

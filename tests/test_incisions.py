@@ -83,8 +83,8 @@ class InspectedTissue(judged.WatchedTissue):
         self.n_looks = 0
         self.found: list[str] = []
 
-    def _cut(self, one_pass) -> None:
-        super()._cut(one_pass)
+    def _after_cut(self) -> None:
+        super()._after_cut()
         links = self._body.links[: self.n_tetrahedra]
         state = self.n_tetrahedra + 10**6 * int((links < 0).sum())
         if state != self.looked_at:

@@ -49,7 +49,7 @@ def test_a_body_that_fell_asleep_hangs_where_it_would_awake(law):
     """Short of equilibrium by the share of the weight that wakes a node, of the sag, at most."""
     mesh = bodies.jittered(3, 0)
     awake, asleep = (waited(mesh, LAWS[law], how) for how in (NEVER_ASLEEP, LOCAL))
-    assert asleep._relaxation.n_awake == 0
+    assert asleep._integrator.n_awake == 0
     apart = np.abs(asleep.snapshot().positions - awake.snapshot().positions).max()
     sag = np.abs(awake.snapshot().positions - mesh.positions).max()
     assert apart <= WAKE_ACCELERATION / 9.81 * sag

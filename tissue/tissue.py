@@ -126,9 +126,8 @@ class Tissue(BodyQueries):
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
         checked_floor(floor, float(self.bounds[0, 2]))
-        hooks = CutHooks(self._before_cut, self._after_pass, self._after_cut, self._mesh)
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
-        self._incision = Incision(scheme, self.node_size, hooks)
+        self._incision = Incision(scheme, self.node_size)
         self._audit = Audit(surroundings.gravity) if solver.audit else None
         audited = self._audit.audited if self._audit else None
         self._global_stepper = GlobalStepper(solver.threads, audited)
@@ -171,15 +170,15 @@ class Tissue(BodyQueries):
                 if has_blade:
                     self._update_anchors(increment)
             with clock.CD:  # collision detection: path, active tetrahedra, crossed edges
-                is_crossed = has_blade and self._trace(increment) and incision.detect()
+                is_crossed = has_blade and self._trace(increment) and incision.detect(*self._mesh())
             with clock.GC:  # geometric changes: subdivision, separation
                 if is_crossed:
-                    incision.cut()
+                    incision.cut(self._hooks)
                 elif has_blade and not interaction.is_engaged:
                     self._end_incision()
         with clock.GC:
             if has_blade:
-                incision.open_if_at_rest(travel, dt)
+                incision.open_if_at_rest(self._hooks, travel, dt)
         return self._result(edge, has_blade, dt, n_substeps, clock)
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
@@ -206,7 +205,7 @@ class Tissue(BodyQueries):
         self._end_incision()
         incision, blade_path = self._incision, self._incision.path
         before = incision.cut_area
-        cut_along(incision, lambda: self._system.body, rows, directions, self.node_size)
+        cut_along(incision, self._hooks, rows, directions, self.node_size)
         self._end_incision()
         incision.path = blade_path
         return incision.cut_area - before
@@ -303,7 +302,7 @@ class Tissue(BodyQueries):
     def _end_incision(self) -> None:
         """Resolve what the blade left uncut; the next contact begins another incision."""
         if self._incision.has_begun:
-            self._incision.end()
+            self._incision.end(self._hooks)
             self._system.contact.incision_ended(self._system.body)
             forget_path(self._incision.path)
 
@@ -338,6 +337,10 @@ class Tissue(BodyQueries):
         )
 
     # changes of the mesh
+
+    @property
+    def _hooks(self) -> CutHooks:
+        return CutHooks(self._before_cut, self._after_pass, self._after_cut, self._mesh)
 
     def _mesh(self) -> tuple[Body, Visits]:
         return self._system.body, self._system.visits

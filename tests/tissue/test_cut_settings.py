@@ -20,10 +20,10 @@ DRAG = 0.02
 """How far the blade may push the tissue aside all the same, in node sizes."""
 
 
-def cut_at(x: float, quality: CutSettings | None = None) -> Tissue:
+def cut_at(x: float, cut: CutSettings = CutSettings()) -> Tissue:
     """Return a block that an upright blade has cut in two at `x` [m]."""
     tissue = Tissue(
-        MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, solver=SolverSettings(cut=quality)
+        MESH, SOFT_TO_CUT, fixed=HELD, gravity=NO_GRAVITY, solver=SolverSettings(cut=cut)
     )
     make(tissue, upright(x, -0.005, SIZE + 0.01, -0.01, SIZE + 0.01))
     return tissue

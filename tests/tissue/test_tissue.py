@@ -1,5 +1,8 @@
 """The border of the engine: what it takes, what it refuses, what it hands out."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
@@ -212,3 +215,16 @@ def test_without_a_blade_the_body_hangs_and_swings(tissue):
     assert result.anchored_length == 0.0
     assert not np.any(result.wrench.force)
     assert hanging.snapshot().velocities[:, 2].min() < 0.0
+
+
+def test_a_tissue_that_is_no_longer_used_is_freed_at_once():
+    """Without waiting for Python to look for cycles: a server makes one for each client."""
+    gc.disable()
+    try:
+        tissue = Tissue(MESH)
+        strokes.make(tissue, strokes.straight(MESH))
+        remains = weakref.ref(tissue._system)
+        del tissue
+        assert remains() is None
+    finally:
+        gc.enable()

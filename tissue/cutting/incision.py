@@ -22,7 +22,11 @@ instant at each turn; to lay a crack front there each time would shred the mesh.
 
 
 class CutHooks(NamedTuple):
-    """Calls of the owner of the mesh while it is cut."""
+    """Calls of the owner of the mesh while it is cut.
+
+    They are passed to each call and not kept: the owner holds the incision, and a cycle of the two
+    would keep the arrays of a body in memory until Python looks for cycles.
+    """
 
     before_cut: Callable[[], None]
     """Called before the passes of a cut step."""
@@ -40,17 +44,15 @@ class Incision:
     Args:
         scheme: How the mesh is cut.
         node_size: Mean node size of the body [m].
-        hooks: Calls of the owner of the mesh.
     """
 
-    def __init__(self, scheme: Scheme, node_size: float, hooks: CutHooks) -> None:
+    def __init__(self, scheme: Scheme, node_size: float) -> None:
         self.scheme = scheme
         self.path = new_path(2)
         """Path of the edge through the body at rest, in this step."""
         self.has_begun = False
         """Whether the edge is in the tissue, or was in the last step."""
         self._node_size = node_size
-        self._hooks = hooks
         self._is_open = False
         self._resting_time = 0.0
 
@@ -67,28 +69,29 @@ class Incision:
         """Prepare for an edge of that many samples."""
         self.path = new_path(n_samples)
 
-    def detect(self) -> bool:
+    def detect(self, body: Body, visits: Visits) -> bool:
         """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
         if not self.has_begun or path_travel(self.path) == 0.0:
             return False
         self._is_open = False
-        self._detect()
+        self._detect(body, visits)
         return True
 
-    def cut(self) -> None:
+    def cut(self, hooks: CutHooks) -> None:
         """Cut what was detected."""
-        self._cut_in_passes(self.scheme.cut)
+        self._cut_in_passes(self.scheme.cut, hooks)
 
-    def open_to_edge(self) -> None:
+    def open_to_edge(self, hooks: CutHooks) -> None:
         """Cut up to the edge itself, which rests or leaves the way that it came."""
-        self._detect()
-        self._cut_in_passes(self.scheme.cut_to_edge)
+        self._detect(*hooks.mesh())
+        self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True
 
-    def open_if_at_rest(self, travel: float, dt: float) -> None:
+    def open_if_at_rest(self, hooks: CutHooks, travel: float, dt: float) -> None:
         """Cut up to the edge if it has rested for a while.
 
         Args:
+            hooks: Calls of the owner of the mesh.
             travel: How far the edge moved in this step [m].
             dt: Length of the step [s].
         """
@@ -100,30 +103,31 @@ class Incision:
         else:
             self._resting_time += dt
         if self._resting_time >= RESTING_TIME:
-            self.open_to_edge()
+            self.open_to_edge(hooks)
 
-    def end(self) -> None:
+    def end(self, hooks: CutHooks) -> None:
         """Resolve what the blade left uncut; the next contact begins another incision."""
         if not self._is_open:
-            self.open_to_edge()
+            self.open_to_edge(hooks)
         self._is_open = False
-        self._cut_in_passes(self.scheme.end)
+        self._cut_in_passes(self.scheme.end, hooks)
         self.scheme.forget()
         self.has_begun = False
 
-    def _detect(self) -> None:
-        body, visits = self._hooks.mesh()
+    def _detect(self, body: Body, visits: Visits) -> None:
         put_on_lattice(self.path, body.lattice)
         self.scheme.detect(body, visits, self.path)
 
-    def _cut_in_passes(self, one_pass: Callable[[Body, Visits, Path], None]) -> None:
+    def _cut_in_passes(
+        self, one_pass: Callable[[Body, Visits, Path], None], hooks: CutHooks
+    ) -> None:
         """Cut; where room runs out, make some and cut on."""
-        self._hooks.before_cut()
+        hooks.before_cut()
         while True:
-            one_pass(*self._hooks.mesh(), self.path)
+            one_pass(*hooks.mesh(), self.path)
             is_full = bool(self.scheme.change.is_full)
-            self._hooks.after_pass()
+            hooks.after_pass()
             if not is_full:
                 break
-            self.scheme.detect(*self._hooks.mesh(), self.path)
-        self._hooks.after_cut()
+            self.scheme.detect(*hooks.mesh(), self.path)
+        hooks.after_cut()

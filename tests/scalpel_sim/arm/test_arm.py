@@ -75,11 +75,11 @@ def test_an_unknown_arm_is_refused_with_the_known_ones():
 @pytest.mark.parametrize(
     ("qpos", "message"),
     [
-        ([0, 0.5, 0, 0, 1.5], "wanted 6 finite angles"),
-        ([0, 0.5, 0, 0, 1.5, np.nan], "wanted 6 finite angles"),
+        ([0, 0.5, 0, 0, 1.5], "must be 6 finite angles"),
+        ([0, 0.5, 0, 0, 1.5, np.nan], "must be 6 finite angles"),
         (
             [0, 2.0, 0, 0, 1.5, 0],
-            "joint 'shoulder' is put to 2.000 rad; its range is 0.000 to 1.75",
+            "joint 'shoulder' is set to 2.000 rad; its range is 0.000 to 1.75",
         ),
     ],
 )

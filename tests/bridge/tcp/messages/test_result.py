@@ -69,7 +69,7 @@ def test_a_result_arrives_bit_for_bit_even_where_the_tissue_diverged(result):
         ({"active_point_tetrahedron": -2}, "tip in number -2"),
         ({"n_tetrahedra": -1}, "-1 elements"),
         ({"n_substeps": -1}, "-1 substeps"),
-        ({"touch": BodyContacts(-1, 0.0, 0.0, np.zeros(3))}, "-1 contacts"),
+        ({"body_contacts": BodyContacts(-1, 0.0, 0.0, np.zeros(3))}, "-1 contacts"),
     ],
 )
 def test_a_result_with_impossible_counts_is_refused(change, why):
