@@ -1,5 +1,6 @@
 """From the command line's options to a run that only has to be started."""
 
+import gc
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -197,10 +198,11 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
 
 
 def load_kernels(options: PrintOptions) -> None:
-    """Load the kernels; where they must be compiled first, say why nothing seems to happen."""
+    """Load the kernels, which ends the loading; log it where they must be compiled first."""
     if not options.quiet and not kernels_are_compiled():
         say("compiling kernels, first run only (about a minute)")
     warm_up()
+    gc.enable()
 
 
 def _changes_of_scene(arm: ArmOptions) -> dict[str, Any]:
