@@ -132,12 +132,12 @@ class Bar:
     def frequencies(self) -> dict[str, float]:
         """Return the frequencies of `MODES` [Hz]."""
 
-        def of(kind: str) -> list[float]:
+        def of_kind(kind: str) -> list[float]:
             return [mode.frequency for mode in self.modes if mode.kind == kind]
 
         # Bending in y and in z are a pair, which a mesh with diagonals splits.
-        first, second = np.reshape(of("bending")[:4], (2, 2)).mean(axis=1)
-        values = (first, second, of("torsion")[0], of("stretching")[0])
+        first, second = np.reshape(of_kind("bending")[:4], (2, 2)).mean(axis=1)
+        values = (first, second, of_kind("torsion")[0], of_kind("stretching")[0])
         return dict(zip(MODES, map(float, values), strict=True))
 
     def _kind(self, motion: FloatArray) -> str:
@@ -149,14 +149,14 @@ class Bar:
         section = np.unique(np.round(x / self.length, 9), return_inverse=True)[1].ravel()
         weight = np.bincount(section, weights=self.masses)
 
-        def together(values: FloatArray) -> float:
+        def rigid_share(values: FloatArray) -> float:
             mean = np.bincount(section, weights=self.masses * values) / weight
             return float((weight * mean**2).sum())
 
         shares = {
-            "stretching": together(motion[:, 0]),
-            "torsion": together(twist),
-            "bending": together(motion[:, 1]) + together(motion[:, 2]),
+            "stretching": rigid_share(motion[:, 0]),
+            "torsion": rigid_share(twist),
+            "bending": rigid_share(motion[:, 1]) + rigid_share(motion[:, 2]),
         }
         return max(shares, key=lambda kind: shares[kind])
 

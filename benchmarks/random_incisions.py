@@ -1,4 +1,4 @@
-"""Random incisions, as many as are asked for, and what becomes of the mesh.
+"""Random incisions in several meshes, and checks of the mesh after each of them.
 
 Usage: PYTHONPATH=. python benchmarks/random_incisions.py [--runs N] [--motion], in the repository
 
@@ -61,7 +61,7 @@ def expected_pieces(mesh: str, kind: str) -> int | None:
 
 
 def main() -> None:
-    """Run, and print a row for each mesh and each kind of surface, and what went wrong."""
+    """Run, and print a row for each mesh and each kind of surface, and the failures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=18, help="incisions of each kind in each mesh")
     parser.add_argument("--first", type=int, default=0, help="first seed")
@@ -70,30 +70,30 @@ def main() -> None:
     )
     parser.add_argument("--meshes", default="", help="only those whose name contains this")
     parser.add_argument("--kinds", default="", help="only those whose name contains this")
-    given = parser.parse_args()
+    options = parser.parse_args()
 
     table = Table("mesh", "kind", "runs", "exceptions", "violations", "pieces as expected",
                   "growth, median", "most", "volume", "mass", "momentum", "s")  # fmt: skip
-    wrong: list[str] = []
+    failures: list[str] = []
     total = 0
     console = Console(width=170)
     for name, make in meshes().items():
         for kind in KINDS:
-            if given.meshes not in name or given.kinds not in kind:
+            if options.meshes not in name or options.kinds not in kind:
                 continue
             started = perf_counter()
             verdicts: list[Verdict] = []
             n_exceptions = n_violations = n_as_expected = 0
-            for seed in range(given.first, given.first + given.runs):
+            for seed in range(options.first, options.first + options.runs):
                 mesh = make(seed)
                 cuts = cuts_of(kind, mesh, seed)
                 total += 1
                 try:
-                    cut = judged.cut_by_blade if given.motion else judged.incised
+                    cut = judged.cut_by_blade if options.motion else judged.incised
                     verdict = cut(mesh, cuts)
                 except Exception:
                     n_exceptions += 1
-                    wrong.append(f"{name}, {kind}, seed {seed}: {traceback.format_exc()}")
+                    failures.append(f"{name}, {kind}, seed {seed}: {traceback.format_exc()}")
                     continue
                 verdicts.append(verdict)
                 n_violations += bool(verdict.faults)
@@ -101,14 +101,14 @@ def main() -> None:
                 as_expected = expected in (None, verdict.n_pieces)
                 n_as_expected += as_expected
                 if verdict.faults or not as_expected:
-                    wrong.append(
+                    failures.append(
                         f"{name}, {kind}, seed {seed}: {verdict.n_pieces} pieces {verdict.faults}"
                     )
             growths = [v.growth for v in verdicts] or [np.nan]
             table.add_row(
                 name,
                 kind,
-                str(given.runs),
+                str(options.runs),
                 str(n_exceptions),
                 str(n_violations),
                 str(n_as_expected) if expected_pieces(name, kind) else "-",
@@ -122,7 +122,7 @@ def main() -> None:
             )
     console.print(table)
     console.print(f"{total} runs")
-    for line in wrong:
+    for line in failures:
         print(line)
 
 

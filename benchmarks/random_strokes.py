@@ -75,7 +75,7 @@ def main() -> int:
     for name in (*names, "CPU ms/ms", "fastest [m/s]"):
         table.add_column(name, justify="right")
     console = Console()
-    is_stable, swiftest = True, 0.0
+    is_stable, largest_speed = True, 0.0
     try:
         for i in range(options.strokes):
             substeps, began, n = 0, thread_time(), 0
@@ -84,24 +84,24 @@ def main() -> int:
                 result = tissue.step(BladeSweep(before, after), DT)
                 substeps, n = max(substeps, result.n_substeps), n + 1
                 if n % 20 == 0:
-                    swiftest = max(swiftest, fastest(tissue))
+                    largest_speed = max(largest_speed, fastest(tissue))
             for _ in range(50):
                 result = tissue.step(None, DT)
             pressed = result.body_contacts.n_contacts
             row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps, pressed)
             spent = (thread_time() - began) / (n + 50) / DT
-            table.add_row(*map(str, row), f"{spent:.2f}", f"{swiftest:.2f}")
-            print(*row, f"{spent:.2f} {swiftest:.2f}", file=sys.stderr)
+            table.add_row(*map(str, row), f"{spent:.2f}", f"{largest_speed:.2f}")
+            print(*row, f"{spent:.2f} {largest_speed:.2f}", file=sys.stderr)
         for _ in range(1000):
             tissue.step(None, DT)
-        is_stable = swiftest < FASTEST and fastest(tissue) < AT_REST
+        is_stable = largest_speed < FASTEST and fastest(tissue) < AT_REST
     except TissueError as error:
         console.print(f"[red]{error}[/red]")
         is_stable = False
     console.print(table)
-    at_last = fastest(tissue)
+    final_speed = fastest(tissue)
     console.print(
-        f"{'stable' if is_stable else 'NOT STABLE'}; fastest node at the end {at_last:.4f} m/s"
+        f"{'stable' if is_stable else 'NOT STABLE'}; fastest node at the end {final_speed:.4f} m/s"
     )
     return 0 if is_stable else 1
 

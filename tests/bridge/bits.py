@@ -1,4 +1,4 @@
-"""Equality that forgives nothing."""
+"""Values as bits, for comparisons that must be exact."""
 
 import struct
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def bits(value: Any) -> Any:
-    """Return what a value is, down to the sign of a zero and the payload of a NaN."""
+    """Return the bits of a value, with the sign of a zero and the payload of a NaN."""
     if isinstance(value, tuple):
         return tuple(bits(part) for part in value)
     if isinstance(value, np.ndarray):

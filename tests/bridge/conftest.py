@@ -10,7 +10,7 @@ import pytest
 from bridge.tcp.keys import KEY_VARIABLE
 from tissue import BladeSegment
 
-# A busy machine is no fault of the code under test.
+# A busy machine must not fail a test.
 hypothesis.settings.register_profile("no deadline", deadline=None)
 hypothesis.settings.load_profile("no deadline")
 
@@ -46,8 +46,8 @@ class ServerProcess:
 def start_server():
     servers = []
 
-    def start(**how):
-        servers.append(ServerProcess(**how))
+    def start(**options):
+        servers.append(ServerProcess(**options))
         return servers[-1]
 
     yield start
@@ -65,7 +65,7 @@ def server():
 
 @pytest.fixture
 def upright():
-    """A blade that stands upright, longer than the block is high, and faces along y."""
+    """Return a function that makes an upright blade, longer than the block is high, facing +y."""
 
     def at(x: float, y: float, bottom: float = -0.005) -> BladeSegment:
         return BladeSegment(

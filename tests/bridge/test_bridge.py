@@ -37,12 +37,12 @@ def block_tissue():
 
 
 def draw(bridge, upright, n_frames, y_start=-0.002, speed=0.1):
-    """Draw the blade along y through the block and return what was felt."""
+    """Draw the blade along y through the block and return the wrenches on the arm."""
     return [bridge.step(upright(0.009, y_start + speed * DT * i), DT) for i in range(n_frames)]
 
 
 class DivergedLink(InProcessLink):
-    """A real tissue whose answer is spoilt on its way."""
+    """A real tissue whose results are spoilt in transit."""
 
     def __init__(self, tissue, spoil):
         super().__init__(tissue)
@@ -52,7 +52,7 @@ class DivergedLink(InProcessLink):
         return self._spoil(super().step(sweep, dt))
 
 
-def test_nothing_is_felt_out_of_contact_and_the_tissue_still_lives(block_tissue, upright):
+def test_nothing_is_felt_out_of_contact_and_the_tissue_still_advances(block_tissue, upright):
     tissue = Tissue(block((1, 1, 1), (0.02, 0.02, 0.02)))
     bridge = Bridge(InProcessLink(tissue))
     felt = [bridge.step(upright(0.01, 0.01, ABOVE), DT) for _ in range(20)]
@@ -77,13 +77,13 @@ def test_a_bridge_takes_a_tissue_as_it_is(block_tissue, upright):
 
 
 @pytest.mark.parametrize(
-    ("thing", "found"),
+    ("argument", "found"),
     [(None, "NoneType"), ("127.0.0.1:8766", "str"), (block((1, 1, 1), (1.0, 1.0, 1.0)), "Mesh")],
     ids=["nothing", "an address", "a mesh"],
 )
-def test_what_is_neither_a_tissue_nor_a_link_is_refused_by_its_type(thing, found):
+def test_an_argument_that_is_neither_a_tissue_nor_a_link_is_refused_with_its_type(argument, found):
     with pytest.raises(TypeError, match=rf"needs a tissue\.Tissue, or a link .*; got \w*{found}$"):
-        Bridge(thing)
+        Bridge(argument)
 
 
 @pytest.mark.parametrize("made", [Tissue, InProcessLink])
@@ -92,7 +92,7 @@ def test_a_class_in_place_of_an_object_is_refused(made):
         Bridge(made)
 
 
-def test_the_side_without_the_tissue_starts_without_its_compiler():
+def test_a_process_without_the_tissue_does_not_load_its_compiler():
     code = "import sys; from bridge import Bridge, TcpLink, serve; print('numba' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
@@ -101,23 +101,23 @@ def test_the_side_without_the_tissue_starts_without_its_compiler():
 
 
 def test_the_first_call_does_not_move_the_blade(block_tissue, upright):
-    # Anywhere but outside, a sweep from elsewhere would cut.
+    # Inside the tissue a sweep from any other pose would cut.
     bridge = Bridge(InProcessLink(block_tissue()))
     bridge.step(upright(0.009, 0.01), DT)
     assert bridge.result.cut_area == 0.0
 
 
-def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(
+def test_where_the_broad_phase_rejects_the_tissue_finds_no_active_tetrahedron(
     block_tissue, upright
 ):
-    filtered, asked = block_tissue(), block_tissue()
+    filtered, unfiltered = block_tissue(), block_tissue()
     bridge = Bridge(InProcessLink(filtered))
     before, n_rejected = upright(0.009, -0.03), 0
     for i in range(400):  # in from one side, out at the other
         segment = upright(0.009, -0.03 + 0.2 * DT * i)
         rejected_before = bridge.counters.rejected
         bridge.step(segment, DT)
-        without_filter = asked.step(BladeSweep(before, segment), DT)
+        without_filter = unfiltered.step(BladeSweep(before, segment), DT)
         if bridge.counters.rejected > rejected_before:
             assert without_filter.n_active == 0
             assert without_filter.anchored_length == 0.0
@@ -128,21 +128,21 @@ def test_where_the_broad_phase_says_no_the_tissue_finds_no_active_tetrahedron(
 
 
 def horseshoe(blade):
-    """Return a bar of soft tissue that is bent to half a ring around z, held by its middle."""
+    """Return a bar of soft tissue that is bent into half a ring around z and held at its middle."""
     mesh = block((12, 2, 3), (0.06, 0.01, 0.01))
     turn = np.pi * (1.0 - mesh.positions[:, 0] / 0.06)
     radius = 0.015 + mesh.positions[:, 1]
     bent = np.stack([radius * np.cos(turn), radius * np.sin(turn), mesh.positions[:, 2]], axis=1)
-    material = Material(young_modulus=1e3, toughness=1.0)  # sound goes 1.1 mm in a frame
+    material = Material(young_modulus=1e3, toughness=1.0)  # sound travels 1.1 mm in a frame
     fixed = np.abs(mesh.positions[:, 0] - 0.03) < 1e-3
     body = TetrahedralMesh(bent, mesh.tetrahedra)
     return Tissue(body, material, fixed=fixed, blade=blade, gravity=(0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("blade", [None, BladeShape()], ids=["line", "body"])
-def test_in_the_hollow_of_a_body_the_broad_phase_is_strict_too(upright, blade):
+def test_in_the_hollow_of_a_body_the_broad_phase_is_conservative_too(upright, blade):
     """A blade goes into the hollow and turns there, then out through an arm of the horseshoe."""
-    filtered, asked = horseshoe(blade), horseshoe(blade)
+    filtered, unfiltered = horseshoe(blade), horseshoe(blade)
     bridge = Bridge(InProcessLink(filtered))
     before, n_free, n_touching = None, 0, 0
     for i in range(500):
@@ -151,7 +151,7 @@ def test_in_the_hollow_of_a_body_the_broad_phase_is_strict_too(upright, blade):
         segment = segment._replace(forward=np.array([np.sin(turn), np.cos(turn), 0.0]))
         n_rejected = bridge.counters.rejected
         bridge.step(segment, DT)
-        result = asked.step(BladeSweep(before or segment, segment), DT)
+        result = unfiltered.step(BladeSweep(before or segment, segment), DT)
         before = segment
         touches = result.n_active > 0 or len(result.contacts.point) > 0
         n_touching += touches
@@ -159,7 +159,7 @@ def test_in_the_hollow_of_a_body_the_broad_phase_is_strict_too(upright, blade):
             assert not touches
             n_free += bool((filtered.bounds[0, :2] < segment.tip[:2]).all())
     assert n_free > 30 and n_touching > 50
-    assert bits(filtered.snapshot()) == bits(asked.snapshot())
+    assert bits(filtered.snapshot()) == bits(unfiltered.snapshot())
 
 
 def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block_tissue, upright):
@@ -167,7 +167,7 @@ def test_an_engaged_blade_keeps_its_tissue_however_far_it_pulls_it(block_tissue,
     draw(bridge, upright, 60)
     n_rejected = bridge.counters.rejected
     assert bridge.result.anchored_length > 0.0
-    bridge.step(upright(0.03, 0.004), DT)  # at once beyond the block: held tissue comes along
+    bridge.step(upright(0.03, 0.004), DT)  # a jump beyond the block: the held tissue follows
     bridge.step(upright(0.03, 0.004), DT)
     assert bridge.counters.rejected == n_rejected
 
@@ -199,7 +199,7 @@ def test_the_arm_never_feels_more_than_its_device_can_exert(block_tissue, uprigh
     np.testing.assert_allclose(np.cross(felt[-1].force, bridge.wrench_raw.force), 0.0, atol=1e-12)
 
 
-def test_the_fixtures_that_the_blade_meets_are_named_in_the_world(block_tissue, upright):
+def test_the_fixtures_that_the_blade_touches_are_named_in_the_world(block_tissue, upright):
     frame = TissueFrame(origin=np.array([0.0, 0.0, 0.05]))
     table = FixtureBox("table", np.array([1.0, 1.0, 0.02]), np.array([0.0, 0.0, 0.0]))
     bridge = Bridge(InProcessLink(block_tissue()), frame, fixtures=[table])
@@ -230,53 +230,53 @@ WALL_AT, BACK = np.array([0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0])
 
 
 def in_and_out(upright, n_frames=330, depth=2e-3):
-    """Poses of a blade that goes into a wall at y = 0 and out again, at up to 40 mm/s."""
-    way = 0.5 * (depth + 1e-3) * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, n_frames))) - 1e-3
-    return [upright(0.0, y) for y in way]
+    """Return the poses of a blade that moves into a wall at y = 0 and out, at up to 40 mm/s."""
+    path = 0.5 * (depth + 1e-3) * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, n_frames))) - 1e-3
+    return [upright(0.0, y) for y in path]
 
 
-class Counting(Wall):
-    """A wall that notes what it is asked."""
+class RecordingWall(Wall):
+    """A wall that records its queries."""
 
     def __init__(self, stiffness=500.0):
         super().__init__(WALL_AT, BACK, stiffness)
-        self.asked = []
+        self.queries = []
 
     def step(self, sweep, dt):
-        self.asked.append((sweep, dt))
+        self.queries.append((sweep, dt))
         return super().step(sweep, dt)
 
 
-def test_a_tissue_that_is_asked_every_ten_frames_lives_as_long_and_goes_the_same_way(upright):
-    wall = Counting()
+def test_queries_every_ten_frames_cover_the_whole_time_and_path(upright):
+    wall = RecordingWall()
     bridge = Bridge(wall, tissue_every=10)
     poses = in_and_out(upright, 101)
     for pose in poses:
         bridge.step(pose, DT)
-    assert sum(dt for _, dt in wall.asked) == pytest.approx(0.101)
-    for (before, _), (after, _) in itertools.pairwise(wall.asked):
+    assert sum(dt for _, dt in wall.queries) == pytest.approx(0.101)
+    for (before, _), (after, _) in itertools.pairwise(wall.queries):
         assert np.array_equal(before.t1.tip, after.t0.tip)
-    assert np.array_equal(wall.asked[-1][0].t1.tip, poses[-1].tip)
+    assert np.array_equal(wall.queries[-1][0].t1.tip, poses[-1].tip)
     assert bridge.counters.answers == 11
 
 
-def test_a_blade_that_holds_tissue_goes_straight_and_one_that_may_meet_it_as_the_arm_went(upright):
-    wall = Counting()
+def test_a_blade_that_holds_tissue_moves_straight_and_a_free_one_follows_the_arm(upright):
+    wall = RecordingWall()
     bridge = Bridge(wall, tissue_every=10)
     for pose in in_and_out(upright, 101):
         bridge.step(pose, DT)
-    steps = np.array([dt for _, dt in wall.asked])
-    inside = np.array([sweep.t0.tip[1] > 0.0 for sweep, _ in wall.asked])
+    steps = np.array([dt for _, dt in wall.queries])
+    inside = np.array([sweep.t0.tip[1] > 0.0 for sweep, _ in wall.queries])
     assert steps[~inside] == pytest.approx(DT)
     assert (~inside).sum() > 10
-    # Once it holds as much as before: nine frames at once, and the last one, which is felt.
+    # Once it holds as much as before: one step of nine frames, and one of the last frame.
     n_straight = np.isclose(steps[inside], 9 * DT).sum()
     assert n_straight >= 4
     assert np.isclose(steps[inside], DT).sum() == len(steps[inside]) - n_straight
 
 
 def test_the_tissue_answers_in_the_first_frame_and_then_in_every_fifth(upright):
-    bridge = Bridge(Counting(), tissue_every=5)
+    bridge = Bridge(RecordingWall(), tissue_every=5)
     answered = []
     for pose in in_and_out(upright, 16):
         bridge.step(pose, DT)
@@ -289,48 +289,50 @@ def test_the_tissue_answers_in_the_first_frame_and_then_in_every_fifth(upright):
     "coupling", [None, VirtualCoupling(stiffness=5e3)], ids=["rigid", "virtual"]
 )
 def test_the_impulse_that_the_arm_feels_is_that_on_the_tissue(upright, every, coupling):
-    """From before a contact to after it; momentum has gone nowhere else."""
-    wall = Counting()
+    """From before a contact to after it no momentum is lost."""
+    wall = RecordingWall()
     bridge = Bridge(wall, tissue_every=every, coupling=coupling, passivity=False)
     poses = in_and_out(upright) + [upright(0.0, -1e-3)] * (2 * every)
     felt = DT * np.sum([bridge.step(pose, DT).force for pose in poses], axis=0)
     missing = np.linalg.norm(felt - wall.impulse)
     assert np.abs(wall.impulse[1]) > 0.1
     assert missing < 0.003 * np.abs(wall.impulse[1])
-    # Half a dozen frames of a few dozen are missing at most where nothing was written off.
+    # Only what was written off may be missing.
     assert missing <= bridge.counters.impulse_written_off + 1e-12
 
 
-def test_a_wall_that_is_asked_every_ten_frames_is_felt_nearly_as_if_it_were_asked_in_each(upright):
-    """Held without its stiffness, what is felt is five frames old on the mean."""
+def test_a_wall_queried_every_ten_frames_feels_nearly_as_if_queried_in_each(upright):
+    """Without the stiffness the wrench is held, and five frames old on average."""
 
-    def forces(every, told):
-        bridge = Bridge(Wall(WALL_AT, BACK, 500.0, told), tissue_every=every)
+    def forces(every, reported):
+        bridge = Bridge(Wall(WALL_AT, BACK, 500.0, reported), tissue_every=every)
         return np.array([bridge.step(pose, DT).force[1] for pose in in_and_out(upright)])
 
-    always = forces(1, 1.0)
-    off, held_off = (np.abs(forces(10, told) - always).mean() for told in (1.0, 0.0))
-    assert always.min() < -0.9
-    assert off < 0.015 and held_off > 1.5 * off
+    each_frame = forces(1, 1.0)
+    error, held_error = (
+        np.abs(forces(10, reported) - each_frame).mean() for reported in (1.0, 0.0)
+    )
+    assert each_frame.min() < -0.9
+    assert error < 0.015 and held_error > 1.5 * error
 
 
 def test_a_virtual_coupling_keeps_the_blade_that_cuts_out_of_a_wall(upright):
-    wall = Counting(stiffness=20e3)
+    wall = RecordingWall(stiffness=20e3)
     bridge = Bridge(wall, coupling=VirtualCoupling(stiffness=700.0))
     for _ in range(100):
         felt = bridge.step(upright(0.0, 2e-3), DT)
-    # 20 kN/m and 700 N/m in a row, 2 mm pressed in.
+    # 20 kN/m and 700 N/m in series, pressed in by 2 mm.
     assert felt.force[1] == pytest.approx(-2e-3 / (1.0 / 700.0 + 1.0 / 20e3), rel=1e-3)
-    assert wall.asked[-1][0].t1.tip[1] == pytest.approx(-felt.force[1] / 20e3, rel=1e-3)
+    assert wall.queries[-1][0].t1.tip[1] == pytest.approx(-felt.force[1] / 20e3, rel=1e-3)
 
 
 @pytest.mark.parametrize("coupling", [None, VirtualCoupling()], ids=["rigid", "virtual"])
-def test_what_is_felt_between_two_answers_turns_with_the_tissue(upright, coupling):
+def test_the_wrench_between_two_answers_turns_with_the_tissue(upright, coupling):
     turned = TissueFrame(
         np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([0.3, -0.1, 0.2])
     )
     bridges = [
-        Bridge(Counting(), frame, tissue_every=10, coupling=coupling)
+        Bridge(RecordingWall(), frame, tissue_every=10, coupling=coupling)
         for frame in (TissueFrame(), turned)
     ]
     for pose in in_and_out(upright):
@@ -345,13 +347,13 @@ def test_what_is_felt_between_two_answers_turns_with_the_tissue(upright, couplin
 
 
 @pytest.mark.parametrize("every", [0, -1, 1.5, 101])
-def test_a_tissue_that_is_asked_too_seldom_or_never_is_refused(every):
+def test_a_number_of_frames_per_query_out_of_range_is_refused(every):
     with pytest.raises(ValueError, match=f"every {every} frames; .* from 1 to 100"):
-        Bridge(Counting(), tissue_every=every)
+        Bridge(RecordingWall(), tissue_every=every)
 
 
-class Silent(Counting):
-    """A tissue that stops answering, and comes back when it is woken."""
+class Silent(RecordingWall):
+    """A wall that does not answer while it is not awake."""
 
     def __init__(self):
         super().__init__()
@@ -372,7 +374,7 @@ def wait_for(bridge, upright, condition):
     raise AssertionError("the tissue never answered")
 
 
-def test_an_arm_that_cannot_wait_feels_a_silent_tissue_fade_and_come_back_by_a_ramp(upright):
+def test_an_arm_that_cannot_wait_feels_a_silent_tissue_fade_and_return_along_a_ramp(upright):
     tissue = Silent()
     bridge = Bridge(tissue, waits=False, passivity=False)
     felt = wait_for(bridge, upright, lambda: bridge.counters.answers > 50)
@@ -400,9 +402,7 @@ UP = np.array([0.0, 0.0, 1.0])
         (BladeSegment(np.zeros(3), UP, UP), "across the edge; they are 0 degrees apart"),
     ],
 )
-def test_a_blade_that_cannot_be_is_refused_before_the_tissue_hears_of_it(
-    block_tissue, segment, why
-):
+def test_an_invalid_pose_is_refused_before_it_reaches_the_tissue(block_tissue, segment, why):
     bridge = Bridge(InProcessLink(block_tissue()))
     with pytest.raises(ValueError, match=why):
         bridge.step(segment, DT)
@@ -415,7 +415,7 @@ def test_a_frame_that_lasts_no_time_is_refused(block_tissue, upright, dt):
         Bridge(InProcessLink(block_tissue())).step(upright(0.0, 0.0), dt)
 
 
-def test_the_link_describes_what_the_arm_side_needs(block_tissue):
+def test_the_link_describes_the_tissue_for_the_side_of_the_arm(block_tissue):
     tissue = block_tissue()
     described = InProcessLink(tissue, "block").describe()
     assert described.scene == "block"

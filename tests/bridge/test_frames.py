@@ -35,7 +35,7 @@ def test_forward_turns_with_the_frame_but_does_not_move_with_it():
 
 
 @given(frames(), vectors, vectors, vectors)
-def test_a_segment_comes_back_from_the_tissue_as_it_went(frame, tip, heel, forward):
+def test_a_segment_is_the_same_after_conversion_to_the_tissue_and_back(frame, tip, heel, forward):
     segment = BladeSegment(tip, heel, forward)
     back = frame.segment_to_world(frame.segment_to_tissue(segment))
     np.testing.assert_allclose(back, segment, atol=1e-14)
@@ -68,7 +68,7 @@ def test_the_identity_changes_no_bit():
 
 
 @given(frames())
-def test_a_corner_of_a_fixture_box_goes_where_its_point_goes(frame):
+def test_a_corner_of_a_fixture_box_is_converted_as_a_point_is(frame):
     box = FixtureBox("table", np.array([0.4, 0.2, 0.1]), np.array([0.1, 0.0, -0.3]))
     turned = frame.fixture_to_tissue(box)
     np.testing.assert_allclose(
@@ -100,7 +100,7 @@ def test_a_matrix_that_is_no_rotation_is_refused(rotation, why):
         TissueFrame(rotation)
 
 
-def test_an_origin_that_is_nowhere_is_refused():
+def test_an_origin_that_is_not_finite_is_refused():
     with pytest.raises(ValueError, match="the tissue's origin is not finite"):
         TissueFrame(origin=np.array([0.0, np.inf, 0.0]))
 

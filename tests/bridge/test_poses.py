@@ -23,21 +23,21 @@ def test_a_quarter_turn_about_the_edge_turns_the_flat():
 
 
 @given(vectors, vectors)
-def test_a_motion_that_was_done_is_found(way, turn):
-    done = np.concatenate([way, 1.5 * turn])
+def test_the_motion_to_a_moved_pose_is_the_one_that_moved_it(shift, turn):
+    done = np.concatenate([shift, 1.5 * turn])
     assert motion(UPRIGHT, moved(UPRIGHT, done)) == pytest.approx(done, abs=1e-12)
 
 
 @given(vectors, vectors)
-def test_a_motion_that_was_found_leads_there(way, turn):
-    there = moved(UPRIGHT, np.concatenate([way, 1.5 * turn]))
+def test_the_motion_between_two_poses_moves_the_first_to_the_second(shift, turn):
+    there = moved(UPRIGHT, np.concatenate([shift, 1.5 * turn]))
     again = moved(UPRIGHT, motion(UPRIGHT, there))
     for wanted, found in zip(there, again, strict=True):
         assert found == pytest.approx(wanted, abs=1e-12)
 
 
 @given(vectors)
-def test_a_moved_blade_is_as_long_and_as_square(turn):
+def test_a_moved_blade_keeps_its_length_and_right_angle(turn):
     there = moved(UPRIGHT, np.concatenate([np.zeros(3), 2.0 * turn]))
     assert half_length(there) == pytest.approx(0.02)
     assert np.linalg.norm(there.forward) == pytest.approx(1.0, abs=1e-15)

@@ -1,4 +1,4 @@
-"""A block of tetrahedra that a knife has parted down the middle, to look at."""
+"""A block of tetrahedra that is cut down the middle, to be drawn."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from tissue.mesh.faces import boundary_faces
 
 
 def cut_block(gap: float, cells: tuple[int, int, int] = (4, 6, 4)) -> Surface:
-    """Return the surface of a block whose halves gape by `gap` [m] at the top, cut down x = middle.
+    """Return the surface of a block cut at its middle x, with a gap [m] at the top of the cut.
 
     Without a gap it is whole: the faces in the middle are inside, and not part of the surface.
     """
@@ -25,7 +25,7 @@ def cut_block(gap: float, cells: tuple[int, int, int] = (4, 6, 4)) -> Surface:
 
 
 def _pulled_apart(rest: FloatArray, n_left: int, middle: float, gap: float) -> FloatArray:
-    """Return the positions of a body whose left and right part gape, most of all at the top."""
+    """Return positions of a body whose left and right parts are moved apart, most at the top."""
     side = np.where(np.arange(len(rest)) < n_left, -1.0, 1.0)
     height = (rest[:, 2] - rest[:, 2].min()) / np.ptp(rest[:, 2])
     reach = 1.0 - np.abs(rest[:, 0] - middle) / np.abs(rest[:, 0] - middle).max()

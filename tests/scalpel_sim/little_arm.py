@@ -1,4 +1,4 @@
-"""A model with one of each shape, and a blade over the middle of a block, to look at."""
+"""A MuJoCo model with a geom of each shape, and a blade above the middle of a block."""
 
 import mujoco
 import numpy as np
@@ -38,7 +38,7 @@ MJCF = """
 """
 
 FRAME = TissueFrame(origin=np.array([-0.02, -0.03, 0.05]))
-"""The block is the one of `cut_block`; its middle is below the origin of the world's x and y."""
+"""Frame of the block of `cut_block`, whose middle lies at x = y = 0 of the world."""
 
 
 def little_arm() -> tuple[mujoco.MjModel, mujoco.MjData]:

@@ -1,4 +1,4 @@
-"""A block that the tissue engine has cut: what the pictures of a run are made of."""
+"""A block that the tissue engine has cut, as the pictures of a run show it."""
 
 import functools
 import itertools
@@ -8,20 +8,20 @@ import numpy as np
 from tissue import BladeSegment, BladeSweep, Surface, Tissue, block, fixed_nodes
 
 DT = 1e-3
-"""[s]."""
+"""Time step [s]."""
 
 SPEED = 0.25
-"""Of the blade [m/s]."""
+"""Speed of the blade [m/s]."""
 
 STRETCH = 1.1
-"""The sides are pulled apart by this factor, so that the cut gapes."""
+"""Factor by which the held sides are pulled apart, so that the cut opens."""
 
 
 @functools.cache
 def cut_tissue() -> tuple[Surface, Surface, Surface]:
     """Return the surface of a block, 40 x 60 x 40 mm, before, in the middle of, and after a cut.
 
-    An upright blade goes through it from front to back, down the middle.
+    An upright blade moves through it from front to back, along the middle.
     """
     mesh = block()
     sides = fixed_nodes(mesh, "left,right")

@@ -12,7 +12,7 @@ GRID2 = SCENES["grid2"]
 def test_the_floor_of_the_scene_is_a_height_and_that_of_snapping_a_share():
     scene = changed(GRID2, floor=-0.05, snap=0.1)
     assert scene.floor == -0.05
-    assert (scene.cut.snap, scene.quality.floor) == (0.1, 0.1)
+    assert (scene.cut.snap, scene.cut.floor) == (0.1, 0.1)
 
 
 def test_properties_change_the_material_that_is_given_beside_them():
@@ -27,7 +27,7 @@ def test_what_is_not_given_stays():
 
 
 @pytest.mark.parametrize("module", ["scalpel_sim.scenes", "scalpel_sim.cli.app"])
-def test_a_list_of_scenes_and_the_help_wait_for_no_compiler_and_no_plots(module):
+def test_a_list_of_scenes_and_the_help_load_no_compiler_and_no_plots(module):
     program = (
         f"import sys, {module}; "
         "print([name for name in ('numba', 'matplotlib', 'scipy') if name in sys.modules])"

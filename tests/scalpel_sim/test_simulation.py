@@ -22,7 +22,7 @@ UNTIMED = COLUMNS.index("cd_s")
 
 
 def same_bits(first: Simulation, second: Simulation) -> bool:
-    """Whether all that was recorded is the same, but for wall times; NaN where nothing is known."""
+    """Return whether two recordings are the same but for wall times; NaN equals NaN."""
     one, other = (simulation.recording.rows[:, :UNTIMED] for simulation in (first, second))
     return np.array_equal(one, other, equal_nan=True)
 
@@ -43,7 +43,7 @@ def test_a_run_in_two_parts_is_the_run_in_one():
     assert same_bits(whole, parts)
 
 
-def test_a_run_ends_when_it_is_told_to():
+def test_a_run_ends_when_its_callback_returns_true():
     simulation = prepare(GRID2)
     simulation.run(1.0, lambda now: len(now.recording) == 7)
     assert len(simulation.recording) == 7
@@ -60,7 +60,7 @@ def test_the_blade_starts_on_the_stroke_and_stays_near_it():
     assert distances.max() < 2e-3
 
 
-def test_the_garbage_collector_rests_during_a_run_and_works_after_it():
+def test_the_garbage_collector_is_off_during_a_run_and_on_after_it():
     simulation = prepare(GRID2)
     seen = []
     simulation.run(0.005, lambda now: seen.append(gc.isenabled()))
@@ -102,7 +102,7 @@ def test_a_body_that_would_be_dragged_instead_of_cut_gets_a_warning(caplog):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_scene_parts_before_it_is_dragged_far(name):
+def test_the_body_of_a_scene_is_cut_before_it_is_dragged_far(name):
     """The blade drags tissue along by toughness / stiffness: little against the body."""
     scene = SCENES[name]
     drag = scene.material.toughness / scene.material.young_modulus
@@ -139,7 +139,7 @@ def test_a_scene_around_a_body_elsewhere_is_the_scene():
     assert (found.name, found.stroke, found.material) == ("grid2", "straight", soft.material)
 
 
-def test_a_run_lasts_for_the_stroke_and_a_rest_unless_it_is_told():
+def test_a_run_lasts_for_the_stroke_and_a_rest_unless_a_time_is_given():
     simulation = prepare(GRID2)
     assert run_time(simulation, None) == simulation.stroke.duration + REST_AFTER_STROKE
     assert run_time(simulation, 0.1) == 0.1
@@ -150,29 +150,29 @@ class BreakingLink(InProcessLink):
 
     n_steps_left = 150
 
-    def _use(self) -> None:
+    def _check_connection(self) -> None:
         if self.n_steps_left == 0:
             raise LinkError("the server is gone")
 
     def step(self, sweep, dt):
-        self._use()
+        self._check_connection()
         self.n_steps_left -= 1
         return super().step(sweep, dt)
 
     def snapshot(self):
-        self._use()
+        self._check_connection()
         return super().snapshot()
 
     def surface(self):
-        self._use()
+        self._check_connection()
         return super().surface()
 
     def n_pieces(self):
-        self._use()
+        self._check_connection()
         return super().n_pieces()
 
 
-def test_an_arm_that_loses_its_tissue_in_the_middle_of_a_cut_is_let_go():
+def test_an_arm_that_loses_its_tissue_in_the_middle_of_a_cut_is_released():
     link = BreakingLink(make_tissue(GRID2), "grid2")
     link.n_steps_left = 600
     simulation = prepare(GRID2, link)
@@ -189,7 +189,7 @@ def perform_in(folder, simulation: Simulation, seconds: float = 0.3):
         )
 
 
-def test_a_run_that_loses_its_tissue_keeps_all_that_can_be_kept(tmp_path):
+def test_a_run_that_loses_its_tissue_keeps_all_files_but_the_final_mesh(tmp_path):
     simulation = prepare(GRID2, BreakingLink(make_tissue(GRID2), "grid2"))
     with pytest.raises(RunError, match=r"after 0\.150 s: the server is gone; .* holds"):
         perform_in(tmp_path, simulation)
@@ -197,7 +197,7 @@ def test_a_run_that_loses_its_tissue_keeps_all_that_can_be_kept(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == UNAUDITED - {"final.vtu"}
 
 
-def test_a_run_whose_fault_is_ours_keeps_its_files_too(tmp_path):
+def test_a_run_that_ends_by_a_bug_keeps_its_files_too(tmp_path):
     simulation = prepare(GRID2)
     simulation.pictures.append(lambda now: 1 / (now.time < 0.1))
     with pytest.raises(RunError, match=r"ZeroDivisionError.*fault of the program"):
@@ -205,6 +205,6 @@ def test_a_run_whose_fault_is_ours_keeps_its_files_too(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == UNAUDITED
 
 
-def test_a_body_that_makes_a_run_crawl_is_named(tmp_path, caplog):
+def test_a_body_that_makes_a_run_slow_gets_a_warning(tmp_path, caplog):
     perform_in(tmp_path, prepare(changed(GRID2, young_modulus=1e10, toughness=2e7)), seconds=0.002)
     assert re.search(r"a frame takes [\d,]+ Runge-Kutta steps.*--young", caplog.text)

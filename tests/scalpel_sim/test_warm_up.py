@@ -1,4 +1,4 @@
-"""The first run compiles in two processes; what the second makes is found by the first."""
+"""The first run compiles in two processes; the first loads what the second compiled."""
 
 import subprocess
 import sys
@@ -13,17 +13,17 @@ def started(monkeypatch):
     """The processes that a warm-up starts, on a machine that seems to have compiled nothing."""
     processes = []
 
-    class Noted(subprocess.Popen):
+    class RecordedProcess(subprocess.Popen):
         def __init__(self, *arguments, **options):
             super().__init__(*arguments, **options)
             processes.append(self)
 
-    monkeypatch.setattr(subprocess, "Popen", Noted)
+    monkeypatch.setattr(subprocess, "Popen", RecordedProcess)
     monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda: False)
     return processes
 
 
-def test_a_first_run_lets_another_process_move_a_body_and_waits_for_it(started):
+def test_a_first_run_compiles_in_another_process_too_and_waits_for_it(started):
     warm_up.warm_up()
     assert [process.args for process in started] == [[sys.executable, "-m", "scalpel_sim.warm_up"]]
     assert started[0].returncode == 0

@@ -17,7 +17,7 @@ from bridge.collision.arm_geoms import ArmGeom
         ("cylinder", (1.0, math.inf), "all positive"),
     ],
 )
-def test_a_geom_of_no_shape_is_refused_by_name(shape, sizes, why):
+def test_a_geom_of_unknown_shape_or_bad_size_is_refused_by_name(shape, sizes, why):
     with pytest.raises(ValueError, match=f"geom 'wrist'.*{why}"):
         ArmGeom("wrist", shape, sizes)
 
@@ -34,10 +34,10 @@ def test_a_geom_of_no_shape_is_refused_by_name(shape, sizes, why):
 def test_the_box_around_a_geom_is_that_of_the_collision_library(shape, sizes, half_extents):
     geom = ArmGeom("wrist", shape, sizes)
     np.testing.assert_array_equal(geom.half_extents, half_extents)
-    there = fcl.CollisionObject(geom.geometry(), fcl.Transform())
+    collision_object = fcl.CollisionObject(geom.geometry(), fcl.Transform())
     for axis in range(3):
-        for gap, meets in ((-1e-3, True), (1e-3, False)):
-            at = np.zeros(3)
-            at[axis] = half_extents[axis] + 0.01 + gap
-            probe = fcl.CollisionObject(fcl.Sphere(0.01), fcl.Transform(at))
-            assert bool(fcl.collide(there, probe)) == meets
+        for gap, collides in ((-1e-3, True), (1e-3, False)):
+            centre = np.zeros(3)
+            centre[axis] = half_extents[axis] + 0.01 + gap
+            probe = fcl.CollisionObject(fcl.Sphere(0.01), fcl.Transform(centre))
+            assert bool(fcl.collide(collision_object, probe)) == collides

@@ -25,18 +25,18 @@ def segment(tip, edge):
 
 
 def resting(tip, edge=(0.0, 0.0, 1.0)):
-    here = segment(tip, edge)
-    return BladeSweep(here, here)
+    pose = segment(tip, edge)
+    return BladeSweep(pose, pose)
 
 
 @given(edges, edges, vectors, fractions, fractions, st.tuples(fractions, fractions, fractions))
-def test_an_edge_that_passes_through_the_tissue_is_never_hidden(
+def test_an_edge_that_passes_through_the_tissue_is_never_missed(
     edge_t0, edge_t1, motion, along, when, inside
 ):
-    # Both ends move on straight lines; put the blade where the point at `along` the edge is at
-    # `inside` the unit box at the time `when`.
-    there = when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
-    tip_t0 = np.array(inside) - there
+    # Both ends move on straight lines. The blade is placed so that the point at the fraction
+    # `along` of its edge is at `inside` in the unit box at the time `when`.
+    swept_point = when * motion + along * ((1.0 - when) * edge_t0 + when * edge_t1)
+    tip_t0 = np.array(inside) - swept_point
     sweep = BladeSweep(segment(tip_t0, edge_t0), segment(tip_t0 + motion, edge_t1))
     assert BroadPhase(UNIT_BOX, 0.0).overlaps(sweep, DT).tissue
 
@@ -45,8 +45,8 @@ def test_a_blade_above_the_tissue_does_not_touch_it():
     assert not BroadPhase(UNIT_BOX, SOUND_SPEED).overlaps(resting((0.5, 0.5, 1.01)), DT).tissue
 
 
-def test_a_blade_beside_a_slanted_tissue_box_is_told_apart_by_its_own_axes():
-    # The axis-aligned box of this diagonal edge would hold the corner (1, 1, 1); its own does not.
+def test_a_diagonal_blade_beside_the_tissue_is_separated_along_its_own_axes():
+    # The axis-aligned box of this edge contains the corner (1, 1, 1); the oriented one does not.
     diagonal = resting((1.5, 0.9, 0.5), (-0.6, 0.6, 0.0))
     assert not BroadPhase(UNIT_BOX, SOUND_SPEED).overlaps(diagonal, DT).tissue
 
@@ -61,13 +61,13 @@ def test_a_fast_blade_does_not_tunnel_through_a_thin_sheet():
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(2.9e-3, True), (3.1e-3, False)])
-def test_the_box_grows_by_what_sound_travels_in_a_step(gap, touches):
+def test_the_box_grows_by_the_distance_that_sound_travels_in_a_step(gap, touches):
     phase = BroadPhase(UNIT_BOX, SOUND_SPEED)
     assert phase.overlaps(resting((0.5, 0.5, 1.0 + gap)), DT).tissue == touches
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(0.0499, True), (0.0501, False)])
-def test_the_box_of_a_falling_body_grows_by_what_it_fell_in_the_last_step(gap, touches):
+def test_the_box_of_a_falling_body_grows_by_the_distance_it_fell_in_the_last_step(gap, touches):
     phase = BroadPhase(UNIT_BOX + np.array([0.0, 0.0, 0.05]), 0.0)
     phase.update_bounds(UNIT_BOX, DT)
     assert phase.overlaps(resting((0.5, 0.5, -1.0 - gap)), DT).tissue == touches
@@ -89,7 +89,7 @@ CLAMP = FixtureMesh(
 
 
 @pytest.mark.parametrize(
-    ("tip", "named"),
+    ("tip", "names"),
     [
         ((0.5, 0.5, 3.0), ()),
         ((0.5, 0.5, -0.5), ("table",)),
@@ -97,9 +97,9 @@ CLAMP = FixtureMesh(
         ((3.0, 0.2, -0.5), ("table", "clamp")),
     ],
 )
-def test_the_fixtures_that_the_blade_meets_are_named(tip, named):
+def test_the_fixtures_that_the_blade_touches_are_named(tip, names):
     phase = BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, CLAMP])
-    assert phase.overlaps(resting(tip), DT).fixtures == named
+    assert phase.overlaps(resting(tip), DT).fixtures == names
 
 
 def test_a_fixture_of_many_triangles_does_not_hide_the_tissue():
@@ -109,16 +109,16 @@ def test_a_fixture_of_many_triangles_does_not_hide_the_tissue():
     assert contacts == (True, ("gauze",))
 
 
-def test_a_turned_box_is_met_where_it_is():
+def test_a_rotated_fixture_box_is_tested_in_its_rotated_pose():
     s = np.sqrt(0.5)
-    turn = np.array([[s, -s, 0.0], [s, s, 0.0], [0.0, 0.0, 1.0]])
-    bar = FixtureBox("bar", np.array([2.0, 0.02, 2.0]), np.array([5.0, 5.0, 0.0]), turn)
+    rotation = np.array([[s, -s, 0.0], [s, s, 0.0], [0.0, 0.0, 1.0]])
+    bar = FixtureBox("bar", np.array([2.0, 0.02, 2.0]), np.array([5.0, 5.0, 0.0]), rotation)
     phase = BroadPhase(UNIT_BOX, 0.0, [bar])
     assert phase.overlaps(resting((5.5, 5.5, 0.0)), DT).fixtures == ("bar",)
     assert phase.overlaps(resting((5.5, 4.5, 0.0)), DT).fixtures == ()
 
 
-def test_two_fixtures_of_one_name_are_refused():
+def test_two_fixtures_with_the_same_name_are_refused():
     with pytest.raises(ValueError, match="two fixtures have the name 'table'"):
         BroadPhase(UNIT_BOX, SOUND_SPEED, [TABLE, TABLE])
 
@@ -136,13 +136,13 @@ HORSESHOE = np.array(
 
 
 class Source:
-    """Chunks that can be moved, and how often they were asked for."""
+    """A source of chunks that can be moved; it counts the queries."""
 
     def __init__(self, boxes, fastest=0.0):
-        self.boxes, self.fastest, self.n_asked = boxes, fastest, 0
+        self.boxes, self.fastest, self.n_queries = boxes, fastest, 0
 
     def __call__(self):
-        self.n_asked += 1
+        self.n_queries += 1
         return Chunks(self.boxes, self.fastest)
 
 
@@ -153,19 +153,19 @@ def test_a_blade_in_the_hollow_of_a_body_touches_nothing():
     assert BroadPhase(UNIT_BOX, 0.0).overlaps(resting((0.5, 0.6, 0.0)), DT).tissue
 
 
-def test_chunks_are_asked_for_only_in_the_box_around_all_and_before_the_blade_holds_tissue():
+def test_chunks_are_queried_only_within_the_bounds_and_before_the_blade_holds_tissue():
     source = Source(HORSESHOE)
     phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
     phase.overlaps(resting((0.5, 0.6, 2.0)), DT)
     assert phase.overlaps(resting((0.5, 0.6, 0.0)), DT, engaged=True).tissue
-    assert source.n_asked == 0
+    assert source.n_queries == 0
     phase.overlaps(resting((0.5, 0.6, 0.0)), DT)
-    assert source.n_asked == 1
+    assert source.n_queries == 1
 
 
 @pytest.mark.parametrize(("fastest", "touches"), [(0.0, False), (99.9, False), (100.1, True)])
-def test_chunks_reach_as_far_as_sound_and_their_fastest_node_go_in_a_step(fastest, touches):
-    """The lips are 0.3 m from the middle of the hollow; sound goes 0.2 m."""
+def test_chunks_grow_by_the_distance_of_sound_and_their_fastest_node_in_a_step(fastest, touches):
+    """The walls of the hollow are 0.3 m from its middle; sound travels 0.2 m."""
     phase = BroadPhase(UNIT_BOX, 200.0, chunks=Source(HORSESHOE, fastest))
     blade = BladeSegment(
         np.array([0.5, 0.6, 0.0]), np.array([0.5, 0.6, 1.0]), np.array([0, 1.0, 0])
@@ -173,7 +173,7 @@ def test_chunks_reach_as_far_as_sound_and_their_fastest_node_go_in_a_step(fastes
     assert phase.overlaps(BladeSweep(blade, blade), DT).tissue == touches
 
 
-def test_chunks_that_move_are_met_where_they_are():
+def test_chunks_that_move_are_tested_at_their_current_positions():
     source = Source(HORSESHOE)
     phase = BroadPhase(UNIT_BOX, 0.0, chunks=source)
     blade = resting((0.5, 0.6, 0.0))
@@ -185,8 +185,8 @@ def test_chunks_that_move_are_met_where_they_are():
 
 
 @given(st.lists(vectors, min_size=1, max_size=6), vectors, edges, vectors, fractions)
-def test_no_chunk_is_passed_through_unseen(corners, tip, edge, motion, when):
-    """A box of a millimetre around a point that the edge sweeps, among others."""
+def test_no_chunk_on_the_path_of_the_edge_is_missed(corners, tip, edge, motion, when):
+    """The boxes are cubes of 1 mm, one of them around a point that the edge sweeps."""
     point = tip + when * motion + 0.3 * edge
     low = np.array([point, *corners])
     boxes = np.stack([low - 5e-4, low + 5e-4], axis=1)
@@ -195,7 +195,7 @@ def test_no_chunk_is_passed_through_unseen(corners, tip, edge, motion, when):
     assert phase.overlaps(BladeSweep(segment(tip, edge), segment(tip + motion, edge)), DT).tissue
 
 
-def test_the_body_of_a_blade_meets_what_its_edge_does_not():
+def test_the_body_of_a_blade_touches_tissue_that_its_edge_does_not():
     shape = BladeShape(thickness=0.02, bevel_angle=0.5, height=0.3)
     blade = BladeSegment(
         np.array([0.5, 1.2, 0.0]), np.array([0.5, 1.2, 1.0]), np.array([0, 1.0, 0])

@@ -18,7 +18,7 @@ fractions = st.floats(0.0, 1.0)
 
 @st.composite
 def segments(draw):
-    """An edge of 1 to 200 mm, with a forward that need not be quite across it."""
+    """Draw an edge of 1 to 200 mm, whose forward need not be exactly across it."""
     edge = draw(vectors.filter(lambda v: np.linalg.norm(v) > 1e-3))
     forward = draw(vectors.filter(lambda v: np.linalg.norm(np.cross(v, edge)) > 1e-5))
     forward /= np.linalg.norm(forward)
@@ -31,7 +31,7 @@ def segments(draw):
 
 @st.composite
 def sweeps(draw):
-    """Anything that two poses may be, or a small motion of the one, as in a frame."""
+    """Draw two arbitrary poses, or a pose and a small motion of it, as in a frame."""
     before, after = draw(segments()), draw(segments())
     share = draw(st.sampled_from([1.0, 0.1, 1e-2, 1e-4]))
     tip = before.tip + share * (after.tip - before.tip)
@@ -45,7 +45,7 @@ def sweeps(draw):
 
 
 def pose_at(sweep, when):
-    """Return the blade on its way as the tissue sees it: ends on lines, forward in between."""
+    """Return the pose at a fraction of a sweep, interpolated linearly as in the tissue."""
     t0, t1 = sweep
     forward = (1.0 - when) * t0.forward + when * t1.forward
     return BladeSegment(
@@ -53,29 +53,29 @@ def pose_at(sweep, when):
     )
 
 
-def holds(box, point):
+def contains(box, point):
     return bool(np.all(np.abs(box.axes.T @ (point - box.centre)) <= 0.5 * box.size))
 
 
 @given(sweeps(), fractions, fractions)
-def test_the_swept_box_holds_the_edge_during_the_whole_step(sweep, along, when):
+def test_the_swept_box_contains_the_edge_during_the_whole_step(sweep, along, when):
     pose = pose_at(sweep, when)
-    assert holds(swept_blade(sweep), pose.tip + along * (pose.heel - pose.tip))
+    assert contains(swept_blade(sweep), pose.tip + along * (pose.heel - pose.tip))
 
 
 @pytest.mark.parametrize("shape", [SCALPEL, WEDGE])
 @given(sweeps(), fractions, fractions, fractions, st.sampled_from([-1.0, 1.0]))
-def test_the_swept_box_holds_the_body_of_the_blade_however_it_turns(
+def test_the_swept_box_contains_the_body_of_the_blade_however_it_turns(
     shape, sweep, along, when, back, side
 ):
     pose = pose_at(sweep, when)
     edge = pose.tip - pose.heel
     if np.linalg.norm(np.cross(edge, pose.forward)) < 1e-6:
-        return  # half way of a turn it has no plane: neither has the tissue's
+        return  # halfway through a turn the blade has no plane, as in the tissue
     axes = edge_axes(pose)
     point = pose.heel + along * edge
     point = point - back * shape.height * axes[:, 0] + side * 0.5 * shape.thickness * axes[:, 2]
-    assert holds(swept_blade(sweep, shape), point)
+    assert contains(swept_blade(sweep, shape), point)
 
 
 @given(segments())
@@ -86,7 +86,7 @@ def test_the_box_of_a_blade_at_rest_is_the_blade(pose):
     np.testing.assert_allclose(box.size, expected + 2.0 * TOUCHING_MARGIN, atol=1e-9)
 
 
-def test_a_blade_that_turns_by_a_degree_is_held_by_a_box_hardly_larger():
+def test_the_box_of_a_blade_that_turns_by_a_degree_is_hardly_larger_than_it():
     turn = math.radians(1.0)
     before = BladeSegment(np.zeros(3), np.array([0, 0, 0.04]), np.array([0.0, 1.0, 0.0]))
     after = before._replace(forward=np.array([math.sin(turn), math.cos(turn), 0.0]))
@@ -96,13 +96,13 @@ def test_a_blade_that_turns_by_a_degree_is_held_by_a_box_hardly_larger():
 
 
 @given(segments())
-def test_the_axes_of_an_edge_are_a_rotation(pose):
+def test_the_axes_of_an_edge_form_a_rotation(pose):
     axes = edge_axes(pose)
     np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-9)
     assert np.linalg.det(axes) == pytest.approx(1.0)
 
 
-def test_a_box_around_a_point_has_an_inside():
+def test_a_box_around_a_point_has_a_positive_size():
     box = box_around(np.array([[1.0, 2.0, 3.0]]), np.eye(3))
     np.testing.assert_array_equal(box.centre, [1.0, 2.0, 3.0])
     np.testing.assert_allclose(box.size, 2.0 * TOUCHING_MARGIN)

@@ -45,7 +45,7 @@ def test_the_limits_hold_and_both_directions_are_kept(force, torque):
     assert felt.force @ force >= 0.0 and felt.torque @ torque >= 0.0
 
 
-def test_a_wrench_that_is_made_shorter_keeps_its_line_of_action():
+def test_a_wrench_that_is_scaled_down_keeps_its_line_of_action():
     felt = Coupling(TOUCH).render(wrench((0.0, 0.0, 6.6), (0.2, 0.0, 0.0)), 1e-3)
     np.testing.assert_allclose(felt.force, [0.0, 0.0, 3.3])
     np.testing.assert_allclose(felt.torque, [0.1, 0.0, 0.0])
@@ -71,7 +71,7 @@ def test_no_profile_changes_the_force_faster_than_the_slew_limit(profile):
         before = felt.force
 
 
-def test_a_slewing_force_arrives():
+def test_a_force_limited_in_its_rate_reaches_its_value():
     coupling = Coupling(DeviceLimits(slew=1000.0))
     felt = [coupling.render(wrench((2.5, 0.0, 0.0)), 1e-3).force[0] for _ in range(4)]
     np.testing.assert_allclose(felt, [1.0, 2.0, 2.5, 2.5])
@@ -80,7 +80,7 @@ def test_a_slewing_force_arrives():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("where", ["force", "torque", "point"])
-def test_what_is_not_finite_never_gets_out_and_is_counted(bad, where):
+def test_a_wrench_that_is_not_finite_is_never_rendered_and_is_counted(bad, where):
     coupling = Coupling(TOUCH)
     with pytest.raises(CouplingError, match="not finite"):
         coupling.render(wrench(**{where: (0.0, bad, 0.0)}), 1e-3)
@@ -88,14 +88,14 @@ def test_what_is_not_finite_never_gets_out_and_is_counted(bad, where):
 
 
 @pytest.mark.parametrize("force", [MAX_PLAUSIBLE_FORCE * 1.01, 1e9, 1e200])
-def test_an_absurd_wrench_is_felt_as_zero_and_counted(force):
+def test_an_implausible_wrench_is_felt_as_zero_and_counted(force):
     coupling = Coupling(DeviceLimits())
     felt = coupling.render(wrench((force, 0.0, 0.0), (0.1, 0.0, 0.0)), 1e-3)
     assert not felt.force.any() and not felt.torque.any()
     assert coupling.n_implausible == 1
 
 
-def test_a_tissue_that_stays_absurd_ends_the_run_after_ten_frames():
+def test_a_tissue_that_stays_implausible_ends_the_run_after_ten_frames():
     coupling = Coupling(TOUCH)
     for _ in range(MAX_IMPLAUSIBLE_FRAMES - 1):
         coupling.render(wrench((1e6, 0.0, 0.0)), 1e-3)
@@ -103,7 +103,7 @@ def test_a_tissue_that_stays_absurd_ends_the_run_after_ten_frames():
         coupling.render(wrench((1e6, 0.0, 0.0)), 1e-3)
 
 
-def test_a_tissue_that_comes_to_its_senses_starts_the_count_again():
+def test_a_plausible_wrench_starts_the_count_again():
     coupling = Coupling(TOUCH)
     for frame in range(5 * MAX_IMPLAUSIBLE_FRAMES):
         coupling.render(wrench((1e6 if frame % 5 else 1.0, 0.0, 0.0)), 1e-3)
@@ -117,9 +117,9 @@ def test_a_limit_that_is_not_positive_is_refused(limit):
 
 
 def profiles(kind, n, n_frames, random):
-    """Forces and torques that a tissue might answer with, shapes (n, n_frames, 3)."""
+    """Return forces and torques over time that a tissue might exert, shapes (n, n_frames, 3)."""
     sizes = random.uniform(0.1, 50.0, (n, 1, 1))
-    ways = random.normal(size=(2, n, 1, 3))
+    directions = random.normal(size=(2, n, 1, 3))
     times = np.arange(n_frames)[None, :, None]
     shapes = {
         "step": times >= random.integers(0, n_frames, (n, 1, 1)),
@@ -128,24 +128,24 @@ def profiles(kind, n, n_frames, random):
         "random": random.normal(size=(n, n_frames, 1)),
     }
     if kind == "random":
-        ways = random.normal(size=(2, n, n_frames, 3))
-    force, torque = sizes * shapes[kind] * ways
+        directions = random.normal(size=(2, n, n_frames, 3))
+    force, torque = sizes * shapes[kind] * directions
     return force, torque * random.uniform(0.0, 0.1)
 
 
-def turned(felt, said):
-    """The largest sine of the angle between what is felt and what was said."""
-    sizes = np.linalg.norm(felt, axis=-1) * np.linalg.norm(said, axis=-1)
-    across = np.linalg.norm(np.cross(felt, said), axis=-1)
-    assert (np.sum(felt * said, axis=-1) >= 0.0).all()
+def largest_sine(felt, exerted):
+    """Return the largest sine of the angle between felt vectors and those of the tissue."""
+    sizes = np.linalg.norm(felt, axis=-1) * np.linalg.norm(exerted, axis=-1)
+    across = np.linalg.norm(np.cross(felt, exerted), axis=-1)
+    assert (np.sum(felt * exerted, axis=-1) >= 0.0).all()
     return (across[sizes > 0.0] / sizes[sizes > 0.0]).max()
 
 
-def felt_of(limits, force, torque, travels=None, silences=None, **how):
-    """What an arm feels of each profile, with a coupling of its own; shapes as they are."""
+def felt_of(limits, force, torque, travels=None, silences=None, **options):
+    """Return the force and torque that an arm feels of each profile, each with its own coupling."""
     felt = np.zeros((2, *force.shape))
     for i in range(len(force)):
-        coupling = Coupling(limits, **how)
+        coupling = Coupling(limits, **options)
         for k in range(force.shape[1]):
             wrench_now = Wrench(force[i, k], torque[i, k], np.zeros(3))
             more = {} if travels is None else {"travel": travels[i][k], "silence": silences[k]}
@@ -155,24 +155,26 @@ def felt_of(limits, force, torque, travels=None, silences=None, **how):
 
 @pytest.mark.parametrize("limits", [TOUCH, PREMIUM], ids=["touch", "premium"])
 @pytest.mark.parametrize("kind", ["step", "ramp", "alternating", "random"])
-def test_625_profiles_of_a_kind_and_device_never_exceed_a_limit_and_keep_their_direction(
+def test_625_profiles_of_each_kind_and_device_stay_within_limits_and_keep_their_direction(
     kind, limits
 ):
     force, torque = profiles(kind, 625, 20, np.random.default_rng(5))
     felt_force, felt_torque = felt_of(limits, force, torque, passivity=False)
     assert np.linalg.norm(felt_force, axis=-1).max() <= limits.force
     assert np.linalg.norm(felt_torque, axis=-1).max() <= limits.torque
-    assert turned(felt_force, force) < 1e-6
-    assert turned(felt_torque, torque) < 1e-6
+    assert largest_sine(felt_force, force) < 1e-6
+    assert largest_sine(felt_torque, torque) < 1e-6
 
 
 @pytest.mark.parametrize("kind", ["step", "ramp", "alternating", "random"])
-def test_nor_do_they_with_controller_slew_limit_and_a_tissue_that_falls_silent(kind):
+def test_profiles_stay_within_limits_with_controller_slew_limit_and_a_silent_tissue(kind):
     limits = DeviceLimits(force=8.5, torque=0.188, slew=2000.0)
     random = np.random.default_rng(6)
     force, torque = profiles(kind, 100, 40, random)
-    ways = random.normal(scale=[1e-4] * 3 + [1e-2] * 3, size=(100, 40, 6))
-    travels = [[Travel(way, 0.02, 0.0) for way in profile] for profile in ways]
+    displacements = random.normal(scale=[1e-4] * 3 + [1e-2] * 3, size=(100, 40, 6))
+    travels = [
+        [Travel(displacement, 0.02, 0.0) for displacement in profile] for profile in displacements
+    ]
     silences = 1e-3 * np.concatenate([np.zeros(10), np.arange(40, 55), np.zeros(15)])
     felt_force, felt_torque = felt_of(limits, force, torque, travels, silences)
     assert np.linalg.norm(felt_force, axis=-1).max() <= limits.force
@@ -181,7 +183,7 @@ def test_nor_do_they_with_controller_slew_limit_and_a_tissue_that_falls_silent(k
     assert changes.max() <= 2000.0 * 1e-3 * (1.0 + 1e-12)
 
 
-def test_what_the_arm_feels_of_a_silent_tissue_fades_and_comes_back_by_a_ramp():
+def test_the_wrench_of_a_silent_tissue_fades_and_returns_along_a_ramp():
     coupling, dt = Coupling(TOUCH), 1e-3
     for frame in range(600):
         felt = coupling.render(wrench((0.0, 2.0, 0.0)), dt, silence=frame * dt)
@@ -193,7 +195,7 @@ def test_what_the_arm_feels_of_a_silent_tissue_fades_and_comes_back_by_a_ramp():
     assert coupling.n_silent == 590
 
 
-def test_after_an_absurd_wrench_the_arm_feels_again_by_a_ramp():
+def test_after_an_implausible_wrench_the_force_returns_along_a_ramp():
     coupling = Coupling(TOUCH)
     coupling.render(wrench((1e6, 0.0, 0.0)), 1e-3)
     felt = [coupling.render(wrench((1.0, 0.0, 0.0)), 1e-3).force[0] for _ in range(110)]

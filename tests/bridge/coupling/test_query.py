@@ -24,7 +24,7 @@ def wall():
 
 
 class SlowWall(Wall):
-    """Answers when it is told to."""
+    """A wall that answers only once it is allowed to."""
 
     def __init__(self):
         super().__init__(np.zeros(3), BACK, 1e3)
@@ -45,7 +45,7 @@ def until_answered(query):
     raise AssertionError("no answer in 10 s")
 
 
-def test_an_answer_that_is_waited_for_is_there():
+def test_a_query_that_waits_has_its_answer():
     query = Query(wall(), waits=True)
     query.ask([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
     assert query.is_pending
@@ -54,7 +54,7 @@ def test_an_answer_that_is_waited_for_is_there():
     assert answer.seconds == DT and not query.is_pending and query.take_answer() is None
 
 
-def test_an_answer_that_is_not_waited_for_comes_when_it_comes():
+def test_a_query_that_does_not_wait_has_no_answer_until_it_arrives():
     slow = SlowWall()
     query = Query(slow, waits=False)
     query.ask([TimedSweep(BladeSweep(at(0.0), at(1e-3)), DT)], at(1e-3))
@@ -63,7 +63,7 @@ def test_an_answer_that_is_not_waited_for_comes_when_it_comes():
     assert until_answered(query).result.wrench_t1.force[1] == pytest.approx(-1.0)
 
 
-def test_a_tissue_that_is_lost_is_told_where_the_answer_is_taken():
+def test_the_loss_of_a_tissue_is_raised_where_the_answer_is_taken():
     class Lost(Wall):
         def step(self, sweep, dt):
             raise LinkError("the server is gone")
@@ -74,18 +74,18 @@ def test_a_tissue_that_is_lost_is_told_where_the_answer_is_taken():
         until_answered(query)
 
 
-def test_the_parts_of_a_path_answer_together_with_their_mean_wrench():
-    """Impulse and angular impulse are those of all steps; what is at the end is of the last."""
-    depths, asked = np.array([0.0, 1e-3, 3e-3, 2e-3]), wall()
+def test_a_path_in_parts_gets_one_answer_with_its_mean_wrench():
+    """Impulse and angular impulse are sums over all steps; values at the end are of the last."""
+    depths, tissue = np.array([0.0, 1e-3, 3e-3, 2e-3]), wall()
     seconds = [DT, 2 * DT, DT]
     path = [
         TimedSweep(BladeSweep(at(a), at(b)), dt)
         for a, b, dt in zip(depths[:-1], depths[1:], seconds, strict=True)
     ]
-    query = Query(asked, waits=True)
+    query = Query(tissue, waits=True)
     query.ask(path, at(depths[-1]))
     result = query.take_answer().result
-    assert result.wrench.force * sum(seconds) == pytest.approx(asked.impulse)
+    assert result.wrench.force * sum(seconds) == pytest.approx(tissue.impulse)
     means = -1e3 * 0.5 * (depths[:-1] + depths[1:])
     assert result.wrench.force[1] == pytest.approx(means @ seconds / sum(seconds))
     assert result.wrench.torque == pytest.approx(

@@ -1,4 +1,4 @@
-"""A proxy on a spring and a damper, and the rule for how much damping a sampled spring takes."""
+"""A proxy on a spring and a damper, and the damping that a sampled spring needs."""
 
 import math
 
@@ -16,8 +16,8 @@ FREE = np.zeros((6, 6))
 MIDDLE = np.array([0.0, 0.0, 0.02])
 
 
-def at(*way):
-    return moved(UPRIGHT, np.array(way + (0.0,) * (6 - len(way))))
+def at(*displacement):
+    return moved(UPRIGHT, np.array(displacement + (0.0,) * (6 - len(displacement))))
 
 
 def middle(pose):
@@ -33,7 +33,7 @@ def test_in_free_air_the_proxy_is_where_the_arm_is_and_nothing_is_felt():
         assert proxy.pose.heel == pytest.approx(arm.heel, abs=1e-6)
 
 
-def test_a_held_proxy_is_off_by_force_over_stiffness_and_the_arm_feels_the_force():
+def test_a_held_proxy_is_displaced_by_force_over_stiffness_and_the_arm_feels_the_force():
     """A force at the middle of the edge: it shifts the proxy and does not turn it."""
     proxy, load = Proxy(VirtualCoupling(stiffness=500.0), DT, UPRIGHT), np.array([0.0, -1.0, 0.0])
     wrench = np.concatenate([load, np.cross(MIDDLE, load)])
@@ -60,8 +60,8 @@ def test_the_arm_feels_spring_and_tissue_in_series():
     assert felt[1] == pytest.approx(-750.0 * 2e-3, rel=1e-6)
 
 
-def test_a_stiff_wall_is_met_within_a_frame_however_stiff():
-    """The balance is solved with the tissue's stiffness, so that no stiffness is too much."""
+def test_a_wall_of_any_stiffness_stops_the_proxy_within_a_frame():
+    """The balance is solved with the tissue's stiffness, so that no stiffness is too large."""
     proxy = Proxy(VirtualCoupling(), DT, UPRIGHT)
     wall = np.diag([1e6, 1e6, 1e6, 1e3, 1e3, 1e3])
     for frame in range(100):
@@ -71,13 +71,13 @@ def test_a_stiff_wall_is_met_within_a_frame_however_stiff():
     assert felt[1] < 0.0
 
 
-def test_what_is_not_given_follows_from_the_stiffness():
+def test_values_that_are_not_given_follow_from_the_stiffness():
     spring, damper = VirtualCoupling(stiffness=1e3).matrices(lever=0.02, dt=DT)
     assert np.diag(spring) == pytest.approx([1e3] * 3 + [0.4] * 3)
     assert np.diag(damper) == pytest.approx([3.0] * 3 + [1.2e-3] * 3)
 
 
-def test_a_coupling_with_too_little_damping_is_told_the_numbers(caplog):
+def test_too_little_damping_gets_a_warning_with_the_numbers(caplog):
     Proxy(VirtualCoupling(stiffness=1e3), DT, UPRIGHT)
     assert not caplog.records
     Proxy(VirtualCoupling(stiffness=1e3, damping=0.5), DT, UPRIGHT)
@@ -91,39 +91,39 @@ def test_a_coupling_with_too_little_damping_is_told_the_numbers(caplog):
 @pytest.mark.parametrize(
     "name", ["stiffness", "damping", "rotational_stiffness", "rotational_damping"]
 )
-def test_a_coupling_that_cannot_be_is_refused(name, bad):
+def test_a_coupling_with_an_impossible_value_is_refused(name, bad):
     with pytest.raises(ValueError, match=f"the coupling's {name} is .*; it must be positive"):
         VirtualCoupling(**{name: bad})
 
 
-# A mass in a spring whose force is held over each period T, and comes d periods late; between two
-# samples it moves as the mass and the damper b do by themselves, which is exact:
+# A mass on a spring whose force is held over each period T and is d periods late. Between two
+# samples the motion of the mass with its damper b is integrated exactly:
 #
 #     m x'' + b x' = -K x(t_(k-d))       for t_k <= t < t_(k+1)
 
 
-def swing(damping, delay, n_steps=100_000):
-    """Return the largest swing in the first and in the last tenth, for 1 kg on 1 kN/m."""
+def largest_amplitudes(damping, delay, n_steps=100_000):
+    """Return the amplitudes in the first and in the last tenth of the steps, 1 kg on 1 kN/m."""
     decay = math.exp(-damping * DT)
     glide = (1.0 - decay) / damping
     seen = [1.0] * (math.ceil(delay) + 1)
-    x, v, swings = 1.0, 0.0, [0.0, 0.0]
+    x, v, amplitudes = 1.0, 0.0, [0.0, 0.0]
     first, last = n_steps // 10, n_steps - n_steps // 10
     for step in range(n_steps):
-        # Half a period late is what the mean over the last one is.
+        # The mean over the last period is half a period late.
         late = seen[0] if delay == int(delay) else 0.5 * (seen[0] + seen[1])
         steady = -1e3 * late / damping
         x, v = x + steady * DT + (v - steady) * glide, steady + (v - steady) * decay
         seen = [*seen[1:], x]
         if step < first or step >= last:
-            swings[step >= last] = max(swings[step >= last], abs(x))
-    return swings
+            amplitudes[step >= last] = max(amplitudes[step >= last], abs(x))
+    return amplitudes
 
 
 @pytest.mark.parametrize("delay", [0, 0.5, 1])
-def test_34_a_sampled_spring_takes_a_damping_of_d_and_a_half_stiffness_times_period(delay):
+def test_a_sampled_spring_needs_damping_of_delay_plus_a_half_times_stiffness_times_period(delay):
     least = least_damping(1e3, DT, delay)
-    first, last = swing(1.1 * least, delay)
+    first, last = largest_amplitudes(1.1 * least, delay)
     assert last < 0.2 * first
-    first, last = swing(0.8 * least, delay)
+    first, last = largest_amplitudes(0.8 * least, delay)
     assert last > 5.0 * first

@@ -8,17 +8,17 @@ DT = 1e-3
 
 
 def silent_for(watchdog, seconds):
-    """Let the tissue be silent, and return the factor in each millisecond."""
+    """Return the gain in each millisecond of a silence."""
     return [watchdog.gain((i + 1) * DT, DT) for i in range(round(seconds / DT))]
 
 
-def test_a_tissue_that_answers_is_felt_whole():
+def test_the_gain_of_a_tissue_that_answers_is_one():
     watchdog = Watchdog()
     assert [watchdog.gain(0.0, DT) for _ in range(10)] == [1.0] * 10
     assert watchdog.n_silent == watchdog.n_faded == 0
 
 
-def test_silence_is_warned_of_once_and_counted_from_10_ms_on(caplog):
+def test_a_silence_gets_one_warning_and_is_counted_from_10_ms_on(caplog):
     watchdog = Watchdog()
     silent_for(watchdog, 0.020)
     assert watchdog.n_silent == 11
@@ -28,7 +28,7 @@ def test_silence_is_warned_of_once_and_counted_from_10_ms_on(caplog):
     assert len(caplog.records) == 2
 
 
-def test_the_wrench_fades_from_50_ms_on_and_is_gone_at_500():
+def test_the_wrench_fades_from_50_ms_on_and_is_zero_at_500():
     gains = silent_for(Watchdog(), 0.6)
     assert set(gains[:50]) == {1.0}
     assert gains[274] == pytest.approx(0.5)
@@ -37,7 +37,7 @@ def test_the_wrench_fades_from_50_ms_on_and_is_gone_at_500():
     assert (WARN_AFTER, DECAY_AFTER, ZERO_AFTER) == (0.010, 0.050, 0.500)
 
 
-def test_a_wrench_comes_back_by_a_ramp():
+def test_a_wrench_returns_along_a_ramp():
     watchdog = Watchdog()
     silent_for(watchdog, 0.6)
     back = [watchdog.gain(0.0, DT) for _ in range(round(RAMP / DT) + 5)]
@@ -47,7 +47,7 @@ def test_a_wrench_comes_back_by_a_ramp():
     assert watchdog.n_faded == 550 + round(RAMP / DT) - 1
 
 
-def test_a_wrench_that_was_reset_comes_back_by_a_ramp_too():
+def test_after_a_reset_a_wrench_returns_along_a_ramp_too():
     watchdog = Watchdog()
     watchdog.reset()
     assert watchdog.gain(0.0, DT) == pytest.approx(DT / RAMP)

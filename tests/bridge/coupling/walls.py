@@ -1,4 +1,4 @@
-"""A wall that pushes back like a spring: a tissue without memory, whose every answer is known."""
+"""A wall that pushes back like a spring: a tissue without memory, with exactly known answers."""
 
 import numpy as np
 
@@ -17,29 +17,29 @@ from tissue import (
 )
 
 N_POINTS = 5
-"""Of the edge, equally spaced from tip to heel, each with its share of the stiffness."""
+"""Number of points on the edge, equally spaced from tip to heel; they share the stiffness."""
 
 
 class Wall:
-    """All space behind a plane. Points of the edge behind it are pushed out, without friction.
+    """A half-space behind a plane, which pushes points of the edge out, without friction.
 
     Args:
-        point: On the plane [m].
-        normal: Out of the wall, a unit vector.
-        stiffness: Of the whole edge [N/m].
-        told: The share of its stiffness that it tells of. 0 makes of it a tissue whose last wrench
-            can only be held.
+        point: Point on the plane [m].
+        normal: Unit vector out of the wall.
+        stiffness: Stiffness against the whole edge [N/m].
+        reported: Share of the stiffness that results report. With 0 the last wrench can only be
+            held.
     """
 
     def __init__(
-        self, point: FloatArray, normal: FloatArray, stiffness: float, told: float = 1.0
+        self, point: FloatArray, normal: FloatArray, stiffness: float, reported: float = 1.0
     ) -> None:
         self._point, self._normal = np.array(point, float), np.array(normal, float)
         self._stiffness = stiffness
-        self._told = told
+        self._reported = reported
         self._work = 0.0
         self.impulse = np.zeros(3)
-        """That the blade felt if all went well: of the wall on the edge [N s]."""
+        """Impulse of the wall on the edge since the start [N s]."""
 
     def describe(self) -> TissueDescription:
         everywhere = np.array([[-1.0] * 3, [1.0] * 3])
@@ -53,8 +53,8 @@ class Wall:
         start, end = _points(sweep.t0), _points(sweep.t1)
         each = self._stiffness / N_POINTS
         depth_t0, depth_t1 = (self._depth(points) for points in (start, end))
-        mean = each * _mean_of_positive(depth_t0, depth_t1)
-        now = each * np.maximum(depth_t1, 0.0)
+        mean_forces = each * _mean_of_positive(depth_t0, depth_t1)
+        forces_t1 = each * np.maximum(depth_t1, 0.0)
         pressed = np.maximum(depth_t1, 0.0) ** 2 - np.maximum(depth_t0, 0.0) ** 2
         self._work += 0.5 * each * pressed.sum()
         lever = end - sweep.t1.tip
@@ -62,17 +62,17 @@ class Wall:
             [np.tile(self._normal, (N_POINTS, 1)), np.cross(lever, self._normal)], axis=1
         )
         touching = turning[depth_t1 > 0.0]
-        wrench = self._wrench(mean, lever, sweep.t1.tip)
+        wrench = self._wrench(mean_forces, lever, sweep.t1.tip)
         self.impulse += dt * wrench.force
         n = len(touching)
         return StepResult(
             wrench=wrench,
-            wrench_t1=self._wrench(now, lever, sweep.t1.tip),
-            stiffness=self._told * each * touching.T @ touching,
+            wrench_t1=self._wrench(forces_t1, lever, sweep.t1.tip),
+            stiffness=self._reported * each * touching.T @ touching,
             contacts=BladeContacts(
                 point=end[depth_t1 > 0.0],
                 normal=np.tile(-self._normal, (n, 1)),
-                normal_force=now[depth_t1 > 0.0],
+                normal_force=forces_t1[depth_t1 > 0.0],
                 friction=np.zeros((n, 3)),
                 cut_area=np.zeros(n),
             ),
@@ -106,7 +106,7 @@ def _points(segment: BladeSegment) -> FloatArray:
 
 
 def _mean_of_positive(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the mean of max(0, x) where x goes evenly from a to b."""
+    """Return the mean of max(0, x) while x changes from a to b at a constant rate."""
     inside = np.maximum(np.maximum(a, b), 0.0) ** 2 - np.maximum(np.minimum(a, b), 0.0) ** 2
     span = np.abs(b - a)
     return np.where(span > 1e-15, 0.5 * inside / np.maximum(span, 1e-15), np.maximum(a, 0.0))

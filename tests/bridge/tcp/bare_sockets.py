@@ -1,4 +1,4 @@
-"""Clients of a tissue server that may do anything, and what must be true after each of them."""
+"""Bare sockets to a tissue server, and the check that it still serves after each of them."""
 
 import contextlib
 import socket
@@ -13,12 +13,12 @@ HELLO = pack_frame(MessageKind.HELLO, 0)
 
 
 def connected(address):
-    """Return a bare socket to the server: a client that may do anything."""
+    """Return a bare socket to the server, through which a test can send anything."""
     return socket.create_connection(parse_address(address), 5.0)
 
 
 def read_all(connection):
-    """Return the frames that the other side sends until it hangs up."""
+    """Return the frames that the other side sends until it closes the connection."""
     reader, frames = FrameReader(), []
     with contextlib.suppress(ConnectionResetError):
         while data := connection.recv(1 << 16):
@@ -37,18 +37,18 @@ def read_one(connection):
 
 
 def link_once_free(address, key=None):
-    """Return a link, as soon as the server has noticed that the client before has left."""
+    """Return a link, as soon as the server has noticed that the last client has left."""
     for _ in range(200):
         try:
             return TcpLink(address, 10.0, key=key)
         except LinkError as error:
             assert "has the tissue" in str(error) or "connections are open" in str(error)
             time.sleep(0.02)
-    raise AssertionError("the server never let go of its client")
+    raise AssertionError("the server never released its client")
 
 
 def connected_client(address):
-    """Return a bare socket that the server takes for its client."""
+    """Return a bare socket that the server has accepted as its client."""
     for _ in range(200):
         peer = connected(address)
         peer.sendall(HELLO)
@@ -56,7 +56,7 @@ def connected_client(address):
             return peer
         peer.close()
         time.sleep(0.02)
-    raise AssertionError("the server never let go of its client")
+    raise AssertionError("the server never released its client")
 
 
 def assert_serves(server, key=None):

@@ -1,6 +1,6 @@
-"""Serves a small block to cut, in a process of its own. Patience is short, for hostile clients.
+"""Serves a small block to cut, in its own process, with short timeouts for hostile clients.
 
-python serve_block.py [HOST]: the key is the environment's, if it has one.
+Usage: python serve_block.py [HOST]; the key, if there is one, is that of the environment.
 """
 
 import sys
@@ -18,7 +18,7 @@ SIDE = 0.02
 def block_tissue() -> Tissue:
     """Return a block of 3 x 2 x 2 cells and 2 cm in length, held at its left and right sides.
 
-    The blade is a body and its work is audited, so that a reply has all that one may have.
+    The blade is a body and energies are audited, so that a reply has all optional parts.
     """
     mesh = block((3, 2, 2), (SIDE, SIDE, SIDE))
     fixed = (mesh.positions[:, 0] == 0.0) | (mesh.positions[:, 0] == SIDE)

@@ -9,16 +9,16 @@ KEY = bytes(range(32))
 
 
 def sent(payload, authenticator=None, kind=MessageKind.STEP, sequence=7):
-    """Return the frame in which a payload travels."""
+    """Return the frame of a payload with its authentication tag."""
     return Frame(
         kind, sequence, (authenticator or Authenticator(KEY)).with_tag(kind, sequence, payload)
     )
 
 
 @given(st.lists(st.binary(max_size=100), max_size=5))
-def test_a_stream_of_messages_with_tags_is_verified_in_its_order(payloads):
-    here, there = Authenticator(KEY), Authenticator(KEY)
-    assert [there.verified(sent(payload, here)).payload for payload in payloads] == payloads
+def test_a_stream_of_messages_with_tags_is_verified_in_order(payloads):
+    sender, receiver = Authenticator(KEY), Authenticator(KEY)
+    assert [receiver.verified(sent(payload, sender)).payload for payload in payloads] == payloads
 
 
 @given(st.binary(max_size=50), st.data())
@@ -33,23 +33,23 @@ def test_a_message_with_a_changed_byte_is_not_verified(payload, data):
 @pytest.mark.parametrize(
     "change", [{"kind": MessageKind.SNAPSHOT}, {"sequence": 8}, {"payload": b""}]
 )
-def test_a_tag_is_worth_nothing_on_another_message(change):
+def test_a_tag_does_not_verify_another_message(change):
     with pytest.raises(MessageError, match="authentication tag is wrong"):
         Authenticator(KEY).verified(sent(b"to cut")._replace(**change))
 
 
-def test_a_message_that_is_repeated_or_left_out_is_noticed():
-    here, there = Authenticator(KEY), Authenticator(KEY)
-    first, second = sent(b"1", here), sent(b"2", here)
+def test_a_repeated_or_omitted_message_is_detected():
+    sender, receiver = Authenticator(KEY), Authenticator(KEY)
+    first, second = sent(b"1", sender), sent(b"2", sender)
     with pytest.raises(MessageError):
-        there.verified(second)
-    there.verified(first)
+        receiver.verified(second)
+    receiver.verified(first)
     with pytest.raises(MessageError):
-        there.verified(first)
-    assert there.verified(second).payload == b"2"
+        receiver.verified(first)
+    assert receiver.verified(second).payload == b"2"
 
 
-def test_each_direction_of_each_conversation_has_keys_of_its_own():
+def test_each_direction_of_each_conversation_has_its_own_key():
     nonces = [new_nonce() for _ in range(4)]
     keys = [*direction_keys(KEY, *nonces[:2]), *direction_keys(KEY, *nonces[2:])]
     keys += direction_keys(bytes(32), *nonces[:2])
@@ -57,7 +57,7 @@ def test_each_direction_of_each_conversation_has_keys_of_its_own():
 
 
 def test_a_tag_is_half_a_digest_of_what_the_documentation_says():
-    """RFC 2104 and RFC 4868, computed the long way: two hashes around padded keys."""
+    """RFC 2104 and RFC 4868, computed step by step: two hashes around padded keys."""
     import hashlib
     import struct
 

@@ -58,20 +58,20 @@ def test_a_long_message_comes_in_parts_of_a_mebibyte_at_most(keys, n):
     assert b"".join(frame.payload for frame in frames) == payload[:n]
 
 
-def test_who_has_another_key_is_not_understood():
+def test_a_message_under_another_key_is_refused():
     _, server = ends()
     stranger, _ = ends(OTHER_KEYS)
     with pytest.raises(MessageError, match="authentication tag is wrong"):
         received(server, stranger.pack(MessageKind.HELLO, 1))
 
 
-def test_a_message_without_a_tag_is_not_taken_where_tags_are_due():
+def test_a_message_without_a_tag_is_refused_where_tags_are_required():
     for end in ends():
         with pytest.raises(MessageError, match="authentication tag is wrong"):
             received(end, [pack_frame(MessageKind.STEP, 1, bytes(100))])
 
 
-def test_a_message_that_is_sent_back_is_not_taken():
+def test_a_message_that_is_sent_back_is_refused():
     client, _ = ends()
     with pytest.raises(MessageError, match="authentication tag is wrong"):
         received(client, client.pack(MessageKind.STEP, 1, b"to cut"))

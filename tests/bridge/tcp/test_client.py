@@ -38,7 +38,7 @@ def link(server):
 
 
 def cut(link, upright):
-    """Draw the blade half through the block; return every result without its wall times."""
+    """Draw the blade halfway through the block; return all results without wall times."""
     bridge = Bridge(link)
     results = []
     for i in range(250):
@@ -50,13 +50,13 @@ def cut(link, upright):
 
 def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     here = InProcessLink(make_block())
-    felt_here, felt_there = cut(here, upright), cut(link, upright)
-    assert felt_here[-1].cut_area > 1e-5
-    assert max(len(result.contacts.point) for result in felt_here) > 3
-    assert max(np.linalg.norm(result.stiffness) for result in felt_here) > 1.0
-    assert felt_here[-1].energies.cutting > 0.0
-    assert felt_here[-1].n_tetrahedra > felt_here[0].n_tetrahedra
-    assert [bits(r) for r in felt_here] == [bits(r) for r in felt_there]
+    results_here, results_there = cut(here, upright), cut(link, upright)
+    assert results_here[-1].cut_area > 1e-5
+    assert max(len(result.contacts.point) for result in results_here) > 3
+    assert max(np.linalg.norm(result.stiffness) for result in results_here) > 1.0
+    assert results_here[-1].energies.cutting > 0.0
+    assert results_here[-1].n_tetrahedra > results_here[0].n_tetrahedra
+    assert [bits(r) for r in results_here] == [bits(r) for r in results_there]
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
     assert bits(here.chunks()) == bits(link.chunks())
@@ -81,7 +81,7 @@ def test_the_description_is_that_of_the_tissue_that_is_served(link):
     assert here._replace(bounds=None) == there._replace(bounds=None)
 
 
-def test_a_second_client_is_refused_and_the_first_goes_on(server, link):
+def test_a_second_client_is_refused_and_the_first_continues(server, link):
     with pytest.raises(
         LinkError, match=r"the client 127\.0\.0\.1:\d+ has the tissue, and only one"
     ):
@@ -89,20 +89,20 @@ def test_a_second_client_is_refused_and_the_first_goes_on(server, link):
     assert link.step(None, DT).n_tetrahedra == 72
 
 
-def test_a_request_that_makes_no_sense_is_refused_and_the_tissue_does_not_hear_of_it(link, upright):
+def test_an_invalid_request_is_refused_before_it_reaches_the_tissue(link, upright):
     before = bits(link.snapshot())
     segment = upright(0.009, 0.01)
-    lost = segment._replace(tip=np.array([0.0, np.nan, 0.0]))
+    invalid = segment._replace(tip=np.array([0.0, np.nan, 0.0]))
     with pytest.raises(LinkError, match="the blade is not within 1000 m"):
-        link.step(BladeSweep(segment, lost), DT)
+        link.step(BladeSweep(segment, invalid), DT)
     with pytest.raises(LinkError, match=r"a step of -1\.0 s"):
         link.step(None, -1.0)
     assert bits(link.snapshot()) == before
     assert link.step(None, DT).n_tetrahedra == 72
 
 
-def test_a_failure_of_the_tissue_is_reported_in_its_words(link, upright):
-    # The link lets a blade without length through; the tissue does not.
+def test_a_failure_of_the_tissue_is_reported_with_its_message(link, upright):
+    # The link accepts a blade without length; the tissue does not.
     point = upright(0.009, 0.01)
     point = BladeSegment(point.tip, point.tip, point.forward)
     with pytest.raises(LinkError, match="refused: ValueError: "):
@@ -125,7 +125,7 @@ def test_a_failure_of_the_tissue_is_reported_in_its_words(link, upright):
     ],
     ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
 )
-def test_garbage_is_answered_by_its_reason_and_costs_the_connection(server, garbage, answer):
+def test_garbage_is_answered_with_the_reason_and_ends_the_connection(server, garbage, answer):
     with connected(server.address) as peer:
         peer.sendall(garbage[:1000])
         (frame,) = read_all(peer)
@@ -138,7 +138,7 @@ def test_garbage_is_answered_by_its_reason_and_costs_the_connection(server, garb
     "join", [connected, connected_client], ids=["before the hello", "as the client"]
 )
 @pytest.mark.parametrize("part", [1, 10, 30])
-def test_half_a_message_costs_the_connection_after_a_while(server, join, part):
+def test_half_a_message_ends_the_connection_after_a_timeout(server, join, part):
     with join(server.address) as peer:
         peer.sendall(pack_frame(MessageKind.STEP, 1, pack_step(None, DT))[:part])
         last = read_all(peer)[-1]
@@ -146,7 +146,7 @@ def test_half_a_message_costs_the_connection_after_a_while(server, join, part):
     assert_serves(server)
 
 
-def test_a_message_that_trickles_in_does_not_keep_its_place(server):
+def test_a_message_sent_byte_by_byte_does_not_keep_its_connection(server):
     with connected(server.address) as peer, contextlib.suppress(OSError):
         started = time.monotonic()
         for byte in pack_frame(MessageKind.SNAPSHOT, 0, bytes(1000)):
@@ -158,7 +158,7 @@ def test_a_message_that_trickles_in_does_not_keep_its_place(server):
 
 @pytest.mark.parametrize("sent", [b"", HELLO, HELLO + HELLO[:7]], ids=["silent", "client", "half"])
 @pytest.mark.parametrize("how", ["closes", "resets"])
-def test_a_peer_that_vanishes_makes_room(server, sent, how):
+def test_a_peer_that_disconnects_frees_its_place(server, sent, how):
     peer = connected(server.address)
     peer.sendall(sent)
     if how == "resets":
@@ -167,7 +167,7 @@ def test_a_peer_that_vanishes_makes_room(server, sent, how):
     assert_serves(server)
 
 
-def test_connections_that_say_nothing_do_not_keep_a_client_out(server):
+def test_silent_connections_do_not_keep_a_client_out(server):
     with contextlib.ExitStack() as stack:
         for _ in range(MAX_CONNECTIONS - 1):
             stack.enter_context(connected(server.address))
@@ -203,13 +203,13 @@ def test_a_flood_of_requests_is_answered_in_order(server):
     assert_serves(server)
 
 
-def test_strangers_who_flood_the_server_do_not_change_a_cut(server, upright):
-    """They connect, say nothing, garbage, half a hello or a whole one, and leave or stay."""
+def test_strangers_that_flood_the_server_do_not_change_a_cut(server, upright):
+    """They connect, send nothing, garbage, half a HELLO or a whole one, and leave or stay."""
     with contextlib.closing(link_once_free(server.address)) as alone:
         expected = [bits(result) for result in cut(alone, upright)]
     done = threading.Event()
 
-    def bother():
+    def flood():
         talk = [b"", b"GET / HTTP/1.1\r\n\r\n", HELLO, HELLO[:9], bytes(1 << 20)]
         with contextlib.ExitStack() as staying:
             for i in range(10**6):
@@ -224,18 +224,18 @@ def test_strangers_who_flood_the_server_do_not_change_a_cut(server, upright):
                         staying.callback(stranger.close)
 
     with contextlib.closing(link_once_free(server.address)) as link:
-        crowd = threading.Thread(target=bother)
-        crowd.start()
+        flooding = threading.Thread(target=flood)
+        flooding.start()
         try:
             found = [bits(result) for result in cut(link, upright)]
         finally:
             done.set()
-            crowd.join()
+            flooding.join()
     assert found == expected
     assert_serves(server)
 
 
-def test_a_client_that_comes_back_in_the_middle_of_a_cut_finds_a_whole_body(start_server, upright):
+def test_a_client_that_reconnects_in_the_middle_of_a_cut_finds_a_whole_body(start_server, upright):
     server = start_server()
     with contextlib.closing(TcpLink(server.address)) as link:
         whole = bits(link.snapshot())
@@ -244,7 +244,7 @@ def test_a_client_that_comes_back_in_the_middle_of_a_cut_finds_a_whole_body(star
         assert bits(link.snapshot()) == whole
 
 
-def test_an_old_request_is_not_done_twice(server):
+def test_an_old_request_is_not_executed_twice(server):
     with connected_client(server.address) as peer:
         step = pack_frame(MessageKind.STEP, 1, pack_step(None, DT))
         peer.sendall(step + step)
@@ -253,12 +253,12 @@ def test_an_old_request_is_not_done_twice(server):
     assert_serves(server)
 
 
-# ---- what a client is told -----------------------------------------------------------------------
+# ---- errors that a client gets -------------------------------------------------------------------
 
 
 @pytest.fixture
 def impostor():
-    """Return a function that starts a server which sends fixed bytes to whoever speaks first."""
+    """Return a function that starts a server which sends fixed bytes to its first client."""
     listener = socket.create_server(("127.0.0.1", 0))
     done = threading.Event()
 
@@ -279,7 +279,7 @@ def impostor():
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "message"),
     [
         (b"HTTP/1.1 400 Bad Request\r\n\r\n", "is not scalpel-sim"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], f"uses version 99 .* this one {PROTOCOL_VERSION}"),
@@ -290,24 +290,24 @@ def impostor():
     ],
     ids=["http", "other version", "no description", "wrong kind", "refusal", "half a frame"],
 )
-def test_a_server_that_is_no_tissue_gets_one_clear_error(impostor, answer, told):
-    with pytest.raises(LinkError, match=told):
+def test_a_server_of_another_kind_is_one_clear_error(impostor, answer, message):
+    with pytest.raises(LinkError, match=message):
         TcpLink(impostor(answer))
 
 
-def test_a_server_that_does_not_answer_is_given_up(impostor):
+def test_a_server_that_does_not_answer_is_an_error_after_the_timeout(impostor):
     with pytest.raises(LinkError, match=r"did not answer within 0\.2 s"):
         TcpLink(impostor(b""), timeout=0.2)
 
 
-def test_a_server_that_is_not_there_gets_one_clear_error():
+def test_a_missing_server_is_one_clear_error():
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
     with pytest.raises(LinkError, match=f"no tissue is served at 127.0.0.1:{port}; start one"):
         TcpLink(f"127.0.0.1:{port}")
 
 
-def test_an_unknown_host_gets_one_clear_error():
+def test_an_unknown_host_is_one_clear_error():
     with pytest.raises(LinkError, match=r"no-such-host\.invalid:8766 cannot be reached"):
         TcpLink("no-such-host.invalid:8766")
 
@@ -315,16 +315,16 @@ def test_an_unknown_host_gets_one_clear_error():
 @pytest.mark.parametrize(
     "address", ["", "localhost", ":80", "localhost:", "a:b", "a:65536", "a:-1"]
 )
-def test_what_is_no_address_is_refused(address):
+def test_an_invalid_address_is_refused(address):
     with pytest.raises(ValueError, match="is not an address; wanted HOST:PORT"):
         TcpLink(address)
 
 
-def test_an_address_of_colons_is_written_in_brackets():
+def test_an_ipv6_address_is_written_in_brackets():
     assert parse_address("[::1]:8766") == ("::1", 8766)
 
 
-def test_a_tissue_whose_process_dies_gets_one_clear_error_and_the_link_is_closed(start_server):
+def test_the_death_of_the_server_is_one_clear_error_and_closes_the_link(start_server):
     server = start_server()
     link = TcpLink(server.address)
     server.end(signal.SIGKILL)
@@ -343,7 +343,7 @@ def test_the_server_ends_cleanly_on_a_signal_even_with_a_client(start_server, nu
     link.close()
 
 
-def test_a_request_that_was_interrupted_does_not_put_the_link_out_of_step(link, monkeypatch):
+def test_after_an_interrupted_request_replies_still_match_their_requests(link, monkeypatch):
     def interrupt(*_):
         raise KeyboardInterrupt
 
@@ -367,7 +367,7 @@ def test_a_host_that_others_can_reach_is_refused(host):
 
 
 @pytest.mark.parametrize("port", [-1, 65536])
-def test_a_port_that_is_none_is_refused(port):
+def test_an_invalid_port_is_refused(port):
     with pytest.raises(ValueError, match=f"port {port} does not exist"):
         TissueServer(make_block, port=port)
 

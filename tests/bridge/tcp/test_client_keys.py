@@ -1,4 +1,4 @@
-"""A server that asks for a key, and who comes to it with the right one, another, or none."""
+"""A server with a key, and clients with the same key, another key, or none."""
 
 import contextlib
 import socket
@@ -31,20 +31,20 @@ def server():
     running.end(15)
 
 
-def test_with_the_key_the_tissue_is_cut_and_its_whole_body_comes(server):
+def test_a_client_with_the_key_is_served_and_receives_the_whole_body(server):
     assert_serves(server, KEY)
     with contextlib.closing(TcpLink(server.address, key=KEY)) as link:
         assert len(link.snapshot().positions) == len(block_tissue().snapshot().positions)
         assert link.n_pieces() == 1
 
 
-def test_with_another_key_nobody_is_served(server):
+def test_a_client_with_another_key_is_refused(server):
     with pytest.raises(LinkError, match="refused: your key is not the one of this server"):
         TcpLink(server.address, key=OTHER_KEY)
     assert_serves(server, KEY)
 
 
-def test_without_a_key_nobody_is_served(server):
+def test_a_client_without_a_key_is_refused(server):
     with pytest.raises(LinkError, match="refused: this server asks for a key"):
         TcpLink(server.address)
     assert_serves(server, KEY)
@@ -56,8 +56,8 @@ def test_a_client_with_a_key_does_not_trust_a_server_without_one(start_server):
         TcpLink(server.address, key=KEY)
 
 
-def test_a_server_that_cannot_prove_that_it_has_the_key_is_left(listener):
-    """It challenges, and then cannot know what to say."""
+def test_a_server_that_cannot_prove_that_it_has_the_key_is_refused(listener):
+    """It sends a challenge, but cannot compute the tag of its next message."""
     address = listener(
         pack_frame(MessageKind.CHALLENGE, 0, bytes(NONCE_BYTES)),
         pack_frame(MessageKind.HELLO, 1, bytes(300)),
@@ -66,7 +66,7 @@ def test_a_server_that_cannot_prove_that_it_has_the_key_is_left(listener):
         TcpLink(address, key=KEY)
 
 
-def test_a_challenge_of_another_length_is_no_challenge(listener):
+def test_a_challenge_of_the_wrong_length_is_refused(listener):
     with pytest.raises(LinkError, match="a challenge of 5 bytes; wanted 32"):
         TcpLink(listener(pack_frame(MessageKind.CHALLENGE, 0, b"prove")), key=KEY)
 
@@ -91,7 +91,7 @@ def listener():
 
 
 def client_with_key(address):
-    """Return a bare socket that the server takes for its client, and its channel."""
+    """Return a bare socket that the server has accepted as its client, and its channel."""
     peer, channel, nonce = connected(address), Channel(), new_nonce()
     peer.sendall(pack_frame(MessageKind.HELLO, 0, nonce))
     keys = direction_keys(KEY, nonce, read_one(peer).payload)
@@ -104,12 +104,12 @@ def client_with_key(address):
 def next_frame(peer, channel):
     while (frame := channel.take()) is None:
         data = peer.recv(1 << 16)
-        assert data, "the server has hung up"
+        assert data, "the server has closed the connection"
         channel.feed(data)
     return frame
 
 
-def test_a_recorded_step_is_not_done_twice(server):
+def test_a_recorded_step_is_not_executed_twice(server):
     peer, channel = client_with_key(server.address)
     with peer:
         step = b"".join(channel.pack(MessageKind.STEP, 2, pack_step(None, DT)))
@@ -124,7 +124,7 @@ def test_a_recorded_step_is_not_done_twice(server):
     assert_serves(server, KEY)
 
 
-def test_a_recorded_conversation_opens_no_other_one(server):
+def test_a_recorded_handshake_opens_no_second_conversation(server):
     nonce = new_nonce()
     with connected(server.address) as peer:
         peer.sendall(pack_frame(MessageKind.HELLO, 0, nonce))
@@ -141,8 +141,8 @@ def test_a_recorded_conversation_opens_no_other_one(server):
 
 
 @pytest.mark.parametrize("where", ["magic", "kind", "sequence", "payload", "tag"])
-def test_a_step_that_somebody_changed_on_its_way_is_not_done(server, where):
-    """Somebody who can compute the checksums again, but has no key."""
+def test_a_step_that_was_changed_in_transit_is_not_executed(server, where):
+    """The attacker computes the checksums again, but has no key."""
     peer, channel = client_with_key(server.address)
     with peer:
         (step,) = channel.pack(MessageKind.STEP, 2, pack_step(None, DT))
@@ -163,7 +163,7 @@ def test_a_step_that_somebody_changed_on_its_way_is_not_done(server, where):
     assert_serves(server, KEY)
 
 
-def test_no_frame_with_a_random_change_is_done(server):
+def test_no_frame_with_a_random_change_is_executed(server):
     random = np.random.default_rng(0)
     for _ in range(50):
         peer, channel = client_with_key(server.address)
@@ -180,13 +180,13 @@ def test_no_frame_with_a_random_change_is_done(server):
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::"])
-def test_a_host_that_others_can_reach_takes_a_key(host):
+def test_a_host_that_others_can_reach_needs_a_key(host):
     with pytest.raises(ValueError, match=r"is open to other machines, and that takes a key"):
         TissueServer(block_tissue, host=host, port=0)
     with TissueServer(block_tissue, host=host, port=0, key=KEY) as server:
         assert parse_address(server.address)[1] > 0
 
 
-def test_another_machine_is_not_asked_without_a_key():
+def test_another_machine_is_not_contacted_without_a_key():
     with pytest.raises(ValueError, match=r"192\.0\.2\.1:8766 is another machine.* --key FILE"):
         TcpLink("192.0.2.1:8766")

@@ -23,13 +23,13 @@ def test_a_new_key_is_random_and_for_its_owner_alone(tmp_path):
     assert stat.S_IMODE((tmp_path / "first").stat().st_mode) == 0o600
 
 
-def test_a_key_is_never_written_over(file):
+def test_an_existing_key_file_is_never_overwritten(file):
     with pytest.raises(ValueError, match="exists already"):
         write_new_key(file)
     assert read_key(file) == bytes.fromhex(KEY)
 
 
-def test_the_file_comes_before_the_environment_and_neither_is_no_key(file, monkeypatch):
+def test_the_file_has_priority_over_the_environment_and_both_are_optional(file, monkeypatch):
     monkeypatch.delenv(KEY_VARIABLE, raising=False)
     assert chosen_key(None) is None
     monkeypatch.setenv(KEY_VARIABLE, "ab" * 16)
@@ -47,7 +47,7 @@ def test_the_file_comes_before_the_environment_and_neither_is_no_key(file, monke
         ("\xff" * 32, "holds no key"),
     ],
 )
-def test_what_could_be_guessed_is_no_key_and_is_not_repeated(file, monkeypatch, text, why):
+def test_a_short_or_malformed_key_is_refused_and_not_repeated(file, monkeypatch, text, why):
     file.write_text(text, encoding="latin-1")
     monkeypatch.setenv(KEY_VARIABLE, text)
     for path in (file, None):
@@ -57,13 +57,13 @@ def test_what_could_be_guessed_is_no_key_and_is_not_repeated(file, monkeypatch, 
 
 
 @pytest.mark.parametrize("mode", [0o640, 0o604, 0o666])
-def test_a_key_that_others_can_read_is_none(file, mode):
+def test_a_key_that_others_can_read_is_refused(file, mode):
     file.chmod(mode)
     with pytest.raises(ValueError, match=r"open to other users .* chmod 600"):
         read_key(file)
 
 
-def test_a_key_file_that_is_not_there_gets_one_clear_error(tmp_path):
+def test_a_missing_key_file_is_one_clear_error(tmp_path):
     for path in (tmp_path / "none", tmp_path):
         with pytest.raises(ValueError, match=r"cannot be read: .*scalpel-sim key"):
             read_key(path)

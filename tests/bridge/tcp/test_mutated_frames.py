@@ -1,6 +1,6 @@
-"""Streams with bytes changed, cut off or repeated: none has an effect but an error.
+"""Streams with bytes changed, cut off or repeated: none has any effect but an error.
 
-SCALPEL_SIM_MUTATIONS sets how many; a million takes an hour.
+The environment variable SCALPEL_SIM_MUTATIONS sets their number; a million takes an hour.
 """
 
 import os
@@ -26,12 +26,12 @@ from tests.bridge.tcp.bare_sockets import (
 N = int(os.environ.get("SCALPEL_SIM_MUTATIONS", "1000"))
 STEP = pack_frame(MessageKind.STEP, 1, pack_step(None, DT))
 GROWTH_ALLOWED = 4 << 20
-"""[byte]. What the allocator of a process that works may keep beyond its first thousand clients; a
-leak of one frame of 200 bytes in each mutation of the long setting would be 200 MB."""
+"""Memory that the allocator of a running server may keep beyond its first thousand clients [byte].
+A leak of one frame of 200 bytes in each mutation of the long setting would be 200 MB."""
 
 
 def mutated(stream, random):
-    """Return a stream with some bytes changed, and at times a part left out or repeated."""
+    """Return a stream with some bytes changed, and sometimes a part omitted or repeated."""
     changed = bytearray(stream)
     for at in random.integers(0, len(changed), random.integers(1, 5)):
         changed[at] ^= random.integers(1, 256)
@@ -44,15 +44,15 @@ def mutated(stream, random):
 
 
 def answers(address, stream):
-    """Return what the server says to somebody who sends this and no more."""
+    """Return the frames that the server sends to a client that sends a stream and no more."""
     with connected(address) as peer:
         peer.sendall(stream)
         peer.shutdown(socket.SHUT_WR)
         return read_all(peer)
 
 
-def what_it_did(frame):
-    """Return what a step did, without the time that it took."""
+def outcome(frame):
+    """Return the result of a step as bits, without its wall times."""
     return bits(unpack_result(frame.payload)._replace(stage_times=None))
 
 
@@ -61,26 +61,28 @@ def resident_bytes(process):
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="asks Linux for the memory")
+@pytest.mark.skipif(
+    not Path("/proc/self/statm").exists(), reason="reads the memory of a process from Linux"
+)
 def test_no_mutated_stream_has_an_effect_or_costs_memory(server):
     random = np.random.default_rng(0)
     with connected_client(server.address) as peer:
         peer.sendall(STEP)
         peer.shutdown(socket.SHUT_WR)
-        good = what_it_did(read_all(peer)[-1])
+        good = outcome(read_all(peer)[-1])
     memory = 0
     for i in range(2 * N):
         for frame in answers(server.address, mutated(HELLO + STEP, random)):
             assert frame.kind in (MessageKind.HELLO, MessageKind.STEP, MessageKind.ERROR)
-            if frame.kind == MessageKind.STEP:  # what was changed came after it, or was left out
-                assert what_it_did(frame) == good
+            if frame.kind == MessageKind.STEP:  # the change came after it, or was omitted
+                assert outcome(frame) == good
         if i == N:
             memory = resident_bytes(server.process)
     assert resident_bytes(server.process) - memory < GROWTH_ALLOWED
     assert_serves(server)
 
 
-def test_a_reader_of_mutated_frames_gives_the_frame_that_was_sent_or_an_error():
+def test_a_reader_of_mutated_frames_returns_frames_that_were_sent_or_raises():
     random = np.random.default_rng(1)
     sent = [Frame(MessageKind.HELLO, 0, b""), Frame(MessageKind.STEP, 1, pack_step(None, DT))]
     for _ in range(10 * N):

@@ -24,7 +24,7 @@ def reader_of(data):
 
 
 @given(st.lists(frames), st.integers(1, 50))
-def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(sent, piece):
+def test_frames_arrive_as_they_were_sent_however_the_stream_is_divided(sent, piece):
     stream = b"".join(pack_frame(*frame) for frame in sent)
     reader, received = FrameReader(), []
     for at in range(0, len(stream), piece):
@@ -36,7 +36,7 @@ def test_frames_come_out_as_they_went_in_however_the_stream_is_cut(sent, piece):
 
 
 @given(frames, st.data())
-def test_a_frame_with_a_broken_byte_is_never_taken(frame, data):
+def test_a_frame_with_a_changed_byte_is_never_accepted(frame, data):
     stream = bytearray(pack_frame(*frame))
     at = data.draw(st.integers(0, len(stream) - 1))
     stream[at] ^= data.draw(st.integers(1, 255))
@@ -53,12 +53,12 @@ def test_a_part_of_a_frame_is_waited_for(frame, data):
 
 
 @given(st.binary(min_size=1).filter(lambda data: not b"SCUT".startswith(data[:4])))
-def test_bytes_that_are_not_ours_are_refused_at_once(data):
+def test_bytes_of_another_protocol_are_refused_at_once(data):
     with pytest.raises(MessageError, match="not scalpel-sim"):
         reader_of(data).take()
 
 
-def test_a_payload_over_the_limit_is_refused_before_it_comes():
+def test_a_payload_over_the_limit_is_refused_before_it_arrives():
     stream = pack_frame(MessageKind.STEP, 0, bytes(LARGEST_FRAME + 1))
     with pytest.raises(MessageError, match="1048577 bytes; at most 1048576"):
         reader_of(stream[:HEADER_BYTES]).take()

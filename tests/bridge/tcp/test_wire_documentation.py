@@ -1,4 +1,4 @@
-"""What docs/wire.md says is so, and docs/examples/client.py runs against a real server."""
+"""docs/wire.md agrees with the code, and docs/examples/client.py runs against a real server."""
 
 import re
 import subprocess
@@ -28,7 +28,7 @@ def run_client(port):
     )
 
 
-def test_a_client_of_thirty_lines_cuts_the_tissue_and_feels_it(server):
+def test_a_client_of_thirty_lines_cuts_the_tissue_and_prints_its_force(server):
     done = run_client(parse_address(server.address)[1])
     assert (done.returncode, done.stderr) == (0, "")
     rows = re.findall(r"(\d+) ms: ([+-][\d.]+) N along y, (\d+) mm2 cut", done.stdout)
@@ -37,14 +37,14 @@ def test_a_client_of_thirty_lines_cuts_the_tissue_and_feels_it(server):
     assert float(rows[-1][2]) == pytest.approx(20 * 20, rel=0.05)
 
 
-def test_the_client_is_thirty_lines_and_imports_nothing_of_ours():
+def test_the_client_is_thirty_lines_and_imports_only_the_standard_library():
     lines = [line for line in CLIENT.read_text().splitlines() if line.strip()]
     assert len(lines) <= 30
     imported = re.findall(r"^(?:import|from) (\w+)", CLIENT.read_text(), re.MULTILINE)
     assert set(imported) <= set(sys.stdlib_module_names)
 
 
-def test_the_client_says_what_the_server_refuses(start_server):
+def test_the_client_prints_why_the_server_refuses_it(start_server):
     server = start_server(key=bytes(32))
     done = run_client(parse_address(server.address)[1])
     assert done.returncode == 1 and "this server asks for a key" in done.stderr
@@ -115,13 +115,13 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
 
 def test_the_tags_of_the_documentation_are_those_of_the_link():
     (code,) = re.findall(r"```python\n(.*?)```", WIRE, re.DOTALL)
-    told = {}
-    exec(compile(code, "wire.md", "exec"), told)
+    namespace = {}
+    exec(compile(code, "wire.md", "exec"), namespace)
     key, mine, theirs = bytes(range(32)), bytes(32), bytes([7] * 32)
-    to_server, to_client = told["direction_keys"](key, mine, theirs)
+    to_server, to_client = namespace["direction_keys"](key, mine, theirs)
     assert (to_server, to_client) == direction_keys(key, mine, theirs)
     authenticator = Authenticator(to_server)
     for n, payload in enumerate((b"", b"to cut")):
         kind, sequence = MessageKind.STEP | MORE, 10 + n
-        tag = told["authentication_tag"](to_server, n, kind, sequence, payload)
+        tag = namespace["authentication_tag"](to_server, n, kind, sequence, payload)
         assert authenticator.with_tag(kind, sequence, payload) == payload + tag

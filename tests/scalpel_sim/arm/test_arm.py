@@ -32,20 +32,20 @@ def test_the_arm_is_balanced_and_stays_where_it_is_left(preset):
 
 
 @pytest.mark.parametrize(("preset", "published"), [("touch", 0.045), ("premium", 0.075)])
-def test_one_feels_the_published_mass_at_the_gimbal(preset, published):
-    """Vendor's figures; the eigenvalues differ by direction, as they do in the device."""
+def test_the_apparent_mass_at_the_gimbal_is_as_published(preset, published):
+    """The figures are the vendor's. The mass differs by direction, as it does in the device."""
     arm = Arm(preset)
     inertia = np.zeros((6, 6))
     mujoco.mj_fullM(arm.model, arm.data, inertia)
     jacobian = np.zeros((3, 6))
     gimbal = arm.model.body("gimbal").id
     mujoco.mj_jac(arm.model, arm.data, jacobian, None, arm.data.xpos[gimbal], gimbal)
-    felt = np.linalg.eigvalsh(np.linalg.inv(jacobian @ np.linalg.solve(inertia, jacobian.T)))
-    assert 0.9 * published < felt[0] < felt[2] < 2.2 * published
+    apparent = np.linalg.eigvalsh(np.linalg.inv(jacobian @ np.linalg.solve(inertia, jacobian.T)))
+    assert 0.9 * published < apparent[0] < apparent[2] < 2.2 * published
 
 
 @BOTH
-def test_the_blade_is_as_long_as_was_asked_and_straight(preset):
+def test_the_blade_has_the_given_length_and_forward_is_across_it(preset):
     arm = Arm(preset, blade_length=0.083, mount_angle=0.7)
     segment = arm.blade.segment()
     assert np.linalg.norm(segment.tip - segment.heel) == pytest.approx(0.083)
@@ -58,7 +58,7 @@ def test_the_mount_angle_is_that_between_stylus_and_blade():
     assert np.arccos(stylus @ blade) == pytest.approx(0.7)
 
 
-def test_the_base_stands_and_faces_as_was_asked():
+def test_the_base_has_the_given_position_and_yaw():
     here, there = (
         Arm("touch", base_position=position, base_yaw=yaw).blade.segment()
         for position, yaw in (((0, 0, 0), 0.0), ((0.1, 0.2, 0.3), np.pi / 2))
@@ -99,14 +99,14 @@ def test_a_state_that_is_not_finite_stops_the_run_and_never_resets_silently():
 
 
 @pytest.mark.parametrize("force", [np.nan, 1e12])
-def test_a_force_put_past_the_blade_is_noticed_within_the_tick(force, caplog):
+def test_a_force_that_bypasses_the_blade_is_detected_within_the_step(force, caplog):
     arm = Arm("touch")
     arm.step1()
     arm.data.xfrc_applied[arm.blade.body_id, 0] = force
     with caplog.at_level(logging.WARNING, "scalpel_sim"), pytest.raises(ArmError):
         arm.step2()
         arm.check()
-        arm.step1()  # MuJoCo looks at the state when a step begins
+        arm.step1()  # MuJoCo checks the state when a step begins
         arm.check()
     assert arm.time > 0.0
 
@@ -147,7 +147,7 @@ def test_the_same_wrenches_give_the_same_motion_bit_for_bit():
     assert run().tobytes() == run().tobytes()
 
 
-def test_a_reset_arm_forgets_what_it_did():
+def test_a_reset_arm_moves_like_a_new_one():
     arm = Arm("touch")
     fresh = Arm("touch")
     arm.blade.apply(Wrench(np.array([3.0, 0, 0]), np.zeros(3), arm.blade.segment().tip))

@@ -38,7 +38,7 @@ def wrench(force=(0.0, 0.0, 0.0), torque=(0.0, 0.0, 0.0), point=(0.0, 0.0, 0.0))
     return Wrench(np.array(force), np.array(torque), np.array(point))
 
 
-def test_the_segment_is_where_the_sites_are_and_copies(arm):
+def test_the_segment_is_a_copy_of_the_positions_of_the_sites(arm):
     model, data = arm
     blade = Blade(model, data)
     segment = blade.segment()
@@ -62,17 +62,17 @@ def test_the_applied_wrench_is_j_transpose_w(arm):
     applied = wrench((1.0, -2.0, 0.5), (0.01, 0.02, -0.03), data.site("tip").xpos)
     Blade(model, data).apply(applied)
     mujoco.mj_step2(model, data)  # fills qfrc_smooth with passive - bias + actuator + applied
-    felt = data.qfrc_smooth - (data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator)
+    generalised_force = data.qfrc_smooth - (data.qfrc_passive - data.qfrc_bias + data.qfrc_actuator)
     translation, rotation = np.zeros((3, 2)), np.zeros((3, 2))
     mujoco.mj_jac(model, data, translation, rotation, applied.point, model.body("blade").id)
     assert np.allclose(
-        felt, translation.T @ applied.force + rotation.T @ applied.torque, atol=1e-14
+        generalised_force, translation.T @ applied.force + rotation.T @ applied.torque, atol=1e-14
     )
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e9, 1.01 * MAX_PLAUSIBLE_FORCE])
 @pytest.mark.parametrize("where", ["force", "torque", "point"])
-def test_a_wrench_that_no_tissue_exerts_never_reaches_mujoco(arm, bad, where):
+def test_an_implausible_wrench_never_reaches_mujoco(arm, bad, where):
     model, data = arm
     blade = Blade(model, data)
     blade.apply(wrench((1.0, 0.0, 0.0), point=data.xipos[blade.body_id]))
@@ -96,7 +96,7 @@ def test_a_wrench_that_no_tissue_exerts_never_reaches_mujoco(arm, bad, where):
         ({"forward": (0.0, np.nan, 1.0)}, "three finite numbers"),
     ],
 )
-def test_a_blade_that_is_not_there_is_refused_by_name(arm, arguments, message):
+def test_sites_that_do_not_form_a_blade_are_refused_by_name(arm, arguments, message):
     with pytest.raises(BladeError) as error:
         Blade(*arm, **arguments)
     assert message in str(error.value)

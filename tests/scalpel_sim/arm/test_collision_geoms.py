@@ -44,11 +44,11 @@ def test_the_table_is_a_box_whose_top_is_the_plane():
     np.testing.assert_allclose(table.size, [1.0, 1.0, TABLE_THICKNESS])
 
 
-def test_a_plane_without_an_end_is_no_table():
+def test_an_infinite_plane_is_no_table():
     assert tables(mujoco.MjModel.from_xml_string(MJCF)) == []
 
 
-def test_the_parts_of_ones_own_arm_are_found_too():
+def test_the_parts_of_any_other_model_are_found_too():
     model = mujoco.MjModel.from_xml_string(MJCF)
     data = mujoco.MjData(model)
     parts = ArmParts(model, data, model.body("blade").id).parts

@@ -9,75 +9,75 @@ from scalpel_sim.scenes import changed
 
 
 def lowered(arm, height):
-    """Let the hand lead the blade's tip down to a height, as a user would who aims too low."""
+    """Lower the blade's tip to a height with the hand, as a user would who aims too low."""
     before = arm.blade.segment()
     shift = np.array([0.0, 0.0, height - before.tip[2]])
-    for part in np.linspace(0.0, 1.0, 300):
-        way = part * shift
-        arm.hand.follow(before._replace(tip=before.tip + way, heel=before.heel + way))
+    for fraction in np.linspace(0.0, 1.0, 300):
+        offset = fraction * shift
+        arm.hand.follow(before._replace(tip=before.tip + offset, heel=before.heel + offset))
         arm.step1()
         yield
         arm.step2()
 
 
 @pytest.mark.parametrize("preset", ARMS)
-def test_an_arm_at_home_meets_nothing(preset, caplog):
-    touching = CollisionMonitor(Arm(preset))
-    touching.check()
-    assert touching.now == () and touching.frames == {} and not caplog.records
+def test_an_arm_at_home_touches_nothing(preset, caplog):
+    monitor = CollisionMonitor(Arm(preset))
+    monitor.check()
+    assert monitor.now == () and monitor.frames == {} and not caplog.records
 
 
-def test_a_blade_that_is_led_into_the_table_is_counted_and_said_once(caplog):
+def test_a_blade_that_is_led_into_the_table_is_counted_and_gets_one_warning(caplog):
     arm = Arm("touch")
-    touching = CollisionMonitor(arm)
+    monitor = CollisionMonitor(arm)
     for _ in lowered(arm, -0.005):
-        touching.check()
-    assert ("blade", "table") in touching.now
-    assert touching.frames["blade, table"] > 5
-    said = [
+        monitor.check()
+    assert ("blade", "table") in monitor.now
+    assert monitor.frames["blade, table"] > 5
+    warnings = [
         record.message for record in caplog.records if "blade meets the table" in record.message
     ]
-    assert len(said) == 1 and "nothing pushes back" in said[0]
+    assert len(warnings) == 1 and "nothing pushes back" in warnings[0]
 
 
-def test_a_handle_that_meets_a_clamp_is_named_with_it():
+def test_a_handle_that_touches_a_clamp_is_named_with_it():
     arm = Arm("touch")
     arm.step1()
     handle = arm.data.geom("stylus").xpos
     clamp = FixtureBox("clamp", np.full(3, 0.01), handle + np.array([0.0, 0.0, 0.012]))
-    touching = CollisionMonitor(arm, [clamp])
-    touching.check()
-    assert ("stylus", "clamp") in touching.now
+    monitor = CollisionMonitor(arm, [clamp])
+    monitor.check()
+    assert ("stylus", "clamp") in monitor.now
 
 
-def test_an_instrument_that_is_folded_back_on_the_arm_is_seen():
+def test_an_instrument_that_is_folded_back_on_the_arm_is_found():
     arm = Arm("touch", blade_length=0.16)
-    touching = CollisionMonitor(arm)
+    monitor = CollisionMonitor(arm)
     poses = np.random.default_rng(0).uniform(*arm.model.jnt_range.T, (300, 6))
-    met = set()
+    touched = set()
     for qpos in poses:
         arm.reset(qpos)
-        touching.check()
-        met |= set(touching.now)
-    assert {("blade", "upper_arm"), ("blade", "base")} <= met
-    assert not any(other in ("wrist", "gimbal", "stylus") for _, other in met)
+        monitor.check()
+        touched |= set(monitor.now)
+    assert {("blade", "upper_arm"), ("blade", "base")} <= touched
+    assert not any(other in ("wrist", "gimbal", "stylus") for _, other in touched)
 
 
 @pytest.mark.parametrize("scene", ["grid2", "slab"])
-def test_the_scenes_as_they_come_meet_nothing(scene):
+def test_in_the_scenes_nothing_is_touched(scene):
     simulation = prepare(SCENES[scene])
     simulation.run(0.02)
     assert simulation.touching.frames == {}
 
 
-def test_a_blade_that_passes_below_the_body_meets_the_floor_there():
+def test_a_blade_that_passes_below_the_body_touches_the_floor():
     simulation = prepare(changed(SCENES["grid2"], floor=-0.001))
     simulation.run(0.02)
     assert ("blade", "floor") in simulation.touching.now
     assert simulation.touching.frames["blade, floor"] == 20
 
 
-def test_the_floor_lies_below_the_body_and_no_farther():
+def test_the_floor_extends_below_the_body_and_a_margin_around_it():
     bounds = np.array([[0.0, 0.0, 0.0], [0.04, 0.02, 0.01]])
     floor = floor_below(bounds, -0.005)
     np.testing.assert_allclose(floor.centre[:2], [0.02, 0.01])
@@ -85,7 +85,7 @@ def test_the_floor_lies_below_the_body_and_no_farther():
     np.testing.assert_allclose(floor.size[:2], [0.04 + 2 * FLOOR_MARGIN, 0.02 + 2 * FLOOR_MARGIN])
 
 
-def test_what_stands_around_the_body_is_said_in_its_frame():
+def test_fixtures_are_given_in_the_frame_of_the_body():
     start = prepare(SCENES["grid2"]).stroke.pose(0.0)
     clamp = FixtureBox("clamp", np.full(3, 5e-3), 0.5 * (start.tip + start.heel))
     simulation = prepare(SCENES["grid2"], fixtures=[clamp])

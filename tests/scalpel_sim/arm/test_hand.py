@@ -70,7 +70,7 @@ def moved(segment, shift):
 
 
 @pytest.mark.parametrize("preset", ARMS)
-def test_the_blade_does_not_lag_behind_an_even_motion(preset):
+def test_the_blade_does_not_lag_behind_a_steady_motion(preset):
     arm = Arm(preset)
     start = arm.blade.segment()
     for k in range(400):
@@ -114,7 +114,7 @@ def test_an_impedance_is_positive(value):
         Impedance(rotational_stiffness=value)
 
 
-# A free blade in space: whoever has an arm of their own can have the hand too.
+# A free blade in space: the hand can be added to any model.
 FREE_BLADE = """
 <mujoco>
   <worldbody>
@@ -140,6 +140,6 @@ def test_the_hand_holds_the_blade_of_any_model():
     assert np.allclose(blade.segment().tip, goal.tip, atol=1e-9)
 
 
-def test_a_hand_on_a_blade_that_is_not_there_is_refused_by_name():
+def test_a_hand_on_a_site_that_does_not_exist_is_refused_by_name():
     with pytest.raises(ValueError, match=r"no site 'point'\. It has: 'heel', 'tip'"):
         add_hand(mujoco.MjSpec.from_string(FREE_BLADE), tip="point")

@@ -94,7 +94,7 @@ def test_auto_takes_the_smallest_arm_that_reaches_and_renders_the_force():
     ("preset", "remedy"),
     [("touch", "smaller, or choose --arm premium"), ("premium", "smaller"), ("auto", "smaller")],
 )
-def test_a_stroke_out_of_reach_is_refused_with_the_scale_that_would_do(preset, remedy):
+def test_a_stroke_out_of_reach_is_refused_with_a_scale_that_is_in_reach(preset, remedy):
     mesh = block((4, 6, 4), (0.4, 0.6, 0.4))
     with pytest.raises(PlacementError, match=rf"at 0\.\d+ times the size: .*{remedy}$") as error:
         place(plan_stroke("straight", mesh), bounds(mesh), preset)

@@ -8,12 +8,12 @@ from scalpel_sim.errors import UsageError
 from tissue import BladeShape
 
 
-def test_what_is_not_asked_for_is_as_usual():
+def test_without_measures_the_usual_blade_stays():
     assert chosen_blade(SCALPEL) is SCALPEL
     assert chosen_blade(None) is None
 
 
-def test_no_thickness_is_a_line():
+def test_a_thickness_of_zero_is_a_line():
     assert chosen_blade(SCALPEL, thickness=0.0) is None
 
 

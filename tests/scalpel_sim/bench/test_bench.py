@@ -1,4 +1,4 @@
-"""The benchmarks: that they do the work they say, and say what they found."""
+"""The benchmarks do the work that they describe, and report what they measured."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from scalpel_sim.scenes import SCHEMES
 
 
 def is_sane(measured):
-    """Whether a measurement has a unit, a clock, samples, and percentiles on the bad side."""
+    """Check that a measurement has a unit, a clock, samples, and percentiles on the slow side."""
     assert measured.unit and measured.clock and measured.n >= measured.rounds >= 1
     assert all(map(math.isfinite, (measured.median, measured.p95, measured.p99)))
     assert measured.lowest <= measured.highest
@@ -37,7 +37,7 @@ def printed(result, capsys):
     return capsys.readouterr().out
 
 
-def test_the_blade_does_the_same_to_a_body_however_large_it_is():
+def test_a_cut_does_the_same_work_in_a_body_of_any_size():
     small, large = map(median_cost, cut_slits(1, CUT_BLOCKS[:2]))
     assert large.n_tetrahedra > 9 * small.n_tetrahedra
     assert large.n_split == pytest.approx(small.n_split, rel=0.05)
@@ -51,9 +51,10 @@ def test_the_blade_does_the_same_to_a_body_however_large_it_is():
 def test_every_step_of_a_cut_is_a_sample():
     found = measure_cut_steps(2, CUT_BLOCKS[:1])
     assert all(map(is_sane, found.measurements))
-    of = {each.case: each for each in found.measurements}
-    assert of["cut step"].n == of["split tetrahedron"].n > 10
-    assert of["split tetrahedron"].median < of["cut step"].median  # some are split in each
+    by_case = {each.case: each for each in found.measurements}
+    assert by_case["cut step"].n == by_case["split tetrahedron"].n > 10
+    # Each cut step splits several tetrahedra.
+    assert by_case["split tetrahedron"].median < by_case["cut step"].median
 
 
 def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
@@ -65,30 +66,30 @@ def test_table_1_has_our_figures_beside_the_papers(capsys, tmp_path):
     measurements = load_results(file).measurements
     assert all(map(is_sane, measurements))
     assert len({each.case for each in measurements}) == len(TABLE_1) * len(SCHEMES)
-    of = {(each.case, each.quantity): each.median for each in measurements}
+    by_case = {(each.case, each.quantity): each.median for each in measurements}
     for cells, paper in TABLE_1.items():
         for scheme in SCHEMES:
             case = f"{'x'.join(map(str, cells))} cells, {scheme}"
-            assert of[case, "frames"] > 10.0 * paper.frame_rate
-            assert of[case, "after the cut"] > paper.tetrahedra_initial
-            shares = [of[case, f"share of {s}"] for s in ("RX", "RD", "GC", "CD", "other")]
+            assert by_case[case, "frames"] > 10.0 * paper.frame_rate
+            assert by_case[case, "after the cut"] > paper.tetrahedra_initial
+            shares = [by_case[case, f"share of {s}"] for s in ("RX", "RD", "GC", "CD", "other")]
             assert min(shares) > 0.0 and sum(shares) == pytest.approx(100.0)
-    assert of["2x2x2 cells, paper", "after the cut"] == 354  # as printed
-    assert of["2x4x3 cells, paper", "after the cut"] == 960  # as printed
-    assert of["4x6x4 cells, paper", "after the cut"] == 576 + 17 * 108  # the paper: 110
+    assert by_case["2x2x2 cells, paper", "after the cut"] == 354  # as printed
+    assert by_case["2x4x3 cells, paper", "after the cut"] == 960  # as printed
+    assert by_case["4x6x4 cells, paper", "after the cut"] == 576 + 17 * 108  # the paper: 110
 
 
 def test_a_longer_loop_takes_longer_and_a_larger_body_takes_more_time(capsys):
     found = measure_kernels(1, 5_400)
     assert all(map(is_sane, found.measurements))
-    of = {(each.case, each.tetrahedra): each.median for each in found.measurements}
+    by_case = {(each.case, each.tetrahedra): each.median for each in found.measurements}
     for law in ("springs", "neo-Hookean"):
         for size in (576, 5_400):
-            assert of[f"{law}: forces", size] < of[f"{law}: Runge-Kutta step", size]
-            assert of[f"{law}: forces", size] < 100.0  # ns per tetrahedron
+            assert by_case[f"{law}: forces", size] < by_case[f"{law}: Runge-Kutta step", size]
+            assert by_case[f"{law}: forces", size] < 100.0  # ns per tetrahedron
         step = f"{law}: Runge-Kutta step"
-        assert 5_400 * of[step, 5_400] > 3 * 576 * of[step, 576]
-    assert of["contact: search", 10_800] > of["contact: check of a step", 10_800] > 0.0
+        assert 5_400 * by_case[step, 5_400] > 3 * 576 * by_case[step, 576]
+    assert by_case["contact: search", 10_800] > by_case["contact: check of a step", 10_800] > 0.0
     text = printed(found, capsys)
     assert "ns/tet" in text and "CPU" in text and "wall" in text and "p99" in text
 
@@ -96,34 +97,36 @@ def test_a_longer_loop_takes_longer_and_a_larger_body_takes_more_time(capsys):
 def test_scaling_gives_the_time_of_a_step_whole_and_per_tetrahedron(capsys):
     found = measure_scaling(1, sizes=(576, 6_000))
     assert all(map(is_sane, found.measurements))
-    of = {(each.case, each.quantity, each.tetrahedra): each.median for each in found.measurements}
+    by_case = {
+        (each.case, each.quantity, each.tetrahedra): each.median for each in found.measurements
+    }
     for law in ("springs", "neo-Hookean"):
         step = f"{law}: Runge-Kutta step"
         for size in (576, 6_000):
-            each, whole = of[step, "time per tetrahedron", size], of[step, "time", size]
+            each, whole = by_case[step, "time per tetrahedron", size], by_case[step, "time", size]
             assert each == pytest.approx(1e6 * whole / size)
     assert "6,000" in printed(found, capsys)
 
 
-def test_a_local_frame_splits_a_dozen_and_does_not_depend_on_the_body_around(capsys):
+def test_a_local_frame_splits_a_dozen_and_does_not_depend_on_the_size_of_the_body(capsys):
     found = measure_local_frames(1, sizes=(6_000, 20_250))
     assert all(map(is_sane, found.measurements))
-    of = {(each.case, each.tetrahedra): each for each in found.measurements}
+    by_case = {(each.case, each.tetrahedra): each for each in found.measurements}
     for name in BENCHED_RELAXATIONS:
-        small, large = (of[f"{name}: cut frame", size] for size in (6_000, 20_250))
+        small, large = (by_case[f"{name}: cut frame", size] for size in (6_000, 20_250))
         splits = [float(each.note.split()[0]) for each in (small, large)]
         assert all(6.0 < n < 24.0 for n in splits)
         assert large.median < 2.0 * small.median  # 3.4 times the tetrahedra
-        assert of[f"{name}: blade moves, nothing split", 6_000].median < small.median
+        assert by_case[f"{name}: blade moves, nothing split", 6_000].median < small.median
     text = printed(found, capsys)
     assert "share" in text and "µs" in text
 
 
-def test_a_roofline_tells_the_limits_what_a_step_needs_and_its_share(capsys):
+def test_a_roofline_reports_the_limits_the_needs_of_a_step_and_its_share(capsys):
     found = measure_roofline(1, 576)
     assert all(map(is_sane, found.measurements))
-    of = {each.case: each for each in found.measurements}
-    shares = [share for case, share in of.items() if case.startswith("share")]
+    by_case = {each.case: each for each in found.measurements}
+    shares = [share for case, share in by_case.items() if case.startswith("share")]
     assert len(shares) == 3 and all(0.0 < share.median <= 100.0 for share in shares)
     (whole,) = [share for share in shares if share.case.startswith("share of the limit")]
     assert whole.median == max(share.median for share in shares)
@@ -132,15 +135,15 @@ def test_a_roofline_tells_the_limits_what_a_step_needs_and_its_share(capsys):
     assert "bytes and" in text and "operations for each of" in text
 
 
-def test_a_scene_tells_its_frames_and_its_stages(capsys):
+def test_a_scene_reports_its_frames_and_its_stages(capsys):
     found = measure_scenes(1, ["grid2"], seconds=0.6)
     assert all(map(is_sane, found.measurements))
-    of = {each.case: each for each in found.measurements}
-    assert of["grid2: frame"].n == 600 > of["grid2: frame, blade in the tissue"].n > 0
-    stages = sum(of[f"grid2: {stage}"].median for stage in ("RX", "GC", "CD"))
-    assert stages < of["grid2: frame"].median
-    assert 0.0 <= of["grid2: late frames"].median <= 100.0
-    assert of["grid2: real-time factor"].better == HIGHER
+    by_case = {each.case: each for each in found.measurements}
+    assert by_case["grid2: frame"].n == 600 > by_case["grid2: frame, blade in the tissue"].n > 0
+    stages = sum(by_case[f"grid2: {stage}"].median for stage in ("RX", "GC", "CD"))
+    assert stages < by_case["grid2: frame"].median
+    assert 0.0 <= by_case["grid2: late frames"].median <= 100.0
+    assert by_case["grid2: real-time factor"].better == HIGHER
     assert "wall" in printed(found, capsys)
 
 
@@ -167,7 +170,7 @@ def test_a_run_is_saved_and_compared_with_itself(capsys, tmp_path):
         (["peers", "--python", "nowhere"], "--python is nowhere"),
     ],
 )
-def test_a_benchmark_that_makes_no_sense_is_refused_before_it_begins(words, expected, capsys):
+def test_wrong_arguments_of_a_benchmark_are_refused_before_it_begins(words, expected, capsys):
     assert command_line(["bench", *words]) == 2
     out, err = capsys.readouterr()
     assert out == ""

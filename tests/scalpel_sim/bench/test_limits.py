@@ -1,4 +1,4 @@
-"""The limits of the machine, and which of them holds a step."""
+"""The limits of the machine, and which of them limits a step."""
 
 import numpy as np
 import pytest
@@ -48,14 +48,14 @@ def test_a_step_is_counted_from_its_rows_and_nodes():
     assert damped.n_flops > two.n_flops > 3 * 18 * 24
 
 
-def test_a_triad_fills_the_bytes_that_it_says_and_adds_what_it_should():
+def test_a_triad_uses_the_bytes_that_it_states_and_adds_correctly():
     triad = Triad(48_000)
     triad.run(1)
     assert triad.n_bytes == 48_000 == 3 * triad._a.nbytes
     assert np.all(triad._a == 2.0)
 
 
-def test_the_nearer_a_cache_the_larger_its_triad_may_not_be():
+def test_the_triad_of_a_cache_fits_in_it_and_that_of_memory_in_none():
     sizes = [triad.n_bytes for triad in triads_by_level(SIZES).values()]
     assert sizes == sorted(sizes)
     assert sizes[0] <= SIZES.l1 and sizes[1] <= SIZES.l2 and sizes[-1] > 2 * SIZES.l3
@@ -67,7 +67,7 @@ def test_a_core_does_more_than_one_operation_a_nanosecond():
     assert 1e9 < FLOPS_PER_CALL / seconds < 1e13
 
 
-def test_the_system_says_what_the_machine_is():
+def test_the_machine_is_described():
     found = describe_machine()
     assert found["processor"] and found["cores"] >= 1
     caches = cache_sizes()
@@ -75,7 +75,7 @@ def test_the_system_says_what_the_machine_is():
     assert memory_bytes() is None or 0 < memory_bytes() <= memory_bytes("MemTotal")
 
 
-def test_bodies_that_do_not_fit_the_memory_are_left_out_with_a_reason():
+def test_bodies_that_do_not_fit_the_memory_are_omitted_with_a_reason():
     fit, skipped = sizes_that_fit((576, 6_000, 10**9), 2_000_000_000, "made")
     assert fit == (576, 6_000)
     (one,) = skipped

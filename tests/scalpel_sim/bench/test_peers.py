@@ -15,7 +15,7 @@ from scalpel_sim.bench.peer_cases import OURS, OURS_SPRINGS, PEERS
 from scalpel_sim.bench.peer_process import NotInstalledError, PeerError, PeerProcess
 from tissue import Tissue
 
-HERE = Path(sys.executable)
+PYTHON = Path(sys.executable)
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def body(tmp_path_factory):
     return body_file(tmp_path_factory.mktemp("peers"), jittered_block(576))
 
 
-def test_everyone_gets_the_masses_and_springs_that_our_engine_has(body):
+def test_every_engine_gets_the_masses_and_springs_of_ours(body):
     mesh = jittered_block(576)
     with np.load(body) as given:
         ours = Tissue(mesh, block_material("springs"))
@@ -52,7 +52,7 @@ def test_edges_have_the_volume_around_them_and_nodes_a_quarter_of_it():
     [("ours", "springs:runge_kutta:damped"), ("mujoco_flex", "Euler:damped")],
 )
 def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(adapter, case, body):
-    process = PeerProcess(adapter, case, body, HERE, 0)
+    process = PeerProcess(adapter, case, body, PYTHON, 0)
     try:
         turn = process.turn(0.02)
     finally:
@@ -61,7 +61,7 @@ def test_an_engine_in_its_own_process_steps_and_moves_under_gravity(adapter, cas
     assert 1e-6 < turn.moved < 0.01  # metres: it sags, and did not explode
 
 
-def test_what_an_engine_prints_does_not_get_among_the_answers(body, tmp_path):
+def test_output_that_an_engine_prints_is_not_taken_for_an_answer(body, tmp_path):
     (tmp_path / "mujoco.py").write_text('print("welcome")\nraise ImportError("another MuJoCo")\n')
     python = tmp_path / "python"
     python.write_text(f'#!/bin/sh\nPYTHONPATH={tmp_path} exec {sys.executable} "$@"\n')
@@ -70,28 +70,28 @@ def test_what_an_engine_prints_does_not_get_among_the_answers(body, tmp_path):
         PeerProcess("mujoco_flex", "Euler:damped", body, python, 0)
 
 
-def test_an_engine_that_is_not_there_and_one_that_cannot_are_told_apart(body, tmp_path):
+def test_a_missing_engine_and_one_without_the_case_raise_different_errors(body, tmp_path):
     bare = tmp_path / "python"
     bare.write_text('#!/bin/sh\necho "ModuleNotFoundError: No module named newton" >&2\nexit 1\n')
     bare.chmod(0o755)
     with pytest.raises(NotInstalledError, match="newton"):
         PeerProcess("newton_semi_implicit", "springs:damped", body, bare, 0)
     with pytest.raises(PeerError, match="implicit"):
-        PeerProcess("mujoco_flex", "implicit:damped", body, HERE, 0)
+        PeerProcess("mujoco_flex", "implicit:damped", body, PYTHON, 0)
 
 
-def test_ratios_are_taken_in_each_round_and_what_is_missing_is_said(capsys, monkeypatch):
+def test_ratios_are_taken_in_each_round_and_missing_cases_are_reported(capsys, monkeypatch):
     ours, theirs = OURS_SPRINGS, "MuJoCo flex, Euler"
     monkeypatch.setattr(peer_benchmark, "OURS", {ours: OURS[ours]})
     chosen = {theirs: PEERS[theirs], "MuJoCo flex, made up": PEERS[theirs]._replace(
         case="none:damped")}  # fmt: skip
     monkeypatch.setattr(peer_benchmark, "PEERS", chosen)
     found = measure_peers(2, sizes=(576,))
-    of = {(each.case, each.quantity): each for each in found.measurements}
-    ratio = of[theirs, f"times as long as {ours}"]
+    by_case = {(each.case, each.quantity): each for each in found.measurements}
+    ratio = by_case[theirs, f"times as long as {ours}"]
     assert ratio.n == 2 and ratio.lowest <= ratio.median <= ratio.highest
     assert ratio.median == pytest.approx(
-        of[theirs, "time"].median / of[ours, "time"].median, rel=0.5
+        by_case[theirs, "time"].median / by_case[ours, "time"].median, rel=0.5
     )
     (skipped,) = found.skipped
     assert skipped.case == "MuJoCo flex, made up" and "none" in skipped.reason

@@ -1,4 +1,4 @@
-"""One format for everything that is measured, and what a comparison says of two runs."""
+"""One format for all measurements, and the verdicts of a comparison of two runs."""
 
 import json
 
@@ -41,7 +41,7 @@ def rate(tetrahedra, values):
 
 
 def run(seconds, n_rounds=5, spread=0.02):
-    """Five rounds of samples around so many seconds, each with a median of its own."""
+    """Return a measurement of rounds around a time [s], each with its own median."""
     around = seconds * (1.0 + spread * np.linspace(-1.0, 1.0, n_rounds))
     return measured([[0.99 * s, s, 1.01 * s] for s in around])
 
@@ -51,7 +51,7 @@ def verdict(before, now):
     return comparison.verdict
 
 
-def test_a_measurement_has_the_median_and_the_slow_samples_and_how_far_the_rounds_are_apart():
+def test_a_measurement_has_the_median_the_slow_samples_and_the_range_of_the_rounds():
     made = measured([np.linspace(1e-6, 100e-6, 100), np.full(3, 2e-6)])
     assert made.median == pytest.approx(np.median([*range(1, 101), 2, 2, 2]))
     assert 90.0 < made.p95 < made.p99 < 100.0
@@ -59,7 +59,7 @@ def test_a_measurement_has_the_median_and_the_slow_samples_and_how_far_the_round
     assert (made.n, made.rounds) == (103, 2)
 
 
-def test_of_a_rate_the_slow_samples_are_the_low_ones():
+def test_the_slow_samples_of_a_rate_are_the_low_ones():
     made = measured([np.linspace(1.0, 2.0, 101)], better=HIGHER, convert=lambda s: 100.0 / s)
     assert made.p99 < made.p95 < made.median
     assert rate(None, [1.0, 2.0, 9.0]).p99 < 2.0
@@ -94,7 +94,7 @@ def test_a_higher_rate_is_faster_and_a_share_is_neither():
     assert verdict(slow._replace(better=NEITHER), fast._replace(better=NEITHER)) == NOT_COMPARED
 
 
-def test_only_the_same_case_in_the_same_body_is_compare_measurements():
+def test_only_the_same_case_in_the_same_body_is_compared():
     assert compare_measurements([measured([[1.0]], case="another")], [measured([[1.0]])]) == []
     assert (
         compare_measurements([measured([[1.0]])._replace(tetrahedra=48)], [measured([[1.0]])]) == []
@@ -112,7 +112,7 @@ def test_only_the_same_case_in_the_same_body_is_compare_measurements():
         (json.dumps({"format": FORMAT}), "parts missing"),
     ],
 )
-def test_a_file_that_is_none_is_refused_by_name(content, expected, tmp_path):
+def test_an_invalid_results_file_is_refused_by_name(content, expected, tmp_path):
     file = tmp_path / "before.json"
     if content is not None:
         file.write_text(content)

@@ -22,12 +22,12 @@ HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
 FAR_AWAY = HEADER + "0,1,1,1,1,1,1.04\n1,1,1.02,1,1,1.02,1.04\n"
 
 UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
-"""The files of a run without an account of its energy."""
+"""Files of a run without an energy audit."""
 
 WRONG_USE = {
     "an unknown command": (["rnu"], "Did you mean .run."),
     "an unknown option": (["run", "slab", "--tougness", "3"], "Did you mean --toughness"),
-    "a number that is none": (["run", "slab", "--young", "soft"], "soft"),
+    "a word for a number": (["run", "slab", "--young", "soft"], "soft"),
     "too many words": (["run", "slab", "grid2"], "grid2"),
     "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
     "a scene and a mesh": (["run", "slab", "--mesh", "{mesh}"], "choose one"),
@@ -53,7 +53,7 @@ WRONG_USE = {
         ["run", "slab", "--coupling-stiffness", "500"],
         "--coupling-stiffness is for --coupling virtual",
     ),
-    "a coupling that pulls the wrong way": (
+    "a coupling of negative stiffness": (
         ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
         "stiffness is -1.0; it must be positive",
     ),
@@ -61,8 +61,11 @@ WRONG_USE = {
         ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
         "damping is 0.0; it must be positive",
     ),
-    "a tissue that is never asked": (["run", "slab", "--tissue-every", "0"], "it must be 1 to 100"),
-    "a tissue that is asked too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
+    "a tissue that is never queried": (
+        ["run", "slab", "--tissue-every", "0"],
+        "it must be 1 to 100",
+    ),
+    "a tissue that is queried too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
     "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
@@ -75,11 +78,11 @@ WRONG_USE = {
         "--spring-error belongs to the tissue",
     ),
     "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
-    "springs with the ratio of cork": (
+    "springs with a Poisson's ratio of 0": (
         ["run", "slab", "--poisson-ratio", "0"],
         "Use law neo_hookean",
     ),
-    "a ratio of what keeps its volume": (
+    "a Poisson's ratio of 1/2": (
         ["run", "organ", "--law", "neo_hookean", "--poisson-ratio", "0.5"],
         "below 0.5",
     ),
@@ -88,9 +91,12 @@ WRONG_USE = {
         ["run", "slab", "--blade-thickness", "-1"],
         "thickness is -1",
     ),
-    "a blade with the bevel of a hammer": (["run", "slab", "--blade-bevel", "80"], "80 degrees"),
+    "a bevel that is too steep": (["run", "slab", "--blade-bevel", "80"], "80 degrees"),
     "bevels that do not fit": (["run", "slab", "--blade-thickness", "0.01"], "only 0.006 m high"),
-    "an edge that is no number": (["run", "slab", "--blade-edge-radius", "nan"], "edge_radius"),
+    "an edge radius that is no number": (
+        ["run", "slab", "--blade-edge-radius", "nan"],
+        "edge_radius",
+    ),
     "a bevel of a line": (
         ["run", "organ", "--blade-thickness", "0", "--blade-bevel", "10"],
         "--blade-bevel is about a blade with faces",
@@ -99,20 +105,20 @@ WRONG_USE = {
         ["run", "slab", "--blade-friction", "0.2"],
         "add --blade-thickness 0.0004",
     ),
-    "what blunts an edge that has no radius": (
+    "a work to rupture of an edge without radius": (
         ["run", "organ", "--work-to-rupture", "1e4", "--blade-edge-radius", "0"],
         "add --blade-edge-radius",
     ),
     "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "blade_friction is -0.1"),
-    "a skin that costs less than nothing": (
+    "a skin of negative toughness": (
         ["run", "slab", "--skin-toughness", "-1"],
         "skin_toughness is -1",
     ),
-    "a toughness that is never twice itself": (
+    "a toughness speed of 0": (
         ["run", "slab", "--toughness-speed", "0"],
         "toughness_speed is 0",
     ),
-    "an account of nodes at different instants": (
+    "an audit of a local relaxation": (
         ["run", "slab", "--audit", "--relaxation", "local"],
         "--audit needs --relaxation global",
     ),
@@ -120,7 +126,7 @@ WRONG_USE = {
         ["run", "slab", "--threads", "0"],
         "--threads is 0; it must be from 1",
     ),
-    "an account by two threads": (
+    "an audit on two threads": (
         ["run", "slab", "--audit", "--threads", "2"],
         "--audit needs --relaxation global and --threads 1",
     ),
@@ -128,22 +134,22 @@ WRONG_USE = {
         ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],
         "--blade-thickness belongs to the tissue",
     ),
-    "a time that ends before it begins": (["run", "slab", "--seconds", "-1"], "--seconds"),
-    "a time without an end": (["run", "slab", "--seconds", "inf"], "--seconds"),
+    "a negative time": (["run", "slab", "--seconds", "-1"], "--seconds"),
+    "an infinite time": (["run", "slab", "--seconds", "inf"], "--seconds"),
     "an unknown scheme": (["run", "slab", "--scheme", "papper"], "Did you mean 'paper'"),
     "a figure by an unknown scheme": (
         ["figure", "10", "--scheme", "mine"],
         "Known: stellar, paper",
     ),
     "a snap beyond the node": (["run", "slab", "--snap", "2"], "snap is 2"),
-    "a guard that no split passes": (["run", "slab", "--guard", "nan"], "guard is nan"),
-    "a quality for a tissue elsewhere": (
+    "a guard that is no number": (["run", "slab", "--guard", "nan"], "guard is nan"),
+    "a cut setting for a tissue elsewhere": (
         ["run", "--connect", "127.0.0.1:1", "--snap", "0.1"],
         "scalpel-sim serve",
     ),
-    "no speed": (["run", "slab", "--speed", "0"], "speed"),
+    "a speed of 0": (["run", "slab", "--speed", "0"], "speed"),
     "an output folder that is a file": (["run", "slab", "--out", "{text}"], "is a file"),
-    "an address that is none": (["run", "--connect", "here"], "here"),
+    "an invalid address": (["run", "--connect", "here"], "here"),
     "a material for a tissue elsewhere": (
         ["run", "--connect", "127.0.0.1:1", "--young", "1e4"],
         "scalpel-sim serve",
@@ -157,7 +163,7 @@ WRONG_USE = {
         "another machine, and that takes a key",
     ),
     "a key for no server": (["run", "grid2", "--key", "{text}"], "add --connect"),
-    "a key that is none": (["serve", "grid2", "--key", "{text}"], "key file text.stl"),
+    "an invalid key": (["serve", "grid2", "--key", "{text}"], "key file text.stl"),
     "a key written over a file": (["key", "{text}"], "exists already"),
     "a port that does not exist": (["view", "grid2", "--port", "99999"], "99999"),
 }
@@ -215,9 +221,9 @@ def test_wrong_use_gets_one_line_and_exit_code_2(case, files, capsys):
 
 
 def test_an_unreachable_server_is_a_failed_run(files, capsys):
-    with socket.socket() as nobody:
-        nobody.bind(("127.0.0.1", 0))
-        address = f"127.0.0.1:{nobody.getsockname()[1]}"
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{unused.getsockname()[1]}"
     assert command_line(["run", "--connect", address]) == 1
     assert address in only_line(capsys.readouterr().err)
 
@@ -272,7 +278,7 @@ def test_json_prints_the_summary_and_nothing_else(files, capsys):
     assert printed["simulated_seconds"] == pytest.approx(0.02)
 
 
-def test_quiet_says_nothing(files, capsys):
+def test_quiet_prints_nothing(files, capsys):
     assert command_line(["run", "grid2", "--seconds", "0.01", "-q"]) == 0
     assert capsys.readouterr() == ("", "")
 
@@ -285,7 +291,7 @@ def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
 
 
 def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
-    how = [
+    coupling_options = [
         "--tissue-every",
         "10",
         "--coupling",
@@ -295,7 +301,7 @@ def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):
         "--no-passivity",
     ]
     line = ["run", "grid2", "--seconds", "0.5", "--json", "--out", "soft"]
-    assert command_line([*line, *how]) == 0
+    assert command_line([*line, *coupling_options]) == 0
     summary = json.loads(capsys.readouterr().out)
     settings, counters = summary["settings"], summary["counters"]
     assert (settings["tissue_every"], settings["coupling"]) == (10, "virtual")
@@ -338,16 +344,16 @@ def test_a_tougher_skin_on_the_command_line_is_a_peak_of_force(files, capsys):
 
 def test_materials_are_listed_with_their_sources(capsys):
     assert command_line(["materials"]) == 0
-    told = capsys.readouterr().out
+    out = capsys.readouterr().out
     for preset in MATERIALS.values():
-        assert preset.name in told
-    assert "Gokgol et al. 2012" in told
+        assert preset.name in out
+    assert "Gokgol et al. 2012" in out
     assert command_line(["materials", "liver", "--json"]) == 0
     (liver,) = json.loads(capsys.readouterr().out)
     assert liver["toughness"]["value"] == MATERIALS["liver"].material.toughness
 
 
-def test_the_error_of_springs_is_stated_on_request_and_calibrated_away(files, capsys):
+def test_the_error_of_springs_is_reported_on_request_and_removed_by_calibration(files, capsys):
     words = ["run", "slab", "--young", "2e4", "--seconds", "0.01"]
     assert command_line([*words, "--spring-error", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["settings"]["springs"]["poisson_ratio"] < 0.05
@@ -455,14 +461,14 @@ def test_the_arm_cuts_the_organ_in_two(tmp_path, stroke):
     assert json.loads((tmp_path / "summary.json").read_text())["pieces"] == 2
 
 
-def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
+def test_view_shows_the_run_and_stays_until_it_is_interrupted(tmp_path):
     program = start("view", "grid2", "--seconds", "0.3", "--out", str(tmp_path))
-    said = ""
-    while "stays until Ctrl-C" not in said:
+    log = ""
+    while "stays until Ctrl-C" not in log:
         line = program.stderr.readline()
-        assert line, f"it ended: {said}"
-        said += line
-    url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", said).group(1)
+        assert line, f"it ended: {log}"
+        log += line
+    url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", log).group(1)
     with urllib.request.urlopen(url, timeout=10) as page:
         assert "grid2: straight stroke" in page.read().decode()
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(UNAUDITED)
@@ -472,7 +478,7 @@ def test_view_shows_the_run_and_stays_until_it_is_told_to_end(tmp_path):
     assert "tetrahedra after" in out
 
 
-def test_view_waits_for_enter_where_a_person_looks_on(tmp_path):
+def test_view_waits_for_enter_at_a_terminal(tmp_path):
     ours, theirs = pty.openpty()
     program = start("view", "grid2", "--seconds", "0.1", "--out", str(tmp_path), stdin=theirs)
     try:

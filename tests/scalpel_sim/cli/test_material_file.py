@@ -19,8 +19,8 @@ from tissue import MATERIALS, BladeShape, Material
 
 WRONG_FILES = {
     "no file": (None, r"cannot be read: No such file.*materials --write"),
-    "no text": (b"\xff\xfe\x00", "is not a text file"),
-    "no TOML": ("[material]\nyoung_modulus 5", r"is not valid TOML: .*line 2"),
+    "not a text file": (b"\xff\xfe\x00", "is not a text file"),
+    "invalid TOML": ("[material]\nyoung_modulus 5", r"is not valid TOML: .*line 2"),
     "a key twice": ("[material]\ndensity = 1\ndensity = 2", "is not valid TOML"),
     "nothing": ("", r"has no table \[material\]; .*materials --write"),
     "the other table alone": ("[blade]\nheight = 0.01", r"has no table \[material\]"),
@@ -28,7 +28,7 @@ WRONG_FILES = {
     "no table": ("young_modulus = 5e3", r"stands in no table; write \[material\]"),
     "a number for a table": ("material = 3", r"material is 3; it must be a table"),
     "a wrong key": ("[material]\nyung_modulus = 5e3", "Did you mean 'young_modulus'"),
-    "a key as the option has it": ("[material]\nyoung = 5e3", "Did you mean 'young_modulus'"),
+    "the name of the option as a key": ("[material]\nyoung = 5e3", "Did you mean 'young_modulus'"),
     "a key in another case": ("[material]\nDensity = 1e3", "Did you mean 'density'"),
     "a key of the other table": (
         "[material]\nheight = 0.01",
@@ -36,20 +36,20 @@ WRONG_FILES = {
     ),
     "a wrong key of the blade": ("[blade]\nbevel_angle = 10", "Did you mean 'bevel_degrees'"),
     "a text for a number": ('[material]\ndensity = "heavy"', 'density is "heavy"; .* above 0'),
-    "a truth for a number": ("[material]\ndensity = true", "density is true; .* above 0"),
+    "a boolean for a number": ("[material]\ndensity = true", "density is true; .* above 0"),
     "a list for a number": ("[material]\ndensity = [1, 2]", r"density is \[1, 2\]; .* above 0"),
     "a negative number": ("[material]\nyoung_modulus = -1", "young_modulus is -1; .* above 0"),
     "zero where it may not be": ("[material]\ndensity = 0", "density is 0; .* above 0"),
     "no number": ("[material]\ntoughness = nan", "toughness is nan; .* 0 or more"),
     "infinity": ("[material]\ntoughness = inf", "toughness is inf; .* 0 or more"),
-    "a ratio of what keeps its volume": ("[material]\npoisson_ratio = 0.5", "0 to below 0.5"),
-    "a law that there is not": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
+    "a Poisson's ratio of 1/2": ("[material]\npoisson_ratio = 0.5", "0 to below 0.5"),
+    "an unknown law": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
     "a number for a law": ("[material]\nlaw = 1", 'law is 1; .*"springs" or "neo_hookean"'),
     "a ratio that the law cannot have": (
         '[material]\nlaw = "springs"\npoisson_ratio = 0.1',
         "poisson_ratio is 0.1; springs",
     ),
-    "a calibration of what has no springs": (
+    "a calibration of a law without springs": (
         '[material]\nlaw = "neo_hookean"\nspring_calibration = 0.9',
         "spring_calibration is 0.9",
     ),
@@ -59,7 +59,7 @@ WRONG_BLADES = {
     "the other table alone": ("[material]\ndensity = 1000", r"has no table \[blade\]"),
     "a negative thickness": ("[blade]\nthickness = -1", "thickness is -1; .* 0 or more"),
     "no height": ("[blade]\nheight = 0", "height is 0; .* above 0"),
-    "a bevel of a hammer": ("[blade]\nbevel_degrees = 80", "80 degrees; at most 60"),
+    "a bevel that is too steep": ("[blade]\nbevel_degrees = 80", "80 degrees; at most 60"),
     "bevels that do not fit": ("[blade]\nthickness = 0.01", "only 0.006 m high"),
 }
 
@@ -80,7 +80,7 @@ def test_the_tables_have_the_fields_of_material_and_blade():
 
 
 @pytest.mark.parametrize("table", [MaterialTable, BladeTable])
-def test_each_key_says_what_it_may_be(table):
+def test_each_key_describes_its_values(table):
     for hint in get_type_hints(table, include_extras=True).values():
         assert get_args(hint)[0].__metadata__[0].description
 
@@ -115,7 +115,7 @@ def test_every_number_of_the_file_has_a_comment_and_a_preset_its_sources(tmp_pat
     assert set(tomllib.loads(text)) == {"material", "blade"}
 
 
-def test_a_file_is_not_written_over_unless_that_is_asked_for(tmp_path, capsys):
+def test_a_file_is_overwritten_only_on_request(tmp_path, capsys):
     path = tmp_path / "mine.toml"
     path.write_text("precious")
     assert command_line(["materials", "--write", str(path)]) == 2
@@ -141,13 +141,13 @@ def test_what_cannot_be_written_is_wrong_use(words, expected, tmp_path, monkeypa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_not_there_is_a_failed_run(tmp_path, capsys):
+def test_a_missing_folder_is_a_failed_run(tmp_path, capsys):
     assert command_line(["materials", "--write", str(tmp_path / "no" / "mine.toml")]) == 1
     assert "cannot be written" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("case", WRONG_FILES)
-def test_a_wrong_file_is_named_with_the_key_and_what_would_be_right(case, tmp_path):
+def test_a_wrong_file_is_named_with_the_key_and_a_remedy(case, tmp_path):
     content, expected = WRONG_FILES[case]
     path = tmp_path / "mine.toml"
     if content is not None:
@@ -159,7 +159,7 @@ def test_a_wrong_file_is_named_with_the_key_and_what_would_be_right(case, tmp_pa
 
 
 @pytest.mark.parametrize("case", WRONG_BLADES)
-def test_a_wrong_blade_is_named_with_the_key_and_what_would_be_right(case, tmp_path):
+def test_a_wrong_blade_is_named_with_the_key_and_a_remedy(case, tmp_path):
     content, expected = WRONG_BLADES[case]
     path = tmp_path / "mine.toml"
     path.write_text(content)
@@ -204,7 +204,7 @@ def test_a_thickness_of_zero_in_the_file_is_a_line_unless_an_option_makes_it_a_b
     assert read_blade(path)["bevel_degrees"] == 20.0
 
 
-def test_a_table_that_no_option_asks_for_gets_a_warning(tmp_path, caplog):
+def test_an_unused_table_gets_a_warning(tmp_path, caplog):
     path = tmp_path / "mine.toml"
     path.write_text("[material]\ndensity = 900\n[blade]\nheight = 0.01\n")
     chosen_scene("slab", options(path, blade=path))
@@ -216,7 +216,7 @@ def test_a_table_that_no_option_asks_for_gets_a_warning(tmp_path, caplog):
     assert f"add --material {path}" in caplog.text
 
 
-def test_a_material_of_a_file_reaches_the_tissue(tmp_path, monkeypatch, capsys):
+def test_a_material_from_a_file_reaches_the_tissue(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(
         "[material]\nyoung_modulus = 2e4\n[blade]\nthickness = 0.001\n"

@@ -18,7 +18,8 @@ from scalpel_sim.cli.options import (
 from scalpel_sim.cli.reference import command_line_reference
 
 pytestmark = pytest.mark.skipif(
-    int(version("cyclopts").partition(".")[0]) != 5, reason="other versions word the page otherwise"
+    int(version("cyclopts").partition(".")[0]) != 5,
+    reason="other versions word the page differently",
 )
 
 PAGE = Path(__file__).parents[3] / "docs" / "command_line.md"
@@ -38,12 +39,12 @@ reference = cache(command_line_reference)
 
 
 def section(title: str) -> str:
-    """The text about one command."""
+    """Return the section about one command."""
     return re.search(rf"^## {title}\n(.*?)(?=^## |\Z)", reference(), re.S | re.M).group(1)
 
 
 def test_the_page_of_the_command_line_is_that_of_the_program():
-    """If not: `python -m scalpel_sim.cli.reference > docs/command_line.md`."""
+    """To renew it: `python -m scalpel_sim.cli.reference > docs/command_line.md`."""
     assert PAGE.read_text(encoding="utf-8") == command_line_reference()
 
 

@@ -28,10 +28,10 @@ def red(image: np.ndarray) -> float:
 @pytest.mark.parametrize(("number", "n_panels"), [(10, 4), (11, 2), (12, 2)])
 def test_each_figure_is_one_command(number, n_panels, small, capsys):
     assert command_line(["figure", str(number), "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
-    assert said["file"] == f"figure{number}.png"
-    assert len(said["labels"]) == len(said["n_tetrahedra"]) == n_panels
-    image = matplotlib.image.imread(said["file"])
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["file"] == f"figure{number}.png"
+    assert len(printed["labels"]) == len(printed["n_tetrahedra"]) == n_panels
+    image = matplotlib.image.imread(printed["file"])
     assert image.shape[0] > 120 and image.shape[1] > 300
     assert 0.002 < red(image) < 0.5  # lines are thin
     assert (image[:, :, :3].min(axis=2) > 0.9).mean() > 0.3  # on white
@@ -46,7 +46,7 @@ def test_a_figure_can_be_cut_by_the_papers_own_scheme(small, capsys):
     assert found["paper"][1] > 2 * found["stellar"][1]
 
 
-def test_figure_10_grows_from_576_tetrahedra_as_the_blade_goes_through_and_its_cut_gapes():
+def test_figure_10_grows_from_576_tetrahedra_as_the_blade_advances_and_its_cut_opens():
     seen = moments(FIGURE_10, FIGURE_10_MOMENTS)
     counts = [len(moment.snapshot.tetrahedra) for moment in seen]
     assert counts[0] == 576 and counts == sorted(counts) and counts[3] > counts[1] > 576
@@ -71,6 +71,6 @@ def test_a_tetrahedron_has_six_edges_and_two_that_share_a_face_have_nine():
         (["10", "--output", "nowhere/picture.png"], "no folder nowhere"),
     ],
 )
-def test_a_figure_that_is_none_or_has_no_place_is_refused(words, expected, small, capsys):
+def test_an_unknown_figure_or_an_invalid_output_is_refused(words, expected, small, capsys):
     assert command_line(["figure", *words]) == 2
     assert expected in capsys.readouterr().err

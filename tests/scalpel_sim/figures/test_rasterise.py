@@ -14,7 +14,7 @@ SQUARE = np.array([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]])
 
 
 def at(nearness, *places):
-    """Return a triangle whose corners are all as near."""
+    """Return a triangle whose corners have the same nearness."""
     return [[x, y, nearness] for x, y in places]
 
 
@@ -30,10 +30,10 @@ def test_two_halves_of_a_square_leave_no_gap():
     assert (raster.triangle >= 0).sum() == 64
 
 
-def test_the_nearer_triangle_is_seen_in_any_order_and_either_turn():
-    behind, before = halves(FAR)[0], at(NEAR, (2.0, 1.0), (8.0, 1.0), (8.0, 6.0))
-    for before_turned in itertools.permutations(before):
-        for triangles, number in (([behind, before_turned], 1), ([before_turned, behind], 0)):
+def test_the_nearer_triangle_is_seen_in_any_order_and_orientation():
+    behind, in_front = halves(FAR)[0], at(NEAR, (2.0, 1.0), (8.0, 1.0), (8.0, 6.0))
+    for permuted in itertools.permutations(in_front):
+        for triangles, number in (([behind, permuted], 1), ([permuted, behind], 0)):
             raster = rasterise(np.array(triangles), 10, 10)
             assert raster.triangle[2, 6] == number
             assert raster.triangle[4, 8] == 1 - number

@@ -1,4 +1,4 @@
-"""Camera, light and paint: where things are seen, and how bright."""
+"""Camera, light and rendering: where points are drawn, and how bright."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def lit_below(mesh: TriangleMesh, points: np.ndarray) -> np.ndarray:
     return illuminate(lights, SurfacePoints(points, up, up, up), 50.0).diffuse
 
 
-def test_a_plate_throws_a_shadow_below_and_none_far_beside_or_above():
+def test_a_plate_casts_a_shadow_below_and_none_far_beside_or_above():
     points = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 0.0, 0.06]])
     below, beside, above = lit_below(plate(0.02), points)
     assert below < 0.35 * beside

@@ -138,7 +138,7 @@ def test_faces_of_a_cut_are_marked_and_have_a_colour_of_their_own():
 
 
 def hollow_block() -> Tissue:
-    """Return a block of 3 x 3 x 3 cells: the middle of its middle cell is another, loose block."""
+    """Return a block of 3 x 3 x 3 cells, with a smaller, loose block in place of the middle one."""
     mesh, inner = block((3, 3, 3), (0.03, 0.03, 0.03)), block((1, 1, 1), (0.004, 0.004, 0.004))
     middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
     around = (np.abs(middles - 0.015) > 0.005).any(axis=1)
@@ -189,7 +189,7 @@ def test_an_obj_has_an_object_for_each_piece_with_groups_for_skin_and_cut_faces(
     ]
 
 
-def test_a_ply_says_of_each_face_its_piece_and_whether_it_is_of_a_cut(tmp_path):
+def test_a_ply_marks_each_face_with_its_piece_and_whether_it_is_of_a_cut(tmp_path):
     surface = cut_block().surface()
     export_surface(surface, tmp_path / "body.ply")
     faces = trimesh.load(tmp_path / "body.ply").metadata["_ply_raw"]["face"]["data"]
@@ -197,7 +197,7 @@ def test_a_ply_says_of_each_face_its_piece_and_whether_it_is_of_a_cut(tmp_path):
     assert np.unique(faces["piece"]).tolist() == [1, 2]
 
 
-def test_another_ending_is_refused_with_those_that_there_are(tmp_path):
+def test_another_ending_is_refused_with_the_known_ones(tmp_path):
     with pytest.raises(UsageError, match=r"must end in \.stl, \.obj, \.ply or \.glb"):
         export_surface(Tissue(BLOCK).surface(), tmp_path / "body.dae")
 

@@ -10,8 +10,8 @@ from tissue import BladeContacts
 FORWARD = np.array([0.0, 1.0, 0.0])
 
 
-def test_the_parts_are_the_edge_the_press_on_the_faces_and_what_rubs_along_them():
-    """A sample of the edge holds 2 N back; each face is pressed by 3 N, one is rubbed by 1 N."""
+def test_the_parts_are_the_force_of_the_edge_the_pressure_on_the_faces_and_friction():
+    """A sample of the edge resists with 2 N; faces are pressed by 3 N, one has friction of 1 N."""
     contacts = BladeContacts(
         point=np.zeros((3, 3)),
         normal=np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
@@ -25,7 +25,7 @@ def test_the_parts_are_the_edge_the_press_on_the_faces_and_what_rubs_along_them(
     assert parts.friction == pytest.approx([0.0, -1.0, 0.0])
 
 
-def test_the_face_of_the_steepest_bevel_is_none_of_the_edge():
+def test_the_face_of_the_steepest_bevel_does_not_count_as_edge():
     steep = np.array([[0.5, np.sin(np.radians(60.0)), 0.0]])
     contacts = BladeContacts(np.zeros((1, 3)), steep, np.ones(1), np.zeros((1, 3)), np.zeros(1))
     assert not force_parts(contacts, FORWARD).edge.any()
@@ -33,7 +33,7 @@ def test_the_face_of_the_steepest_bevel_is_none_of_the_edge():
 
 @pytest.fixture(scope="module")
 def cut() -> tuple[Simulation, list[np.ndarray]]:
-    """A cut with a scalpel that rubs, and the force at the end of each of its frames."""
+    """Return a cut by a scalpel with friction, and the force at the end of each frame."""
     scene = changed(SCENES["grid2"], blade=SCALPEL, blade_friction=0.3, audit=True)
     simulation = prepare(scene)
     forces: list[np.ndarray] = []
@@ -59,7 +59,7 @@ def test_the_stiffness_of_each_frame_is_that_of_the_tissue_in_the_world(cut):
     assert last[first : first + 3] == pytest.approx(np.diag(there), rel=1e-12)
 
 
-def test_the_account_of_each_frame_is_in_the_table_and_closes(cut):
+def test_the_energy_account_of_each_frame_is_in_the_table_and_closes(cut):
     recording = cut[0].recording
     assert recording.is_audited
     work = recording.column("work_of_blade_j")[-1]

@@ -29,7 +29,7 @@ from scalpel_sim.output.summary import RunFacts, Summary, summarise
 from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
 
 DT = 1e-3
-QUALITY = CutReport(
+CUT_REPORT = CutReport(
     n_cut_nodes=9,
     path_error_mean=1e-4,
     path_error_largest=6e-4,
@@ -59,7 +59,7 @@ def plotter():
 
 
 def recorded(n_frames: int) -> Recording:
-    """A recording in which everything is random, but for times that sum to less than the wall's."""
+    """Return a random recording whose stage times sum to less than the wall time."""
     untimed = COLUMNS.index("cd_s") - 1
     rng = np.random.default_rng(0)
     recording = Recording(1)
@@ -79,7 +79,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any)
             tetrahedra_initial=6,
             tetrahedra_final=8,
             pieces=PIECES,
-            quality=QUALITY,
+            quality=CUT_REPORT,
             counters=counters,
             touched={},
             settings={"stroke": "straight"},
@@ -111,7 +111,7 @@ def test_forces_csv_reads_back_to_the_same_bits(tmp_path, plotter):
     assert np.array_equal(np.array(rows, float), recording.rows)
 
 
-def test_forces_csv_is_on_disk_while_the_run_goes_on(tmp_path, plotter):
+def test_forces_csv_is_written_to_disk_during_the_run(tmp_path, plotter):
     outputs, recording = Outputs(tmp_path, plotter), Recording()
     for i in range(FRAMES_PER_FLUSH + 5):
         recording.append([float(i)] * len(COLUMNS))
@@ -175,11 +175,11 @@ def test_the_plot_is_a_picture_that_shows_the_force(tmp_path, plotter):
 
 
 def test_the_plot_shows_what_the_force_is_made_of_and_where_the_device_limits_it(tmp_path):
-    plain, limited = still(), still()
+    plain, limited = zero_recording(), zero_recording()
     for name in ("force_z_n", "tissue_force_z_n"):
         plain.column(name)[:] = limited.column(name)[:] = 2.0
     limited.column("tissue_force_z_n")[50:] = 4.0
-    edge = still()
+    edge = zero_recording()
     edge.column("edge_force_x_n")[:] = 1.0
     plot_forces(plain, "plain", tmp_path / "plain.png")
     plot_forces(limited, "limited", tmp_path / "limited.png")
@@ -191,22 +191,22 @@ def test_the_plot_shows_what_the_force_is_made_of_and_where_the_device_limits_it
     assert n_of_colour(tmp_path / "edge.png", edge_colour) > 500
 
 
-def test_an_account_gets_a_picture_in_which_heights_are_energies(tmp_path):
-    recording = still()
+def test_heights_in_the_energy_plot_are_energies(tmp_path):
+    recording = zero_recording()
     recording.column("work_of_blade_j")[:] = 3e-3
     recording.column("cutting_j")[:] = 2e-3
     recording.column("damping_j")[:] = 1e-3
     plot_energies(recording, "block", tmp_path / ENERGY_PLOT)
     cutting, damping = (
-        n_of_colour(tmp_path / ENERGY_PLOT, seen_through(colour_of(name)))
+        n_of_colour(tmp_path / ENERGY_PLOT, on_white(colour_of(name)))
         for name in ("cutting", "damping")
     )
     assert cutting > 10_000
     assert cutting == pytest.approx(2 * damping, rel=0.1)
 
 
-def test_without_an_account_there_is_no_picture_of_it(tmp_path):
-    recording = still()
+def test_without_an_account_there_is_no_energy_plot(tmp_path):
+    recording = zero_recording()
     recording.column("residual_j")[:] = np.nan
     with Plotter() as plotter:
         outputs = Outputs(tmp_path, plotter)
@@ -216,8 +216,8 @@ def test_without_an_account_there_is_no_picture_of_it(tmp_path):
     assert (tmp_path / PLOT).exists() and not (tmp_path / ENERGY_PLOT).exists()
 
 
-def still(n_frames: int = 100) -> Recording:
-    """A recording of nothing, to put something in."""
+def zero_recording(n_frames: int = 100) -> Recording:
+    """Return a recording of zeros, to be filled in."""
     recording = Recording()
     for i in range(n_frames):
         row = dict.fromkeys(COLUMNS, 0.0) | {"time_s": i * DT, "frame_s": 1e-4}
@@ -226,7 +226,7 @@ def still(n_frames: int = 100) -> Recording:
 
 
 def n_of_colour(path: Path, colour: str) -> int:
-    """How many pixels of a picture are nearly of a colour."""
+    """Return the number of pixels of a picture that have nearly a given colour."""
     image = pytest.importorskip("PIL.Image")
     with image.open(path) as picture:
         pixels = np.asarray(picture.convert("RGB"), int)
@@ -238,31 +238,31 @@ def colour_of(name: str) -> str:
     return next(term.colour for term in TERMS if term.name == name)
 
 
-def seen_through(colour: str) -> str:
-    """What a colour of the stack looks like on white."""
+def on_white(colour: str) -> str:
+    """Return how a colour of the stack appears on a white background."""
     channels = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     seen = (round(OPACITY * channel + (1.0 - OPACITY) * 255) for channel in channels)
     return "#" + "".join(f"{channel:02x}" for channel in seen)
 
 
-def test_the_summary_has_every_key_that_was_promised(tmp_path, plotter):
+def test_the_summary_has_every_documented_key(tmp_path, plotter):
     outputs = Outputs(tmp_path, plotter)
     outputs.write_summary(summary_of(recorded(10)))
     found = json.loads((tmp_path / SUMMARY).read_text())
-    promised = (
+    documented = (
         "scene simulated_seconds wall_seconds real_time_factor frame_rate_median "
         "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
         "force_peak_n "
         "force_mean_n work_of_blade_j share versions"
     )
-    assert set(promised.split()) <= set(found)
+    assert set(documented.split()) <= set(found)
     assert {"RX", "RD", "GC", "CD"} <= set(found["share"])
     assert {"scalpel_sim", "python", "numpy", "numba", "mujoco", "platform"} <= set(
         found["versions"]
     )
 
 
-def test_the_summary_tells_of_each_piece():
+def test_the_summary_lists_each_piece():
     summary = json.loads(summary_json(summary_of(recorded(10))))
     assert summary["pieces"] == len(summary["each_piece"]) == 2
     assert [piece["held"] for piece in summary["each_piece"]] == [False, True]
@@ -278,7 +278,7 @@ def test_the_table_has_a_row_for_each_piece():
     assert "piece 1, loose" in text and "piece 2, held" in text
 
 
-def test_the_table_tells_what_came_between_the_tissue_and_the_arm():
+def test_the_table_reports_frames_that_were_limited_or_damped():
     console = Console(record=True, width=100)
     passivity = {"energy": 0.0, "least_energy": -5e-7, "injected_away": 2e-3, "frames": 12}
     print_summary(
@@ -299,8 +299,8 @@ def test_the_summary_has_the_trade_between_path_error_and_time_step():
     assert found["substep_growth"] == pytest.approx(4.0)
 
 
-def test_the_summary_tells_where_the_work_went_and_what_is_missing():
-    recording = still()
+def test_the_summary_reports_where_the_work_went_and_the_residual():
+    recording = zero_recording()
     for name, energy in (("work_of_blade_j", 4e-3), ("cutting_j", 3e-3), ("residual_j", 1e-5)):
         recording.column(name)[-1] = energy
     summary = summary_of(recording)
@@ -310,8 +310,8 @@ def test_the_summary_tells_where_the_work_went_and_what_is_missing():
     assert summary.residual_of_work == pytest.approx(0.0025)
 
 
-def test_without_an_audit_the_summary_does_not_pretend_to_know():
-    recording = still()
+def test_without_an_audit_the_summary_has_no_energies():
+    recording = zero_recording()
     recording.column("residual_j")[:] = np.nan
     summary = summary_of(recording)
     assert summary.energies_j is None and summary.residual_of_work is None
@@ -320,7 +320,7 @@ def test_without_an_audit_the_summary_does_not_pretend_to_know():
 
 def test_the_table_has_a_row_for_each_term_of_the_account():
     console = Console(record=True, width=100)
-    recording = still()
+    recording = zero_recording()
     recording.column("work_of_blade_j")[-1] = 4e-3
     recording.column("friction_j")[-1] = 1e-3
     print_summary(summary_of(recording), console)

@@ -36,7 +36,7 @@ if "SCALPEL_SIM_TEST_MESHES" in os.environ:
 
 
 def swept_side(stroke, points):
-    """On which side of the swept sheet points are, seen from the pose that is level with them."""
+    """Return the side of the swept sheet that each point is on, by the pose level with it."""
     poses = stroke.poses(400)
     middles = np.array([(pose.tip + pose.heel) / 2.0 for pose in poses])
     forwards = np.array([pose.forward for pose in poses])
@@ -48,7 +48,7 @@ def swept_side(stroke, points):
 
 
 def pieces(tetrahedra):
-    """How many parts tetrahedra make that hang together through faces."""
+    """Return the number of parts of tetrahedra, which are connected through faces."""
     faces = np.sort(
         tetrahedra[:, [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]].reshape(-1, 3), axis=1
     )
@@ -63,7 +63,7 @@ def pieces(tetrahedra):
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("name", THROUGH)
-def test_a_stroke_clean_through_parts_left_from_right(body, name):
+def test_a_stroke_clean_through_separates_left_from_right(body, name):
     mesh = BODIES[body]()
     stroke = plan_stroke(name, mesh)
     centroids = mesh.positions[mesh.tetrahedra].mean(axis=1)
@@ -73,7 +73,7 @@ def test_a_stroke_clean_through_parts_left_from_right(body, name):
     left, right = x < low + 0.06 * (high - low), x > high - 0.06 * (high - low)
     assert len(set(side[left])) <= 1
     assert len(set(side[right])) <= 1
-    if body not in ("tower", "narrow", "grid2"):  # too few cells for whole cells to tell the parts
+    if body not in ("tower", "narrow", "grid2"):  # their cells are too coarse to count parts by
         assert pieces(mesh.tetrahedra[side]) == pieces(mesh.tetrahedra[~side]) == 1
     assert 0.2 < mesh_share(mesh, side) < 0.8
 
@@ -98,7 +98,7 @@ def test_the_blade_is_longer_than_the_section_and_leaves_the_body_behind(body, n
 
 
 def near_body(mesh, point, clearance=0.003):
-    """Whether a point is within the body, or as near as that to one of its nodes."""
+    """Return whether a point is in the body, or within a clearance [m] of one of its nodes."""
     corners = mesh.positions[mesh.tetrahedra]
     axes = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
     weights = np.linalg.solve(axes, (point - corners[:, 0])[:, :, None])[:, :, 0]
@@ -161,7 +161,7 @@ def test_a_sheet_through_a_narrow_body_leans_less_and_spares_the_held_sides():
 
 
 @pytest.mark.parametrize(("toughness", "share"), [(0.0, 0.55), (1e3, 0.9)])
-def test_stop_ends_at_55_percent_or_later_where_the_body_gives_way_but_inside(toughness, share):
+def test_stop_ends_at_55_percent_or_later_where_the_body_is_dragged_but_inside(toughness, share):
     stroke = plan_stroke("stop", BODIES["across"](), material=Material(toughness=toughness))
     assert stroke.pose(stroke.duration).tip[1] == pytest.approx(share * 0.03)
 
@@ -177,18 +177,18 @@ def test_press_goes_half_as_deep_as_toughness_over_stiffness():
 
 
 @pytest.mark.parametrize(
-    ("half_width", "give"),
+    ("half_width", "displacement"),
     # Cantilevers of 20 x 20 mm, E = 10 kPa, with half of 20 J/m2 x 20 mm: F L^3 / 3EI + F L / GA.
     [(0.02, 0.2 * (0.02**3 / (3e4 * 0.02**4 / 12) + 0.02 / (1e4 / 3 * 0.02**2))), (0.15, 0.075)],
 )
-def test_the_blade_goes_on_by_what_a_long_soft_body_gives_way(half_width, give):
+def test_the_stroke_is_longer_by_the_displacement_of_a_long_soft_body(half_width, displacement):
     mesh = block((8, 2, 2), (2 * half_width, 0.02, 0.02))
     stroke = plan_stroke("straight", mesh, material=Material(young_modulus=10e3, toughness=20.0))
-    assert stroke.pose(stroke.duration).tip[1] == pytest.approx(0.02 + 0.015 + give)
+    assert stroke.pose(stroke.duration).tip[1] == pytest.approx(0.02 + 0.015 + displacement)
 
 
 def fork():
-    """Two prongs along x, joined at the right end: at the middle a plane would cut three parts."""
+    """Return two prongs along x, joined on the right: a plane at the middle leaves three parts."""
     mesh = block((20, 3, 1), (0.10, 0.03, 0.01))
     centroids = mesh.positions[mesh.tetrahedra].mean(axis=1)
     slot = (centroids[:, 0] < 0.055) & (np.abs(centroids[:, 1] - 0.015) < 0.005)
@@ -198,7 +198,7 @@ def fork():
 
 
 @pytest.mark.parametrize("name", THROUGH)
-def test_a_branched_body_is_cut_where_it_falls_into_two(name):
+def test_a_branched_body_is_cut_where_it_falls_into_two_parts(name):
     tip = plan_stroke(name, fork()).pose(0.5).tip
     assert tip[0] > 0.055
 
@@ -209,7 +209,7 @@ def test_an_unknown_stroke_is_refused_with_the_known_ones():
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, np.inf])
-def test_a_speed_that_is_none_is_refused(speed):
+def test_an_invalid_speed_is_refused(speed):
     with pytest.raises(StrokeError, match="speed of the stroke"):
         plan_stroke("straight", BODIES["slab"](), speed=speed)
 

@@ -9,7 +9,7 @@ FORWARD = ",forward_x,forward_y,forward_z"
 
 
 def standing(y=0.0, length=0.05):
-    """A blade that stands with its tip down at the origin, and cuts towards +y."""
+    """Return an upright blade with its tip at (0, y, 0), which cuts towards +y."""
     return BladeSegment(
         np.array([0.0, y, 0.0]), np.array([0.0, y, length]), np.array([0.0, 1.0, 0.0])
     )
@@ -85,7 +85,7 @@ def test_a_file_of_poses_is_a_stroke(tmp_path):
     )
     pose = from_csv(path).pose(0.5)
     assert np.allclose(pose.tip, [0.0, 0.01, 0.0])
-    assert np.allclose(pose.forward, [0.0, 1.0, 0.0])  # the way it moves
+    assert np.allclose(pose.forward, [0.0, 1.0, 0.0])  # the direction of its motion
 
 
 def test_columns_may_come_in_any_order_and_name_forward(tmp_path):
@@ -98,7 +98,7 @@ def test_columns_may_come_in_any_order_and_name_forward(tmp_path):
     assert np.allclose(from_csv(path).pose(0.5).forward, [1.0, 0.0, 0.0])
 
 
-def test_a_blade_that_rests_faces_the_way_it_will_move_or_did(tmp_path):
+def test_a_blade_at_rest_faces_the_direction_of_its_next_or_last_motion(tmp_path):
     rows = [f"{t},0,{y},0,0,{y},.05" for t, y in enumerate([0, 0, 0, 0.01, 0.02, 0.02, 0.02])]
     stroke = from_csv(write(tmp_path, HEADER, *rows))
     for t in (0.0, 3.0, 6.0):
@@ -128,7 +128,7 @@ GOOD = "0,0,0,0,0,0,.05"
         ([HEADER, GOOD, "1,0,0,-.01,0,0,.04"], "never moves across its edge"),
     ],
 )
-def test_a_bad_file_is_refused_by_its_line(tmp_path, lines, message):
+def test_a_bad_file_is_refused_with_the_line(tmp_path, lines, message):
     with pytest.raises(StrokeError, match=message) as error:
         from_csv(write(tmp_path, *lines))
     assert "stroke.csv" in str(error.value)

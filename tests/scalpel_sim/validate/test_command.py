@@ -32,17 +32,17 @@ def test_a_check_that_fails_ends_with_exit_code_1(tmp_path, capsys, monkeypatch)
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "expected"),
     [
         (["--only", "stedy"], "Did you mean 'steady'"),
         (["--out", "{file}"], "is a file"),
         (["--quik"], "--quick"),
     ],
 )
-def test_wrong_use_is_one_line_before_anything_is_run(words, says, tmp_path, capsys):
+def test_wrong_use_is_one_line_before_anything_is_run(words, expected, tmp_path, capsys):
     file = tmp_path / "file"
     file.write_text("")
     code = command_line(["validate", *(word.format(file=file) for word in words)])
     err = capsys.readouterr().err
     assert code == 2
-    assert says in err and err.startswith("error: ") and err.count("\n") == 1
+    assert expected in err and err.startswith("error: ") and err.count("\n") == 1

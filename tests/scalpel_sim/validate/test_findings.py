@@ -22,11 +22,11 @@ EXPLAINED = KnownDeviation(0.5, 0.9, "the reason")
         (math.inf, None, FAIL),
     ],
 )
-def test_a_check_passes_within_its_bounds_and_is_known_within_what_is_explained(
+def test_a_check_passes_within_its_bounds_and_is_known_within_those_explained(
     value, known, verdict
 ):
     assert Check("a value", value, *within(0.05), known=known).verdict == verdict
 
 
-def test_within_is_a_share_of_what_is_asked():
+def test_within_is_a_share_of_the_expected_value():
     assert within(0.1, 164.0) == pytest.approx((147.6, 180.4))

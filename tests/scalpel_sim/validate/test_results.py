@@ -38,13 +38,13 @@ def test_checks_are_counted_by_verdict():
     )
 
 
-def test_the_json_says_all_and_is_json():
+def test_the_json_is_valid_and_complete():
     content = json.loads(validation_as_json(RUNS, quick=True, versions={"numpy": "2"}))
     assert content["passed"] is False
     assert content["counts"] == {"passed": 1, "known": 1, "failed": 1}
     lines = content["scenes"][0]["lines"]
     assert [line["verdict"] for line in lines] == ["pass", "FAIL", "known"]
-    assert lines[1]["figure"] is None  # no number: JSON has no word for it
+    assert lines[1]["figure"] is None  # not a number, which JSON cannot express
     assert lines[2]["why"] == "it is a Tuesday" and lines[0]["why"] == ""
 
 

@@ -82,9 +82,9 @@ def test_action_and_reaction_balance_and_a_force_from_nowhere_fails():
 def test_an_account_that_misses_six_thousandths_of_the_work_fails():
     nothing = dict.fromkeys(Energies._fields, 0.0)
     closed = Energies(**nothing | {"work_of_blade": 1.0, "cutting": 0.996})
-    open_ = closed._replace(cutting=0.994)
+    unclosed = closed._replace(cutting=0.994)
     assert check_residual("it", closed).verdict == PASS
-    assert check_residual("it", open_).verdict == FAIL
+    assert check_residual("it", unclosed).verdict == FAIL
 
 
 def test_strokes_of_the_audit_are_continuous():
@@ -107,7 +107,7 @@ def test_a_withdrawal_that_cuts_or_pushes_fails():
         assert FAIL in verdicts(check_withdrawal("it", found._replace(**wrong), 0.4))
 
 
-def test_a_coupling_that_makes_energy_fails():
+def test_a_coupling_that_generates_energy_fails():
     assert check_least_energy("taps", 10, -5e-7).verdict == PASS
     assert check_least_energy("taps", 10, -2e-6).verdict == FAIL
 
@@ -127,7 +127,7 @@ def test_a_mirrored_block_is_its_own_mirror_image():
     assert len(mesh.tetrahedra) == 6 * 8 * 8 * 4
 
 
-def test_an_edge_that_slices_is_in_with_its_whole_length_from_end_to_end():
+def test_an_edge_that_slices_spans_the_body_from_the_first_pose_to_the_last():
     poses = straight_cut(0.05, ratio=2.0)
     for pose in (poses[0], poses[-1]):
         assert pose.tip[2] < 0.0 and pose.heel[2] > 0.02

@@ -77,14 +77,14 @@ def test_a_title_is_text_and_not_markup(tmp_path):
     assert "<h1>&lt;b&gt;$bold&lt;/b&gt;</h1>" in (tmp_path / "replay.html").read_text()
 
 
-def test_without_meshcats_bundle_one_sentence_says_where_it_was_looked_for(tmp_path, monkeypatch):
+def test_without_meshcats_bundle_one_sentence_names_the_path_that_was_tried(tmp_path, monkeypatch):
     monkeypatch.setattr(page, "_BUNDLE", Path("viewer", "dist", "moved.js"))
     with pytest.raises(RunError, match=r"^meshcat's viewer.*moved\.js: pip install 'meshcat>=.*'$"):
         write_cut(tmp_path / "replay.html")
     assert not (tmp_path / "replay.html").exists()
 
 
-def test_without_meshcat_one_sentence_says_so(tmp_path, monkeypatch):
+def test_without_meshcat_one_sentence_names_it_as_missing(tmp_path, monkeypatch):
     monkeypatch.setattr(page.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(
         RunError, match=r"^meshcat, .* is not installed: pip install 'meshcat>=.*'$"
@@ -99,12 +99,12 @@ def test_the_message_names_the_versions_of_meshcat_that_the_project_requires():
 
 @pytest.mark.browser
 def test_the_page_plays_the_cut_by_itself_and_sends_no_request(tab, tmp_path):
-    asked = []
-    tab.on("request", lambda request: asked.append(request.url.split(":")[0]))
+    schemes = []
+    tab.on("request", lambda request: schemes.append(request.url.split(":")[0]))
     write_cut(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("window.viewer && typeof player !== 'undefined' && player.shown === 2")
-    assert set(asked) <= {"file", "data", "blob"}
+    assert set(schemes) <= {"file", "data", "blob"}
     assert tab.title() == "a block"
     assert tab.text_content("#force") == "1.00 N"
     tab.click("#play")
@@ -114,14 +114,14 @@ def test_the_page_plays_the_cut_by_itself_and_sends_no_request(tab, tmp_path):
 @pytest.mark.browser
 def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp_path):
     model, data = little_arm()
-    felt = readings(0.0)._replace(
+    shown = readings(0.0)._replace(
         contact_points=np.array([[0.0, 0.0, 0.08], [0.01, 0.0, 0.08]]),
         contact_forces=np.array([[0.0, -0.5, 0.0], [0.0, -0.5, 0.1]]),
         parts=ForceParts(np.array([0.0, -0.6, 0.8]), np.zeros(3), np.array([0.2, 0.0, 0.0])),
         energies=Energies(*np.zeros(12))._replace(cutting=3e-3, friction=1e-3, elastic=-2e-3),
     )
     replay = ReplayWriter(model, frame=FRAME)
-    replay.add(0.0, cut_tissue()[0], body_poses(data), felt)
+    replay.add(0.0, cut_tissue()[0], body_poses(data), shown)
     replay.write(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")

@@ -33,7 +33,7 @@ def test_the_camera_frames_bodies_of_any_size(size):
     assert camera["target"] == pytest.approx(centre)
     distance = np.linalg.norm(np.subtract(camera["eye"], centre))
     assert 1.5 * diagonal < distance < 4.0 * diagonal
-    assert camera["eye"][2] > centre[2] + 0.3 * distance, "one looks down on it"
+    assert camera["eye"][2] > centre[2] + 0.3 * distance, "the camera looks down on it"
 
 
 def test_the_camera_turns_with_the_tissue():
@@ -58,7 +58,7 @@ def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
     )
 
 
-def test_pictures_travel_once_and_geometry_with_every_frame():
+def test_textures_are_sent_once_and_geometry_with_every_frame():
     model, data = little_arm()
     packets = ScenePackets(shapes_of(model), FRAME)
     first = commands(packets.opening(cut_block(0.0), body_poses(data)))
@@ -69,7 +69,7 @@ def test_pictures_travel_once_and_geometry_with_every_frame():
     assert not any(key.startswith("set_object /bodies") for key in later)
 
 
-def test_a_model_without_shapes_is_no_obstacle():
+def test_a_model_without_shapes_is_accepted():
     packets = ScenePackets([])
     camera = commands(packets.opening(cut_block(0.0), np.zeros((1, 7))))["set_camera"]
     assert np.isfinite(camera["eye"]).all()

@@ -19,11 +19,11 @@ from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
 from tests.scalpel_sim.real_cut import cut_tissue
 
 NO_WAIT = 0.25
-"""What `show` may take on a busy machine [s]. Usually 20 microseconds; if it waited for
-a viewer that does not read, it would wait for ever."""
+"""Longest time of a call of `show` on a busy machine [s]. Usually it is 20 microseconds; if it
+waited for a viewer that does not read, it would wait for ever."""
 
 PATIENCE = 20.0
-"""How long anything may take on a busy machine [s]."""
+"""Longest time that a test waits for anything on a busy machine [s]."""
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def viewer():
 
 
 class Run:
-    """A run that shows a block being parted, as fast as it can, until it is told to stop."""
+    """A run that shows pictures of a cut, as fast as it can."""
 
     def __init__(self, viewer: Viewer) -> None:
         self.surfaces = cut_tissue()
@@ -42,7 +42,7 @@ class Run:
         self.longest = 0.0
         self.n_shown = 0
 
-    def go_on(self, n: int = 200) -> None:
+    def show_pictures(self, n: int = 200) -> None:
         """Show the next `n` pictures, and remember the longest wait."""
         for _ in range(n):
             surface = self.surfaces[self.n_shown % len(self.surfaces)]
@@ -83,12 +83,12 @@ def test_a_foreign_name_that_points_here_is_not_served(viewer):
     assert status(viewer.url, Host="evil.example") == 404
 
 
-def test_a_port_that_was_asked_for_and_is_in_use_is_an_error_that_names_it(viewer):
+def test_a_given_port_that_is_in_use_is_an_error_that_names_it(viewer):
     with pytest.raises(RunError, match=f"port {port_of(viewer)} is in use"):
         Viewer(little_arm()[0], port=port_of(viewer))
 
 
-def test_without_a_wish_the_next_free_port_is_taken(viewer):
+def test_without_a_given_port_the_next_free_one_is_taken(viewer):
     with Viewer(little_arm()[0]) as second:
         assert port_of(second) != port_of(viewer)
         assert status(second.url) == 200
@@ -99,7 +99,7 @@ def test_a_port_that_does_not_exist_is_wrong_use():
         Viewer(little_arm()[0], port=70000)
 
 
-def test_a_page_that_cannot_be_made_is_an_error_that_says_why(monkeypatch):
+def test_a_page_that_cannot_be_made_is_an_error_with_the_reason(monkeypatch):
     broken = "from scalpel_sim.viewer import page; page._BUNDLE = 'gone.js'; "
     monkeypatch.setattr(viewer_module, "_PROGRAM", broken + viewer_module._PROGRAM)
     with pytest.raises(RunError, match=r"did not start: meshcat's viewer.* is not at .*gone\.js"):
@@ -108,10 +108,10 @@ def test_a_page_that_cannot_be_made_is_an_error_that_says_why(monkeypatch):
 
 def test_a_killed_viewer_does_not_disturb_the_run(viewer):
     run = Run(viewer)
-    run.go_on()
+    run.show_pictures()
     os.kill(viewer._process.pid, signal.SIGKILL)
     until(lambda: not viewer.is_running, "the process to be gone")
-    run.go_on()
+    run.show_pictures()
     assert not viewer.is_due()
     assert run.longest < NO_WAIT
 
@@ -119,7 +119,7 @@ def test_a_killed_viewer_does_not_disturb_the_run(viewer):
 def test_a_viewer_that_has_stopped_reading_does_not_disturb_the_run(viewer):
     run = Run(viewer)
     os.kill(viewer._process.pid, signal.SIGSTOP)
-    run.go_on(2000)
+    run.show_pictures(2000)
     assert run.longest < NO_WAIT
     start = time.monotonic()
     viewer.close()
@@ -143,7 +143,7 @@ def test_the_process_ends_with_the_run_however_that_ended(viewer):
 def test_pictures_are_due_at_most_thirty_times_a_second(viewer):
     run = Run(viewer)
     assert viewer.is_due()
-    run.go_on(1)
+    run.show_pictures(1)
     assert not viewer.is_due()
     time.sleep(1 / 20)
     assert viewer.is_due()
@@ -151,7 +151,7 @@ def test_pictures_are_due_at_most_thirty_times_a_second(viewer):
 
 def test_a_page_that_does_not_draw_gets_no_more_pictures(viewer):
     run = Run(viewer)
-    run.go_on(1)
+    run.show_pictures(1)
     received = []
 
     async def sleepy_page():
@@ -159,7 +159,7 @@ def test_a_page_that_does_not_draw_gets_no_more_pictures(viewer):
         page = await websocket_connect(socket_url, on_message_callback=received.append)
         deadline = time.monotonic() + 1.0
         while time.monotonic() < deadline:
-            run.go_on(1)
+            run.show_pictures(1)
             await asyncio.sleep(0.02)
         page.close()
 
@@ -187,7 +187,7 @@ def in_a_thread(coroutine) -> None:
 @pytest.mark.browser
 def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
     run = Run(viewer)
-    run.go_on(21)  # ends with the block cut in two
+    run.show_pictures(21)  # ends with the block cut in two
     tab, other = new_tab(browser), new_tab(browser)
     for page in (tab, other):
         page.goto(viewer.url)
@@ -200,10 +200,10 @@ def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
     assert len(pixels_of(tab, "tissue/cut")) > n_pixels / 300
 
     other.close()
-    run.go_on(1000)
+    run.show_pictures(1000)
     tab.wait_for_function("document.getElementById('time').textContent === '1.02 s'")
     tab.close()
-    run.go_on(1000)
+    run.show_pictures(1000)
     assert viewer.is_running
     assert run.longest < NO_WAIT
     assert tab.failures == other.failures == []

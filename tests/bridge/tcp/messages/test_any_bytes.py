@@ -1,4 +1,4 @@
-"""Bytes that were never a message, and messages with bytes changed, through every decoder."""
+"""Every decoder, given random bytes and messages with changed bytes."""
 
 import numpy as np
 import pytest
@@ -24,11 +24,11 @@ from tests.bridge.tcp.serve_block import block_tissue
 from tissue import BladeSegment, BladeSweep
 
 N_MUTATIONS = 2000
-"""Of each message."""
+"""Number of changed copies of each message."""
 
 
 def real_messages():
-    """Return one of each, from a tissue that lives."""
+    """Return a message of each kind, from a real tissue, and its decoder."""
     tissue = block_tissue()
     edge = BladeSegment(np.array([0.01, 0, 0]), np.array([0.01, 0, 0.03]), np.array([0.0, 1, 0]))
     result = tissue.step(BladeSweep(edge, edge), 1e-3)
@@ -40,7 +40,7 @@ def real_messages():
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
         "pieces": (pack_pieces(1), unpack_pieces),
-        "quality": (pack_cut_report(tissue.cut_report()), unpack_cut_report),
+        "cut report": (pack_cut_report(tissue.cut_report()), unpack_cut_report),
         "description": (pack_description(described), unpack_description),
         "error": (pack_error("no blade"), unpack_error),
     }
@@ -50,8 +50,8 @@ MESSAGES = real_messages()
 
 
 @given(st.sampled_from(sorted(MESSAGES)), st.binary(max_size=400))
-@example("error", b"\xa1\x80")  # a string that is no UTF-8
-def test_random_bytes_never_give_another_exception_than_ours(what, payload):
+@example("error", b"\xa1\x80")  # not UTF-8
+def test_random_bytes_raise_nothing_but_a_message_error(what, payload):
     _, unpack = MESSAGES[what]
     try:
         value = unpack(payload)
@@ -62,8 +62,8 @@ def test_random_bytes_never_give_another_exception_than_ours(what, payload):
 
 
 @pytest.mark.parametrize("what", sorted(MESSAGES))
-def test_a_changed_message_is_refused_or_still_means_something(what):
-    """Half of all changed numbers are still numbers: what passes must be fit for use."""
+def test_a_changed_message_is_refused_or_decodes_to_valid_values(what):
+    """Half of all changed numbers are still numbers: what is accepted must be valid."""
     packed, unpack = MESSAGES[what]
     random = np.random.default_rng(0)
     n_refused = 0
@@ -77,12 +77,12 @@ def test_a_changed_message_is_refused_or_still_means_something(what):
         except MessageError:
             n_refused += 1
         else:
-            assert is_fit(what, value)
+            assert is_valid(what, value)
     assert n_refused > 0
 
 
-def is_fit(what, value):
-    """Whether nothing in a decoded message could harm who uses it."""
+def is_valid(what, value):
+    """Return whether the values of a decoded message are in the ranges that its users rely on."""
     if what == "step":
         sweep, dt = value
         return 0.0 < dt <= 1.0 and (sweep is None or np.isfinite(np.array(sweep)).all())
@@ -98,4 +98,4 @@ def is_fit(what, value):
         return np.isfinite(value.bounds).all() and value.material.density > 0.0
     if what == "error":
         return value.isprintable()
-    return what == "quality" or value >= 0
+    return what == "cut report" or value >= 0

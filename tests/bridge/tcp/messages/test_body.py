@@ -48,14 +48,14 @@ def test_a_surface_arrives_bit_for_bit_and_within_the_bound():
     assert len(payload) <= surface_bytes(n_tetrahedra=1)
 
 
-def test_what_arrives_may_be_written_to():
+def test_received_arrays_are_writable():
     snapshot = unpack_snapshot(pack_snapshot(TETRAHEDRON))
     surface = unpack_surface(pack_surface(SKIN))
     assert all(array.flags.writeable for array in (*snapshot, *surface))
 
 
 @pytest.mark.parametrize("index", [4, -1, 2**62])
-def test_a_tetrahedron_or_triangle_that_names_no_node_is_refused(index):
+def test_a_tetrahedron_or_triangle_without_such_a_node_is_refused(index):
     tetrahedra, triangles = np.array([[0, 1, 2, index]]), np.array([[0, 1, index], [0, 1, 3]])
     with pytest.raises(MessageError, match="tetrahedra refer to points"):
         unpack_snapshot(pack_snapshot(TETRAHEDRON._replace(tetrahedra=tetrahedra)))
@@ -72,7 +72,7 @@ def test_a_body_that_is_not_finite_is_refused(field):
 
 
 @pytest.mark.parametrize("counts", [(-1, 1), (4, -1), (4, 3), (2**62, 2**62), (2**63 - 1, 0)])
-def test_a_count_that_lies_is_refused(counts):
+def test_a_wrong_count_is_refused(counts):
     for packed, unpack in (
         (pack_snapshot(TETRAHEDRON), unpack_snapshot),
         (pack_surface(SKIN), unpack_surface),
@@ -81,7 +81,7 @@ def test_a_count_that_lies_is_refused(counts):
             unpack(struct.pack("<2q", *counts) + packed[16:])
 
 
-def test_a_number_of_pieces_arrives_unless_it_is_none():
+def test_a_number_of_pieces_arrives_and_an_invalid_one_is_refused():
     assert unpack_pieces(pack_pieces(2)) == 2
     for payload in (pack_pieces(-1), b"", bytes(PIECES_BYTES + 1)):
         with pytest.raises(MessageError, match="pieces"):

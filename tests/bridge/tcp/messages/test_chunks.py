@@ -18,18 +18,18 @@ def test_chunks_arrive_bit_for_bit(n):
 @pytest.mark.parametrize(
     "boxes", [CHUNKS.boxes[:, ::-1], CHUNKS.boxes * np.nan, np.full((2, 2, 3), np.inf)]
 )
-def test_boxes_that_are_none_are_refused(boxes):
+def test_invalid_boxes_are_refused(boxes):
     with pytest.raises(MessageError, match="the box of a chunk is not finite or inverted"):
         unpack_chunks(pack_chunks(Chunks(boxes, 0.0)))
 
 
 @pytest.mark.parametrize("fastest", [-1.0, np.nan, np.inf])
-def test_a_speed_that_is_none_is_refused(fastest):
+def test_an_invalid_speed_is_refused(fastest):
     with pytest.raises(MessageError, match="the fastest node moves at"):
         unpack_chunks(pack_chunks(CHUNKS._replace(fastest=fastest)))
 
 
-def test_a_number_of_chunks_that_lies_is_refused():
+def test_a_wrong_number_of_chunks_is_refused():
     packed = pack_chunks(CHUNKS)
     for payload in (packed[:-8], packed + bytes(48), packed[:4], b"\xff" * 16):
         with pytest.raises(MessageError):

@@ -6,7 +6,7 @@ from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
 from tissue import CutReport, MeshMeasures
 
-QUALITY = CutReport(
+REPORT = CutReport(
     7,
     1e-5,
     3e-5,
@@ -17,8 +17,8 @@ QUALITY = CutReport(
 )
 
 
-def test_a_quality_report_arrives_bit_for_bit():
-    assert bits(unpack_cut_report(pack_cut_report(QUALITY))) == bits(QUALITY)
+def test_a_cut_report_arrives_bit_for_bit():
+    assert bits(unpack_cut_report(pack_cut_report(REPORT))) == bits(REPORT)
 
 
 @pytest.mark.parametrize(
@@ -27,10 +27,10 @@ def test_a_quality_report_arrives_bit_for_bit():
         {"n_cut_nodes": -1},
         {"path_error_mean": np.nan},
         {"guard": -1e-9},
-        {"now": QUALITY.now._replace(altitude=-np.inf)},
-        {"initial": QUALITY.initial._replace(n_tetrahedra=0)},
+        {"now": REPORT.now._replace(altitude=-np.inf)},
+        {"initial": REPORT.initial._replace(n_tetrahedra=0)},
     ],
 )
-def test_a_quality_report_of_no_body_is_refused(change):
+def test_a_cut_report_with_an_impossible_number_is_refused(change):
     with pytest.raises(MessageError):
-        unpack_cut_report(pack_cut_report(QUALITY._replace(**change)))
+        unpack_cut_report(pack_cut_report(REPORT._replace(**change)))

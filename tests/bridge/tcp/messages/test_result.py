@@ -74,17 +74,19 @@ def test_a_result_arrives_bit_for_bit_even_where_the_tissue_diverged(result):
 )
 def test_a_result_with_impossible_counts_is_refused(change, why):
     zeros = np.zeros(3)
-    wrench, bounds, profile = (
+    wrench, bounds, stage_times = (
         Wrench(zeros, zeros, zeros),
         np.zeros((2, 3)),
         StageTimes(0.0, 0.0, 0.0),
     )
-    touch = BodyContacts(0, 0.0, 0.0, zeros)
+    body_contacts = BodyContacts(0, 0.0, 0.0, zeros)
     none = np.zeros((0, 3))
     contacts = BladeContacts(none, none, np.zeros(0), none, np.zeros(0))
     at_t1 = (wrench, np.zeros((6, 6)), contacts)
     counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1)
-    good = StepResult(wrench, *at_t1, zeros, bounds, *counts_and_floats, touch, profile, None)
+    good = StepResult(
+        wrench, *at_t1, zeros, bounds, *counts_and_floats, body_contacts, stage_times, None
+    )
     with pytest.raises(MessageError, match=why):
         unpack_result(pack_result(good._replace(**change)))
 

@@ -38,7 +38,7 @@ def test_no_blade_arrives_as_no_blade():
 
 
 def step_numbers(**changes):
-    """Return a good step request as 19 numbers, with some places changed."""
+    """Return a good step request as 19 numbers, with some of them changed."""
     numbers = [1e-3, *[0.1] * 6, 0.0, 1.0, 0.0, *[0.2] * 6, 0.0, 1.0, 0.0]
     for place, value in changes.items():
         numbers[int(place[1:])] = value
@@ -54,6 +54,6 @@ def test_a_step_with_one_impossible_number_is_refused(place, bad):
 
 
 @pytest.mark.parametrize("dt", [0.0, -1e-3, 1.1, np.nan])
-def test_a_step_that_lasts_no_time_or_too_long_is_refused(dt):
+def test_a_step_of_no_time_or_too_much_is_refused(dt):
     with pytest.raises(MessageError, match="a step of"):
         unpack_step(struct.pack("<d", dt))

@@ -50,7 +50,7 @@ def test_the_longest_error_fits():
 
 
 @pytest.mark.parametrize("density", [b"-1000.0", b"null", b"1e999", b'"heavy"'])
-def test_a_description_of_no_real_material_is_refused(density):
+def test_a_description_of_an_impossible_material_is_refused(density):
     bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     packed = pack_description(TissueDescription("", Material(density=1000.0), bounds, 1, 4))
     assert unpack_description(packed)
@@ -58,6 +58,6 @@ def test_a_description_of_no_real_material_is_refused(density):
         unpack_description(packed.replace(b'"density":1000.0', b'"density":' + density))
 
 
-def test_an_error_arrives_but_not_what_would_steer_a_terminal():
+def test_an_error_arrives_without_its_control_characters():
     assert unpack_error(pack_error("no blade: 3 µm")) == "no blade: 3 µm"
     assert unpack_error(b"gone\x1b[2J\n") == "gone\ufffd[2J\ufffd"
