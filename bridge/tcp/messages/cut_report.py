@@ -32,14 +32,14 @@ def unpack_cut_report(payload: bytes) -> CutReport:
         MessageError: the length is wrong, a number is negative or NaN, or there is no tetrahedron.
     """
     if len(payload) != _CUT_REPORT.size:
-        raise MessageError(f"a quality report of {len(payload)} bytes; wanted {_CUT_REPORT.size}")
+        raise MessageError(f"a cut report of {len(payload)} bytes; wanted {_CUT_REPORT.size}")
     numbers = _CUT_REPORT.unpack(payload)
     n_cut_nodes, n_initial, n_now = numbers[10:]
     check_counts(n_cut_nodes, min(n_initial, n_now) - 1)
     if not all(
         number >= 0.0 for number in numbers[:10]
     ):  # infinity is the time step of a body that cannot move
-        raise MessageError(f"a quality report of {numbers[:10]}; wanted numbers of 0 or more")
+        raise MessageError(f"a cut report of {numbers[:10]}; wanted numbers of 0 or more")
     return CutReport(
         n_cut_nodes,
         numbers[0],
