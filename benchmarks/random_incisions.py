@@ -34,7 +34,7 @@ def meshes() -> dict[str, Callable[[int], TetrahedralMesh]]:
         "Delaunay, slivers": partial(bodies.with_slivers, 5),
     }
     for file in bodies.FILES if bodies.FOLDER else ():
-        made[file] = partial(lambda mesh, seed: mesh, bodies.of_others(file))
+        made[file] = partial(lambda mesh, seed: mesh, bodies.third_party_mesh(file))
     return made
 
 

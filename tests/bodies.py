@@ -1,4 +1,4 @@
-"""Bodies that can be drawn on paper, and small unstructured ones."""
+"""Test bodies: ones small enough to check by hand, and small unstructured ones."""
 
 import os
 from pathlib import Path
@@ -10,15 +10,15 @@ from tissue import BoolArray, FloatArray, TetrahedralMesh, block, read_mesh
 from tissue.mesh.validation import checked, quality
 
 FLAT = 1e-9
-"""Quality of a tetrahedron that Delaunay makes of four points on the side of a box, at most."""
+"""Highest quality of a tetrahedron that Delaunay makes of four points on one side of a box."""
 
 WORST = 0.03
-"""Quality below which a random mesh has slivers that no mesh generator would let pass."""
+"""Quality below which a random mesh has slivers that no mesh generator would accept."""
 
 FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
-"""Where the meshes of others are; tests of them are skipped where it is not given."""
+"""Folder of the third-party meshes; tests that need them are skipped if it is not set."""
 
-FILES = {  # and their unit of length, in metres: organs of about 0.1 m
+FILES = {  # file to its unit of length [m]; the organs measure about 0.1 m
     "sofa_liver.msh": 0.01,
     "sofa_truthcylinder1.msh": 0.005,
     "bullet_banana.vtk": 1.0,
@@ -26,8 +26,8 @@ FILES = {  # and their unit of length, in metres: organs of about 0.1 m
 }
 
 
-def of_others(file: str) -> TetrahedralMesh:
-    """Return one of the meshes in `FOLDER`."""
+def third_party_mesh(file: str) -> TetrahedralMesh:
+    """Return one of the third-party meshes in `FOLDER`, checked and in metres."""
     return checked(read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])).mesh
 
 
@@ -46,8 +46,8 @@ def two_tetrahedra() -> TetrahedralMesh:
 def jittered(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
     """Return the Delaunay mesh of a box of n x n x n cells whose nodes are shifted at random.
 
-    Nodes on the sides stay on them, so that the body is the box. Meshes with slivers are passed
-    over.
+    Nodes on the sides stay on them, so that the body is the box. Meshes with slivers are
+    skipped.
     """
     random = np.random.default_rng(seed)
     while True:
@@ -56,23 +56,23 @@ def jittered(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
         shift = random.uniform(-0.3, 0.3, lattice.shape) * spacing
         on_side = (lattice < 0.5 * spacing) | (lattice > size - 0.5 * spacing)
         positions = lattice + np.where(on_side, 0.0, shift)
-        tetrahedra = positively_turned(positions, Delaunay(positions).simplices.astype(np.int64))
+        tetrahedra = positively_oriented(positions, Delaunay(positions).simplices.astype(np.int64))
         tetrahedra = tetrahedra[quality(positions, tetrahedra) > FLAT]
         if quality(positions, tetrahedra).min() > WORST:
             return TetrahedralMesh(positions, tetrahedra)
 
 
-def positively_turned(positions: FloatArray, tetrahedra: np.ndarray) -> np.ndarray:
-    """Return the tetrahedra with the nodes of inverted ones swapped."""
+def positively_oriented(positions: FloatArray, tetrahedra: np.ndarray) -> np.ndarray:
+    """Return the tetrahedra with two nodes of each inverted one swapped."""
     corners = positions[tetrahedra]
     inverted = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0.0
-    turned = tetrahedra.copy()
-    turned[inverted, 2], turned[inverted, 3] = tetrahedra[inverted, 3], tetrahedra[inverted, 2]
-    return turned
+    oriented = tetrahedra.copy()
+    oriented[inverted, 2], oriented[inverted, 3] = tetrahedra[inverted, 3], tetrahedra[inverted, 2]
+    return oriented
 
 
 def sides(mesh: TetrahedralMesh, axis: int = 0, share: float = 0.0) -> BoolArray:
-    """Return the nodes on, or within a share of the extent from, the two sides across an axis."""
+    """Return a mask of the nodes within a share of the extent from the two sides across an axis."""
     x = mesh.positions[:, axis]
     extent = float(np.ptp(x))
     reach = share * extent + 1e-9 * extent
@@ -84,9 +84,9 @@ def jittered_grid(n: int, seed: int, size: float = 0.04, shift: float = 0.15) ->
 
     Args:
         n: Cells along each axis.
-        seed: Of the random shifts.
+        seed: Seed of the random shifts.
         size: Edge of the box [m].
-        shift: Of each coordinate at most, in cells.
+        shift: Largest shift of each coordinate, in cells.
     """
     mesh = block((n, n, n), (size, size, size))
     x = mesh.positions
@@ -99,7 +99,7 @@ def jittered_grid(n: int, seed: int, size: float = 0.04, shift: float = 0.15) ->
 def body_centred(n: int, seed: int, size: float = 0.04) -> TetrahedralMesh:
     """Return the Delaunay mesh of a box of corners and centres of n x n x n cells, shifted.
 
-    No dihedral angle is less than 10 degrees: what a mesh generator makes.
+    No dihedral angle is less than 10 degrees, as in the output of a mesh generator.
     """
     random = np.random.default_rng(seed)
     corners = block((n, n, n), (size, size, size)).positions
@@ -127,7 +127,7 @@ def with_slivers(n: int, seed: int, size: float = 0.05) -> TetrahedralMesh:
 
 def _delaunay(positions: FloatArray) -> TetrahedralMesh:
     """Return the Delaunay mesh of a box, without the flat tetrahedra on its sides."""
-    tetrahedra = positively_turned(positions, Delaunay(positions).simplices.astype(np.int64))
+    tetrahedra = positively_oriented(positions, Delaunay(positions).simplices.astype(np.int64))
     return TetrahedralMesh(positions, tetrahedra[quality(positions, tetrahedra) > FLAT])
 
 

@@ -1,4 +1,4 @@
-"""A headless Chromium for tests that look at pages."""
+"""A headless Chromium for tests of web pages."""
 
 import io
 import shutil
@@ -22,13 +22,13 @@ DETERMINISTIC = (
     "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
 )
-"""Draw in software, the same everywhere, and talk to nobody."""
+"""Draw in software, the same on every machine, and open no network connection."""
 
 WINDOW = {"width": 480, "height": 360}
 
 UNTIL_DRAWN = """() => new Promise((done) =>
     requestAnimationFrame(() => requestAnimationFrame(done)))"""
-"""Resolves when what was changed so far is on the screen."""
+"""Resolves when all changes made so far are on the screen."""
 
 TIMEOUT = 60_000
 """How long a page may take [ms]: drawing in software on a busy machine is slow."""
@@ -36,7 +36,7 @@ TIMEOUT = 60_000
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Chromium, without a window. Skips where there is none."""
+    """Start Chromium without a window; skip the test if it is not installed."""
     executable = next(filter(None, map(shutil.which, NAMES)), None)
     if executable is None:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
@@ -49,7 +49,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def tab(browser: Any) -> Iterator[Any]:
-    """An empty tab in which no script may fail."""
+    """Open an empty tab; the test fails if a script in it fails."""
     page = new_tab(browser)
     yield page
     page.close()
@@ -74,10 +74,7 @@ def pixels(tab: Any) -> np.ndarray:
 
 
 def pixels_of(tab: Any, path: str) -> np.ndarray:
-    """Return the pixels that an object of the scene accounts for, shape (n, 3).
-
-    They are those that change when the object is hidden.
-    """
+    """Return the pixels that change when an object of the scene is hidden, shape (n, 3)."""
     with_it = pixels(tab)
     set_visible(tab, path, False)
     without_it = pixels(tab)
@@ -97,5 +94,5 @@ def set_visible(tab: Any, path: str, is_visible: bool) -> None:
 
 
 def local_file(path: Path) -> str:
-    """Return the address under which a browser finds a file of this machine."""
+    """Return the URL of a file on this machine."""
     return path.resolve().as_uri()

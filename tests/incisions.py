@@ -1,4 +1,4 @@
-"""Incisions at random: surfaces for `Tissue.incise`, of every kind that a hand could make."""
+"""Random incisions: surfaces for `Tissue.incise`, of every kind that a hand could make."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,73 +8,74 @@ import numpy as np
 from tests.strokes import Stroke, pose
 from tissue import FloatArray, TetrahedralMesh
 
-N_PLACES = 60
-"""Places of the edge on its way through the body; those of a curve are chords of it."""
+N_POSITIONS = 60
+"""Number of positions of the edge along its path; a curved path is divided into chords."""
 
-OUTREACH = 1.15
-"""How far an edge reaches, and where its way begins and ends, in half diagonals of the body."""
+EXTENT = 1.15
+"""Reach of an edge, and of its path, from the middle of the body [half diagonals]."""
 
 
 class Incision(NamedTuple):
-    """A ruled surface."""
+    """A ruled surface that an edge sweeps."""
 
     edges: FloatArray
-    """Places of the edge from tip to heel [m], shape (n_places, 2, 3)."""
+    """Tip and heel of the edge at each position [m], shape (n_positions, 2, 3)."""
     forward: FloatArray
-    """Where it faces, shape (n_places, 3)."""
+    """Direction in which the edge faces, shape (n_positions, 3)."""
 
 
 class Shape(NamedTuple):
-    """How an edge goes through a body, in units of half the body's diagonal where not said."""
+    """Shape of the path of an edge through a body; lengths in half diagonals unless stated."""
 
-    ways: FloatArray
-    """Where the edge is along its way, shape (n_places,)."""
-    low: float = -OUTREACH
-    """Where the tip is along the edge."""
-    high: float = OUTREACH
-    """Where the heel is."""
+    path: FloatArray
+    """Positions of the edge along its path, shape (n_positions,)."""
+    low: float = -EXTENT
+    """Position of the tip along the edge."""
+    high: float = EXTENT
+    """Position of the heel along the edge."""
     bow: float = 0.0
-    """How far the way goes sideways [m]."""
+    """Amplitude of the sideways waves of the path [m]."""
     waves: float = 0.0
-    """How often, per half diagonal [rad]."""
+    """Angular frequency of the sideways waves, per half diagonal [rad]."""
     phase: float = 0.0
+    """Phase of the sideways waves [rad]."""
     twist: float = 0.0
-    """How far the edge turns about its way, per half diagonal [rad]."""
+    """Rotation of the edge about its path, per half diagonal [rad]."""
 
 
-THROUGH = np.linspace(-OUTREACH, OUTREACH, N_PLACES)
+THROUGH = np.linspace(-EXTENT, EXTENT, N_POSITIONS)
 
 
-def tilted(random: np.random.Generator, thin: float) -> Shape:
+def tilted(random: np.random.Generator, thickness: float) -> Shape:
     return Shape(THROUGH)
 
 
-def curved(random: np.random.Generator, thin: float) -> Shape:
-    bow = random.uniform(0.03, 0.15) * thin
+def curved(random: np.random.Generator, thickness: float) -> Shape:
+    bow = random.uniform(0.03, 0.15) * thickness
     return Shape(
         THROUGH, bow=bow, waves=random.uniform(0.5, 1.5) * np.pi, phase=random.uniform(0.0, 6.0)
     )
 
 
-def twisted(random: np.random.Generator, thin: float) -> Shape:
+def twisted(random: np.random.Generator, thickness: float) -> Shape:
     return Shape(THROUGH, twist=random.uniform(-0.6, 0.6))
 
 
-def back_and_forth(random: np.random.Generator, thin: float) -> Shape:
+def back_and_forth(random: np.random.Generator, thickness: float) -> Shape:
     turn = int(random.integers(20, 40))
     back = turn - int(random.integers(5, 18))
-    ways = np.concatenate([THROUGH[:turn], THROUGH[back:turn][::-1], THROUGH[back:]])
-    return curved(random, thin)._replace(ways=ways)
+    path = np.concatenate([THROUGH[:turn], THROUGH[back:turn][::-1], THROUGH[back:]])
+    return curved(random, thickness)._replace(path=path)
 
 
-def slit(random: np.random.Generator, thin: float) -> Shape:
-    """It stops inside, its tip too."""
-    ways = np.linspace(-OUTREACH, random.uniform(-0.2, 0.3), N_PLACES)
-    return Shape(ways, low=random.uniform(-0.15, 0.15))
+def slit(random: np.random.Generator, thickness: float) -> Shape:
+    """Return a path that ends inside the body, with the tip inside."""
+    path = np.linspace(-EXTENT, random.uniform(-0.2, 0.3), N_POSITIONS)
+    return Shape(path, low=random.uniform(-0.15, 0.15))
 
 
-def buried(random: np.random.Generator, thin: float) -> Shape:
-    """Both ends of the edge are inside."""
+def buried(random: np.random.Generator, thickness: float) -> Shape:
+    """Return a path on which both ends of the edge are inside the body."""
     low = random.uniform(-0.2, 0.0)
     return Shape(THROUGH, low=low, high=low + random.uniform(0.15, 0.3))
 
@@ -88,64 +89,71 @@ KINDS: dict[str, Callable[[np.random.Generator, float], Shape]] = {
     "buried": buried,
 }
 CLEAN_THROUGH = ("tilted", "curved", "twisted", "back and forth")
-"""Kinds that cut the body in two."""
+"""Kinds of incision that cut the body in two."""
 
 
 def incision(mesh: TetrahedralMesh, kind: str, seed: int) -> Incision:
-    """Return a surface of that kind through the middle third or so of the body, any way turned."""
+    """Return a surface of that kind through about the middle third of the body, at any angle."""
     random = np.random.default_rng(seed)
     turn = rotation(random)
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
-    thin = float((high - low).min())
-    aside = random.uniform(-0.2, 0.2) * thin
-    return ruled(mesh, KINDS[kind](random, thin), turn, aside)
+    thickness = float((high - low).min())
+    aside = random.uniform(-0.2, 0.2) * thickness
+    return ruled(mesh, KINDS[kind](random, thickness), turn, aside)
 
 
 def ruled(mesh: TetrahedralMesh, shape: Shape, turn: FloatArray, aside: float = 0.0) -> Incision:
-    """Return the surface: columns of `turn` are the way, the edge, and sideways; `aside` [m]."""
+    """Return the surface that an edge of this shape sweeps.
+
+    Args:
+        mesh: The body.
+        shape: Shape of the path of the edge.
+        turn: Unit vectors along the path, along the edge and sideways, as columns.
+        aside: Sideways offset from the middle of the body [m].
+    """
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    way, upright, sideways = turn.T
-    at = shape.ways[:, None]
+    direction, upright, sideways = turn.T
+    at = shape.path[:, None]
     swing = shape.waves * at + shape.phase
     along = np.cos(shape.twist * at) * upright + np.sin(shape.twist * at) * sideways
-    places = middle + half * at * way + (aside + shape.bow * np.sin(swing)) * sideways
+    centres = middle + half * at * direction + (aside + shape.bow * np.sin(swing)) * sideways
     slope = shape.bow * shape.waves / half * np.cos(swing)
-    edges = np.stack([places + half * shape.low * along, places + half * shape.high * along], 1)
-    return Incision(edges, way + slope * sideways)
+    edges = np.stack([centres + half * shape.low * along, centres + half * shape.high * along], 1)
+    return Incision(edges, direction + slope * sideways)
 
 
 def plane(mesh: TetrahedralMesh, normal: FloatArray, offset: float = 0.0) -> Incision:
     """Return the plane at `offset` [m] from the middle of the body along its normal."""
     normal = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
-    way = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    way /= np.linalg.norm(way)
-    turn = np.stack([way, np.cross(normal, way), normal], axis=1)
+    direction = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    direction /= np.linalg.norm(direction)
+    turn = np.stack([direction, np.cross(normal, direction), normal], axis=1)
     return ruled(mesh, Shape(1.3 * THROUGH, -1.5, 1.5), turn, offset)
 
 
 def crossing_planes(mesh: TetrahedralMesh, seed: int) -> list[Incision]:
-    """Return three planes that cross at nearly right angles, near the middle of the body."""
+    """Return three planes that cross at almost right angles near the middle of the body."""
     random = np.random.default_rng(seed)
-    thin = float(np.ptp(mesh.positions, axis=0).min())
+    thickness = float(np.ptp(mesh.positions, axis=0).min())
     turn = rotation(random) if seed % 2 else np.eye(3)
     return [
-        plane(mesh, axis + random.uniform(-0.15, 0.15, 3), random.uniform(-0.1, 0.1) * thin)
+        plane(mesh, axis + random.uniform(-0.15, 0.15, 3), random.uniform(-0.1, 0.1) * thickness)
         for axis in turn.T
     ]
 
 
 def rotation(random: np.random.Generator) -> FloatArray:
-    """Return a rotation, all of them equally likely."""
+    """Return a random rotation matrix, uniformly distributed."""
     q, r = np.linalg.qr(random.normal(size=(3, 3)))
     q *= np.sign(np.diag(r))
     return q * np.linalg.det(q)
 
 
 def blade_on(cut: Incision, travel: float) -> Stroke:
-    """Return the stroke of a blade along a surface, an end of it by at most `travel` [m] a frame.
+    """Return the stroke of a blade along a surface; its ends move at most `travel` [m] a frame.
 
-    The blade is rigid: its middle goes straight from place to place, and it turns on the way.
+    The blade is rigid: its middle moves straight between positions while the blade rotates.
     """
     middles, spans = cut.edges.mean(axis=1), cut.edges[:, 1] - cut.edges[:, 0]
     half = 0.5 * float(np.linalg.norm(spans[0]))
@@ -153,9 +161,9 @@ def blade_on(cut: Incision, travel: float) -> Stroke:
     for i in range(len(middles) - 1):
         farthest = np.linalg.norm(cut.edges[i + 1] - cut.edges[i], axis=1).max()
         n = max(1, int(np.ceil(farthest / travel)))
-        for at in np.arange(n) / n:
+        for share in np.arange(n) / n:
             middle, span, forward = (
-                (1.0 - at) * x[i] + at * x[i + 1] for x in (middles, spans, cut.forward)
+                (1.0 - share) * x[i] + share * x[i + 1] for x in (middles, spans, cut.forward)
             )
             along = span / np.linalg.norm(span)
             stroke.append(pose(middle - half * along, middle + half * along, forward))
@@ -163,7 +171,7 @@ def blade_on(cut: Incision, travel: float) -> Stroke:
 
 
 def area_within(mesh: TetrahedralMesh, cut: Incision) -> float:
-    """Return the area of a flat incision inside the box that the body is [m2]."""
+    """Return the area of a flat incision inside a box-shaped body [m2]."""
     first, last = cut.edges[0], cut.edges[-1]
     polygon = np.array([first[0], last[0], last[1], first[1]])
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""Cuts under the eyes of a judge: a body that moves and is out of shape, watched at every event."""
+"""Cuts of a moving, deformed body, with every invariant checked after each of them."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,16 @@ from tissue import FloatArray, Snapshot, TetrahedralMesh, Tissue
 
 
 class WatchedTissue(Tissue):
-    """A tissue that remembers how much momentum its cuts made or lost.
+    """A tissue that records how much its cuts change the momentum.
 
-    Forces act between two cuts; in the instant of one, nothing may change.
+    Forces act only between cuts, so a cut itself must not change the momentum.
     """
 
     momentum_jump = 0.0
-    """The largest of any cut step, relative to the sum of mass times speed."""
+    """Largest change in any cut step, relative to the sum of mass times speed."""
 
     n_watched = 0
-    """Number of cut steps that were watched."""
+    """Number of cut steps so far."""
 
     def _before_cut(self) -> None:
         self._before = self.snapshot()
@@ -36,22 +36,22 @@ class WatchedTissue(Tissue):
 
 
 class Verdict(NamedTuple):
-    """What was found after the cuts."""
+    """State of the body after the cuts."""
 
     faults: list[str]
     n_pieces: int
     growth: float
-    """Tetrahedra after over before."""
+    """Number of tetrahedra after the cuts over that before."""
     volume: float
-    """Relative change."""
+    """Relative change of the volume."""
     mass: float
-    """Relative change."""
+    """Relative change of the mass."""
     momentum: float
-    """Largest relative jump in a cut step."""
+    """Largest relative jump of the momentum in a cut step."""
 
 
 def out_of_shape(mesh: TetrahedralMesh, seed: int) -> FloatArray:
-    """Return positions of a body that is sheared, stretched and bent by some 10 % [m]."""
+    """Return positions of the body sheared, stretched and bent by about 10 % [m]."""
     random = np.random.default_rng(seed)
     middle = mesh.positions.mean(axis=0)
     x = mesh.positions - middle
@@ -62,15 +62,15 @@ def out_of_shape(mesh: TetrahedralMesh, seed: int) -> FloatArray:
     )
 
 
-def moving(tissue: Tissue, seed: int) -> None:
-    """Let every node that can move at some 0.1 m/s."""
+def set_random_velocities(tissue: Tissue, seed: int) -> None:
+    """Give every free node a random velocity of about 0.1 m/s."""
     n = tissue.n_nodes
     velocities = 0.1 * np.random.default_rng(seed).normal(size=(n, 3))
     tissue._body.velocities[:n] = np.where(tissue._body.fixed[:n, None], 0.0, velocities)
 
 
 def judge(before: Snapshot, tissue: WatchedTissue, lips_match: bool) -> Verdict:
-    """Look at every invariant."""
+    """Check every invariant of the cut body."""
     after = tissue.snapshot()
     found = soundness.faults(before, after, volume=1e-12, mass=1e-12, lips_match=lips_match)
     found += soundness.link_faults(tissue._body)
@@ -91,10 +91,10 @@ def judge(before: Snapshot, tissue: WatchedTissue, lips_match: bool) -> Verdict:
 
 
 def incised(mesh: TetrahedralMesh, cuts: list[Incision], seed: int = 0, **options) -> Verdict:
-    """Return what becomes of a moving body, out of shape, that is cut along those surfaces."""
+    """Cut a moving, deformed body along these surfaces and judge the result."""
     options = {"positions": out_of_shape(mesh, seed), "gravity": (0.0, 0.0, 0.0)} | options
     tissue = WatchedTissue(mesh, **options)
-    moving(tissue, seed)
+    set_random_velocities(tissue, seed)
     before = tissue.snapshot()
     for cut in cuts:
         tissue.incise(*cut)
@@ -102,9 +102,9 @@ def incised(mesh: TetrahedralMesh, cuts: list[Incision], seed: int = 0, **option
 
 
 def cut_by_blade(mesh: TetrahedralMesh, cuts: list[Incision]) -> Verdict:
-    """Return what becomes of a body at rest, held on either side of the first cut, after strokes.
+    """Cut a body at rest, held on both sides of the first cut, by strokes; judge the result.
 
-    A blade follows the surfaces, and feels the tissue; for 3 ms at the end there is none.
+    A blade follows each surface against the forces of the tissue, then leaves it for 3 ms.
     """
     sideways = np.cross(cuts[0].forward[0], cuts[0].edges[0, 1] - cuts[0].edges[0, 0])
     across = mesh.positions @ sideways

@@ -1,4 +1,4 @@
-"""Slow twins of kernels, in plain Python and NumPy: the same answers the obvious way."""
+"""Slow reference versions of kernels, written in the obvious form in plain Python and NumPy."""
 
 import itertools
 from fractions import Fraction
@@ -10,7 +10,7 @@ from tissue.mesh.body import OUTER
 
 
 def determinant(a, b, c, d) -> int:
-    """Six times the signed volume of four lattice points, in Python's whole numbers."""
+    """Return six times the signed volume of four lattice points, in Python's exact integers."""
     u, v, w = ([int(q) - int(p) for p, q in zip(a, x, strict=True)] for x in (b, c, d))
     return (
         w[0] * (u[1] * v[2] - u[2] * v[1])
@@ -20,14 +20,14 @@ def determinant(a, b, c, d) -> int:
 
 
 def pierced_at(a, b, p, q, r) -> list[Fraction] | None:
-    """Weights of the point where the line ab meets the plane pqr; None if it is parallel to it."""
+    """Return the weights of the point where line ab meets plane pqr; None if they are parallel."""
     weights = [determinant(a, b, *edge) for edge in ((q, r), (r, p), (p, q))]
     total = sum(weights)
     return None if total == 0 else [Fraction(w, total) for w in weights]
 
 
 def links(tetrahedra: IntArray) -> IntArray:
-    """What is behind each face: the other tetrahedron with a face of the same three nodes."""
+    """Return the link of each face: the other tetrahedron with a face of the same three nodes."""
     out = np.full(tetrahedra.shape, OUTER)
     faces = [[frozenset(t) - {node} for node in t] for t in tetrahedra.tolist()]
     for (t, of_t), (u, of_u) in itertools.permutations(enumerate(faces), 2):
@@ -37,17 +37,17 @@ def links(tetrahedra: IntArray) -> IntArray:
 
 
 def star(tetrahedra: IntArray, node: int) -> set[int]:
-    """The tetrahedra that name `node`."""
+    """Return the tetrahedra that have `node` as a corner."""
     return set(np.flatnonzero((tetrahedra == node).any(axis=1)).tolist())
 
 
 def volume(corners: FloatArray) -> float:
-    """Signed volume of a tetrahedron with these corners [m3]."""
+    """Return the signed volume of a tetrahedron with these corners [m3]."""
     return float(np.linalg.det(corners[1:] - corners[0])) / 6.0
 
 
 def node_size(rest: FloatArray, tetrahedra: IntArray, node: int) -> float:
-    """Smallest altitude from `node`: three times volume over area of the face opposite."""
+    """Return the least altitude from `node`: three times volume over area of the face opposite."""
     altitudes = []
     for t in star(tetrahedra, node):
         face = rest[[n for n in tetrahedra[t] if n != node]]
@@ -57,7 +57,7 @@ def node_size(rest: FloatArray, tetrahedra: IntArray, node: int) -> float:
 
 
 def masses(rest: FloatArray, tetrahedra: IntArray, density: float) -> FloatArray:
-    """A quarter of each tetrahedron to each of its nodes [kg]."""
+    """Return the mass of each node: a quarter of each tetrahedron around it [kg]."""
     out = np.zeros(len(rest))
     for nodes in tetrahedra:
         out[nodes] += 0.25 * density * volume(rest[nodes])
@@ -67,7 +67,7 @@ def masses(rest: FloatArray, tetrahedra: IntArray, density: float) -> FloatArray
 def stiffnesses(
     rest: FloatArray, tetrahedra: IntArray, young_modulus: float
 ) -> dict[tuple[int, int], float]:
-    """The spring of each edge: k = E * (volume around it) / (rest length)^2 [N/m]."""
+    """Return the spring of each edge: k = E * (volume around it) / (rest length)^2 [N/m]."""
     around: dict[tuple[int, int], float] = {}
     for nodes in tetrahedra:
         for a, b in itertools.combinations(sorted(nodes.tolist()), 2):
@@ -81,7 +81,7 @@ def stiffnesses(
 def elastic_energy(
     springs: dict[tuple[int, int], float], rest: FloatArray, positions: FloatArray
 ) -> float:
-    """Sum of k (l - l0)^2 / 2 over the springs [J]."""
+    """Return the elastic energy: the sum of k (l - l0)^2 / 2 over the springs [J]."""
     energy = 0.0
     for (a, b), k in springs.items():
         stretch = np.linalg.norm(positions[b] - positions[a]) - np.linalg.norm(rest[b] - rest[a])
@@ -96,46 +96,46 @@ def forces(
     velocities: FloatArray,
     retardation_time: float = 0.0,
 ) -> FloatArray:
-    """Pull of each spring, and of the damper beside it, on its two ends [N]."""
+    """Return the force on each node: the pull of every spring and its damper on both ends [N]."""
     out = np.zeros_like(positions)
     for (a, b), k in springs.items():
         d = positions[b] - positions[a]
         length = np.linalg.norm(d)
-        way = d / length
+        direction = d / length
         pull = k * (length - np.linalg.norm(rest[b] - rest[a]))
-        pull += retardation_time * k * float((velocities[b] - velocities[a]) @ way)
-        out[a] += pull * way
-        out[b] -= pull * way
+        pull += retardation_time * k * float((velocities[b] - velocities[a]) @ direction)
+        out[a] += pull * direction
+        out[b] -= pull * direction
     return out
 
 
-def goes_through(
-    p_t0: FloatArray, p_t1: FloatArray, t0: FloatArray, t1: FloatArray, n_pictures: int = 300
+def passes_through(
+    p_t0: FloatArray, p_t1: FloatArray, t0: FloatArray, t1: FloatArray, n_instants: int = 300
 ) -> bool | None:
-    """Whether a point went through a triangle inwards and is still below its plane: a film of it.
+    """Return whether a point passes through a triangle inwards and stays below, by sampling time.
 
-    None where it passes so close to the triangle's rim that a film cannot tell.
+    None where it passes so close to the boundary of the triangle that samples cannot decide.
     """
-    before, doubtful, through = None, False, False
-    for when in np.linspace(0.0, 1.0, n_pictures):
+    before, uncertain, through = None, False, False
+    for when in np.linspace(0.0, 1.0, n_instants):
         p, (a, b, c) = p_t0 + when * (p_t1 - p_t0), t0 + when * (t1 - t0)
         normal = np.cross(b - a, c - a)
         height = float((p - a) @ normal) / float(np.linalg.norm(normal))
         if before is not None and before > 0.0 >= height:
             solution = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
             smallest = min(*solution, 1.0 - solution.sum())
-            doubtful |= abs(smallest) < 0.05
+            uncertain |= abs(smallest) < 0.05
             through |= smallest > 0.0
         if before is not None and before < 0.0 <= height:
             through = False
         before = height
     weights = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
-    doubtful |= abs(min(*weights, 1.0 - weights.sum())) < 0.05 or abs(height) < 1e-3
-    return None if doubtful else through
+    uncertain |= abs(min(*weights, 1.0 - weights.sum())) < 0.05 or abs(height) < 1e-3
+    return None if uncertain else through
 
 
 def distance_to_triangle(p: FloatArray, triangle: FloatArray) -> float:
-    """Distance of a point from the nearest point of a triangle [m]."""
+    """Return the distance of a point from the nearest point of a triangle [m]."""
     a, b, c = triangle
     inside = np.linalg.lstsq(np.stack([b - a, c - a], axis=1), p - a, rcond=None)[0]
     nearest = [a + max(0.0, min(1.0, (p - a) @ (b - a) / ((b - a) @ (b - a)))) * (b - a)

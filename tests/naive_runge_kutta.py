@@ -1,4 +1,4 @@
-"""Both forms of the Runge-Kutta method, as they stand on paper: slow twins of the kernels."""
+"""Both forms of the Runge-Kutta method as published: slow reference versions of the kernels."""
 
 from collections.abc import Callable
 
@@ -7,11 +7,11 @@ import numpy as np
 from tissue import FloatArray
 
 Acceleration = Callable[[FloatArray, FloatArray], FloatArray]
-"""Of positions and velocities."""
+"""Acceleration as a function of positions and velocities."""
 
 
 def nystroem(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
-    """One step of Nystroem's form, with the correction terms in h^2 (Collatz, chapter 2)."""
+    """Take one step of Nystroem's form, with the correction terms in h^2 (Collatz, chapter 2)."""
     a1 = a(x, v)
     x2 = x + h / 2 * v + h**2 / 8 * a1
     a2 = a(x2, v + h / 2 * a1)
@@ -21,7 +21,7 @@ def nystroem(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
 
 
 def classical(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
-    """One step of the classical method on the system x' = v, v' = a(x, v) of first order."""
+    """Take one step of the classical method on the system x' = v, v' = a(x, v) of first order."""
 
     def rates(state: FloatArray) -> FloatArray:
         return np.array([state[1], a(state[0], state[1])])
@@ -36,10 +36,10 @@ def classical(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
 
 
 def two_levels(a: Acceleration, x: FloatArray, v: FloatArray, h: float) -> tuple:
-    """The classical method with positions and velocities on two levels: four positions, not three.
+    """Take one step of the classical method, written separately for positions and velocities.
 
-    What the stages of the positions are made of is put into those of the velocities; the terms in
-    h^2 are what the paper calls correction terms.
+    It has four stage positions, not three. The stages of the velocities are substituted into those
+    of the positions; this gives the terms in h^2, which the paper calls correction terms.
     """
     a1 = a(x, v)
     a2 = a(x + h / 2 * v, v + h / 2 * a1)

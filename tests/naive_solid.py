@@ -1,4 +1,4 @@
-"""Slow twins of the forces of tetrahedra, in plain NumPy: by deformation gradients and stresses."""
+"""Slow reference versions of the forces of tetrahedra: deformation gradients and stresses."""
 
 import numpy as np
 
@@ -7,37 +7,37 @@ from tissue.elasticity.finite_elements import EnergyDensity
 
 
 def edges(positions: FloatArray, tetrahedra: IntArray) -> FloatArray:
-    """Columns x1 - x0, x2 - x0, x3 - x0 of each tetrahedron [m], shape (n_tets, 3, 3)."""
+    """Return columns x1 - x0, x2 - x0, x3 - x0 of each tetrahedron [m], shape (n_tets, 3, 3)."""
     x = positions[tetrahedra]
     return (x[:, 1:] - x[:, :1]).transpose(0, 2, 1)
 
 
 def volumes(mesh: TetrahedralMesh) -> FloatArray:
-    """Volume of each tetrahedron at rest [m3]."""
+    """Return the volume of each tetrahedron at rest [m3]."""
     return np.linalg.det(edges(*mesh)) / 6.0
 
 
 def gradients(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
-    """Deformation gradient F of each tetrahedron, shape (n_tets, 3, 3)."""
+    """Return the deformation gradient F of each tetrahedron, shape (n_tets, 3, 3)."""
     return edges(positions, mesh.tetrahedra) @ np.linalg.inv(edges(*mesh))
 
 
 def around_nodes(mesh: TetrahedralMesh, values: FloatArray) -> FloatArray:
-    """A quarter of the value of each tetrahedron around each node."""
+    """Return, for each node, a quarter of the sum of the values of the tetrahedra around it."""
     out = np.zeros(len(mesh.positions))
     np.add.at(out, mesh.tetrahedra, 0.25 * values[:, None])
     return out
 
 
 def averaged_j(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
-    """J of each node: volume of the tetrahedra around it over that at rest."""
+    """Return J of each node: volume of the tetrahedra around it over their volume at rest."""
     v = volumes(mesh)
     j = np.linalg.det(gradients(mesh, positions))
     return around_nodes(mesh, v * j) / around_nodes(mesh, v)
 
 
 def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> float:
-    """Elastic energy less that at rest [J]."""
+    """Return the elastic energy less that at rest [J]."""
     v, f = volumes(mesh), gradients(mesh, positions)
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
     shear = 0.5 * law.mu * (squared - 3.0 - np.log((squared + 1.0) / 4.0))
@@ -48,7 +48,7 @@ def energy(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> 
 
 
 def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
-    """First Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
+    """Return the first Piola-Kirchhoff stress of each tetrahedron [Pa], shape (n_tets, 3, 3)."""
     f = gradients(mesh, positions)
     squared, j = (f**2).sum(axis=(1, 2)), np.linalg.det(f)
     cofactors = j[:, None, None] * np.linalg.inv(f).transpose(0, 2, 1)
@@ -59,7 +59,7 @@ def stresses(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -
 
 
 def forces(mesh: TetrahedralMesh, positions: FloatArray, law: EnergyDensity) -> FloatArray:
-    """Force on each node [N]: minus V P grad N of each corner."""
+    """Return the force on each node: minus V P grad N, summed over the tetrahedra around it [N]."""
     v, p = volumes(mesh), stresses(mesh, positions, law)
     pulls = -v[:, None, None] * p @ np.linalg.inv(edges(*mesh)).transpose(0, 2, 1)
     out = np.zeros_like(positions)

@@ -1,4 +1,4 @@
-"""Whether a cut body is a sound mesh: asked of its nodes and tetrahedra alone, or of links."""
+"""Checks that a cut body is a sound mesh, from its nodes and tetrahedra or from its links."""
 
 from typing import NamedTuple
 
@@ -13,81 +13,81 @@ OUTWARD = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
 
 
 class Faces(NamedTuple):
-    """Every triangle of every tetrahedron."""
+    """Every face of every tetrahedron."""
 
     nodes: IntArray
-    """Counter-clockwise seen from outside its tetrahedron, shape (4 n_tets, 3)."""
-    same: IntArray
+    """Nodes, counter-clockwise seen from outside the tetrahedron, shape (4 n_tets, 3)."""
+    group: IntArray
     """Number of the set of nodes, equal for the two sides of one triangle, shape (4 n_tets,)."""
     count: IntArray
-    """How many tetrahedra have that set, shape (n_sets,)."""
+    """Number of tetrahedra that have each set of nodes, shape (n_sets,)."""
 
     @property
     def boundary(self) -> IntArray:
-        return self.nodes[self.count[self.same] == 1]
+        return self.nodes[self.count[self.group] == 1]
 
 
 def faces_of(tetrahedra: IntArray) -> Faces:
     nodes = tetrahedra[:, OUTWARD].reshape(-1, 3)
-    _, same, count = np.unique(
+    _, group, count = np.unique(
         np.sort(nodes, axis=1), axis=0, return_inverse=True, return_counts=True
     )
-    return Faces(nodes, same.ravel(), count)
+    return Faces(nodes, group.ravel(), count)
 
 
 def volumes(rest: FloatArray, tetrahedra: IntArray) -> FloatArray:
-    """Return signed volumes [m3]."""
+    """Return the signed volume of each tetrahedron [m3], shape (n_tets,)."""
     a, b, c, d = (rest[tetrahedra[:, k]] for k in range(4))
     return np.einsum("ij,ij->i", np.cross(b - a, c - a), d - a) / 6.0
 
 
 def triangle_areas(rest: FloatArray, triangles: IntArray) -> FloatArray:
-    """Return areas [m2]."""
+    """Return the area of each triangle [m2], shape (n_triangles,)."""
     a, b, c = (rest[triangles[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
 
 
 def is_closed(triangles: IntArray) -> bool:
-    """Whether as many triangles run along each edge one way as the other."""
+    """Return whether as many triangles run along each edge in one direction as in the other."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    ways, way = np.where(edges[:, 0] < edges[:, 1], 1, -1), np.sort(edges, axis=1)
-    _, same = np.unique(way, axis=0, return_inverse=True)
-    return not np.bincount(same.ravel(), weights=ways).any()
+    signs, ends = np.where(edges[:, 0] < edges[:, 1], 1, -1), np.sort(edges, axis=1)
+    _, group = np.unique(ends, axis=0, return_inverse=True)
+    return not np.bincount(group.ravel(), weights=signs).any()
 
 
 def n_pieces(tetrahedra: IntArray) -> int:
-    """Return into how many pieces the tetrahedra fall: they hang together through faces."""
+    """Return the number of pieces of a mesh; tetrahedra that share a face are connected."""
     return _n_groups(len(tetrahedra), _pairs(faces_of(tetrahedra)) // 4)
 
 
 def n_split_stars(tetrahedra: IntArray, pairs: IntArray | None = None) -> int:
-    """Return how many nodes hold together tetrahedra that share no face there.
+    """Return how many nodes connect groups of tetrahedra that share no face at the node.
 
     Args:
         tetrahedra: Nodes, shape (n_tets, 4).
-        pairs: The faces that are one, as 4 * tetrahedron + face, shape (n, 2); default those of the
-            same three nodes.
+        pairs: Pairs of coinciding faces, as 4 * tetrahedron + face, shape (n, 2). By default faces
+            with the same three nodes.
     """
     pairs = _pairs(faces_of(tetrahedra)) if pairs is None else pairs
     order = np.argsort(tetrahedra, axis=1)
     t, f = pairs // 4, pairs % 4
-    # The corners of a face in the order of their nodes are the same three in both tetrahedra.
+    # Sorted by node, the corners of a face have the same order in both tetrahedra.
     corners = 4 * t[..., None] + order[t][order[t] != f[..., None]].reshape(len(pairs), 2, 3)
     links = np.moveaxis(corners, 1, 2).reshape(-1, 2)
     return _n_groups(tetrahedra.size, links) - len(np.unique(tetrahedra))
 
 
-def lone_area(body: Snapshot) -> float:
-    """Area of the triangles that bound the body once nodes at one rest position are one [m2].
+def unmatched_area(body: Snapshot) -> float:
+    """Return the area of the boundary once nodes at the same rest position are merged [m2].
 
-    The lips of a cut close up then, and what is left is the skin. A crack, a hanging node, or a
-    face that was cut on one side only would add to it.
+    Merging closes the lips of a cut, so only the skin is left. A crack, a hanging node, or a face
+    that was cut on one side only adds to the area.
     """
-    _, glued = np.unique(body.rest_positions, axis=0, return_inverse=True)
+    _, merged = np.unique(body.rest_positions, axis=0, return_inverse=True)
     faces = faces_of(body.tetrahedra)
-    same = faces_of(glued.ravel()[body.tetrahedra])
-    lone = faces.nodes[same.count[same.same] == 1]
-    return float(triangle_areas(body.rest_positions, lone).sum())
+    merged_faces = faces_of(merged.ravel()[body.tetrahedra])
+    unmatched = faces.nodes[merged_faces.count[merged_faces.group] == 1]
+    return float(triangle_areas(body.rest_positions, unmatched).sum())
 
 
 def faults(
@@ -97,15 +97,15 @@ def faults(
     mass: float = 1e-12,
     lips_match: bool = True,
 ) -> list[str]:
-    """Return what is wrong with the body after a cut; nothing if all is well.
+    """Return a list of faults of the body after a cut, empty if it is sound.
 
     Args:
-        before: The whole body.
-        after: The cut body.
+        before: The body before the cut.
+        after: The body after the cut.
         volume: Largest relative change of volume.
         mass: Largest relative change of mass.
-        lips_match: Whether both lips of a cut must be the same triangles: not where a later cut
-            crosses it, which goes through each lip by itself.
+        lips_match: Whether both lips of a cut must consist of the same triangles. They need not
+            where a later cut crosses, because it divides each lip separately.
     """
     found = []
     rest, tetrahedra = after.rest_positions, after.tetrahedra
@@ -122,22 +122,22 @@ def faults(
     if len(np.unique(tetrahedra)) != len(rest):
         found.append(f"{len(rest) - len(np.unique(tetrahedra))} nodes are not used")
     if (np.diff(np.sort(tetrahedra, axis=1)) == 0).any():
-        found.append("a tetrahedron names a node twice")
+        found.append("a tetrahedron has the same node twice")
     faces = faces_of(tetrahedra)
     if (faces.count > 2).any():
         found.append(f"{(faces.count > 2).sum()} triangles belong to three tetrahedra")
     if not is_closed(faces.boundary):
         found.append("the boundary is open")
     if n_split_stars(tetrahedra):
-        found.append(f"{n_split_stars(tetrahedra)} nodes hold together what shares no face")
-    skin = lone_area(before)
-    if lips_match and abs(lone_area(after) / skin - 1.0) > 1e-9:
-        found.append(f"cut faces without a twin: {lone_area(after) - skin:.2e} m2")
+        found.append(f"{n_split_stars(tetrahedra)} nodes connect groups that share no face")
+    skin = unmatched_area(before)
+    if lips_match and abs(unmatched_area(after) / skin - 1.0) > 1e-9:
+        found.append(f"cut faces without a twin: {unmatched_area(after) - skin:.2e} m2")
     return found
 
 
 def link_faults(body: Body) -> list[str]:
-    """Return what is wrong with the links of a body, and with what names tetrahedra and twins."""
+    """Return a list of faults in the links, node-to-tetrahedron references and twins of a body."""
     found = []
     n_nodes, n = body.n_nodes, body.n_tetrahedra
     tetrahedra, links = body.tetrahedra[:n], body.links[:n].ravel()
@@ -154,7 +154,7 @@ def link_faults(body: Body) -> list[str]:
     if n_split_stars(tetrahedra, pairs):
         found.append(f"links leave {n_split_stars(tetrahedra, pairs)} stars in parts")
     if (tetrahedra[body.node_tetrahedron[:n_nodes]] != np.arange(n_nodes)[:, None]).all(1).any():
-        found.append("a node names a tetrahedron that does not hold it")
+        found.append("a node refers to a tetrahedron that does not contain it")
     if (body.rest[body.twin[:n_nodes]] != body.rest[:n_nodes]).any():
         found.append("twins are apart at rest")
     return found
@@ -166,7 +166,7 @@ def momentum(body: Snapshot) -> FloatArray:
 
 
 def cut_area(before: Snapshot, after: Snapshot) -> float:
-    """Area of the cut at rest, one side of it [m2]."""
+    """Return the area of one side of the cut, at rest [m2]."""
     return 0.5 * (_boundary_area(after) - _boundary_area(before))
 
 
@@ -176,19 +176,19 @@ def _boundary_area(body: Snapshot) -> float:
 
 
 def _pairs(faces: Faces) -> IntArray:
-    """Return the faces that two tetrahedra share, as places in `faces.nodes`; shape (n, 2)."""
-    order = np.argsort(faces.same, kind="stable")
+    """Return the faces that two tetrahedra share, as rows of `faces.nodes`; shape (n, 2)."""
+    order = np.argsort(faces.group, kind="stable")
     ends = np.cumsum(faces.count)[faces.count == 2]
     return np.stack([order[ends - 2], order[ends - 1]], axis=1)
 
 
 def _n_groups(n: int, pairs: IntArray) -> int:
-    """Return into how many groups `n` things fall, pairs of which belong together."""
+    """Return the number of connected groups of `n` items, given pairs that are connected."""
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
     return int(connected_components(graph, directed=False)[0])
 
 
 def smallest_altitude(rest: FloatArray, tetrahedra: IntArray) -> float:
-    """Return the least altitude of all tetrahedra [m]: three times volume over largest face."""
+    """Return the smallest altitude of all tetrahedra: three times volume over largest face [m]."""
     faces = [triangle_areas(rest, tetrahedra[:, face]) for face in OUTWARD]
     return float((3.0 * volumes(rest, tetrahedra) / np.max(faces, axis=0)).min())

@@ -1,4 +1,4 @@
-"""What cutting, pulling and moving must keep: mass, momentum, energy; action equals reaction."""
+"""Conservation of mass, momentum and energy in cuts and motion; action equals reaction."""
 
 import itertools
 
@@ -15,19 +15,19 @@ SLAB = (0.04, 0.08, 0.02)
 
 
 def momentum(tissue):
-    """Return the linear and angular momentum about the origin [kg m/s, kg m2/s]."""
+    """Return the linear momentum and the angular momentum about the origin [kg m/s, kg m2/s]."""
     body = tissue.snapshot()
     p = body.masses[:, None] * body.velocities
     return p.sum(axis=0), np.cross(body.positions, p).sum(axis=0)
 
 
-def scale_of_momentum(tissue):
-    """Return the momentum that the body has at 1 m/s [kg m/s]."""
+def momentum_scale(tissue):
+    """Return the momentum of the body at 1 m/s [kg m/s]."""
     return float(tissue.snapshot().masses.sum())
 
 
 def drifting(mesh, undamped=True):
-    """Return a free body that flies and tumbles; drag, which slows it, is off."""
+    """Return a free body that flies and tumbles, without drag."""
     material = Material(viscous_damping=0.0, retardation_time=0.0 if undamped else 2e-4)
     tissue = Tissue(mesh, material, gravity=NO_GRAVITY)
     n = tissue.n_nodes
@@ -72,7 +72,7 @@ def test_a_falling_body_falls_by_half_g_t_squared():
 
 
 class Audit:
-    """A free body without drag, cut by a blade; what each frame did to it and to the blade."""
+    """A free body without drag, cut by a blade; impulses and momentum changes of each frame."""
 
     def __init__(self, mesh, stroke):
         self.tissue = Tissue(mesh, Material(viscous_damping=0.0), gravity=NO_GRAVITY)
@@ -93,9 +93,9 @@ class Audit:
 
 @pytest.fixture(scope="module")
 def audit():
-    """A free cube, first run into and then cut by a fast blade."""
+    """Cut a free cube with a fast blade."""
     mesh = bodies.jittered(4, 0)
-    # So fast that the body has no time to run away from the blade.
+    # The blade is so fast that the body has no time to move away.
     stroke = [
         strokes.pose((0.0187, y, -0.03), (0.0227, y + 0.004, 0.07), (0.1, 1.0, 0.0))
         for y in strokes.along_y(-0.02, 0.2, speed=3.0)
@@ -109,17 +109,17 @@ def test_the_free_body_of_these_tests_was_cut(audit):
 
 
 def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(audit):
-    """Frame by frame, through splits, un-gluing and growing arrays."""
-    scale = scale_of_momentum(audit.tissue)
+    """In every frame, including those with splits, separation and growing arrays."""
+    scale = momentum_scale(audit.tissue)
     assert np.abs(audit.impulse).max() > 1e-4 * scale
     np.testing.assert_allclose(audit.gained, -np.array(audit.impulse), atol=1e-12 * scale)
 
 
 def test_the_angular_momentum_changes_by_the_torque_of_the_blade(audit):
-    """Runge-Kutta keeps angular momentum to the order of the method, not to the last digit."""
-    gained, given = np.array(audit.gained_angular), np.array(audit.angular_impulse)
-    assert np.abs(given).max() > 1e-7
-    np.testing.assert_allclose(gained, -given, atol=0.02 * np.abs(given).max())
+    """Runge-Kutta conserves angular momentum to the order of the method only."""
+    gained, applied = np.array(audit.gained_angular), np.array(audit.angular_impulse)
+    assert np.abs(applied).max() > 1e-7
+    np.testing.assert_allclose(gained, -applied, atol=0.02 * np.abs(applied).max())
 
 
 def test_force_on_the_tissue_plus_force_on_the_blade_is_zero_in_every_frame(audit):
@@ -127,7 +127,7 @@ def test_force_on_the_tissue_plus_force_on_the_blade_is_zero_in_every_frame(audi
     assert np.abs(total).max() < 1e-9
 
 
-def test_a_blade_out_of_contact_feels_exactly_nothing():
+def test_a_blade_out_of_contact_has_exactly_zero_wrench():
     mesh = block()
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
     beside = strokes.upright(0.2, -0.01, 0.1, -0.01, 0.05)
@@ -140,7 +140,7 @@ def test_a_blade_out_of_contact_feels_exactly_nothing():
 
 
 def test_a_press_that_does_not_cut_springs_back():
-    """Half a millimetre is less than toughness over anchor stiffness: the tissue only dents."""
+    """Half a millimetre is less than toughness over anchor stiffness: the tissue is only dented."""
     mesh = block()
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY)
     slowly = {"low": -0.01, "high": 0.05, "speed": 0.02}
@@ -158,7 +158,7 @@ def test_a_press_that_does_not_cut_springs_back():
 SOLID = {"law": "neo_hookean", "poisson_ratio": 0.45}
 
 
-def steady(cells, toughness, speed, dt=strokes.DT, depth=0.02, relaxation="global", **law):
+def steady_cut(cells, toughness, speed, dt=strokes.DT, depth=0.02, relaxation="global", **law):
     """Cut a block held at both sides; return the frames in the middle of the cut."""
     mesh = block(cells, SLAB)
     tissue = Tissue(
@@ -183,7 +183,7 @@ COARSE, FINE = (4, 8, 2), (6, 12, 3)
 )
 @pytest.mark.parametrize("speed", [0.05, 0.1])
 def test_steady_cutting_force_is_toughness_times_anchored_length(cells, toughness, speed):
-    _, middle, _ = steady(cells, toughness, speed)
+    _, middle, _ = steady_cut(cells, toughness, speed)
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert anchored == pytest.approx(SLAB[2], rel=0.05)
@@ -196,10 +196,10 @@ def test_steady_cutting_force_is_toughness_times_anchored_length(cells, toughnes
 @pytest.mark.parametrize(
     ("cells", "toughness"), [(COARSE, 5.0), (FINE, 5.0), (FINE, 20.0), (COARSE, 60.0)]
 )
-def test_it_is_so_under_either_law_and_however_the_body_is_relaxed(
+def test_the_steady_cutting_force_holds_under_either_law_and_either_relaxation(
     cells, toughness, relaxation, law
 ):
-    _, middle, _ = steady(cells, toughness, 0.1, relaxation=relaxation, **law)
+    _, middle, _ = steady_cut(cells, toughness, 0.1, relaxation=relaxation, **law)
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert anchored == pytest.approx(SLAB[2], rel=0.05)
@@ -207,17 +207,17 @@ def test_it_is_so_under_either_law_and_however_the_body_is_relaxed(
 
 
 @pytest.mark.parametrize("relaxation", ["global", "local"])
-def test_tetrahedra_bear_a_toughness_that_strains_springs_too_far(relaxation):
+def test_tetrahedra_are_accurate_at_a_toughness_that_strains_springs_too_far(relaxation):
     """Toughness over Young's modulus is 6 mm here, 1.27 times the mean node size."""
-    _, middle, _ = steady(FINE, 60.0, 0.1, relaxation=relaxation, **SOLID)
+    _, middle, _ = steady_cut(FINE, 60.0, 0.1, relaxation=relaxation, **SOLID)
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert force == pytest.approx(60.0 * anchored, rel=0.05)
 
 
-def test_a_toughness_that_strains_springs_too_far_reads_low_and_is_warned_of(caplog):
+def test_springs_give_a_low_force_and_a_warning_at_a_toughness_that_strains_them_too_far(caplog):
     """Toughness over Young's modulus is 6 mm here, 1.27 times the mean node size."""
-    _, middle, _ = steady(FINE, 60.0, 0.05)
+    _, middle, _ = steady_cut(FINE, 60.0, 0.05)
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert 0.8 < force / (60.0 * anchored) < 1.0
@@ -226,21 +226,21 @@ def test_a_toughness_that_strains_springs_too_far_reads_low_and_is_warned_of(cap
 
 @pytest.mark.parametrize("dt", [0.5e-3, 2e-3])
 def test_the_cutting_force_does_not_depend_on_the_time_step(dt):
-    _, middle, _ = steady((6, 12, 3), 20.0, 0.1, dt)
+    _, middle, _ = steady_cut((6, 12, 3), 20.0, 0.1, dt)
     force = -np.mean([r.wrench.force[1] for r in middle])
     assert force == pytest.approx(20.0 * SLAB[2], rel=0.05)
 
 
 def test_an_incision_half_as_deep_costs_half_the_force():
-    _, middle, _ = steady((6, 12, 4), 20.0, 0.1, depth=0.01)
+    _, middle, _ = steady_cut((6, 12, 4), 20.0, 0.1, depth=0.01)
     force = -np.mean([r.wrench.force[1] for r in middle])
     assert force == pytest.approx(20.0 * 0.01, rel=0.1)
 
 
 @pytest.mark.parametrize("toughness", [5.0, 20.0, 60.0])
-def test_what_the_blade_works_is_cut_or_stored_or_damped(toughness):
-    """From rest: work of cutting and the energy stored are no more than the work of the blade."""
-    tissue, _, results = steady((6, 12, 3), toughness, 0.1)
+def test_the_work_of_the_blade_goes_into_cutting_stored_energy_and_damping(toughness):
+    """From rest, the work of cutting plus the stored energy is at most the work of the blade."""
+    tissue, _, results = steady_cut((6, 12, 3), toughness, 0.1)
     body = tissue.snapshot()
     stored = 0.5 * float(body.masses @ (body.velocities**2).sum(axis=1))
     stored += elastic_energy(tissue._system.elasticity.arrays, tissue._body)
@@ -262,7 +262,7 @@ def test_the_work_of_cutting_is_toughness_times_the_area_cut(toughness):
 
 
 def test_rows_and_masses_after_cuts_are_those_built_from_scratch():
-    """To the last bit: a row follows from the tetrahedra around the node alone."""
+    """To the last bit: a row depends only on the tetrahedra around its node."""
     mesh = bodies.jittered(4, 0)
     tissue = Tissue(mesh, fixed=bodies.sides(mesh))
     strokes.make(tissue, strokes.slanted(mesh))

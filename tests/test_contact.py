@@ -1,4 +1,4 @@
-"""Pieces, lips and the floor: nothing goes through anything, and all comes to rest."""
+"""Contact of pieces, lips and the floor: nothing interpenetrates, and all comes to rest."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ ELEMENT = 0.01
 """Edge of a cell in all bodies of these tests [m]."""
 
 ALLOWED = 0.01 * ELEMENT
-"""How deep one body may be in another [m]."""
+"""Largest allowed penetration of one body into another [m]."""
 
 AT_REST = 0.01
 """Speed [m/s] below which no node moves by more than 10 um in a frame."""
@@ -32,11 +32,11 @@ def joined(first: TetrahedralMesh, second: TetrahedralMesh, offset) -> Tetrahedr
     )
 
 
-def depth_of_overlap(body: Snapshot) -> float:
-    """Return how deep a node of one piece is in another, at most [m]; by looking at every pair.
+def overlap_depth(body: Snapshot) -> float:
+    """Return the deepest penetration of a node of one piece into another [m], testing every pair.
 
-    A node in a tetrahedron of another piece is as deep as it is far from that piece's surface: from
-    the nearest plane of a boundary face around there, at least.
+    The depth of a node in a tetrahedron of another piece is its distance from the surface of that
+    piece, approximated by the nearest plane of a boundary face.
     """
     piece = piece_of_tetrahedra(body)
     of_node = np.zeros(len(body.positions), dtype=np.int64)
@@ -64,27 +64,30 @@ def speed(tissue: Tissue) -> float:
     return float(np.linalg.norm(tissue.snapshot().velocities, axis=1).max())
 
 
-def speed_in_a_frame(tissue: Tissue) -> float:
-    """Return how fast a node gets on [m/s]; one that is pinched may only seem to."""
+def frame_speed(tissue: Tissue) -> float:
+    """Return the largest displacement of a node in a frame over its length [m/s].
+
+    A pinched node may have a velocity without moving.
+    """
     before = tissue.snapshot().positions
     tissue.step(None, strokes.DT)
     moved = tissue.snapshot().positions - before
     return float(np.linalg.norm(moved, axis=1).max()) / strokes.DT
 
 
-def live(tissue: Tissue, seconds: float, every: int = 50) -> float:
-    """Let the body live; return the deepest overlap seen, in every 50th frame [m]."""
+def advance(tissue: Tissue, duration: float, every: int = 50) -> float:
+    """Advance the body; return the deepest overlap, tested in every `every`-th frame [m]."""
     worst = 0.0
-    for i in range(round(seconds / strokes.DT)):
+    for i in range(round(duration / strokes.DT)):
         result = tissue.step(None, strokes.DT)
         if i % every == 0:
-            worst = max(worst, depth_of_overlap(tissue.snapshot()))
+            worst = max(worst, overlap_depth(tissue.snapshot()))
         worst = max(worst, result.body_contacts.penetration)
     return worst
 
 
 def incised(mesh: TetrahedralMesh, at: float, until: float, **options) -> Tissue:
-    """Return a body cut by an upright plane at x, from its front to a place along y."""
+    """Return a body cut along an upright plane, from its front to y = `until` [m]."""
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, **options)
     edges = [[(at, y, -0.01), (at, y, 0.05)] for y in (-0.01, until)]
     assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
@@ -92,7 +95,7 @@ def incised(mesh: TetrahedralMesh, at: float, until: float, **options) -> Tissue
 
 
 def squeeze(tissue: Tissue, by: float) -> None:
-    """Move the held sides towards each other, each by a way along x [m]."""
+    """Move both held sides towards each other along x, each by `by` [m]."""
     body, n = tissue._body, tissue.n_nodes
     held = body.fixed[:n]
     middle = body.rest[:n, 0].mean()
@@ -108,25 +111,25 @@ PAIRS = {
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pair):
-    """The upper one lies on the lower; gravity is such that it weighs 1 N."""
+    """The upper block lies on the lower one; gravity is chosen so that it weighs 1 N."""
     cells, beside = PAIRS[pair]
     lower = block((6, 6, 2), SLAB)
     mesh = joined(lower, block(cells, SLAB), (*beside, SLAB[2] + 1e-3))
     weight = 1.0 / (1000.0 * np.prod(SLAB))
-    # A damped body rests sooner; where it rests is the same.
+    # Damping changes how soon the body comes to rest, not where.
     tissue = Tissue(
         mesh,
         Material(viscous_damping=20.0),
         fixed=mesh.positions[:, 2] == 0.0,
         gravity=(0.0, 0.0, -weight),
     )
-    assert live(tissue, 1.5) < ALLOWED
+    assert advance(tissue, 1.5) < ALLOWED
     last = tissue.step(None, strokes.DT)
     assert last.body_contacts.n_contacts > 10
     assert last.body_contacts.force == pytest.approx(
         1.0, rel=0.25
-    )  # faces bend: not all point upwards
-    assert speed_in_a_frame(tissue) < AT_REST
+    )  # faces bend, so not all normals point upwards
+    assert frame_speed(tissue) < AT_REST
     upper = tissue.pieces()[1 if tissue.pieces()[0].is_held else 0]
     assert np.linalg.norm(upper.velocity) < 1e-3
     assert upper.centre[2] > 1.39 * SLAB[2]
@@ -144,10 +147,10 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     worst = 0.0
     for _ in range(300):
         squeeze(tissue, 1e-5)
-        worst = max(worst, live(tissue, 0.005, every=5))
+        worst = max(worst, advance(tissue, 0.005, every=5))
         if tissue.step(None, strokes.DT).body_contacts.force > 1.0:
             break
-    worst = max(worst, live(tissue, 0.5))
+    worst = max(worst, advance(tissue, 0.5))
     assert worst < ALLOWED
     last = tissue.step(None, strokes.DT)
     assert last.body_contacts.force == pytest.approx(1.0, rel=0.2)
@@ -155,15 +158,15 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
 
 
 @pytest.mark.parametrize("until", [0.02, 0.06], ids=["a slit", "clean through"])
-def test_freshly_cut_lips_that_nothing_presses_feel_nothing(until):
+def test_freshly_cut_lips_under_no_load_have_no_contact_force(until):
     tissue = incised(bodies.jittered(3, 0), 0.0207, until)
     for _ in range(50):
-        touch = tissue.step(None, strokes.DT).body_contacts
-        assert touch.force < 1e-12 and touch.penetration < 1e-12
+        contacts = tissue.step(None, strokes.DT).body_contacts
+        assert contacts.force < 1e-12 and contacts.penetration < 1e-12
     assert speed(tissue) < 1e-12
 
 
-def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_go_through_each_other():
+def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_interpenetrate():
     mesh = block((4, 6, 4), (0.04, 0.06, 0.04))
     tissue = incised(mesh, 0.0207, 0.03, material=Material(viscous_damping=20.0))
     assert tissue.n_pieces() == 1
@@ -204,7 +207,7 @@ def test_before_the_first_cut_contact_has_nothing_to_test():
 
 
 def falling(height=0.02, material=None, gravity=(0.0, 0.0, -9.81), **options):
-    """Return a loose block some way above a floor at 0."""
+    """Return a loose block at `height` [m] above a floor at z = 0."""
     mesh = block((3, 3, 2), (0.03, 0.03, 0.02))
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, height]))
     return Tissue(lifted, material, gravity=gravity, floor=0.0, **options)
@@ -222,7 +225,7 @@ def test_a_block_that_falls_on_the_floor_stays_on_it_and_comes_to_rest():
 
 @pytest.mark.parametrize(("degrees", "slides"), [(10.0, False), (15.0, False), (19.0, True)])
 def test_friction_of_0_3_holds_a_block_on_a_slope_of_less_than_16_7_degrees(degrees, slides):
-    """The floor is level; gravity leans."""
+    """The floor is level; gravity is tilted instead."""
     slope = np.radians(degrees)
     material = Material(viscous_damping=2.0, friction=0.3)
     tissue = falling(0.0, material, 9.81 * np.array([np.sin(slope), 0.0, -np.cos(slope)]))
@@ -245,7 +248,7 @@ def energy(tissue: Tissue, gravity: float = 0.0) -> float:
 
 @pytest.mark.parametrize(("closing", "young"), [(0.2, 10e3), (1.0, 10e3), (3.0, 100e3)])
 def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(closing, young):
-    """Undamped, of unlike meshes, edges and corners first, at a third of their speed of sound."""
+    """Undamped, with different meshes, edges and corners first, at up to 1/3 of the wave speed."""
     first, second = block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3)
     mesh = joined(first, second, (0.007, 0.004, 0.032))
     tissue = Tissue(
@@ -259,13 +262,13 @@ def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(clo
         return (body.masses[:, None] * body.velocities).sum(axis=0)
 
     before, energy_t0 = momentum(), energy(tissue)
-    worst = live(tissue, 0.1, every=5)
+    worst = advance(tissue, 0.1, every=5)
     np.testing.assert_allclose(momentum(), before, atol=1e-12 * np.linalg.norm(before))
     assert energy(tissue) < energy_t0
     assert worst < ALLOWED
     body = tissue.snapshot()
     speeds = [body.velocities[part, 2].mean() for part in (slice(0, n), slice(n, m))]
-    assert speeds[1] > speeds[0] - 0.9 * closing  # they did meet
+    assert speeds[1] > speeds[0] - 0.9 * closing  # they did collide
 
 
 def test_the_energy_of_a_block_that_bounces_never_exceeds_what_it_fell_with():
@@ -278,8 +281,8 @@ def test_the_energy_of_a_block_that_bounces_never_exceeds_what_it_fell_with():
     assert energy(tissue, 9.81) < 0.8 * at_first
 
 
-def test_crossed_beams_meet_edge_on_edge():
-    """Each turned on its edge, so that no node comes near a face of the other."""
+def test_crossed_beams_touch_edge_on_edge():
+    """Both beams stand on an edge, so that no node comes near a face of the other."""
     beam = block((6, 1, 1), (0.06, 0.01, 0.01))
     c = np.sqrt(0.5)
     on_edge = (beam.positions - [0.03, 0.005, 0.005]) @ np.array(
@@ -295,10 +298,10 @@ def test_crossed_beams_meet_edge_on_edge():
     edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
     assert edge.sum() == 2 and low > ridge
     for _ in range(300):
-        touch = tissue.step(None, strokes.DT).body_contacts
-        # The edge between the two nodes lies across the middle of an edge of the lower beam.
+        contacts = tissue.step(None, strokes.DT).body_contacts
+        # The edge between the two nodes crosses an edge of the lower beam in its middle.
         assert tissue.snapshot().positions[n:][edge, 2].mean() > ridge - ALLOWED
-    assert touch.n_contacts > 0
+    assert contacts.n_contacts > 0
 
 
 def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
@@ -314,7 +317,7 @@ def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
     assert np.linalg.norm(loose.velocity) < AT_REST
 
 
-def test_contact_gives_the_same_bits_twice():
+def test_contact_is_reproducible_to_the_bit():
     def run():
         mesh = joined(
             block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
@@ -328,7 +331,7 @@ def test_contact_gives_the_same_bits_twice():
         np.testing.assert_array_equal(one, other)
 
 
-def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
+def test_contact_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
     def run():
         mesh = joined(
             block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
@@ -338,14 +341,14 @@ def test_room_that_is_made_in_the_middle_of_a_step_changes_nothing(monkeypatch):
             tissue.step(None, strokes.DT)
         return tissue.snapshot()
 
-    roomy = run()
+    ample = run()
     monkeypatch.setattr("tissue.contact.self_contact.CAPACITY", 8)
-    for one, other in zip(roomy, run(), strict=True):
+    for one, other in zip(ample, run(), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
-def lying(n_steps=300):
-    """Return a small block that lies on a larger one."""
+def resting_blocks(n_steps=300):
+    """Return a small block at rest on a larger one."""
     mesh = joined(block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.0301))
     material = Material(viscous_damping=20.0)
     tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] == 0.0)
@@ -354,9 +357,9 @@ def lying(n_steps=300):
     return tissue
 
 
-def test_before_a_step_contact_gives_nothing_to_what_it_presses():
-    """What it gave along the normals of the step before fed corners of lips that turn with them."""
-    tissue = lying()
+def test_contact_applies_no_impulse_before_a_step():
+    """Impulses along the normals of the last step fed energy to corners of lips that turn."""
+    tissue = resting_blocks()
     contact, body = tissue._system.contact.arrays, tissue._body
     assert (contact.contacts.impulse[: contact.contacts.n_contacts] > 0.0).sum() > 5
     before = tissue.snapshot()
@@ -365,18 +368,20 @@ def test_before_a_step_contact_gives_nothing_to_what_it_presses():
     np.testing.assert_array_equal(tissue.snapshot().positions, before.positions)
 
 
-def test_contacts_of_faces_that_changed_are_found_again_and_the_others_last():
-    tissue = lying()
+def test_contacts_of_changed_faces_are_found_again_and_the_others_persist():
+    tissue = resting_blocks()
     contact = tissue._system.contact.arrays
     contacts, faces = contact.contacts, contact.faces
-    of = {tuple(contacts.node[k]): contacts.face[k].tolist() for k in range(contacts.n_contacts)}
-    changed = {face for sides in list(of.values())[:4] for face in sides}
+    faces_of = {
+        tuple(contacts.node[k]): contacts.face[k].tolist() for k in range(contacts.n_contacts)
+    }
+    changed = {face for sides in list(faces_of.values())[:4] for face in sides}
     faces.generation[list(changed)] += 1
     contact.stale = FACES_CHANGED
     tissue.step(None, strokes.DT)
     n_changed = n_lasting = 0
     for k in range(contacts.n_contacts):
-        sides = of.get(tuple(contacts.node[k]))
+        sides = faces_of.get(tuple(contacts.node[k]))
         if sides is not None and changed & set(sides):
             assert contacts.last_impulse[k] == 0.0
             n_changed += 1
@@ -386,7 +391,7 @@ def test_contacts_of_faces_that_changed_are_found_again_and_the_others_last():
 
 
 def cut_and_dropped(n_steps: int) -> Snapshot:
-    """Cut a block in two, slanting, so that one lip slides down the other on to the floor."""
+    """Cut a block in two at a slant, so that one lip slides down the other on to the floor."""
     mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
     fixed = mesh.positions[:, 0] == 0.0
     tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.01)
@@ -399,16 +404,16 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
 
 
 def test_testing_every_pair_of_the_body_in_every_step_changes_no_bit(monkeypatch):
-    """With an endless margin all are paired, and where no node is fast all pairs are near."""
-    frugal = cut_and_dropped(150)
+    """With a huge margin every pair is listed, and if no node is fast every pair is near."""
+    default = cut_and_dropped(150)
     monkeypatch.setattr("tissue.contact.self_contact.PAIR_MARGIN", 1e3)
     monkeypatch.setattr("tissue.contact.self_contact.FAST_MOVE", 1e3)
-    for one, other in zip(frugal, cut_and_dropped(150), strict=True):
+    for one, other in zip(default, cut_and_dropped(150), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize("floor", [np.nan, np.inf, 0.011])
-def test_a_floor_that_is_none_or_in_the_body_is_refused(floor):
+def test_a_floor_that_is_not_finite_or_inside_the_body_is_refused(floor):
     mesh = block((1, 1, 1), (0.01,) * 3)
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, 0.01]))
     with pytest.raises(ValueError, match="floor"):

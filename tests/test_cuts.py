@@ -1,4 +1,4 @@
-"""Whole cuts: a blade goes through a body by itself, and what is left must be sound."""
+"""Whole cuts: a blade without an arm passes through a body and leaves a sound mesh."""
 
 import os
 from pathlib import Path
@@ -23,13 +23,13 @@ MESHES = {
 
 
 def at_rest(mesh: TetrahedralMesh, **options) -> Tissue:
-    """Return a body held at its left and right side, without weight."""
+    """Return a body held at its left and right side, without gravity."""
     options = {"fixed": bodies.sides(mesh), "gravity": (0.0, 0.0, 0.0)} | options
     return Tissue(mesh, **options)
 
 
 def expect_sound(before, tissue: Tissue, pieces: int) -> None:
-    """Fail unless the body is sound and in that many pieces, by the engine's count and by ours."""
+    """Fail unless the body is sound and in that many pieces, as the engine and the test count."""
     after = tissue.snapshot()
     assert soundness.faults(before, after) == []
     assert soundness.n_pieces(after.tetrahedra) == pieces
@@ -59,20 +59,20 @@ def test_an_organ_falls_into_two_sound_pieces(stroke):
 
 
 FOLDER = os.environ.get("SCALPEL_SIM_TEST_MESHES")
-FILES = {  # and about what their unit of length is, in metres
+FILES = {  # file to its approximate unit of length [m]
     "bullet_banana.vtk": 0.1,
     "sofa_liver.msh": 0.05,
     "sofa_truthcylinder1.msh": 0.01,
     "sofaenv_tissue_volume.msh": 1.0,
 }
 EXTENT = 0.2
-"""Longest side to which the meshes of others are scaled [m]: twice an organ's; they are coarse."""
+"""Longest side of the scaled third-party meshes [m]: twice an organ's, as they are coarse."""
 
 
 @pytest.mark.skipif(not FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
 @pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
 @pytest.mark.parametrize("file", FILES)
-def test_a_mesh_of_others_falls_into_two_sound_pieces(file, stroke):
+def test_a_third_party_mesh_falls_into_two_sound_pieces(file, stroke):
     raw = read_mesh(Path(str(FOLDER)) / file, scale=FILES[file])
     longest = np.ptp(raw.positions, axis=0).max()
     mesh = raw._replace(positions=raw.positions * (EXTENT / longest))
@@ -93,8 +93,8 @@ def test_the_paper_s_slab_grows_to_at_most_850_tetrahedra():
         assert tissue.n_tetrahedra <= 850
 
 
-def test_a_plane_between_those_of_the_mesh_makes_28_tetrahedra_of_the_6_of_each_cell():
-    """Two of the six are cut 2 to 2, into 6 each; four are cut 1 to 3, into 4 each."""
+def test_a_plane_between_those_of_the_mesh_splits_the_6_tetrahedra_of_each_cell_into_28():
+    """Two of the six have 2 nodes on either side: 6 parts each. Four have 1 and 3: 4 parts each."""
     tissue = at_rest(block())
     strokes.make(tissue, strokes.straight(block(), 0.41))
     assert tissue.n_tetrahedra == 576 + 24 * (28 - 6)
@@ -110,7 +110,7 @@ def test_a_cut_along_a_plane_of_the_mesh_adds_no_tetrahedra_and_has_its_area():
 
 DEGENERATE = {
     "through nodes, along a plane of the mesh": strokes.straight(block((2, 2, 2), CUBE)),
-    "a rounding error beside the plane": strokes.straight(block((2, 2, 2), CUBE), 0.5 + 1e-13),
+    "a rounding error off the plane": strokes.straight(block((2, 2, 2), CUBE), 0.5 + 1e-13),
     "along the diagonals of the cells": [
         strokes.pose((s, s, -0.01), (s, s, 0.05), (1.0, 1.0, 0.0))
         for s in strokes.along_y(-0.01, 0.09)
@@ -119,7 +119,7 @@ DEGENERATE = {
         strokes.pose((s, 0.04 - s, -0.01), (s, 0.04 - s, 0.05), (1.0, -1.0, 0.0))
         for s in strokes.along_y(-0.01, 0.09)
     ],
-    "ends of the edge in the skin": strokes.upright(0.02, -0.01, 0.1, 0.0, 0.04),
+    "both ends of the edge in the skin": strokes.upright(0.02, -0.01, 0.1, 0.0, 0.04),
     "from edge to edge of the block": [
         strokes.pose((-0.01, y, -0.01), (0.05, y, 0.05), (0.0, 1.0, 0.0))
         for y in strokes.along_y(-0.01, 0.1)
@@ -150,19 +150,19 @@ def test_a_blade_that_does_not_move_cuts_nothing():
 
 INCISIONS = {
     "stops inside": strokes.upright(0.0217, -0.01, 0.03, -0.01, 0.05),
-    "the tip inside all the way": strokes.upright(0.0217, -0.01, 0.1, 0.0173, 0.05),
+    "the tip always inside": strokes.upright(0.0217, -0.01, 0.1, 0.0173, 0.05),
     "the tip on a line of the grid": strokes.upright(0.02, -0.01, 0.1, 0.02, 0.05),
     "the heel inside": strokes.upright(0.0217, -0.01, 0.1, -0.01, 0.0237),
     "both ends inside": strokes.upright(0.0217, -0.01, 0.1, 0.0113, 0.0291),
-    "in half way and out again": strokes.upright(0.0217, -0.01, 0.03, -0.01, 0.05)
+    "halfway in and out again": strokes.upright(0.0217, -0.01, 0.03, -0.01, 0.05)
     + strokes.upright(0.0217, 0.03, -0.02, -0.01, 0.05),
     "pressed in from above": [
         strokes.pose((0.0217, -0.01, z), (0.0217, 0.07, z), (0.0, 0.0, -1.0))
         for z in 0.05 - strokes.along_y(0.0, 0.03)
     ],
 }
-INCISIONS["in half way and out again"] = [
-    strokes.pose(p.tip, p.heel, (0.0, 1.0, 0.0)) for p in INCISIONS["in half way and out again"]
+INCISIONS["halfway in and out again"] = [
+    strokes.pose(p.tip, p.heel, (0.0, 1.0, 0.0)) for p in INCISIONS["halfway in and out again"]
 ]
 
 
@@ -182,21 +182,23 @@ def test_a_blade_drawn_back_along_its_cut_cuts_nothing_more(x):
     back = [*reversed(there)]
     tissue = at_rest(block())
     cut = strokes.make(tissue, there)[-1]
-    back_out = strokes.make(tissue, back)[-1]
-    assert back_out.cut_area == cut.cut_area
-    assert back_out.n_tetrahedra == cut.n_tetrahedra
+    drawn_back = strokes.make(tissue, back)[-1]
+    assert drawn_back.cut_area == cut.cut_area
+    assert drawn_back.n_tetrahedra == cut.n_tetrahedra
 
 
-def test_a_blade_drawn_back_in_its_cut_feels_nothing():
+def test_a_blade_drawn_back_in_its_cut_meets_no_force():
     there = strokes.upright(0.02, -0.01, 0.03, -0.01, 0.05)
     tissue = at_rest(block())
     strokes.make(tissue, there)
     results = strokes.make(tissue, [*reversed(there)])
-    assert np.abs([r.wrench.force for r in results[20:]]).max() < 1e-15  # lips touch: rounding
+    assert (
+        np.abs([r.wrench.force for r in results[20:]]).max() < 1e-15
+    )  # rounding errors of the contact of the lips
 
 
 def gap(tissue: Tissue) -> float:
-    """Return how far the lips of the cut are apart, at most [m]: copies of one node of rest."""
+    """Return the largest distance between copies of one node, across the lips of the cut [m]."""
     body = tissue.snapshot()
     _, same = np.unique(body.rest_positions, axis=0, return_inverse=True)
     order = np.argsort(same.ravel(), kind="stable")
@@ -209,8 +211,8 @@ def gap(tissue: Tissue) -> float:
 def test_a_slit_opens_when_the_sides_are_pulled_apart(mesh):
     def slit(stretch):
         x = MESHES[mesh].positions
-        # So easy to cut that no tetrahedron is dragged inside out, from where springs may not turn
-        # it back: what is asked here is how lips gape.
+        # The toughness is low so that no tetrahedron is inverted, from which springs may not
+        # recover: only the gap between the lips is tested here.
         tissue = at_rest(
             MESHES[mesh], material=Material(toughness=2.0), positions=x * [stretch, 1.0, 1.0]
         )
@@ -254,9 +256,9 @@ def test_a_cut_in_a_stretched_and_turned_body_is_sound():
     expect_sound(before, tissue, pieces=2)
 
 
-def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
+def test_the_number_of_active_tetrahedra_does_not_depend_on_the_size_of_the_body():
     def most_active(n):
-        """A blade 10 mm long, in a body of n x 6 x n cells of 10 mm."""
+        """Return the most active tetrahedra for a 10 mm blade in n x 6 x n cells of 10 mm."""
         mesh = block((n, 6, n), (0.01 * n, 0.06, 0.01 * n))
         tissue = at_rest(mesh)
         middle = 0.005 * n + 0.0013
@@ -268,7 +270,7 @@ def test_the_active_tetrahedra_do_not_depend_on_how_far_the_body_goes_on():
 
 
 def test_a_fine_mesh_grows_by_the_tetrahedra_along_the_cut():
-    """Ten thousand tetrahedra, arrays that grow on the way, and a cut through the middle."""
+    """Ten thousand tetrahedra, cut through the middle, with arrays that grow during the cut."""
     mesh = block((12, 12, 12), CUBE)
     tissue = at_rest(mesh)
     before = tissue.snapshot()

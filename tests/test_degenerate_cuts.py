@@ -1,4 +1,4 @@
-"""Cuts where three things meet that never do in a mesh at random: ordinary input, exact answers."""
+"""Degenerate cuts: exact answers where the blade passes through nodes, edges or faces."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tissue import TetrahedralMesh, Tissue, block
 
 EDGE = 0.04
 CUBE = block((4, 4, 4), (EDGE, EDGE, EDGE))
-"""Cells of 10 mm, six tetrahedra each around a diagonal from the lowest corner to the highest."""
+"""Cells of 10 mm of six tetrahedra around the diagonal from the lowest to the highest corner."""
 
 SIDE = EDGE**2
 """Area of a side of the cube [m2]."""
@@ -19,12 +19,12 @@ def at_rest(mesh: TetrahedralMesh) -> Tissue:
     return Tissue(mesh, gravity=(0.0, 0.0, 0.0))
 
 
-def straight(tip, heel, way, stop=None) -> Incision:
-    """Return a flat cut of an edge from `tip` to `heel` [m] that goes by `way` [m]."""
-    tip, heel, way = (np.asarray(x, dtype=np.float64) for x in (tip, heel, way))
-    shares = np.linspace(0.0, 1.0, incisions.N_PLACES)[:, None, None]
-    edges = np.stack([tip, heel]) + shares * way
-    return Incision(edges, np.tile(way / np.linalg.norm(way), (len(edges), 1)))
+def straight(tip, heel, displacement, stop=None) -> Incision:
+    """Return the flat cut of an edge from `tip` to `heel` [m] that moves by `displacement` [m]."""
+    tip, heel, displacement = (np.asarray(x, dtype=np.float64) for x in (tip, heel, displacement))
+    shares = np.linspace(0.0, 1.0, incisions.N_POSITIONS)[:, None, None]
+    edges = np.stack([tip, heel]) + shares * displacement
+    return Incision(edges, np.tile(displacement / np.linalg.norm(displacement), (len(edges), 1)))
 
 
 def upright_at(x: float, low: float = -0.01, start: float = -0.01, stop: float = 0.05) -> Incision:
@@ -74,7 +74,7 @@ def test_14_a_cut_along_a_plane_of_the_mesh_has_its_area_and_adds_no_tetrahedra(
 SLITS = {
     "starts at nodes inside": (upright_at(0.02, start=0.01, stop=0.05), 3 * SIDE / 4),
     "tip and end on lines of the grid": (upright_at(0.02, 0.02, stop=0.02), SIDE / 4),
-    "the tip on a line, all the way": (upright_at(0.02, 0.02), SIDE / 2),
+    "the tip always on a line": (upright_at(0.02, 0.02), SIDE / 2),
     "stops at nodes": (upright_at(0.02, stop=0.03), 3 * SIDE / 4),
 }
 
@@ -117,7 +117,7 @@ NOTHING = {
     ),
     "an edge that moves backward only": straight(
         (0.02, 0.05, -0.01), (0.02, 0.05, 0.05), (0.0, -0.06, 0.0)
-    )._replace(forward=np.tile([0.0, 1.0, 0.0], (incisions.N_PLACES, 1))),
+    )._replace(forward=np.tile([0.0, 1.0, 0.0], (incisions.N_POSITIONS, 1))),
     "an edge beside the body": upright_at(0.05),
     "an edge in the skin": upright_at(0.0),
     "an edge that grazes the skin": upright_at(EDGE - 1e-13),
@@ -129,16 +129,16 @@ NOTHING = {
 
 
 @pytest.mark.parametrize("name", NOTHING)
-def test_what_does_not_cut_leaves_every_bit_of_the_body_as_it_was(name):
+def test_an_incision_that_cuts_nothing_changes_no_bit_of_the_body(name):
     tissue = at_rest(CUBE)
     before = tissue.snapshot()
     assert tissue.incise(*NOTHING[name]) == 0.0
-    for was, is_now in zip(before, tissue.snapshot(), strict=True):
-        np.testing.assert_array_equal(is_now, was)
+    for old, after in zip(before, tissue.snapshot(), strict=True):
+        np.testing.assert_array_equal(after, old)
 
 
-def test_a_cut_in_one_step_is_the_cut_in_many():
-    """From one side of the body to the other, or from millimetre to millimetre."""
+def test_a_cut_in_one_step_is_the_same_as_in_many():
+    """One step from side to side of the body, or many of a millimetre."""
     mesh = bodies.jittered_grid(4, 3)
     many = upright_at(0.0217)
     at_once = Incision(many.edges[[0, -1]], many.forward[[0, -1]])
@@ -176,7 +176,7 @@ def test_thin_small_and_badly_shaped_bodies_stay_sound(shape, kind):
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("shape", ["a sheet 100 times as wide as thick", "a rod", "a single cell"])
-def test_a_thin_body_falls_in_two_across_any_axis_that_it_has_elements_along(shape, axis):
+def test_a_thin_body_can_be_cut_in_two_across_any_axis(shape, axis):
     mesh = SHAPES[shape]
     tissue = at_rest(mesh)
     normal = np.eye(3)[axis] + 1e-3
@@ -184,10 +184,10 @@ def test_a_thin_body_falls_in_two_across_any_axis_that_it_has_elements_along(sha
     assert tissue.n_pieces() == 2
 
 
-# a blade in motion
+# Cuts by a moving blade.
 
 
-def drawn(mesh: TetrahedralMesh, stroke: strokes.Stroke) -> tuple[Tissue, float]:
+def cut_by_stroke(mesh: TetrahedralMesh, stroke: strokes.Stroke) -> tuple[Tissue, float]:
     """Return the body after a stroke, held at two sides, and the area cut [m2]."""
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
     before = tissue.snapshot()
@@ -197,13 +197,15 @@ def drawn(mesh: TetrahedralMesh, stroke: strokes.Stroke) -> tuple[Tissue, float]
     return tissue, results[-1].cut_area
 
 
-def test_a_blade_at_10_metres_a_second_passes_many_elements_in_a_step_and_cuts_them_all():
-    tissue, area = drawn(CUBE, strokes.upright(0.0217, -0.01, 0.08, -0.01, 0.05, speed=10.0))
+def test_a_blade_at_10_metres_a_second_cuts_all_the_elements_that_it_passes_in_a_step():
+    tissue, area = cut_by_stroke(
+        CUBE, strokes.upright(0.0217, -0.01, 0.08, -0.01, 0.05, speed=10.0)
+    )
     assert tissue.n_pieces() == 2
     assert area == pytest.approx(SIDE, rel=0.1)
 
 
 def test_a_blade_that_only_grazes_the_skin_leaves_one_piece():
-    tissue, area = drawn(CUBE, strokes.upright(0.0217, -0.01, 0.08, 0.0399, 0.08))
+    tissue, area = cut_by_stroke(CUBE, strokes.upright(0.0217, -0.01, 0.08, 0.0399, 0.08))
     assert tissue.n_pieces() == 1
     assert area < 0.1 * SIDE

@@ -1,4 +1,4 @@
-"""The same strokes give the same bits."""
+"""The same strokes give bit-identical results."""
 
 import hashlib
 
@@ -13,11 +13,11 @@ MESHES = {
     "jittered": bodies.jittered(4, 0),
     "fine": block((8, 9, 10), (0.04,) * 3),
 }
-"""In the fine one the arrays grow during the cut."""
+"""Meshes of the tests; in the fine one the arrays grow during the cut."""
 
 
 def fingerprint(tissue, results):
-    """Return a hash of every bit of the state and of what was felt."""
+    """Return a hash of every bit of the final state and of the wrenches of all frames."""
     digest = hashlib.sha256()
     for array in tissue.snapshot():
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -45,19 +45,19 @@ def test_the_same_stroke_twice_gives_the_same_bits(mesh, stroke):
 
 
 def test_arrays_that_grow_change_nothing():
-    """Room that is there from the start, and room made in the middle of the cut."""
+    """Arrays with enough capacity from the start, and arrays that grow during the cut."""
     mesh = MESHES["jittered"]
     stroke = strokes.slanted(mesh)
     _, expected = run(mesh, stroke)
-    roomy = Tissue(mesh, fixed=bodies.sides(mesh))
-    for _ in range(3):  # each call doubles arrays that look nearly full
-        n_nodes, n_tetrahedra = roomy._body.n_nodes, roomy._body.n_tetrahedra
-        roomy._body.n_nodes = len(roomy._body.rest)
-        roomy._body.n_tetrahedra = len(roomy._body.tetrahedra)
-        roomy._make_room()
-        roomy._body.n_nodes, roomy._body.n_tetrahedra = n_nodes, n_tetrahedra
-    assert len(roomy._body.rest) > 4 * len(Tissue(mesh)._body.rest)
-    assert fingerprint(roomy, strokes.make(roomy, stroke)) == expected
+    ample = Tissue(mesh, fixed=bodies.sides(mesh))
+    for _ in range(3):  # each call doubles arrays that appear nearly full
+        n_nodes, n_tetrahedra = ample._body.n_nodes, ample._body.n_tetrahedra
+        ample._body.n_nodes = len(ample._body.rest)
+        ample._body.n_tetrahedra = len(ample._body.tetrahedra)
+        ample._make_room()
+        ample._body.n_nodes, ample._body.n_tetrahedra = n_nodes, n_tetrahedra
+    assert len(ample._body.rest) > 4 * len(Tissue(mesh)._body.rest)
+    assert fingerprint(ample, strokes.make(ample, stroke)) == expected
 
 
 def test_another_stroke_gives_other_bits():
@@ -66,13 +66,13 @@ def test_another_stroke_gives_other_bits():
 
 
 def test_two_bodies_do_not_disturb_each_other():
-    """Steps of two bodies in turn give each the bits that it has alone."""
+    """Alternating steps of two bodies give each the same bits as alone."""
     mesh = MESHES["jittered"]
     stroke = strokes.straight(mesh)
     _, alone = run(mesh, stroke)
     pair = [Tissue(mesh, fixed=bodies.sides(mesh)) for _ in range(2)]
     results = [], []
     for sweep in strokes.sweeps(stroke):
-        for tissue, felt in zip(pair, results, strict=True):
-            felt.append(tissue.step(sweep, strokes.DT))
+        for tissue, step_results in zip(pair, results, strict=True):
+            step_results.append(tissue.step(sweep, strokes.DT))
     assert [fingerprint(t, r) for t, r in zip(pair, results, strict=True)] == [alone] * 2

@@ -1,4 +1,4 @@
-"""Every example of docs/examples runs from start to end, and says what its page says."""
+"""Every example in docs/examples runs to its end and prints the documented results."""
 
 import os
 import re
@@ -36,7 +36,7 @@ def numbers(text: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
 
 
-def test_an_arm_of_ones_own_cuts_a_block_in_two_and_feels_its_toughness(run):
+def test_an_attached_arm_cuts_a_block_in_two_with_a_force_set_by_toughness(run):
     peak, area, pieces = re.search(
         r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", run("attach_mjcf.py")
     ).groups()
@@ -45,7 +45,7 @@ def test_an_arm_of_ones_own_cuts_a_block_in_two_and_feels_its_toughness(run):
     assert int(pieces) == 2
 
 
-def test_an_edge_that_is_led_through_a_block_meets_toughness_times_thickness(run):
+def test_an_edge_moved_through_a_block_meets_toughness_times_thickness(run):
     peak, area, _, pieces = numbers(run("cut_block.py"))
     assert peak == pytest.approx(20.0 * 0.02, rel=0.2)
     assert area == pytest.approx(40 * 20, rel=0.1) and pieces == 2
@@ -63,18 +63,18 @@ def test_a_stroke_from_a_file_cuts_the_slab_in_two(run):
     assert float(area) == pytest.approx(60 * 40, rel=0.05) and int(pieces) == 2
 
 
-def test_the_forces_of_a_step_come_with_the_account_of_its_energy(run):
+def test_a_step_reports_its_forces_and_its_energy_balance(run):
     found = run("forces.py")
     assert float(re.search(r"press with ([\d.]+) N", found).group(1)) > 0.1
     assert int(re.search(r"cutting took (\d+)%", found).group(1)) > 50
     assert abs(float(re.search(r"not accounted for: (-?[\d.]+)%", found).group(1))) < 0.5
 
 
-def test_a_clamp_in_front_of_the_blade_is_met(run):
+def test_a_clamp_in_front_of_the_blade_is_hit(run):
     assert re.search(r"'blade, clamp': \d+", run("clamp.py"))
 
 
-def test_a_loose_piece_lies_on_the_floor_with_its_whole_weight(run):
+def test_the_floor_carries_the_whole_weight_of_a_loose_piece(run):
     found = run("falling_piece.py")
     grams, height = re.search(r"([\d.]+) g lie ([\d.]+) mm", found).groups()
     assert float(grams) == pytest.approx(8.0, rel=0.01)  # half of 16 cm3
@@ -83,7 +83,7 @@ def test_a_loose_piece_lies_on_the_floor_with_its_whole_weight(run):
 
 
 def test_a_tissue_in_another_process_is_cut_in_two():
-    """A process of its own: the server is started from the file, as a user would."""
+    """The example runs in a process of its own, as a user would start it."""
     done = subprocess.run(
         [sys.executable, str(FOLDER / "two_processes.py")],
         capture_output=True,

@@ -1,6 +1,6 @@
-"""The force of a cut: what it follows from, and where the work of the blade goes.
+"""The force of a cut: what determines it, and where the work of the blade goes.
 
-Tests 28 to 33 of the specification. A block is held at two sides, and a blade goes through it.
+Tests 28 to 33 of the specification. A block is held at two sides, and a blade cuts through it.
 """
 
 import itertools
@@ -34,7 +34,7 @@ def segment(tip, along=(0.0, 0.0, 1.0), forward=(0.0, 1.0, 0.0), length=0.03):
 
 
 def upright(speed=0.05, x=0.0201, begin=-0.003, end=0.043, slice_ratio=0.0):
-    """An upright edge that goes along y, and down by `slice_ratio` of that."""
+    """Return the poses of an upright edge that moves along y, and down by `slice_ratio` of that."""
     ys = np.arange(begin, end, speed * DT)
     length = 0.03 + slice_ratio * (end - begin)
     zs = -0.005 - slice_ratio * (ys - begin)
@@ -49,21 +49,21 @@ def mirrored(cells):
         np.round(np.concatenate((half.positions, other)), 9), axis=0, return_inverse=True
     )
     n = len(half.positions)
-    turned = half.tetrahedra[:, [1, 0, 2, 3]] + n  # a mirror image would be inside out
+    turned = half.tetrahedra[:, [1, 0, 2, 3]] + n  # a mirror image would be inverted
     return TetrahedralMesh(points, place.ravel()[np.concatenate((half.tetrahedra, turned))])
 
 
 class Run:
-    """A stroke through a block, with its account."""
+    """A stroke through a block, with its energy balance."""
 
     def __init__(self, poses, blade=None, cells=(8, 8, 4), dt=DT, mesh=None, **material):
         mesh = mesh or block(cells, SIZE)
-        of_tissue = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
+        boundary = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
         self.tissue = Tissue(
             mesh,
             Material(**SOFT | material),
             blade=blade,
-            **of_tissue,
+            **boundary,
             solver=SolverSettings(audit=True),
         )
         self.poses = poses
@@ -78,7 +78,7 @@ class Run:
         return self.results[-1].energies
 
     def steady(self, axis=1, begin=0.012, end=0.03):
-        """Mean force on the tissue along an axis while the blade is well within it [N]."""
+        """Return the mean force on the tissue along an axis, with the blade well within it [N]."""
         return self.force[(self.y > begin) & (self.y < end), axis].mean()
 
     def anchored(self, begin=0.012, end=0.03):
@@ -87,18 +87,18 @@ class Run:
 
 
 @pytest.mark.parametrize(
-    "change",
+    "variation",
     [{}, {"cells": (12, 12, 6)}, {"poses": upright(0.1)}, {"dt": 5e-4, "poses": upright(0.1)}],
     ids=["as is", "finer", "faster", "shorter steps"],
 )
-def test_the_steady_force_is_toughness_times_depth(change):
-    run = Run(**{"poses": upright()} | change)
+def test_the_steady_force_is_toughness_times_depth(variation):
+    run = Run(**{"poses": upright()} | variation)
     assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
 
 
 @pytest.mark.parametrize("slice_ratio", [0.0, 0.5, 1.0])
 def test_slicing_lowers_the_normal_force_as_theory_says(slice_ratio):
-    """Atkins: the work goes into area alone, so both forces are along the way: 1 / (1 + xi^2)."""
+    """Atkins: all work goes into area, so the force is along the motion: 1 / (1 + xi^2)."""
     run = Run(upright(slice_ratio=slice_ratio))
     pressing = TOUGHNESS * run.anchored() / (1.0 + slice_ratio**2)
     assert run.steady() == pytest.approx(pressing, rel=0.05)
@@ -117,7 +117,7 @@ def test_a_blunt_edge_costs_twice_its_radius_times_the_work_to_rupture():
 
 
 def down_and_up(length, depth=0.008, speed=0.05):
-    """A level edge that goes into the block from above, and out again."""
+    """Return the poses of a level edge that moves into the block from above and out again."""
     zs = 0.0205 - np.arange(0.0, depth, speed * DT)
     zs = np.concatenate((zs, zs[::-1]))
     at = [(0.0201, 0.02 - 0.5 * length, z) for z in zs]
@@ -137,15 +137,15 @@ def test_the_skin_breaks_at_a_peak_and_the_force_drops(puncture):
     assert down[peak] == pytest.approx(3.0 * TOUGHNESS * 0.002, rel=0.12)
     assert down[peak + 5] < 0.6 * down[peak]
     area = np.array([r.contacts.cut_area.sum() for r in puncture.results])
-    assert not area[: peak - 2].any()  # until then it only dents
+    assert not area[: peak - 2].any()  # until then the skin is only dented
 
 
-def test_withdrawal_cuts_nothing_and_friction_turns_round(puncture):
+def test_withdrawal_cuts_nothing_and_reverses_friction(puncture):
     half = len(puncture.results) // 2
     going_up = puncture.results[half + 40 : half + 100]
     areas = {r.cut_area for r in going_up}
     assert len(areas) == 1
-    assert np.mean([r.wrench.force[2] for r in going_up]) < 0.0  # it holds the blade back
+    assert np.mean([r.wrench.force[2] for r in going_up]) < 0.0  # friction opposes the withdrawal
     before, after = going_up[0].energies, going_up[-1].energies
     assert after.cutting == before.cutting
     assert after.friction > before.friction
@@ -187,7 +187,7 @@ STROKES = {
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("blade", [None, SCALPEL], ids=["line", "scalpel"])
 @pytest.mark.parametrize("stroke", STROKES)
-def test_the_account_closes_within_half_a_percent(stroke, blade):
+def test_the_energy_balance_closes_within_half_a_percent(stroke, blade):
     poses, material = STROKES[stroke]
     run = Run(poses, blade=blade, blade_friction=0.3, **material)
     assert abs(run.energies.residual) < 5e-3 * run.energies.work_of_blade
@@ -208,13 +208,13 @@ def test_action_is_reaction_in_every_step_with_cuts_friction_and_side_load(strok
         np.testing.assert_allclose(result.force_on_tissue, -result.wrench.force, atol=1e-12)
 
 
-def test_a_symmetric_cut_pushes_the_blade_to_no_side():
+def test_a_symmetric_cut_has_no_side_force():
     run = Run(upright(x=0.02), blade=SCALPEL, mesh=mirrored((8, 8, 4)), blade_friction=0.3)
     assert abs(run.steady(axis=0)) < 0.05 * run.steady()
 
 
-def test_a_blade_pushed_sideways_is_pushed_back_with_a_torque():
-    """Its flat goes 3 mm into the side of a block that is held at its far side."""
+def test_a_blade_pressed_sideways_into_tissue_gets_a_force_and_a_torque():
+    """The side face of the blade moves 3 mm into a block that is held at its far side."""
     mesh = block((6, 6, 3), SIZE)
     fixed = mesh.positions[:, 0] < 1e-9
     tissue = Tissue(mesh, Material(**SOFT), fixed=fixed, gravity=NO_GRAVITY, blade=SCALPEL)
@@ -222,14 +222,14 @@ def test_a_blade_pushed_sideways_is_pushed_back_with_a_torque():
     poses = [segment((x, 0.022, 0.004), length=0.012) for x in xs]
     results = [tissue.step(BladeSweep(a, b), DT) for a, b in itertools.pairwise(poses)]
     assert results[-1].wrench.force[0] > 0.05
-    assert results[-1].wrench.torque[1] > 0.0  # of a force 6 mm up from the tip
+    assert results[-1].wrench.torque[1] > 0.0  # the force acts 6 mm above the tip
     lever = results[-1].wrench.torque[1] / results[-1].wrench.force[0]
     assert 0.002 < lever < 0.010
     assert results[-1].cut_area == 0.0
 
 
 def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
-    """The lips are as far apart as the blade is thick, and behind it they are not."""
+    """The lips are a blade thickness apart at the blade, and close together behind it."""
     thick = BladeShape(thickness=1e-3, bevel_angle=0.2, height=8e-3)
     run = Run(upright(end=0.035), blade=thick)
     contacts = run.results[-1].contacts
@@ -245,8 +245,8 @@ def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
     assert np.ptp(behind[:, 0]) < 0.4e-3
 
 
-def test_the_faces_of_the_blade_do_not_press_the_skin_that_it_goes_through():
-    """In cells of 20 mm there is no lip beside the blade before it is through."""
+def test_the_side_faces_of_the_blade_do_not_press_the_skin_that_the_edge_cuts():
+    """In cells of 20 mm there is no lip beside the blade until it is through."""
     run = Run(
         upright(end=0.036),
         SCALPEL,
@@ -259,7 +259,7 @@ def test_the_faces_of_the_blade_do_not_press_the_skin_that_it_goes_through():
     assert late == pytest.approx(early, rel=0.02)
 
 
-def test_an_audit_of_another_relaxation_is_refused():
+def test_an_audit_with_local_relaxation_is_refused():
     with pytest.raises(ValueError, match="audit"):
         Tissue(block((2, 2, 2), SIZE), solver=SolverSettings(audit=True, relaxation="local"))
 

@@ -1,6 +1,6 @@
-"""Incisions of every kind in bodies of every kind: what must hold, and how often the rest does.
+"""Incisions of every kind in bodies of every kind: invariants, and rates of success.
 
-Numbers in names of tests refer to the acceptance tests that the design was written with.
+Numbers in names of tests are those of the acceptance tests in the specification.
 """
 
 from functools import partial
@@ -16,9 +16,9 @@ from tests.incisions import Incision
 from tissue import CutSettings, SolverSettings, TetrahedralMesh, Tissue
 
 EXACT = CutSettings(snap=0.0, floor=0.0, guard=0.0, crumb=0.0)
-"""Every crossing gets its own node: what is cut can be counted."""
+"""Settings that give every crossing a node of its own, so that counts are exact."""
 
-MADE = {
+MESHES = {
     "jittered grid": partial(bodies.jittered_grid, 4),
     "Delaunay, 10 degrees": partial(bodies.body_centred, 3),
     "Delaunay, slivers": partial(bodies.with_slivers, 4),
@@ -33,7 +33,7 @@ def at_rest(mesh: TetrahedralMesh, quality: CutSettings | None = None) -> Tissue
 
 
 def cut_along(mesh: TetrahedralMesh, *cuts: Incision, quality: CutSettings | None = None) -> Tissue:
-    """Return the body after those cuts."""
+    """Return a body cut along these surfaces."""
     tissue = at_rest(mesh, quality)
     for cut in cuts:
         tissue.incise(*cut)
@@ -46,11 +46,11 @@ def random_plane(mesh: TetrahedralMesh, seed: int) -> Incision:
     return incisions.plane(mesh, random.normal(size=3), random.uniform(-0.1, 0.1) * thin)
 
 
-# 11
+# Acceptance test 11.
 
 
 def n_after_plane(mesh: TetrahedralMesh, cut: Incision) -> int:
-    """Four tetrahedra of each that has one node on its own side of a plane, six of two and two."""
+    """Return the expected count: 4 from a tetrahedron cut with 1 and 3 nodes, 6 from 2 and 2."""
     normal = np.cross(cut.forward[0], cut.edges[0, 1] - cut.edges[0, 0])
     above = (mesh.positions - cut.edges[0, 0]) @ normal > 0.0
     n_above = above[mesh.tetrahedra].sum(axis=1)
@@ -58,10 +58,10 @@ def n_after_plane(mesh: TetrahedralMesh, cut: Incision) -> int:
     return int(len(mesh.tetrahedra) - (n_a + n_b) + 4 * n_a + 6 * n_b)
 
 
-@pytest.mark.parametrize("made", GOOD)
+@pytest.mark.parametrize("mesh_kind", GOOD)
 @pytest.mark.parametrize("seed", range(25))
-def test_11_a_plane_makes_4_or_6_of_each_tetrahedron_it_crosses(made, seed):
-    mesh = MADE[made](seed)
+def test_11_a_plane_makes_4_or_6_of_each_tetrahedron_it_crosses(mesh_kind, seed):
+    mesh = MESHES[mesh_kind](seed)
     cut = random_plane(mesh, seed)
     tissue = at_rest(mesh, EXACT)
     area = tissue.incise(*cut)
@@ -70,56 +70,56 @@ def test_11_a_plane_makes_4_or_6_of_each_tetrahedron_it_crosses(made, seed):
     assert tissue.n_pieces() == 2
 
 
-# 12
+# Acceptance test 12.
 
 
 class InspectedTissue(judged.WatchedTissue):
-    """A tissue that is looked at after every cut step that changed it."""
+    """A tissue that is checked after every cut step that changed it."""
 
     def __init__(self, mesh: TetrahedralMesh, **options) -> None:
         super().__init__(mesh, **options)
-        self.whole = self.snapshot()
-        self.looked_at = -1
-        self.n_looks = 0
+        self.original = self.snapshot()
+        self.inspected_state = -1
+        self.n_inspected = 0
         self.found: list[str] = []
 
     def _after_cut(self) -> None:
         super()._after_cut()
         links = self._body.links[: self.n_tetrahedra]
         state = self.n_tetrahedra + 10**6 * int((links < 0).sum())
-        if state != self.looked_at:
-            self.looked_at = state
-            self.n_looks += 1
+        if state != self.inspected_state:
+            self.inspected_state = state
+            self.n_inspected += 1
             after = self.snapshot()
-            self.found += soundness.faults(self.whole, after, volume=1e-12, lips_match=False)
+            self.found += soundness.faults(self.original, after, volume=1e-12, lips_match=False)
             self.found += soundness.link_faults(self._body)
 
 
-def test_12_the_mesh_is_sound_after_each_of_a_thousand_steps_of_cuts_that_cross():
-    n_looks = 0
+def test_12_the_mesh_is_sound_after_each_of_a_thousand_steps_of_crossing_cuts():
+    n_inspected = 0
     for seed in range(24):
         mesh = bodies.jittered_grid(3, seed) if seed % 2 else bodies.body_centred(2, seed)
         tissue = InspectedTissue(
             mesh, positions=judged.out_of_shape(mesh, seed), gravity=(0.0, 0.0, 0.0)
         )
-        judged.moving(tissue, seed)
+        judged.set_random_velocities(tissue, seed)
         kinds = list(incisions.KINDS)
         for i in range(3):
             kind = kinds[(seed + i) % len(kinds)]
             tissue.incise(*incisions.incision(mesh, kind, 3 * seed + i))
         assert tissue.found == []
         assert tissue.momentum_jump < 1e-12
-        n_looks += tissue.n_looks
-    assert n_looks >= 1000
+        n_inspected += tissue.n_inspected
+    assert n_inspected >= 1000
 
 
-# 13
+# Acceptance test 13.
 
 
-@pytest.mark.parametrize("made", GOOD)
+@pytest.mark.parametrize("mesh_kind", GOOD)
 @pytest.mark.parametrize("seed", range(4))
-def test_13_after_ten_cuts_the_surface_is_watertight_and_holds_the_volume(made, seed):
-    mesh = MADE[made](seed)
+def test_13_after_ten_cuts_the_surface_is_watertight_and_encloses_the_volume(mesh_kind, seed):
+    mesh = MESHES[mesh_kind](seed)
     kinds = list(incisions.KINDS)
     tissue = cut_along(
         mesh,
@@ -136,34 +136,34 @@ def test_13_after_ten_cuts_the_surface_is_watertight_and_holds_the_volume(made, 
     )
 
 
-# 15
+# Acceptance test 15.
 
 
-@pytest.mark.parametrize("made", MADE)
-def test_15_a_curved_cut_clean_through_leaves_two_pieces_in_200_of_200_runs(made):
-    whole = []
+@pytest.mark.parametrize("mesh_kind", MESHES)
+def test_15_a_curved_cut_clean_through_leaves_two_pieces_in_200_of_200_runs(mesh_kind):
+    not_in_two = []
     for seed in range(200):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         if cut_along(mesh, incisions.incision(mesh, "curved", seed)).n_pieces() != 2:
-            whole.append(seed)
-    assert whole == []
+            not_in_two.append(seed)
+    assert not_in_two == []
 
 
-@pytest.mark.parametrize("made", MADE)
-def test_15_three_planes_that_cross_leave_eight_pieces_in_97_of_100_runs(made):
+@pytest.mark.parametrize("mesh_kind", MESHES)
+def test_15_three_planes_that_cross_leave_eight_pieces_in_97_of_100_runs(mesh_kind):
     n = 40
     eight = 0
     for seed in range(n):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         eight += cut_along(mesh, *incisions.crossing_planes(mesh, seed)).n_pieces() == 8
     assert eight >= 0.97 * n
 
 
-# 16
+# Acceptance test 16.
 
 
 def crack(tissue: Tissue) -> np.ndarray:
-    """Return the triangles that a cut opened, each once, its corners named by where they rest."""
+    """Return the triangles of the cut, each once, with corners merged by rest position."""
     surface = tissue.surface()
     _, corner = np.unique(surface.rest_positions, axis=0, return_inverse=True)
     return np.unique(np.sort(corner.ravel()[surface.triangles[surface.is_cut]], axis=1), axis=0)
@@ -175,27 +175,27 @@ def euler_characteristic(triangles: np.ndarray) -> int:
 
 
 def flat_slit(mesh: TetrahedralMesh, seed: int) -> Incision:
-    """Return a flat cut, upright but for some degrees, that ends inside with its tip inside."""
+    """Return a flat, nearly upright cut that ends inside the body, with its tip inside."""
     random = np.random.default_rng(seed)
     small = random.uniform(-0.2, 0.2, 3)
     normal = np.array([1.0, *small[:2]]) / np.linalg.norm([1.0, *small[:2]])
-    way = np.array([0.0, 1.0, small[2]])
-    way -= (way @ normal) * normal
-    way /= np.linalg.norm(way)
-    turn = np.stack([way, np.cross(normal, way), normal], axis=1)
-    ways = np.linspace(-1.5, random.uniform(-0.1, 0.2), incisions.N_PLACES)
-    return incisions.ruled(mesh, incisions.Shape(ways, random.uniform(-0.2, 0.1), 1.5), turn)
+    direction = np.array([0.0, 1.0, small[2]])
+    direction -= (direction @ normal) * normal
+    direction /= np.linalg.norm(direction)
+    turn = np.stack([direction, np.cross(normal, direction), normal], axis=1)
+    path = np.linspace(-1.5, random.uniform(-0.1, 0.2), incisions.N_POSITIONS)
+    return incisions.ruled(mesh, incisions.Shape(path, random.uniform(-0.2, 0.1), 1.5), turn)
 
 
 SLITS = {
-    "at the defaults within a tenth": (CutSettings(), 0.10),
-    "closer, without a guard, within 3 in 100": (CutSettings(snap=0.1, floor=0.1, guard=0.0), 0.03),
+    "default settings, within 10 %": (CutSettings(), 0.10),
+    "closer snapping, no guard, within 3 %": (CutSettings(snap=0.1, floor=0.1, guard=0.0), 0.03),
 }
 
 
-@pytest.mark.parametrize("how", SLITS)
-def test_16_a_slit_is_a_disk_of_on_average_the_area_that_the_blade_swept(how):
-    quality, error = SLITS[how]
+@pytest.mark.parametrize("case", SLITS)
+def test_16_a_slit_is_a_disk_and_on_average_has_the_area_swept_by_the_blade(case):
+    quality, error = SLITS[case]
     disks, ratios = [], []
     for seed in range(40):
         mesh = bodies.jittered_grid(6, seed) if seed % 2 else bodies.body_centred(5, seed)
@@ -207,11 +207,11 @@ def test_16_a_slit_is_a_disk_of_on_average_the_area_that_the_blade_swept(how):
     assert np.mean(ratios) == pytest.approx(1.0, abs=error)
 
 
-# 17
+# Acceptance test 17.
 
 
 def added_again(mesh: TetrahedralMesh, cut: Incision) -> tuple[int, float]:
-    """Return the tetrahedra that the same incision adds a second time, and its share of area."""
+    """Return the tetrahedra and the share of area that repeating an incision adds."""
     tissue = at_rest(mesh)
     area = tissue.incise(*cut)
     n = tissue.n_tetrahedra
@@ -219,28 +219,28 @@ def added_again(mesh: TetrahedralMesh, cut: Incision) -> tuple[int, float]:
     return tissue.n_tetrahedra - n, again / area
 
 
-@pytest.mark.parametrize("made", GOOD)
-def test_17_a_plane_that_is_cut_a_second_time_adds_nothing(made):
+@pytest.mark.parametrize("mesh_kind", GOOD)
+def test_17_a_plane_that_is_cut_a_second_time_adds_nothing(mesh_kind):
     for seed in range(50):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         assert added_again(mesh, incisions.incision(mesh, "tilted", seed)) == (0, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["curved", "back and forth"])
-@pytest.mark.parametrize("made", GOOD)
-def test_17_a_curve_that_is_cut_a_second_time_adds_no_tetrahedra_in_97_of_100_runs(made, kind):
+@pytest.mark.parametrize("mesh_kind", GOOD)
+def test_17_a_curve_that_is_cut_a_second_time_adds_no_tetrahedra_in_97_of_100_runs(mesh_kind, kind):
     n = 50
     added = [
         added_again(mesh, incisions.incision(mesh, kind, seed))[0]
-        for seed, mesh in ((seed, MADE[made](seed)) for seed in range(n))
+        for seed, mesh in ((seed, MESHES[mesh_kind](seed)) for seed in range(n))
     ]
     assert np.count_nonzero(added) <= 0.03 * n
 
 
-@pytest.mark.parametrize("made", GOOD)
-def test_17_an_edge_that_goes_back_on_its_sheet_and_forward_again_adds_nothing(made):
+@pytest.mark.parametrize("mesh_kind", GOOD)
+def test_17_an_edge_that_moves_back_and_forth_on_its_cut_surface_adds_nothing(mesh_kind):
     for seed in range(20):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         cut = incisions.incision(mesh, "curved", seed)
         there_and_back = np.concatenate([np.arange(40), np.arange(40)[::-1], np.arange(60)])
         again = Incision(cut.edges[there_and_back], cut.forward[there_and_back])
@@ -249,15 +249,17 @@ def test_17_an_edge_that_goes_back_on_its_sheet_and_forward_again_adds_nothing(m
         assert thrice.n_pieces() == once.n_pieces()
 
 
-# 18
+# Acceptance test 18.
 
 
-@pytest.mark.parametrize("made", GOOD)
-def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in_five_cuts(made):
-    """8 times at the most, and 6 as a rule: the planes meet in the middle of a coarse body."""
+@pytest.mark.parametrize("mesh_kind", GOOD)
+def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in_five_cuts(
+    mesh_kind,
+):
+    """8 times at most, with a median of 6: the planes cross in the middle of a coarse body."""
     growth = []
     for seed in range(20):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         tissue = at_rest(mesh)
         before = tissue._system.elasticity.frequency_squared
         for i in range(5):
@@ -270,35 +272,35 @@ def test_18_no_altitude_falls_below_the_guard_and_the_frequency_grows_6_times_in
     assert max(growth) <= 8.0
 
 
-# 19
+# Acceptance test 19.
 
 
-def places(tissue: Tissue, turn: np.ndarray, shift: np.ndarray) -> set[frozenset]:
-    """Return the tetrahedra, each as the places of its nodes in the body not moved, in 1e-11 m."""
+def tetrahedra_at_rest(tissue: Tissue, turn: np.ndarray, shift: np.ndarray) -> set[frozenset]:
+    """Return each tetrahedron as the set of its nodes' positions, moved back, in 1e-11 m."""
     body = tissue.snapshot()
     where = np.round((body.rest_positions - shift) @ turn / 1e-11).astype(np.int64)
     return {frozenset(map(tuple, where[nodes].tolist())) for nodes in body.tetrahedra}
 
 
 def test_19_a_body_and_a_cut_that_are_moved_together_give_the_same_mesh():
-    """To 1e-11 m in 0.04 m, in all runs but where rounding to that falls two ways."""
+    """To 1e-11 m in 0.04 m, except in runs where positions are rounded to different values."""
     same = []
     for seed in range(40):
-        mesh = MADE[GOOD[seed % 2]](seed)
+        mesh = MESHES[GOOD[seed % 2]](seed)
         cut = incisions.incision(mesh, list(incisions.KINDS)[seed % len(incisions.KINDS)], seed)
         random = np.random.default_rng(seed)
         turn, shift = incisions.rotation(random), random.normal(size=3) * 0.1
         moved = mesh._replace(positions=mesh.positions @ turn.T + shift)
         cut_there = Incision(cut.edges @ turn.T + shift, cut.forward @ turn.T)
-        here = places(cut_along(mesh, cut), np.eye(3), np.zeros(3))
-        same.append(here == places(cut_along(moved, cut_there), turn, shift))
+        here = tetrahedra_at_rest(cut_along(mesh, cut), np.eye(3), np.zeros(3))
+        same.append(here == tetrahedra_at_rest(cut_along(moved, cut_there), turn, shift))
     assert np.mean(same) >= 0.95
 
 
 def test_19_the_mirror_image_of_a_cut_has_the_same_area_and_as_many_tetrahedra():
     mirror = np.array([-1.0, 1.0, 1.0])
     for seed in range(20):
-        mesh = MADE[GOOD[seed % 2]](seed)
+        mesh = MESHES[GOOD[seed % 2]](seed)
         cut = random_plane(mesh, seed)
         image = TetrahedralMesh(mesh.positions * mirror, mesh.tetrahedra[:, [0, 1, 3, 2]])
         tissue, twin = at_rest(mesh, EXACT), at_rest(image, EXACT)
@@ -309,15 +311,15 @@ def test_19_the_mirror_image_of_a_cut_has_the_same_area_and_as_many_tetrahedra()
         assert twin.n_tetrahedra == tissue.n_tetrahedra
 
 
-# 20
+# Acceptance test 20.
 
 
-def test_20_mass_volume_and_momentum_are_what_they_were_after_a_hundred_cuts():
+def test_20_mass_volume_and_momentum_are_unchanged_after_a_hundred_cuts():
     mesh = bodies.jittered_grid(4, 1)
     tissue = judged.WatchedTissue(
         mesh, positions=judged.out_of_shape(mesh, 1), gravity=(0.0, 0.0, 0.0)
     )
-    judged.moving(tissue, 1)
+    judged.set_random_velocities(tissue, 1)
     before = tissue.snapshot()
     for i in range(100):
         kind = ("slit", "buried", "curved")[i % 3]
@@ -329,11 +331,11 @@ def test_20_mass_volume_and_momentum_are_what_they_were_after_a_hundred_cuts():
     assert verdict.growth > 5.0
 
 
-# a thousand: benchmarks/random_incisions.py
+# benchmarks/random_incisions.py runs a thousand of these.
 
 
 def cuts_of(mesh: TetrahedralMesh, kind: str, seed: int) -> list[Incision]:
-    """Return one incision of a kind; or two of any kind, that may cross."""
+    """Return one incision of a kind, or for "crossing" two of any kind that may cross."""
     if kind != "crossing":
         return [incisions.incision(mesh, kind, seed)]
     kinds = list(incisions.KINDS)
@@ -341,17 +343,17 @@ def cuts_of(mesh: TetrahedralMesh, kind: str, seed: int) -> list[Incision]:
 
 
 @pytest.mark.parametrize("kind", [*incisions.KINDS, "crossing"])
-@pytest.mark.parametrize("made", MADE)
-def test_random_incisions_leave_a_sound_body(made, kind):
+@pytest.mark.parametrize("mesh_kind", MESHES)
+def test_random_incisions_leave_a_sound_body(mesh_kind, kind):
     for seed in range(1000, 1010):
-        mesh = MADE[made](seed)
+        mesh = MESHES[mesh_kind](seed)
         assert judged.incised(mesh, cuts_of(mesh, kind, seed), seed).faults == []
 
 
 @pytest.mark.parametrize("kind", [*incisions.KINDS, "crossing"])
-def test_a_blade_in_motion_leaves_a_sound_body(kind):
-    for made in MADE:
-        mesh = MADE[made](7)
+def test_a_moving_blade_leaves_a_sound_body(kind):
+    for mesh_kind in MESHES:
+        mesh = MESHES[mesh_kind](7)
         assert judged.cut_by_blade(mesh, cuts_of(mesh, kind, 7)).faults == []
 
 
@@ -361,9 +363,9 @@ def test_a_blade_in_motion_leaves_a_sound_body(kind):
     st.integers(0, 10**6),
     st.lists(st.tuples(st.sampled_from(list(incisions.KINDS)), st.integers(0, 10**6)), max_size=5),
 )
-def test_any_sequence_of_incisions_leaves_a_sound_body(made, seed, sequence):
-    """Also where a cut was made before, or meets others."""
-    mesh = MADE[made](seed)
+def test_any_sequence_of_incisions_leaves_a_sound_body(mesh_kind, seed, sequence):
+    """Including incisions that repeat or cross earlier ones."""
+    mesh = MESHES[mesh_kind](seed)
     cuts = [incisions.incision(mesh, kind, seed) for kind, seed in sequence]
     verdict = judged.incised(mesh, cuts, seed)
     assert verdict.faults == []
@@ -373,6 +375,6 @@ def test_any_sequence_of_incisions_leaves_a_sound_body(made, seed, sequence):
 @pytest.mark.skipif(not bodies.FOLDER, reason="SCALPEL_SIM_TEST_MESHES names no folder")
 @pytest.mark.parametrize("kind", [*incisions.KINDS, "crossing"])
 @pytest.mark.parametrize("file", bodies.FILES)
-def test_random_incisions_leave_a_mesh_of_others_sound(file, kind):
-    mesh = bodies.of_others(file)
+def test_random_incisions_leave_a_third_party_mesh_sound(file, kind):
+    mesh = bodies.third_party_mesh(file)
     assert judged.incised(mesh, cuts_of(mesh, kind, 3), 3).faults == []

@@ -1,8 +1,8 @@
-"""The body against the theory of elasticity: 22 to 27 of the engine's acceptance tests, and more.
+"""The body against the theory of elasticity: acceptance tests 22 to 27, and more.
 
-Small strains are compared with `tissue.elasticity.stiffness_matrix`, whose matrix is held against
-the engine's own
-forces here; so what a fine bar does by the matrix (benchmarks/mesh_study.py) the engine does too.
+Small strains are compared with `tissue.elasticity.stiffness_matrix`. The matrix is compared here
+with the engine's own forces, so its results for fine bars (benchmarks/mesh_study.py) hold for the
+engine too.
 """
 
 from dataclasses import replace
@@ -43,7 +43,7 @@ RANDOM = bodies.jittered(4, seed=3)
 
 
 def forces_at(mesh, positions, material, dt=1e-9):
-    """Elastic forces of the engine [N]: the momentum that they give a body in next to no time."""
+    """Return the elastic forces of the engine, from the momentum gained in a tiny step [N]."""
     tissue = Tissue(mesh, material, positions=positions, gravity=NO_GRAVITY)
     tissue.step(None, dt)
     after = tissue.snapshot()
@@ -55,11 +55,11 @@ def test_small_forces_are_those_of_the_stiffness_matrix(material):
     u = 1e-6 * np.random.default_rng(0).normal(size=RANDOM.positions.shape)
     found = forces_at(RANDOM, RANDOM.positions + u, material)
     found -= forces_at(RANDOM, RANDOM.positions - u, material)
-    wanted = -2.0 * (stiffness_matrix(RANDOM, material) @ u.ravel()).reshape(-1, 3)
-    np.testing.assert_allclose(found, wanted, atol=1e-5 * np.abs(wanted).max())
+    expected = -2.0 * (stiffness_matrix(RANDOM, material) @ u.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
 
 
-# 22
+# Acceptance test 22.
 
 
 def test_22_under_an_affine_strain_tetrahedra_inside_are_in_equilibrium():
@@ -82,36 +82,37 @@ def test_22_a_rod_that_is_pulled_pulls_back_with_youngs_modulus():
     assert stress == pytest.approx(SOLID.young_modulus, rel=1e-6)
 
 
-# 23
+# Acceptance test 23.
 
 DEFLECTION = {
-    # nu: plain and averaged, for 1, 2 and 4 cells through the thickness; tip over Timoshenko's
+    # nu: plain and averaged, for 1, 2 and 4 cells through the thickness; deflection of the end
+    # over that of Timoshenko's beam
     0.3: ((0.222, 0.504, 0.786), (0.351, 0.664, 0.875)),
     0.45: ((0.113, 0.300, 0.595), (0.314, 0.613, 0.843)),
     0.49: ((0.041, 0.108, 0.288), (0.228, 0.570, 0.822)),
 }
-"""Linear tetrahedra, and those that average the bulk modulus over nodes. The law of Smith, de Goes
-and Kim averages a sixth of the shear modulus more, and is softer by up to 0.02."""
+"""Deflections with linear tetrahedra, and with the bulk modulus averaged over nodes. The law of
+Smith, de Goes and Kim also averages a sixth of the shear modulus, and is softer by up to 0.02."""
 
-OF_SPRINGS = (0.39, 0.67, 0.86)
+SPRING_DEFLECTION = (0.39, 0.67, 0.86)
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.45, 0.49])
 @pytest.mark.parametrize("averaged", [False, True], ids=["plain", "averaged"])
-def test_23_a_cantilever_bends_the_more_like_a_beam_the_finer_it_is(nu, averaged):
+def test_23_a_cantilever_bends_more_like_a_beam_on_a_finer_mesh(nu, averaged):
     model = Model("", replace(SOLID, poisson_ratio=nu), averaged)
     found = [Bar(n, model).end_load_ratio() for n in (1, 2, 4)]
     assert found == pytest.approx(DEFLECTION[nu][averaged], abs=0.02)
     assert sorted(found) == found
 
 
-def test_23_springs_bend_the_more_like_a_beam_the_finer_they_are():
+def test_23_springs_bend_more_like_a_beam_on_a_finer_mesh():
     found = [Bar(n, Model("", UNDAMPED)).end_load_ratio() for n in (1, 2, 4)]
-    assert found == pytest.approx(OF_SPRINGS, abs=0.02)
+    assert found == pytest.approx(SPRING_DEFLECTION, abs=0.02)
 
 
-def test_23_where_nothing_narrows_sag_and_frequencies_converge_to_beam_theory():
-    """Error as the square of the element size: both meshes carried on to none."""
+def test_23_at_poissons_ratio_0_sag_and_frequencies_converge_to_beam_theory():
+    """Richardson extrapolation: the error is proportional to the square of the element size."""
     coarse, fine = (Bar(n, Model("", replace(SOLID, poisson_ratio=0.0))) for n in (3, 6))
     theory = fine.theory()
     found = {mode: (fine.frequencies()[mode], coarse.frequencies()[mode]) for mode in MODES}
@@ -121,8 +122,8 @@ def test_23_where_nothing_narrows_sag_and_frequencies_converge_to_beam_theory():
 
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
-def test_23_the_engine_sags_as_the_matrix_says(material):
-    """So stiff that the sag is small: 1 % of the thickness."""
+def test_23_the_sag_of_the_engine_is_that_of_the_matrix(material):
+    """The material is stiff enough for a small sag: 1 % of the thickness."""
     material = replace(material, young_modulus=2e6)
     bar = Bar(2, Model("", material))
     tissue = Tissue(bar.mesh, material, fixed=bar.mesh.positions[:, 0] < 1e-9)
@@ -134,11 +135,11 @@ def test_23_the_engine_sags_as_the_matrix_says(material):
     assert sag == pytest.approx(bar.deflection(weight), rel=0.01)
 
 
-# 24
+# Acceptance test 24.
 
 
 @pytest.mark.parametrize("nu", [0.3, 0.45])
-def test_24_four_cells_through_the_thickness_bend_8_and_stretch_3_percent_too_fast_at_most(nu):
+def test_24_with_four_cells_bending_is_at_most_8_and_stretching_3_percent_too_fast(nu):
     bar = Bar(4, Model("", replace(SOLID, poisson_ratio=nu)))
     found = bar.frequencies()
     assert found["bending 1"] / bar.euler_bernoulli() == pytest.approx(1.0, abs=0.08)
@@ -147,7 +148,7 @@ def test_24_four_cells_through_the_thickness_bend_8_and_stretch_3_percent_too_fa
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
 @pytest.mark.parametrize("kind", ["bending", "torsion", "stretching"])
-def test_24_the_engine_swings_at_the_frequencies_of_the_matrix(material, kind):
+def test_24_the_engine_oscillates_at_the_frequencies_of_the_matrix(material, kind):
     bar = Bar(1, Model("", material))
     mode = next(mode for mode in bar.modes if mode.kind == kind)
     rest = bar.mesh.positions
@@ -158,20 +159,20 @@ def test_24_the_engine_swings_at_the_frequencies_of_the_matrix(material, kind):
         positions=rest + 1e-3 * bar.thickness * mode.motion,
         gravity=NO_GRAVITY,
     )
-    turns = 0.3  # of the mode: the body stands where the cosine of that says
-    tissue.step(None, turns / mode.frequency)
+    n_periods = 0.3  # of the mode; the displacement is then the cosine of their phase
+    tissue.step(None, n_periods / mode.frequency)
     now = (tissue.snapshot().positions - rest).ravel() @ mode.motion.ravel()
     share = now / (1e-3 * bar.thickness * np.sum(mode.motion**2))
-    assert np.arccos(share) / (2.0 * np.pi) == pytest.approx(turns, rel=0.01)
+    assert np.arccos(share) / (2.0 * np.pi) == pytest.approx(n_periods, rel=0.01)
 
 
-# 25
+# Acceptance test 25.
 
 QUARTER_TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
-def test_25_a_body_that_is_turned_feels_no_force(material):
+def test_25_a_rotated_body_has_no_internal_forces(material):
     forces = forces_at(RANDOM, RANDOM.positions @ QUARTER_TURN.T, material)
     assert np.abs(forces).max() < 1e-9 * material.young_modulus * 0.01**2
 
@@ -180,8 +181,8 @@ def test_25_a_body_that_is_turned_feels_no_force(material):
     ("relaxation", "frame"), [("global", 1e-3), ("global", 1e-2), ("local", 1e-3)]
 )
 @pytest.mark.parametrize("mesh", [block((3, 3, 3), (0.03,) * 3), RANDOM], ids=["cells", "random"])
-def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(mesh, frame, relaxation):
-    """In 2 s, in as many steps a frame as that takes."""
+def test_25_a_block_recovers_from_random_node_positions(mesh, frame, relaxation):
+    """Within 2 s, in as many steps per frame as stability needs."""
     size = mesh.positions.max()
     tissue = Tissue(
         mesh,
@@ -197,11 +198,11 @@ def test_25_nodes_thrown_anywhere_in_the_block_find_their_places_again(mesh, fra
     np.testing.assert_allclose(volumes, signed_volumes(*mesh), rtol=0.05)
 
 
-# 26
+# Acceptance test 26.
 
 
 def after_random_splits(mesh, positions, n, seed=26):
-    """The body out of shape, and after `n` splits of edges at random that cut nothing."""
+    """Yield the deformed body, then the body after `n` random edge splits that cut nothing."""
     cut = cut_of(mesh)
     cut.body.positions[: len(positions)] = positions
     yield cut.body
@@ -214,7 +215,7 @@ def after_random_splits(mesh, positions, n, seed=26):
 
 
 def energy_of(body, material, averaged):
-    """Elastic energy of tetrahedra [J]."""
+    """Return the elastic energy of the tetrahedra [J]."""
     n_nodes, n_tets = body.n_nodes, body.n_tetrahedra
     rooms = (len(body.rest), len(body.tetrahedra))
     law = neo_hookean(material.mu, material.lam, averaged=averaged)
@@ -227,7 +228,7 @@ def energy_of(body, material, averaged):
     return solid_energy(solid, body.positions, n_tets, n_nodes)
 
 
-def test_26_tetrahedra_that_are_split_and_not_cut_hold_the_same_energy():
+def test_26_splits_without_a_cut_keep_the_elastic_energy():
     out_of_shape = RANDOM.positions + 2e-3 * np.sin(RANDOM.positions[:, [1, 2, 0]] / 0.01)
     before, after = (
         energy_of(body, SOLID, averaged=False)
@@ -238,20 +239,20 @@ def test_26_tetrahedra_that_are_split_and_not_cut_hold_the_same_energy():
 
 
 @pytest.mark.parametrize("averaged", [False, True], ids=["plain", "averaged"])
-def test_26_splits_without_a_cut_hardly_change_how_a_body_gives_way(averaged):
+def test_26_splits_without_a_cut_hardly_change_the_compliance(averaged):
     mesh = bodies.jittered(6, seed=4)
 
     def compliance(body):
         n_nodes, n_tets = body.n_nodes, body.n_tetrahedra
         now = TetrahedralMesh(body.rest[:n_nodes].copy(), body.tetrahedra[:n_tets].copy())
-        return give(now, dead_load(now, mesh), SOLID, averaged=averaged)
+        return compliance_of(now, dead_load(now, mesh), SOLID, averaged=averaged)
 
     before, after = map(compliance, after_random_splits(mesh, mesh.positions, 100))
     assert after == pytest.approx(before, rel=0.02)
 
 
 def dead_load(mesh, before):
-    """Forces on the nodes that the right side of `before` has, in proportion to their faces."""
+    """Return unit total force on the nodes of the right side of `before`, in proportion to area."""
     faces = sorted_faces(before.tetrahedra)
     outer = faces.halves[faces.starts[faces.counts == 1]]
     load = np.zeros_like(mesh.positions)
@@ -263,8 +264,8 @@ def dead_load(mesh, before):
     return load / load.sum()
 
 
-def give(mesh, load, material, averaged=True):
-    """How far a body held on the left goes with the load, per load [m/N]."""
+def compliance_of(mesh, load, material, averaged=True):
+    """Return the displacement along the load, per load, of a body held on the left [m/N]."""
     free = np.repeat(mesh.positions[:, 0] > 1e-9, 3)
     matrix = stiffness_matrix(mesh, material, averaged=averaged)[free][:, free]
     force = load.ravel()[free]
@@ -273,13 +274,13 @@ def give(mesh, load, material, averaged=True):
     return float(force @ motion)
 
 
-# 27
+# Acceptance test 27.
 
 
 def slit_compliance(n):
-    """How far a cube with a slit half through it gives way to a pull across, per pull [m/N].
+    """Return the compliance of a cube with a slit half through it, pulled across the slit [m/N].
 
-    Held on the left, pulled to the right; the slit is cut by the engine, from above.
+    The cube is held on the left and pulled to the right; the engine cuts the slit from above.
     """
     size = 0.04
     mesh = block((n, n, n), (size, size, size))
@@ -289,20 +290,20 @@ def slit_compliance(n):
     assert area == pytest.approx(size**2 / 2.0, rel=1e-9)
     cut = tissue.snapshot()
     body = TetrahedralMesh(cut.rest_positions, cut.tetrahedra)
-    return give(body, dead_load(body, mesh), SOLID)
+    return compliance_of(body, dead_load(body, mesh), SOLID)
 
 
-def test_27_a_slit_gives_way_as_much_on_a_mesh_twice_as_fine():
+def test_27_the_compliance_with_a_slit_is_the_same_on_a_mesh_twice_as_fine():
     assert slit_compliance(16) == pytest.approx(slit_compliance(8), rel=0.12)
 
 
-# what springs could not do
+# Large deformations.
 
 
 @pytest.mark.parametrize("law", ["springs and volume", "neo-Hookean"])
-def test_a_slender_tower_bows_to_a_sudden_newton_and_stands_still_in_the_end(law):
-    """10 x 10 x 60 mm: it bows by its own length, and swings. All of the newton is there at once,
-    from one side, on its mass. Springs alone turn inside out."""
+def test_a_slender_tower_bends_under_a_sudden_newton_and_comes_to_rest(law):
+    """10 x 10 x 60 mm: it bends by its own length, and oscillates. The whole newton acts at once,
+    sideways, distributed over its mass. Springs alone would invert."""
     mesh = block((2, 2, 12), (0.01, 0.01, 0.06))
     material = replace(LAWS[law], young_modulus=300e3, viscous_damping=20.0)
     tissue = Tissue(
@@ -312,35 +313,35 @@ def test_a_slender_tower_bows_to_a_sudden_newton_and_stands_still_in_the_end(law
         gravity=(1.0 / (material.density * 0.01 * 0.01 * 0.06), 0.0, 0.0),
     )
     top = mesh.positions[:, 2] > 0.06 - 1e-9
-    swing = []
+    deflection = []
     for _ in range(1000):
         tissue.step(None, 1e-3)
         now = tissue.snapshot()
-        swing.append(now.positions[top, 0].mean() - 0.005)
+        deflection.append(now.positions[top, 0].mean() - 0.005)
         assert (signed_volumes(now.positions, now.tetrahedra) > 0.3 * 0.005**3 / 6.0).all()
-    assert max(swing) > 0.05
-    assert np.ptp(swing[-100:]) < 1e-3
+    assert max(deflection) > 0.05
+    assert np.ptp(deflection[-100:]) < 1e-3
 
 
 @pytest.mark.parametrize(("nu", "height"), [(0.35, 0.7), (0.45, 0.5)])
-@pytest.mark.parametrize("made", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
-def test_springs_with_a_volume_term_do_not_collapse_in_a_block_that_is_pressed(made, nu, height):
-    volumes = volumes_in_a_press(made(), replace(UNDAMPED, poisson_ratio=nu), height)
+@pytest.mark.parametrize("make_mesh", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+def test_springs_with_a_volume_term_do_not_invert_in_a_compressed_block(make_mesh, nu, height):
+    volumes = volumes_in_a_press(make_mesh(), replace(UNDAMPED, poisson_ratio=nu), height)
     assert volumes.min() > 0.0
 
 
-def test_springs_alone_do():
-    """Nothing in them knows on which side of a face a node is."""
+def test_springs_alone_invert_in_a_compressed_block():
+    """Their energy does not depend on which side of a face a node is."""
     assert volumes_in_a_press(RANDOM, UNDAMPED, 0.7).min() < 0.0
 
 
-@pytest.mark.parametrize("made", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
-def test_nor_do_tetrahedra(made):
-    assert volumes_in_a_press(made(), SOLID, 0.6).min() > 0.0
+@pytest.mark.parametrize("make_mesh", [lambda: block((4, 4, 4), (0.04,) * 3), lambda: RANDOM])
+def test_tetrahedra_do_not_invert_in_a_compressed_block(make_mesh):
+    assert volumes_in_a_press(make_mesh(), SOLID, 0.6).min() > 0.0
 
 
 def volumes_in_a_press(mesh, material, height):
-    """Volumes of the tetrahedra of a block between two plates, over those at rest."""
+    """Return the volumes of the tetrahedra of a block between two plates, over those at rest."""
     z = mesh.positions[:, 2]
     tissue = Tissue(
         mesh,

@@ -1,7 +1,7 @@
-"""An arm that presses, lets go and taps: it never gets more energy out than it put in.
+"""An arm that presses, is released or taps never gets more energy out than it put in.
 
-The hand is a spring of 5 kN/m. The wall has no memory, so that what an answer in every frame would
-be is known; tissue is tried too.
+The hand is a spring of 5 kN/m. The wall has no memory, so the exact force in each frame is known;
+the same is tested on tissue.
 """
 
 from typing import NamedTuple
@@ -22,22 +22,22 @@ from tissue import BladeSegment, FloatArray
 
 DT = 1e-3
 NEVER_LESS = -1e-6
-"""[J]."""
+"""Lower bound of the energy of the passivity observer [J]."""
 GAP, DEPTH = 1e-3, 2e-3
-"""[m]: how far the wall is at the start, and how far into it the hand leads."""
+"""Distance of the wall at the start, and depth of the hand's target in the wall [m]."""
 N_FRAMES = 350
-LET_GO = 150
+RELEASE_FRAME = 150
 
 
 class Press(NamedTuple):
-    """What happened at the wall."""
+    """Forces and energies in a press against the wall."""
 
     force: FloatArray
-    """In each frame, of the wall [N], shape (n_frames,)."""
+    """Force of the wall in each frame [N], shape (n_frames,)."""
     energy: FloatArray
-    """Of the arm's motion in each frame [J], shape (n_frames,)."""
+    """Kinetic energy of the arm in each frame [J], shape (n_frames,)."""
     account: FloatArray
-    """What the observer says that the arm has put in, in each frame [J], shape (n_frames,)."""
+    """Energy that the arm has put in by the observer, in each frame [J], shape (n_frames,)."""
     counters: Counters
 
 
@@ -54,25 +54,34 @@ def press(
     every: int,
     stiffness: float = 5e3,
     *,
-    told: float = 1.0,
+    stiffness_scale: float = 1.0,
     passivity: bool = True,
     coupling: VirtualCoupling | None = None,
 ) -> Press:
-    """Lead the blade of a Touch against a wall, and let go of it where the hand does."""
+    """Move the blade of a Touch against a wall; hold it, release it or tap as `hand` says.
+
+    Args:
+        hand: One of `HANDS`.
+        every: Frames between two answers of the wall.
+        stiffness: Stiffness of the wall [N/m].
+        stiffness_scale: Stiffness that the wall reports over its true stiffness.
+        passivity: Whether the passivity controller is on.
+        coupling: Virtual coupling between blade and wall, or None.
+    """
     arm = Arm("touch")
     start = arm.blade.segment()
     normal = np.array([0.0, -1.0, 0.0])
     front = max(start.tip[1], start.heel[1])
-    wall = Wall(np.array([0.0, front + GAP, 0.0]), normal, stiffness, told)
+    wall = Wall(np.array([0.0, front + GAP, 0.0]), normal, stiffness, stiffness_scale)
     bridge = Bridge(
         wall, limits=arm.limits, tissue_every=every, passivity=passivity, coupling=coupling
     )
     force, energy, account = np.zeros((3, N_FRAMES))
     for frame in range(N_FRAMES):
-        way = tap(frame) if hand == "taps" else hold(frame)
-        if hand == "lets go" and frame == LET_GO:
-            let_go(arm)
-        arm.hand.follow(shifted(start, way))
+        displacement = tap(frame) if hand == "taps" else hold(frame)
+        if hand == "releases" and frame == RELEASE_FRAME:
+            release(arm)
+        arm.hand.follow(shifted(start, displacement))
         arm.step1()
         wrench = bridge.step(arm.blade.segment(), DT)
         arm.blade.apply(wrench)
@@ -83,13 +92,13 @@ def press(
     return Press(force, energy, account, bridge.counters)
 
 
-def shifted(segment: BladeSegment, way: float) -> BladeSegment:
-    by = np.array([0.0, way, 0.0])
-    return segment._replace(tip=segment.tip + by, heel=segment.heel + by)
+def shifted(segment: BladeSegment, displacement: float) -> BladeSegment:
+    offset = np.array([0.0, displacement, 0.0])
+    return segment._replace(tip=segment.tip + offset, heel=segment.heel + offset)
 
 
-def let_go(arm: Arm) -> None:
-    """The hand does nothing any more."""
+def release(arm: Arm) -> None:
+    """Switch off the actuators of the hand."""
     for name in ACTUATORS:
         arm.model.actuator(name).gainprm[:] = 0.0
         arm.model.actuator(name).biasprm[:] = 0.0
@@ -101,7 +110,7 @@ def kinetic_energy(arm: Arm) -> float:
     return float(0.5 * arm.data.qvel @ mass @ arm.data.qvel)
 
 
-HANDS = ("holds", "lets go", "taps")
+HANDS = ("holds", "releases", "taps")
 
 
 @pytest.mark.parametrize("stiffness", [500.0, 5e3])
@@ -114,15 +123,15 @@ def test_no_hand_gets_energy_out_of_a_wall(hand, every, stiffness):
 
 
 @pytest.mark.parametrize("every", [1, 5, 10])
-def test_an_arm_that_is_let_go_flies_off_with_no_more_than_it_stored(every):
-    """Told by MuJoCo's masses and speeds alone, of which the observer knows nothing.
+def test_a_released_arm_leaves_with_no_more_energy_than_was_stored(every):
+    """Measured by MuJoCo's masses and speeds, which the observer does not know.
 
-    But for the frame in which it lets go: nobody could know.
+    The frame of the release is excluded: it cannot be predicted.
     """
-    found = press("lets go", every)
-    stored = found.account[LET_GO]
+    found = press("releases", every)
+    stored = found.account[RELEASE_FRAME]
     assert stored > 5e-5
-    assert 0.8 * stored < found.energy[LET_GO + 1 :].max() <= stored - NEVER_LESS
+    assert 0.8 * stored < found.energy[RELEASE_FRAME + 1 :].max() <= stored - NEVER_LESS
 
 
 @pytest.mark.parametrize("stiffness", [5e3, 18e3])
@@ -134,53 +143,57 @@ def test_with_the_stiffness_of_the_wall_a_held_blade_rests_without_the_controlle
 
 
 @pytest.mark.parametrize("every", [5, 10, 33])
-def test_a_wrench_that_is_only_held_makes_energy(every):
-    """What the other tests would see if the stiffness were not used and nothing was damped."""
-    found = press("lets go", every, told=0.0, passivity=False)
+def test_holding_the_last_wrench_creates_energy(every):
+    """The result of the other tests without extrapolation by stiffness and without damping."""
+    found = press("releases", every, stiffness_scale=0.0, passivity=False)
     assert found.counters.passivity.least_energy < -1e-3
-    assert found.energy[LET_GO:].max() > 2.0 * press("lets go", every).energy[LET_GO:].max()
+    assert (
+        found.energy[RELEASE_FRAME:].max()
+        > 2.0 * press("releases", every).energy[RELEASE_FRAME:].max()
+    )
 
 
 @pytest.mark.parametrize("every", [1, 5, 10, 33])
 @pytest.mark.parametrize("hand", HANDS)
-def test_a_wrench_that_is_only_held_makes_none_under_the_controller(hand, every):
-    assert press(hand, every, told=0.0).counters.passivity.least_energy >= NEVER_LESS
+def test_holding_the_last_wrench_creates_no_energy_with_the_controller(hand, every):
+    assert press(hand, every, stiffness_scale=0.0).counters.passivity.least_energy >= NEVER_LESS
 
 
 @pytest.mark.parametrize("every", [1, 10])
 @pytest.mark.parametrize("hand", HANDS)
-def test_through_a_virtual_coupling_no_energy_is_made_without_the_controller(hand, every):
+def test_a_virtual_coupling_creates_no_energy_without_the_controller(hand, every):
     found = press(hand, every, passivity=False, coupling=VirtualCoupling())
     assert found.counters.passivity.least_energy >= NEVER_LESS
     assert found.force.max() < 700.0 * DEPTH
 
 
 TISSUE = changed(SCENES["grid2"], stroke="press", stretch=0.0, gravity=0.0, arm="touch", speed=0.2)
-"""A blade of 38 mm on gel of 10 kPa; what is between them has 1.5 kN/m."""
+"""Scene with a blade of 38 mm on gel of 10 kPa; their contact stiffness is 1.5 kN/m."""
 
 
 def press_tissue(every: int, hand: str) -> Simulation:
-    """Press, and then for 0.2 s hold, let go, or tap where the blade is."""
+    """Press, and then for 0.2 s hold, release, or tap."""
     simulation = prepare(changed(TISSUE, tissue_every=every))
     pressed = simulation.stroke.duration
     if hand == "taps":
         simulation.stroke = with_taps(simulation.stroke)
     simulation.run(pressed)
-    if hand == "lets go":
-        let_go(simulation.arm)
+    if hand == "releases":
+        release(simulation.arm)
     simulation.run(pressed + 0.2)
     return simulation
 
 
 def with_taps(stroke: Stroke) -> Stroke:
-    """The stroke, and then twice 6 mm back and in again."""
+    """Return the stroke followed by two taps, 6 mm back and in again."""
     times = np.linspace(0.0, 0.2, 101)[1:]
-    ways = -3e-3 * (1.0 - np.cos(2.0 * np.pi * 10.0 * times))
+    displacements = -3e-3 * (1.0 - np.cos(2.0 * np.pi * 10.0 * times))
     last = stroke.pose(stroke.duration)
     before = np.linspace(0.0, stroke.duration, 200)
     return Stroke(
         np.append(before, stroke.duration + times),
-        [stroke.pose(t) for t in before] + [shifted(last, way) for way in ways],
+        [stroke.pose(t) for t in before]
+        + [shifted(last, displacement) for displacement in displacements],
     )
 
 

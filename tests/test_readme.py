@@ -1,4 +1,4 @@
-"""The README and the pages of docs: their code runs, their commands and links exist."""
+"""The README and the pages in docs: their code runs, and their commands and links are valid."""
 
 import re
 import shlex
@@ -16,11 +16,11 @@ README = ROOT / "README.md"
 PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
 LARGEST_README = 10 * 1024
 HELPS = ("run", "view", "serve", "key", "materials", "figure", "validate", "bench peers")
-"""Commands whose `--help` has all options between them."""
+"""Commands whose `--help` texts together list all options."""
 
 
 def blocks(language: str) -> list[tuple[str, str]]:
-    """Return every block of code in that language, with its page and line for a message."""
+    """Return every block of code in a language, with its page and line."""
     found = []
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
@@ -41,7 +41,7 @@ def commands() -> list[tuple[str, list[str]]]:
     return found
 
 
-def of_page(case: tuple[str, object]) -> str:
+def page_of(case: tuple[str, object]) -> str:
     return case[0]
 
 
@@ -50,14 +50,14 @@ def in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
-@pytest.mark.parametrize("case", blocks("python"), ids=of_page)
-def test_every_block_of_python_runs_by_itself(case, in_folder):
+@pytest.mark.parametrize("case", blocks("python"), ids=page_of)
+def test_every_python_block_runs_on_its_own(case, in_folder):
     where, code = case
     exec(compile(code, where, "exec"), {"__name__": "__main__"})
 
 
 @pytest.mark.parametrize("case", commands(), ids=lambda case: " ".join(case[1]))
-def test_every_command_is_one_that_the_program_takes(case):
+def test_the_program_accepts_every_command(case):
     program: App = app
     program.parse_args(case[1], exit_on_error=False, print_error=False)
 
@@ -85,23 +85,23 @@ def test_the_arm_of_the_readme_is_the_example():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_what_a_page_shows_and_links_to_is_there(page):
+def test_all_files_that_a_page_links_to_exist(page):
     linked = re.findall(r"\]\((?!https?:)([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
     assert [path for path in linked if not (page.parent / path).exists()] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_the_sections_that_a_page_links_to_are_there(page):
+def test_all_sections_that_a_page_links_to_exist(page):
     text = page.read_text(encoding="utf-8")
     for path, section in re.findall(r"\]\((?!https?:)([^)#]*)#([^)]+)\)", text):
         target = (page.parent / path).read_text(encoding="utf-8") if path else text
         titles = re.findall(r"^#+ (.*)$", target, re.MULTILINE)
         known = {re.sub(r"[^\w\- ]", "", title).lower().replace(" ", "-") for title in titles}
-        assert section in known, f"{page.name}: #{section} is no section of {path or page.name}"
+        assert section in known, f"{page.name}: #{section} is not a section of {path or page.name}"
 
 
-def test_every_source_file_that_a_page_names_is_there():
-    """By its path from the root, or by the end of it: `tissue/tissue.py`, `anchors.py`."""
+def test_every_source_file_that_a_page_names_exists():
+    """Pages give the path from the root or the end of it: `tissue/tissue.py`, `anchors.py`."""
     folders = ("tissue", "bridge", "scalpel_sim", "tests", "benchmarks", "docs")
     there = {path.relative_to(ROOT).as_posix() for f in folders for path in (ROOT / f).rglob("*")}
     ends = {"/".join(path.split("/")[-n:]) for path in there for n in range(1, path.count("/") + 2)}
@@ -145,7 +145,7 @@ def test_the_options_that_a_page_names_are_those_of_the_program(capsys):
     assert named and {option for option in named if option not in known} == set()
 
 
-def test_the_two_commands_of_the_readme_are_the_ones_that_the_package_offers():
+def test_the_package_offers_the_two_commands_of_the_readme():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     text = README.read_text(encoding="utf-8")
     assert "\npip install uv && uv run scalpel-sim run\n" in text

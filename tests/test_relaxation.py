@@ -1,4 +1,4 @@
-"""Whichever way a body is relaxed it comes to the same rest, keeps what it must, and feels real."""
+"""Every relaxation gives the same equilibrium, cutting force and conservation of momentum."""
 
 import numpy as np
 import pytest
@@ -17,11 +17,11 @@ LAWS = {
     "springs and volumes": Material(viscous_damping=60.0, poisson_ratio=0.4),
     "tetrahedra": Material(viscous_damping=60.0, law="neo_hookean", poisson_ratio=0.4),
 }
-"""In thick oil, so that a second brings them to rest."""
+"""Materials with strong drag, so that a body comes to rest within a second."""
 
 
-def waited(mesh, material, relaxation, seconds=1.0):
-    """Return a body held at two sides that has sagged for that long."""
+def sagged_body(mesh, material, relaxation, seconds=1.0):
+    """Return a body held at two sides that has sagged for `seconds`."""
     tissue = Tissue(
         mesh, material, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
     )
@@ -35,9 +35,9 @@ def waited(mesh, material, relaxation, seconds=1.0):
     [*((NEVER_ASLEEP, law) for law in LAWS), (HIERARCHICAL, "springs")],
     ids=str,
 )
-def test_the_rest_is_that_of_all_nodes_together(relaxation, law):
+def test_the_equilibrium_is_that_of_global_relaxation(relaxation, law):
     mesh = bodies.jittered(3, 0)
-    expected, found = (waited(mesh, LAWS[law], how) for how in ("global", relaxation))
+    expected, found = (sagged_body(mesh, LAWS[law], choice) for choice in ("global", relaxation))
     apart = np.abs(found.snapshot().positions - expected.snapshot().positions).max()
     sag = np.abs(expected.snapshot().positions - mesh.positions).max()
     assert sag > 1e-4
@@ -45,18 +45,18 @@ def test_the_rest_is_that_of_all_nodes_together(relaxation, law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_body_that_fell_asleep_hangs_where_it_would_awake(law):
-    """Short of equilibrium by the share of the weight that wakes a node, of the sag, at most."""
+def test_a_sleeping_body_rests_where_it_would_awake(law):
+    """The error, as a share of the sag, is at most the share of gravity that wakes a node."""
     mesh = bodies.jittered(3, 0)
-    awake, asleep = (waited(mesh, LAWS[law], how) for how in (NEVER_ASLEEP, LOCAL))
+    awake, asleep = (sagged_body(mesh, LAWS[law], choice) for choice in (NEVER_ASLEEP, LOCAL))
     assert asleep._integrator.n_awake == 0
     apart = np.abs(asleep.snapshot().positions - awake.snapshot().positions).max()
     sag = np.abs(awake.snapshot().positions - mesh.positions).max()
     assert apart <= WAKE_ACCELERATION / 9.81 * sag
 
 
-def test_a_body_asleep_does_not_change_at_all():
-    tissue = waited(bodies.jittered(3, 0), LAWS["springs"], LOCAL)
+def test_a_sleeping_body_does_not_change_at_all():
+    tissue = sagged_body(bodies.jittered(3, 0), LAWS["springs"], LOCAL)
     before = tissue.snapshot()
     result = tissue.step(None, strokes.DT)
     for now, then in zip(tissue.snapshot(), before, strict=True):
@@ -68,14 +68,14 @@ def test_a_body_asleep_does_not_change_at_all():
 POKE = {"low": -0.01, "high": 0.05, "speed": 0.05}
 
 
-def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
+def test_a_body_woken_by_a_poke_responds_as_if_it_had_never_slept():
     mesh = block((6, 6, 6), (0.04, 0.04, 0.04))
-    pushed = []
-    for how in (LOCAL, NEVER_ASLEEP):
-        tissue = waited(mesh, LAWS["springs"], how)
+    runs = []
+    for choice in (LOCAL, NEVER_ASLEEP):
+        tissue = sagged_body(mesh, LAWS["springs"], choice)
         results = strokes.make(tissue, strokes.upright(0.02, -0.002, 0.003, **POKE))
-        pushed.append((tissue, np.array([r.wrench.force for r in results])))
-    (slept, force), (awake, expected) = pushed
+        runs.append((tissue, np.array([r.wrench.force for r in results])))
+    (slept, force), (awake, expected) = runs
     assert np.abs(expected).max() > 0.05
     np.testing.assert_allclose(force, expected, atol=0.02 * np.abs(expected).max())
     moved = np.abs(awake.snapshot().positions - mesh.positions).max()
@@ -83,7 +83,7 @@ def test_a_poke_wakes_a_body_and_it_gives_way_as_if_it_had_never_slept():
     assert apart < 0.02 * moved
 
 
-def test_far_from_a_small_poke_a_large_body_sleeps_on():
+def test_a_large_body_stays_asleep_far_from_a_small_poke():
     mesh = block((20, 6, 6), (0.4, 0.12, 0.12))
     tissue = Tissue(
         mesh,
@@ -122,7 +122,7 @@ def test_the_cutting_force_is_toughness_times_length(relaxation):
 @pytest.mark.parametrize("rings", [0, 2])
 @pytest.mark.parametrize("law", ["springs", "neo_hookean"])
 def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law, rings):
-    """Frame by frame, through splits and substeps; drag, which slows it, is off."""
+    """In every frame, through splits and substeps, without drag."""
     mesh = bodies.jittered(4, 0)
     material = Material(law=law, poisson_ratio=0.3, viscous_damping=0.0, toughness=5.0)
     relaxation = LocalTimeStepping(rings=rings)
@@ -143,22 +143,22 @@ def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(l
 @pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
 def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
     mesh = bodies.jittered(4, 0)
-    prints = []
+    fingerprints = []
     for _ in range(2):
         tissue = Tissue(
             mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
         )
         results = strokes.make(tissue, strokes.slanted(mesh))
         assert results[-1].cut_area > 0.0
-        prints.append(fingerprint(tissue, results))
-    assert prints[0] == prints[1]
+        fingerprints.append(fingerprint(tissue, results))
+    assert fingerprints[0] == fingerprints[1]
 
 
 @pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
 def test_arrays_that_grow_change_nothing(relaxation):
-    """Room that is there from the start, and room made in the middle of the cut."""
+    """Arrays with enough capacity from the start, and arrays that grow during the cut."""
     mesh = bodies.jittered(4, 0)
-    prints = []
+    fingerprints = []
     for n_doubled in (0, 2):
         tissue = Tissue(
             mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
@@ -169,8 +169,8 @@ def test_arrays_that_grow_change_nothing(relaxation):
             tissue._body.n_tetrahedra = len(tissue._body.tetrahedra)
             tissue._make_room()
             tissue._body.n_nodes, tissue._body.n_tetrahedra = n_nodes, n_tetrahedra
-        prints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
-    assert prints[0] == prints[1]
+        fingerprints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
+    assert fingerprints[0] == fingerprints[1]
 
 
 def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
@@ -192,10 +192,10 @@ def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
     assert result.body_contacts.force_of_floor[2] == pytest.approx(weight, rel=0.3)
 
 
-def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
-    """Nodes that a cut makes between fixed ones never move; contact must know where they are.
+def test_a_cut_between_fixed_nodes_creates_no_false_contacts():
+    """Nodes that a cut makes between fixed ones never move; contact must know their positions.
 
-    Once they were thought to come from the origin, through everything on the way.
+    A past error took them to have moved from the origin, through everything in between.
     """
     mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
     mesh = mesh._replace(positions=mesh.positions + 0.1)
@@ -204,10 +204,10 @@ def test_a_cut_through_what_is_held_fast_leaves_no_contact_out_of_nothing():
     tissue = Tissue(
         mesh, material, fixed=held, gravity=NO_GRAVITY, solver=SolverSettings(relaxation=LOCAL)
     )
-    strokes.make(tissue, strokes.straight(mesh, 0.3))  # from now on lips may touch
+    strokes.make(tissue, strokes.straight(mesh, 0.3))  # from here on lips may touch
     results = strokes.make(tissue, strokes.straight(mesh, 0.7))
-    made = tissue.snapshot().fixed[len(mesh.positions) :]
-    assert made.any()
+    new_fixed = tissue.snapshot().fixed[len(mesh.positions) :]
+    assert new_fixed.any()
     speed = np.linalg.norm(tissue.snapshot().velocities, axis=1).max()
     assert speed < 0.05
     assert max(r.body_contacts.penetration for r in results) < 1e-3

@@ -1,4 +1,4 @@
-"""Limits on the size of files and functions, and one home for each public name."""
+"""Limits on the size of files and functions, and one defining module for each public name."""
 
 import ast
 from collections import defaultdict
@@ -36,7 +36,7 @@ def arguments(function):
 
 
 def public_names(path):
-    """Return the functions, classes and constants that a file defines for others."""
+    """Return the public functions, classes and constants that a file defines."""
     names = set()
     for node in ast.parse(path.read_text()).body:
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
@@ -73,7 +73,7 @@ def test_no_function_takes_many_arguments():
 
 
 def test_public_functions_of_many_arguments_document_each():
-    bare = [
+    undocumented = [
         f"{named(p)}:{f.name}"
         for p in SOURCES
         for f in functions_of(p)
@@ -81,21 +81,21 @@ def test_public_functions_of_many_arguments_document_each():
         and not f.name.startswith("_")
         and "Args:" not in (ast.get_docstring(f) or "Args:")
     ]
-    assert bare == []
+    assert undocumented == []
 
 
-def test_every_public_name_has_one_home():
-    homes = defaultdict(list)
+def test_every_public_name_is_defined_in_one_module():
+    modules = defaultdict(list)
     for path in SOURCES:
         for name in public_names(path):
-            homes[name].append(named(path))
-    assert {name: paths for name, paths in homes.items() if len(paths) > 1} == {}
+            modules[name].append(named(path))
+    assert {name: paths for name, paths in modules.items() if len(paths) > 1} == {}
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_every_folder_says_what_it_holds(package):
     folders = {path.parent for path in SOURCES if path.is_relative_to(ROOT / package)}
-    silent = [
+    without_docstring = [
         f for f in folders if not ast.get_docstring(ast.parse((f / "__init__.py").read_text()))
     ]
-    assert silent == []
+    assert without_docstring == []

@@ -1,4 +1,4 @@
-"""Angles of tetrahedra, for tests of how good a mesh is."""
+"""Angles of tetrahedra, for tests of mesh quality."""
 
 import itertools
 

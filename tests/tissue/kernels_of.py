@@ -34,7 +34,7 @@ DENSITY, YOUNG_MODULUS = 1000.0, 10e3
 
 
 def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
-    """Return all that a cut step reads and writes, with room to grow, for a body that is whole."""
+    """Return the arrays of a cut step for an uncut body, with spare capacity."""
     n_nodes, n_tetrahedra = len(mesh.positions) + SPARE_NODES + 512, 8 * len(mesh.tetrahedra) + 4096
     return Cut(
         body=grown_body(build_body(mesh, None, None), n_nodes, n_tetrahedra),
@@ -48,7 +48,7 @@ def cut_of(mesh: TetrahedralMesh, n_samples: int = 2) -> Cut:
 
 
 def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
-    """Write every mass of the body; return the rows of its springs."""
+    """Compute the masses of the body in place; return its springs."""
     n = body.n_nodes
     capacity = len(body.rest)
     springs = no_springs(capacity, 40 * capacity + SPRING_POOL_MARGIN)
@@ -68,7 +68,7 @@ def springs_of(body: Body, young_modulus: float = YOUNG_MODULUS) -> Springs:
 
 
 def row(springs: Springs, node: int) -> dict[int, tuple[float, float]]:
-    """Return the springs of a node: neighbour to stiffness and rest pull."""
+    """Return the springs of a node: a dict of neighbour to (stiffness, rest pull)."""
     first = int(springs.first[node])
     slots = range(first, first + int(springs.count[node]))
     return {
@@ -78,13 +78,13 @@ def row(springs: Springs, node: int) -> dict[int, tuple[float, float]]:
 
 
 def dense_modes(body: Body, springs: Springs) -> FloatArray:
-    """Return M^-1/2 K M^-1/2 of the nodes that can move, of a body at rest [1/s2]."""
+    """Return M^-1/2 K M^-1/2 of the free nodes of a body at rest [1/s2]."""
     n = body.n_nodes
     stiffness = np.zeros((n, 3, n, 3))
     for i in range(n):
         for j, (k, _) in row(springs, i).items():
-            way = body.rest[j] - body.rest[i]
-            block = k * np.outer(way, way) / (way @ way)
+            direction = body.rest[j] - body.rest[i]
+            block = k * np.outer(direction, direction) / (direction @ direction)
             stiffness[i, :, i] += block
             stiffness[i, :, j] -= block
     free = np.repeat(~body.fixed[:n], 3)
@@ -93,7 +93,7 @@ def dense_modes(body: Body, springs: Springs) -> FloatArray:
 
 
 def elastic_of(springs: Springs) -> Elastic:
-    """Return springs with no tetrahedra."""
+    """Return the elastic arrays of a body with springs and no tetrahedra."""
     solid = no_solid(volume_term(0.0), 0, 0, room_for_stars(0, 0))
     frequencies = np.zeros(len(springs.first))
     return Elastic(
@@ -105,28 +105,28 @@ def elastic_of(springs: Springs) -> Elastic:
     )
 
 
-def tool_with(anchors: Anchors, material: Material = Material()) -> BladeState:
-    """Return a blade that is a line."""
+def line_blade(anchors: Anchors, material: Material = Material()) -> BladeState:
+    """Return the state of a blade without thickness, with these anchors."""
     return new_blade_state(anchors, None, material, 1.0, 0)
 
 
 class Network(NamedTuple):
-    """A body that moves by itself: no blade."""
+    """A body of springs that moves without being touched by a blade."""
 
     body: Body
     springs: Springs
-    tool: BladeState
+    blade: BladeState
     stages: Stages
     surroundings: Surroundings
 
     @property
     def context(self) -> StepContext:
-        """All that takes part in a step."""
+        """Return the context of an integration step."""
         n_nodes, n_tetrahedra = len(self.body.rest), len(self.body.tetrahedra)
         return StepContext(
             body=self.body,
             elastic=elastic_of(self.springs),
-            blade=self.tool,
+            blade=self.blade,
             contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
             surroundings=self.surroundings,
             stages=self.stages,
@@ -134,7 +134,7 @@ class Network(NamedTuple):
         )
 
     def forces(self) -> FloatArray:
-        """Return the forces on the nodes as they are and move now [N]."""
+        """Return the forces on the nodes at their current positions and velocities [N]."""
         out = np.zeros_like(self.body.positions)
         accelerations(self.context, out)
         return out * self.body.masses[:, None]
@@ -152,23 +152,23 @@ def network_of(
     retardation_time: float = 0.0,
     viscous_damping: float = 0.0,
 ) -> Network:
-    """Return the springs and masses of a mesh."""
+    """Return the network of springs of a mesh, at rest."""
     body = build_body(mesh, None, fixed)
     springs = springs_of(body)
     stages = new_stages(len(mesh.positions))
-    tool = tool_with(new_anchors(2, 1.0, YOUNG_MODULUS))
+    blade = line_blade(new_anchors(2, 1.0, YOUNG_MODULUS))
     surroundings = Surroundings(
         gravity=Vec3(0.0, 0.0, 0.0), drag=viscous_damping, retardation_time=retardation_time
     )
-    return Network(body, springs, tool, stages, surroundings)
+    return Network(body, springs, blade, stages, surroundings)
 
 
 def oscillator(
     frequency: float, retardation_time: float = 0.0, viscous_damping: float = 0.0
 ) -> Network:
-    """Return one mass of 1 kg on a spring along x, 1 m from the fixed node it hangs on.
+    """Return one mass of 1 kg on a spring along x, 1 m from the fixed node at its other end.
 
-    As long as it moves along x the spring is linear: x'' = -w^2 (x - 1) - 2 zeta w x'.
+    While it moves along x the spring is linear: x'' = -w^2 (x - 1) - 2 zeta w x'.
     """
     mesh = TetrahedralMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
     network = network_of(

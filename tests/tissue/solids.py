@@ -1,4 +1,4 @@
-"""A body of tetrahedra alone, no springs: its forces, its energy, and how it comes to rest."""
+"""A body of tetrahedra without springs: its forces, its energy and its relaxation."""
 
 from typing import NamedTuple
 
@@ -29,12 +29,12 @@ YOUNG_MODULUS = 10e3
 
 
 def law_of(poisson_ratio: float, averaged: bool = True) -> EnergyDensity:
-    """Return the neo-Hookean law of `YOUNG_MODULUS`."""
+    """Return the neo-Hookean law with Young's modulus `YOUNG_MODULUS`."""
     return neo_hookean(*lame(poisson_ratio), averaged=averaged)
 
 
 def lame(poisson_ratio: float) -> tuple[float, float]:
-    """Return Lame's mu and lam of `YOUNG_MODULUS` [Pa]."""
+    """Return Lame's mu and lam for Young's modulus `YOUNG_MODULUS` [Pa]."""
     mu = YOUNG_MODULUS / (2.0 * (1.0 + poisson_ratio))
     return mu, 2.0 * mu * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
 
@@ -55,19 +55,19 @@ class SolidBody(NamedTuple):
     solid: Solid
 
     def forces(self, positions: FloatArray) -> FloatArray:
-        """Return the forces on the nodes when they are at `positions` [N]."""
+        """Return the forces on the nodes at `positions` [N]."""
         n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
         out = np.zeros((n, 3))
         evaluate(self.solid, self.placed(positions), n_tetrahedra, n, out)
         return out
 
     def energy(self, positions: FloatArray) -> float:
-        """Return the elastic energy when they are at `positions`, less that at rest [J]."""
+        """Return the elastic energy of the nodes at `positions`, less that at rest [J]."""
         n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
         return solid_energy(self.solid, self.placed(positions), n_tetrahedra, n)
 
     def placed(self, positions: FloatArray) -> FloatArray:
-        """Return the positions as an array of the capacity of the body."""
+        """Copy the positions into the body; return its array, which has spare capacity."""
         self.body.positions[: len(positions)] = positions
         return self.body.positions
 
@@ -78,7 +78,7 @@ class SolidBody(NamedTuple):
     def relaxed(
         self, positions: FloatArray, seconds: float, drag: float, pull: FloatArray | None = None
     ) -> FloatArray:
-        """Return the positions after that time under drag [1/s] and dead loads `pull` [N].
+        """Return the positions after `seconds` under drag [1/s] and dead loads `pull` [N].
 
         The step is a sixth of the stable one at rest: crushed tetrahedra are stiffer.
         """
@@ -87,7 +87,7 @@ class SolidBody(NamedTuple):
         h = 2.0 / self.frequency() / 6.0
         load = np.zeros((n, 3)) if pull is None else pull
         scratch = np.zeros((2, n, 3))
-        swing(self.solid, self.body, x, load, scratch, h, drag, n_tetrahedra, int(seconds / h))
+        integrate(self.solid, self.body, x, load, scratch, h, drag, n_tetrahedra, int(seconds / h))
         return x[:n]
 
 
@@ -101,7 +101,7 @@ def solid_of(
 
 
 def built(body: Body, law: EnergyDensity) -> SolidBody:
-    """Return the solid of a body that has its masses."""
+    """Return the solid of a body whose masses are set."""
     n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))
     solid = no_solid(law, *room, room_for_stars(*room))
@@ -114,28 +114,32 @@ def built(body: Body, law: EnergyDensity) -> SolidBody:
 
 
 def moved(mesh: TetrahedralMesh, share: float = 0.1, seed: int = 0) -> FloatArray:
-    """Return positions at random around rest, by that share of the extent."""
+    """Return random positions around rest; the spread is a share of the extent."""
     noise = np.random.default_rng(seed).normal(size=mesh.positions.shape)
     return mesh.positions + share * np.ptp(mesh.positions) * noise
 
 
 def j_of(mesh: TetrahedralMesh, positions: FloatArray) -> FloatArray:
-    """Return J of each tetrahedron."""
+    """Return J of each tetrahedron: its volume over that at rest."""
     corners, rest = positions[mesh.tetrahedra], mesh.positions[mesh.tetrahedra]
     return np.linalg.det(corners[:, 1:] - corners[:, :1]) / np.linalg.det(rest[:, 1:] - rest[:, :1])
 
 
-def fastest(solid: SolidBody, positions: FloatArray | None = None) -> float:
-    """Return the largest angular frequency at rest or elsewhere [1/s], by differences of forces."""
+def highest_frequency(solid: SolidBody, positions: FloatArray | None = None) -> float:
+    """Return the highest angular frequency at rest or at `positions` [1/s]."""
     here = solid.body.rest[: solid.body.n_nodes].copy() if positions is None else positions
     free = np.repeat(~solid.body.fixed[: len(here)], 3)
     roots = np.sqrt(np.repeat(solid.body.masses[: len(here)], 3))
     step = 1e-6 * np.ptp(here)
 
     def product(u):
-        way = np.where(free, u.ravel() / roots, 0.0).reshape(-1, 3)
-        way = way / np.abs(way).max() if (longest := np.abs(way).max()) else way
-        pull = solid.forces(here - step * way) - solid.forces(here + step * way)
+        direction = np.where(free, u.ravel() / roots, 0.0).reshape(-1, 3)
+        direction = (
+            direction / np.abs(direction).max()
+            if (longest := np.abs(direction).max())
+            else direction
+        )
+        pull = solid.forces(here - step * direction) - solid.forces(here + step * direction)
         return np.where(free, longest * pull.ravel() / (2.0 * step) / roots, 0.0)
 
     n = len(roots)
@@ -156,7 +160,7 @@ def evaluate(
 
 
 @kernel
-def swing(
+def integrate(
     solid: Solid,
     body: Body,
     x: FloatArray,
@@ -167,7 +171,7 @@ def swing(
     n_tetrahedra: int,
     n_steps: int,
 ) -> None:
-    """Take steps of the simplest kind (symplectic Euler): a test of forces needs no better."""
+    """Take symplectic Euler steps, which are accurate enough for a test of forces."""
     v, f = scratch[0], scratch[1]
     n = body.n_nodes
     for _ in range(n_steps):

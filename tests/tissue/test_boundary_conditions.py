@@ -8,14 +8,14 @@ from tissue.mesh.faces import boundary_faces
 
 @pytest.mark.parametrize("side", SIDES)
 @pytest.mark.parametrize("cells", [(1, 1, 1), (4, 6, 4), (60, 2, 3)])
-def test_a_side_of_a_grid_is_its_plane_exactly(side, cells):
+def test_a_side_of_a_grid_is_exactly_its_plane(side, cells):
     mesh = block(cells, (0.04, 0.06, 0.01))
     axis, is_high = SIDES[side]
     plane = (0.04, 0.06, 0.01)[axis] if is_high else 0.0
     assert np.array_equal(side_nodes(mesh, [side]), mesh.positions[:, axis] == plane)
 
 
-def test_a_side_that_single_precision_has_bent_is_still_flat():
+def test_a_side_with_single_precision_errors_still_counts_as_flat():
     mesh = block((10, 2, 2))
     bent = mesh.positions.astype(np.float32) * np.float32(1.1) + np.float32(0.003)
     nodes = side_nodes(TetrahedralMesh(bent.astype(float), mesh.tetrahedra), ["right"])
@@ -23,7 +23,7 @@ def test_a_side_that_single_precision_has_bent_is_still_flat():
 
 
 @pytest.mark.parametrize("side", SIDES)
-def test_a_side_of_the_organ_is_a_cap_of_its_surface_that_holds_it(side):
+def test_a_side_of_the_organ_is_a_cap_of_its_surface_that_prevents_rotation(side):
     mesh = liver_lobe()
     axis, is_high = SIDES[side]
     nodes = side_nodes(mesh, [side])
@@ -34,13 +34,13 @@ def test_a_side_of_the_organ_is_a_cap_of_its_surface_that_holds_it(side):
     assert np.linalg.matrix_rank(mesh.positions[nodes] - mesh.positions[nodes][0], tol=1e-3) >= 2
 
 
-def test_a_side_that_ends_in_a_point_is_deepened_until_three_nodes_hold_it():
+def test_a_side_that_ends_in_a_point_is_deepened_until_it_has_three_nodes():
     tip = [[1.0, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     mesh = TetrahedralMesh(0.1 * np.array(tip), np.array([[0, 1, 3, 2]]))
     assert side_nodes(mesh, ["right"]).sum() >= 3
 
 
-def test_sides_add_up_and_may_be_written_as_one_text():
+def test_sides_can_be_combined_in_one_text():
     mesh = block()
     left_and_right = side_nodes(mesh, ["left"]) | side_nodes(mesh, ["right"])
     assert np.array_equal(fixed_nodes(mesh, " Left, right "), left_and_right)
@@ -82,12 +82,12 @@ def test_a_list_holds_the_nodes_in_it():
         ("nan,0,0:1,1,1", "finite"),
     ],
 )
-def test_a_text_that_names_nothing_is_refused_with_what_would_be_right(text, message):
+def test_a_text_that_selects_nothing_is_refused_with_valid_choices(text, message):
     with pytest.raises(ValueError, match=message):
         fixed_nodes(block(), text)
 
 
-def test_nodes_that_are_not_there_are_refused_by_number():
+def test_missing_nodes_are_refused_by_number():
     with pytest.raises(ValueError, match=r"no node 175; .* 0 to 174"):
         listed_nodes(block(), [3, 175])
     with pytest.raises(ValueError, match="whole numbers"):

@@ -10,7 +10,7 @@ from tissue import block
 from tissue.__main__ import cut_through, run_command
 
 
-def test_a_block_is_cut_into_two_and_every_stage_has_its_time(capsys):
+def test_a_block_is_cut_in_two_and_every_stage_is_timed(capsys):
     assert run_command(["--cells", "3", "4", "3", "--steps", "200"]) == 0
     out = capsys.readouterr().out
     for stage in ("CD", "GC", "RX", "all"):
@@ -38,15 +38,15 @@ def test_the_cut_area_is_that_of_the_leaning_blade_through_the_block():
         ["--cells", "100000", "100000", "1000"],
     ],
 )
-def test_a_wrong_option_is_one_clear_error(wrong, capsys):
+def test_a_wrong_option_gives_one_clear_error(wrong, capsys):
     with pytest.raises(SystemExit) as stopped:
         run_command(wrong)
     assert stopped.value.code == 2
     assert "error:" in capsys.readouterr().err.splitlines()[-1]
 
 
-def test_the_engine_stands_alone():
-    """No arm, no window, no network: nothing of MuJoCo, FCL, sockets or meshcat is imported."""
+def test_the_engine_imports_no_arm_collision_or_viewer_package():
+    """Neither MuJoCo, FCL and meshcat nor the other packages of the project are imported."""
     program = (
         "import sys, tissue.tissue, tissue.__main__\n"
         "print({'mujoco', 'fcl', 'meshcat', 'bridge', 'scalpel_sim'} & set(sys.modules))"

@@ -8,7 +8,7 @@ from tissue import Material, Tissue, block
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "message"),
     [
         ({"law": "spring"}, "no law is called 'spring'. Known: springs, neo_hookean"),
         ({"poisson_ratio": np.nan}, "poisson_ratio is nan"),
@@ -19,19 +19,19 @@ from tissue import Material, Tissue, block
         ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),
     ],
 )
-def test_what_no_material_can_be_is_refused_and_the_error_says_what_can(changes, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_impossible_material_is_refused_with_the_valid_range(changes, message):
+    with pytest.raises(ValueError, match=message):
         Material(**changes)
 
 
-def test_lames_constants_are_those_of_the_text_book():
+def test_lames_constants_are_those_of_the_textbook():
     material = Material(young_modulus=3.0, poisson_ratio=0.45)
     bulk = material.lam + 2.0 / 3.0 * material.mu
     assert bulk == pytest.approx(material.young_modulus / (3.0 * (1.0 - 2.0 * 0.45)))
     assert material.mu == pytest.approx(3.0 / 2.9)
 
 
-def test_at_a_quarter_springs_are_van_gelders_and_need_no_volume_term():
+def test_at_poissons_ratio_a_quarter_springs_need_no_volume_term():
     material = Material(young_modulus=10e3, poisson_ratio=0.25)
     assert material.volume_modulus == 0.0
     assert material.spring_modulus == pytest.approx(10e3, rel=1e-15)
@@ -59,7 +59,7 @@ def test_the_damping_ratio_holds_at_both_ends_of_the_band_and_is_less_between(nu
     assert 0.0 < material.damping_ratio(30.0) < 0.1
 
 
-def test_without_a_band_damping_is_viscosity_alone():
+def test_without_a_band_damping_is_by_retardation_alone():
     material = Material().with_damping(0.05, 10.0)
     assert material.viscous_damping == 0.0
     assert material.retardation_time == pytest.approx(2.0 * 0.05 / (2.0 * math.pi * 10.0))
@@ -67,19 +67,19 @@ def test_without_a_band_damping_is_viscosity_alone():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ((-0.1, 5.0), "damping ratio is -0.1"),
         ((0.1, 0.0), "frequency is 0.0 Hz"),
         ((0.1, 5.0, 5.0), "up_to is 5.0 Hz; it must be above frequency"),
     ],
 )
-def test_a_damping_that_means_nothing_is_refused(arguments, told):
-    with pytest.raises(ValueError, match=told):
+def test_an_impossible_damping_is_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
         Material().with_damping(*arguments)
 
 
-def test_a_ratio_that_makes_time_steps_short_is_used_and_told(caplog):
+def test_a_poisson_ratio_that_makes_time_steps_short_is_used_with_a_warning(caplog):
     caplog.set_level(logging.WARNING, logger="tissue")
     mesh = block((1, 1, 1), (0.03, 0.03, 0.03))
     Tissue(mesh, Material(poisson_ratio=0.49))

@@ -2,7 +2,7 @@ import pytest
 
 from tissue import DAMPING_BAND, MATERIALS, Preset
 
-FIGURES = (
+QUANTITIES = (
     "young_modulus",
     "poisson_ratio",
     "density",
@@ -12,22 +12,24 @@ FIGURES = (
 )
 
 
-def test_the_tissues_that_surgeons_meet_and_the_phantoms_that_stand_for_them_are_there():
+def test_there_are_presets_of_common_tissues_and_phantoms():
     assert list(MATERIALS) == ["liver", "kidney", "skin", "fat", "muscle", "gelatin", "silicone"]
 
 
 @pytest.mark.parametrize("preset", MATERIALS.values(), ids=list(MATERIALS))
-def test_a_figure_says_how_it_was_measured_and_a_measured_one_says_by_whom(preset: Preset):
-    for name in FIGURES:
-        figure = getattr(preset, name)
-        assert figure.measured
-        assert figure.source or not figure.is_confirmed or figure.measured.startswith("chosen")
+def test_every_value_has_a_method_and_a_measured_one_a_source(preset: Preset):
+    for name in QUANTITIES:
+        quantity = getattr(preset, name)
+        assert quantity.measured
+        assert (
+            quantity.source or not quantity.is_confirmed or quantity.measured.startswith("chosen")
+        )
 
 
 @pytest.mark.parametrize("preset", MATERIALS.values(), ids=list(MATERIALS))
-def test_a_preset_is_the_material_that_it_says(preset: Preset):
+def test_the_material_of_a_preset_has_its_values(preset: Preset):
     material = preset.material
-    for name in FIGURES[:-1]:
+    for name in QUANTITIES[:-1]:
         assert getattr(material, name) == getattr(preset, name).value
     assert material.law == "neo_hookean"
     for frequency in DAMPING_BAND:

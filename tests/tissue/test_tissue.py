@@ -1,4 +1,4 @@
-"""The border of the engine: what it takes, what it refuses, what it hands out."""
+"""The interface of `Tissue`: arguments, refusals and results."""
 
 import gc
 import weakref
@@ -47,16 +47,16 @@ def test_a_blade_that_faces_along_its_own_edge_is_refused(tissue, forward):
 
 
 @pytest.mark.parametrize(
-    "turned",
+    "rotated",
     [
         {"forward": -POSE.forward},
         {"forward": np.array([1.0, 0.0, 0.0])},
         {"tip": POSE.heel, "heel": POSE.tip},
     ],
 )
-def test_a_blade_that_turns_by_a_right_angle_in_one_step_is_refused(tissue, turned):
+def test_a_blade_that_turns_by_a_right_angle_in_one_step_is_refused(tissue, rotated):
     with pytest.raises(ValueError, match="smaller steps"):
-        tissue.step(sweep_to(**turned), 1e-3)
+        tissue.step(sweep_to(**rotated), 1e-3)
 
 
 @pytest.mark.parametrize("dt", [-1e-3, np.nan, np.inf])
@@ -65,7 +65,7 @@ def test_a_time_step_that_is_negative_or_not_finite_is_refused(tissue, dt):
         tissue.step(None, dt)
 
 
-def test_what_is_refused_changes_nothing(tissue):
+def test_a_refused_step_changes_nothing(tissue):
     before = tissue.snapshot()
     with pytest.raises(ValueError, match="no length"):
         tissue.step(sweep_to(heel=POSE.tip), 1e-3)
@@ -91,7 +91,7 @@ def test_a_broken_mesh_is_refused(fault):
         Tissue(BROKEN[fault])
 
 
-def test_a_mesh_that_would_have_to_be_repaired_is_refused():
+def test_a_mesh_that_needs_repair_is_refused():
     unused = MESH._replace(positions=np.vstack([MESH.positions, [1.0, 1.0, 1.0]]))
     with pytest.raises(MeshError, match="checked"):
         Tissue(unused)
@@ -122,7 +122,7 @@ def test_a_material_with_a_quantity_of_the_wrong_sign_is_refused_by_name(name, v
         Material(**{name: value})
 
 
-def test_the_engine_keeps_its_own_copy_of_what_it_is_given(tissue):
+def test_the_engine_copies_its_arguments(tissue):
     mesh = TetrahedralMesh(MESH.positions.copy(), MESH.tetrahedra.copy())
     positions, fixed = mesh.positions.copy(), bodies.sides(mesh)
     tissue = Tissue(mesh, fixed=fixed, positions=positions)
@@ -140,12 +140,12 @@ def test_a_snapshot_is_a_copy(tissue):
     assert tissue.n_nodes == 27
 
 
-def test_bounds_are_the_lowest_and_highest_corner_now(tissue):
+def test_bounds_are_the_current_lowest_and_highest_corner(tissue):
     np.testing.assert_allclose(tissue.bounds, [[0.0] * 3, [0.04] * 3])
     np.testing.assert_array_equal(tissue.step(None, 1e-3).bounds, tissue.bounds)
 
 
-def test_a_fixed_node_stays_where_it_was_put():
+def test_a_fixed_node_stays_at_its_given_position():
     stretched = MESH.positions * [1.2, 1.0, 1.0]
     tissue = Tissue(MESH, fixed=bodies.sides(MESH), positions=stretched)
     for _ in range(50):
@@ -154,7 +154,7 @@ def test_a_fixed_node_stays_where_it_was_put():
     np.testing.assert_array_equal(tissue.snapshot().positions[fixed], stretched[fixed])
 
 
-def test_a_body_held_below_settles_to_bear_its_weight():
+def test_a_body_held_at_its_bottom_settles_under_its_weight():
     """The springs of the held nodes carry the whole weight above them."""
     low = MESH.positions[:, 2] == 0.0
     tissue = Tissue(MESH, fixed=low)
@@ -167,14 +167,14 @@ def test_a_body_held_below_settles_to_bear_its_weight():
     np.testing.assert_allclose(tissue.snapshot().positions, body.positions, atol=2e-6)
 
 
-def test_time_that_does_not_pass_moves_nothing(tissue):
+def test_a_step_of_zero_length_moves_nothing(tissue):
     before = tissue.snapshot().positions
     result = tissue.step(BladeSweep(POSE, POSE), 0.0)
     np.testing.assert_array_equal(tissue.snapshot().positions, before)
     assert np.isfinite(result.wrench.force).all()
 
 
-def test_a_step_says_where_its_time_went(tissue):
+def test_a_step_reports_the_times_of_its_stages(tissue):
     results = strokes.make(tissue, strokes.slanted(MESH))
     assert all(min(r.stage_times) >= 0.0 for r in results)
     assert max(r.stage_times.topology for r in results) > 0.0
@@ -182,20 +182,20 @@ def test_a_step_says_where_its_time_went(tissue):
     assert max(r.n_active for r in results) > 0
 
 
-def test_the_tetrahedron_of_the_tip_holds_the_tip():
+def test_the_active_point_tetrahedron_contains_the_tip():
     mesh = block((4, 6, 4), (0.04, 0.06, 0.04))
     tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=(0.0, 0.0, 0.0))
     stroke = strokes.upright(0.0217, -0.005, 0.03, 0.0183, 0.05)
     last = strokes.make(tissue, stroke)[-1]
     body = tissue.snapshot()
     corners = body.rest_positions[body.tetrahedra[last.active_point_tetrahedron]]
-    # In the body at rest the tip trails behind the blade, by as much as the tissue is dragged.
+    # In the rest shape the tip lags behind the blade, by as much as the tissue is dragged.
     assert np.abs(corners[:, 0].mean() - 0.0217) < 0.01
     assert np.abs(corners[:, 2].mean() - 0.0183) < 0.01
     assert 0.01 < corners[:, 1].mean() < 0.035
 
 
-def test_another_blade_lets_go_of_what_the_first_one_held(tissue):
+def test_a_blade_of_another_length_starts_with_new_anchors(tissue):
     strokes.make(tissue, strokes.upright(0.0187, -0.01, 0.02, -0.01, 0.05))
     held = tissue.step(sweep_of(0.02, 0.06), 1e-3)
     other = tissue.step(sweep_of(0.02, 0.03), 1e-3)
@@ -209,16 +209,16 @@ def sweep_of(y, length):
     return BladeSweep(pose, pose)
 
 
-def test_without_a_blade_the_body_hangs_and_swings(tissue):
-    hanging = Tissue(MESH, fixed=bodies.sides(MESH))
-    result = hanging.step(None, 1e-3)
+def test_without_a_blade_the_body_sags_under_gravity(tissue):
+    sagging = Tissue(MESH, fixed=bodies.sides(MESH))
+    result = sagging.step(None, 1e-3)
     assert result.anchored_length == 0.0
     assert not np.any(result.wrench.force)
-    assert hanging.snapshot().velocities[:, 2].min() < 0.0
+    assert sagging.snapshot().velocities[:, 2].min() < 0.0
 
 
 def test_a_tissue_that_is_no_longer_used_is_freed_at_once():
-    """Without waiting for Python to look for cycles: a server makes one for each client."""
+    """It does not wait for the garbage collector: a server makes one for each client."""
     gc.disable()
     try:
         tissue = Tissue(MESH)

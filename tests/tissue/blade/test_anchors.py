@@ -1,9 +1,9 @@
-"""The edge anchors: which are set, when they slip, and that action is reaction."""
+"""Edge anchors: where they are set, when they slip, and that action equals reaction."""
 
 import numpy as np
 import pytest
 
-from tests.tissue.kernels_of import springs_of, tool_with
+from tests.tissue.kernels_of import line_blade, springs_of
 from tissue import Material, block
 from tissue.blade.anchors import (
     ANCHORED,
@@ -44,24 +44,24 @@ BOX = (Vec3(0.0, 0.0, 0.0), Vec3(0.02, 0.04, 0.02))
 
 N = 5
 REACH = 0.005
-"""`BladeState.reach` [m]."""
+"""Reach of the blade state [m]."""
 
 
 def edge_at(y, x=0.011, z=0.001, length=0.016):
-    """An upright edge inside the block, that stays where it is and faces along y."""
+    """Return an upright edge inside the block that does not move and faces along y."""
     tip, heel, forward = Vec3(x, y, z), Vec3(x, y, z + length), Vec3(0.0, 1.0, 0.0)
     return Edge(tip, heel, forward, tip, heel, forward)
 
 
-class Held:
-    """A block that five samples of the edge are anchored in, at y = 9 mm."""
+class AnchoredBlade:
+    """A block in which five samples of the edge are anchored, at y = 9 mm."""
 
     def __init__(self):
         self.body = build_body(BLOCK, None, None)
         self.springs = springs_of(self.body)
         self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
         self.anchors = new_anchors(N, 0.016, STIFF)
-        self.blade = tool_with(self.anchors, Material(toughness=TOUGH)).replaced(reach=REACH)
+        self.blade = line_blade(self.anchors, Material(toughness=TOUGH)).replaced(reach=REACH)
         self.forces = np.zeros_like(self.body.rest)
         grid = build_grid(self.body, self.body.positions, 0.0)
         anchor_entering(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3, *BOX)
@@ -81,17 +81,17 @@ class Held:
 
 @pytest.fixture
 def held():
-    return Held()
+    return AnchoredBlade()
 
 
 def is_zero(totals):
-    """Return whether blade and tissue gave each other no impulse."""
+    """Return whether there was no impulse between blade and tissue."""
     impulses = (totals.impulse, totals.angular_impulse, totals.impulse_on_tissue)
     return not np.concatenate(impulses).any()
 
 
 THRESHOLD = TOUGH / (4.0 * STIFF)
-"""How far the edge is ahead of its anchors when they begin to slip [m]: J l / (4 E l)."""
+"""Distance of the edge ahead of its anchors at which they begin to slip [m]: J l / (4 E l)."""
 
 
 def test_a_sample_in_the_tissue_is_anchored_where_it_is(held):
@@ -126,7 +126,7 @@ def test_a_pull_below_toughness_times_length_does_not_slip(held):
     assert held.blade.totals.work_of_cutting == 0.0
 
 
-def test_a_stronger_pull_slips_until_toughness_times_length_is_left(held):
+def test_a_stronger_pull_slips_until_toughness_times_length_remains(held):
     edge = edge_at(0.009 + 3.0 * THRESHOLD)
     held.slip(edge)
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.0 * THRESHOLD, rtol=1e-12)
@@ -134,7 +134,7 @@ def test_a_stronger_pull_slips_until_toughness_times_length_is_left(held):
     assert totals.impulse_on_tissue[1] == pytest.approx(TOUGH * 0.016, rel=1e-12)
 
 
-def test_skin_holds_more_until_it_breaks_and_then_as_much_as_the_rest(held):
+def test_skin_resists_more_until_it_breaks_and_then_as_much_as_the_tissue_below(held):
     held.set_toughness(toughness=TOUGH, skin_toughness=3.0 * TOUGH)
     before = held.anchors.rest.copy()
     held.slip(edge_at(0.009 + 2.9 * THRESHOLD))
@@ -142,12 +142,12 @@ def test_skin_holds_more_until_it_breaks_and_then_as_much_as_the_rest(held):
     held.slip(edge_at(0.009 + 3.1 * THRESHOLD))
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009 + 2.1 * THRESHOLD, rtol=1e-12)
     assert not held.anchors.at_skin.any()
-    # The spring gives (9 - 1) / 2 and 3 x 0.1 of surplus, the area takes 2.1; the rest is breaking.
+    # The spring releases (9 - 1) / 2 plus 3 x 0.1 and the area takes 2.1; the rest breaks the skin.
     unit = TOUGH * 0.016 * THRESHOLD
     assert held.blade.totals.work_of_breaking == pytest.approx(2.2 * unit, rel=1e-6)
 
 
-def test_an_edge_that_goes_faster_is_held_harder(held):
+def test_a_faster_edge_meets_more_resistance(held):
     held.set_toughness(toughness=TOUGH, toughness_exponent=1.0, toughness_speed=0.1)
     fast = edge_at(0.009 + 5.0 * THRESHOLD)
     slow = edge_at(0.009 + 5.0 * THRESHOLD - 1e-4)
@@ -169,14 +169,14 @@ def test_slipping_further_costs_toughness_times_area(held):
     assert work == pytest.approx(TOUGH * 0.016 * slipped, rel=2e-3)
 
 
-def test_a_pull_across_the_flat_never_slips(held):
+def test_a_pull_across_the_side_face_never_slips(held):
     before = held.anchors.rest.copy()
     held.slip(edge_at(0.009, x=0.011 + 10.0 * THRESHOLD))
     np.testing.assert_allclose(held.anchors.rest, before, atol=1e-12)
     assert held.blade.totals.work_of_cutting == 0.0
 
 
-def test_a_blade_that_backs_off_pulls_nothing_and_is_anchored_again_where_it_was(held):
+def test_a_blade_that_backs_off_has_no_force_and_is_anchored_again_where_it_was(held):
     before = held.anchors.rest.copy()
     held.slip(edge_at(0.009 - 0.001))
     assert (held.anchors.state == RETRACTED).all()
@@ -186,21 +186,21 @@ def test_a_blade_that_backs_off_pulls_nothing_and_is_anchored_again_where_it_was
     np.testing.assert_array_equal(held.anchors.rest, before)
 
 
-def test_a_blade_that_backs_off_and_goes_aside_beyond_reach_is_free(held):
+def test_a_blade_that_backs_off_and_moves_aside_beyond_reach_is_free(held):
     held.slip(edge_at(0.003, x=0.019))
     assert (held.anchors.state == FREE).all()
 
 
-@pytest.mark.parametrize(("first", "goes_on"), [(N - 1, True), (0, False)])
-def test_the_path_of_a_freed_sample_goes_on_beside_an_anchored_one_and_else_begins_again(
-    held, first, goes_on
+@pytest.mark.parametrize(("first", "continues"), [(N - 1, True), (0, False)])
+def test_the_path_of_a_freed_sample_continues_beside_an_anchored_one_and_else_restarts(
+    held, first, continues
 ):
     path = new_path(N)
     path.known[:] = True
     held.anchors.state[first:] = RETRACTED
     free_retracted(held.blade, held.body, held.visits, path, pose_at(edge_at(0.012), 1.0))
     assert (held.anchors.state[first:] == FREE).all()
-    assert path.known[N - 1] == goes_on
+    assert path.known[N - 1] == continues
 
 
 def test_backing_off_is_counted_as_released_energy(held):
@@ -209,14 +209,14 @@ def test_backing_off_is_counted_as_released_energy(held):
     assert held.blade.totals.released == pytest.approx(0.5 * stiffness * 0.001**2, rel=1e-9)
 
 
-def test_a_sample_that_slips_out_through_the_skin_has_left(held):
+def test_a_sample_that_slips_out_through_the_skin_is_marked_as_left(held):
     for i in range(40):
         held.slip(edge_at(0.009 + i * 0.001))
     assert (held.anchors.state == LEFT).all()
 
 
-def pushed(held):
-    """The block squeezed and shifted at random, the edge ahead of it and turned."""
+def deform(held):
+    """Move the nodes of the block at random; return an edge ahead of its anchors, rotated."""
     random = np.random.default_rng(0)
     held.body.positions[:] += random.normal(size=held.body.rest.shape) * 5e-4
     tip, heel = Vec3(0.0115, 0.0096, 0.0012), Vec3(0.0107, 0.0102, 0.0171)
@@ -224,7 +224,7 @@ def pushed(held):
 
 
 def test_force_on_the_nodes_plus_force_on_the_blade_is_zero(held):
-    totals = held.pull(pushed(held))
+    totals = held.pull(deform(held))
     on_blade = totals.impulse
     assert np.linalg.norm(on_blade) > 0.1
     np.testing.assert_allclose(held.forces.sum(axis=0) + on_blade, 0.0, atol=1e-14)
@@ -233,21 +233,21 @@ def test_force_on_the_nodes_plus_force_on_the_blade_is_zero(held):
 
 @pytest.mark.parametrize("about", [(0.0, 0.0, 0.0), (0.3, -1.0, 2.0)])
 def test_torques_about_any_point_cancel(held, about):
-    totals = held.pull(pushed(held))
+    totals = held.pull(deform(held))
     on_blade = totals.angular_impulse - np.cross(about, totals.impulse)
     on_nodes = np.cross(held.body.positions - about, held.forces).sum(axis=0)
     np.testing.assert_allclose(on_blade + on_nodes, 0.0, atol=1e-12)
 
 
-def test_forces_are_cleared_where_anchors_were(held):
-    held.pull(pushed(held))
+def test_clearing_anchor_forces_leaves_no_force_on_the_nodes(held):
+    held.pull(deform(held))
     clear_anchor_forces(held.anchors, held.body, held.forces)
     assert not held.forces.any()
 
 
 def test_the_work_of_the_blade_is_force_times_displacement(held):
     tip, heel, forward = Vec3(0.011, 0.009, 0.001), Vec3(0.011, 0.009, 0.017), Vec3(0.0, 1.0, 0.0)
-    to = Edge(
+    moved_edge = Edge(
         tip,
         heel,
         forward,
@@ -255,12 +255,12 @@ def test_the_work_of_the_blade_is_force_times_displacement(held):
         heel._replace(y=0.0091),
         forward,
     )
-    held.pull(to)
+    held.pull(moved_edge)
     stiffness = 4.0 * STIFF * 0.016
     assert held.blade.totals.work_of_blade == pytest.approx(stiffness * 1e-4 * 1e-4, rel=1e-9)
 
 
-def test_the_neighbours_of_an_anchored_sample_that_are_inside_are_anchored_too(held):
+def test_free_neighbours_of_an_anchored_sample_inside_the_tissue_are_anchored(held):
     held.anchors.state[:] = FREE
     held.anchors.state[2] = ANCHORED
     anchor_beside(held.blade, held.body, held.visits, pose_at(edge_at(0.0095), 1.0))
@@ -278,7 +278,7 @@ def test_anchors_raise_the_bound_on_frequency_by_their_stiffness(held):
     assert frequency_with_blade(held.blade, held.body, none, scratch) == 0.0
 
 
-def test_anchored_length_is_that_of_the_samples_that_pull(held):
+def test_anchored_length_is_that_of_the_anchored_samples(held):
     assert anchored_length(held.anchors) == pytest.approx(0.016)
     held.anchors.state[0] = RETRACTED
     assert anchored_length(held.anchors) == pytest.approx(0.014)
@@ -290,18 +290,18 @@ def test_an_anchor_moves_with_its_material_point(held):
     assert at == pytest.approx((0.011, 0.018, 0.501))
 
 
-def test_a_stretched_body_maps_a_step_back_to_rest(held):
+def test_a_displacement_in_a_stretched_body_is_mapped_back_to_rest(held):
     held.body.positions[:] = held.body.rest * [1.0, 1.5, 1.0]
     assert to_material(held.body, 0, Vec3(0.0, 0.003, 0.0)) == pytest.approx((0.0, 0.002, 0.0))
 
 
-def test_a_step_in_a_squashed_tetrahedron_stays_as_it_is(held):
+def test_a_displacement_in_a_crushed_tetrahedron_is_not_changed(held):
     held.body.positions[:] = held.body.rest * [1.0, 1e-3, 1.0]
     assert to_material(held.body, 0, Vec3(0.0, 0.003, 0.0)) == (0.0, 0.003, 0.0)
 
 
 def test_a_search_goes_around_the_rim_of_a_cut(held):
-    """The block is cut at y = 20 mm but for its right half; the search leads around."""
+    """The left half of the block is cut at y = 20 mm; the search goes around the cut."""
     body = held.body
     rest = body.rest[body.tetrahedra]
     for t, f in np.argwhere(body.links >= 0):
@@ -316,14 +316,14 @@ def test_a_search_goes_around_the_rim_of_a_cut(held):
     assert body.rest[body.tetrahedra[place.tetrahedron], 1].mean() > 0.02
 
 
-def test_a_search_that_ends_at_the_skin_says_so(held):
+def test_a_search_that_ends_at_the_skin_reports_it(held):
     place = locate(held.body, held.visits, Vec3(0.01, 0.5, 0.01), 0, held.blade.queue)
     assert not place.inside
     assert place.beyond_skin
     assert OUTER in held.body.links[place.tetrahedron]
 
 
-def test_an_anchor_beyond_the_tissue_is_put_at_a_point_of_it(held):
+def test_an_anchor_outside_the_tissue_is_moved_into_it(held):
     set_anchor(held.anchors, held.body, 0, 0, Vec3(0.011, 0.0, -0.5))
     assert (held.anchors.weights[0] >= 0.0).all()
     assert held.anchors.weights[0].sum() == pytest.approx(1.0)

@@ -45,14 +45,14 @@ def test_samples_reach_from_the_tip_to_the_heel():
     np.testing.assert_allclose(np.diff(points, axis=0), np.diff(points, axis=0)[[0]].repeat(4, 0))
 
 
-def test_a_sample_moves_from_its_place_in_the_first_pose_to_that_in_the_last():
+def test_a_sample_moves_from_its_position_in_the_first_pose_to_that_in_the_last():
     before, after = (sample_point(pose_at(TURNING, when), 3, 5) for when in (0.0, 1.0))
     moved = sample_displacement(TURNING, 3, 5)
     np.testing.assert_allclose(moved, np.subtract(after, before), atol=1e-17)
 
 
 @pytest.mark.parametrize("when", [0.0, 0.5, 1.0])
-def test_a_point_of_the_blade_moves_as_its_coordinates_do_not_change(when):
+def test_a_point_fixed_to_the_blade_moves_as_its_constant_coordinates_say(when):
     motion, at = motion_at(TURNING, when), np.array([0.015, -0.004, 0.0005])
 
     def place(pose):
@@ -63,7 +63,7 @@ def test_a_point_of_the_blade_moves_as_its_coordinates_do_not_change(when):
     np.testing.assert_allclose(moved, expected, atol=1e-16)
 
 
-def test_coordinates_on_the_blade_are_those_of_its_axes():
+def test_blade_coordinates_are_measured_along_its_axes():
     at = blade_coordinates(pose_at(STILL, 1.0), Vec3(0.002, -0.01, 0.014))
     np.testing.assert_allclose(at[:2], [0.014, 0.01], atol=1e-15)
     assert abs(at.across) == pytest.approx(0.002)

@@ -1,4 +1,4 @@
-"""A blade is in its slit beside a cut face; not before the rim, below the bottom or across it."""
+"""A blade is in a slit beside a cut face, not ahead of its rim, below its bottom or across it."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ UP, AHEAD, ACROSS = Vec3(0.0, 0.0, 1.0), Vec3(0.0, 1.0, 0.0), Vec3(1.0, 0.0, 0.0
 
 @pytest.fixture(scope="module")
 def slit_body():
-    """A cube with a slit at x = 20 mm, from y = 0 to 20 mm, from its top down to z = 20 mm."""
+    """Return a cube with a slit at x = 20 mm, from y = 0 to 20 mm and from z = 20 mm to the top."""
     tissue = Tissue(block((4, 4, 4), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))
     y = np.linspace(-0.01, 0.02, 31)
     edges = [[[0.02, at, 0.02], [0.02, at, 0.05]] for at in y]
@@ -37,7 +37,7 @@ def test_a_blade_along_a_cut_face_on_either_side_is_in_the_slit(slit_body, x):
     assert in_slit(slit_body, x, 0.011, 0.033)
 
 
-def test_a_blade_a_few_reaches_beside_the_cut_is_in_whole_tissue(slit_body):
+def test_a_blade_several_reaches_beside_the_cut_is_in_whole_tissue(slit_body):
     assert not in_slit(slit_body, 0.025, 0.011, 0.033)
 
 
@@ -60,7 +60,7 @@ def test_a_body_without_a_cut_has_no_slit():
 
 @pytest.mark.kernel
 @pytest.mark.parametrize(
-    ("place", "expected"),
+    ("point", "expected"),
     [
         ((0.0, -0.5, 0.5), True),
         ((0.0, 0.5, 0.5), False),
@@ -70,9 +70,9 @@ def test_a_body_without_a_cut_has_no_slit():
     ],
     ids=["behind", "ahead", "below the tip", "above the heel", "behind, aside"],
 )
-def test_a_point_is_behind_the_edge_between_tip_and_heel_only(place, expected):
+def test_a_point_is_behind_the_edge_between_tip_and_heel_only(point, expected):
     path = new_path(3)
     path.t1[:] = [[0.0, 0.0, z] for z in (0.0, 0.5, 1.0)]
     path.forward[:] = [0.0, 1.0, 0.0]
     path.linked[:2] = True
-    assert is_behind_edge(path, Vec3(*place)) == expected
+    assert is_behind_edge(path, Vec3(*point)) == expected

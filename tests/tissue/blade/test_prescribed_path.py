@@ -1,4 +1,4 @@
-"""The path of an edge that is given: samples advance or wait, and find their tetrahedra."""
+"""The prescribed path of an edge: samples advance or wait, and find their tetrahedra."""
 
 import numpy as np
 import pytest
@@ -22,15 +22,15 @@ def at(y: float) -> np.ndarray:
 
 
 @pytest.fixture
-def begun():
-    """A unit cube, its grid, and an edge that has not moved yet."""
+def started():
+    """Return a unit cube with an edge at the start of its path, and the grid of the cube."""
     cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)), n_samples=3)
     begin_path(cut.path, at(0.2))
     return cut, build_grid(cut.body, cut.body.rest, 0.0)
 
 
-def test_samples_move_to_the_given_points(begun):
-    cut, cells = begun
+def test_samples_move_to_the_given_points(started):
+    cut, cells = started
     there = at(0.3)
     prescribe_path(cut.path, cut.body, cells, there, AHEAD)
     np.testing.assert_array_equal(cut.path.t0, at(0.2))
@@ -38,25 +38,25 @@ def test_samples_move_to_the_given_points(begun):
     np.testing.assert_array_equal(cut.path.linked, [True, True, False])
 
 
-def test_a_sample_that_goes_back_waits_until_it_is_ahead_of_where_it_has_been(begun):
-    cut, cells = begun
+def test_a_sample_that_moves_back_waits_until_it_is_ahead_of_its_earlier_path(started):
+    cut, cells = started
     for y in (0.3, 0.1, 0.25, 0.4):
         prescribe_path(cut.path, cut.body, cells, at(y), AHEAD)
         assert cut.path.t1[0, 1] == pytest.approx(max(y, 0.3))
 
 
-def test_samples_inside_know_a_tetrahedron_that_holds_them(begun):
-    cut, cells = begun
+def test_samples_inside_have_a_seed_tetrahedron_that_contains_them(started):
+    cut, cells = started
     prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
     for k in range(2):
         corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
         assert (corners.min(axis=0) <= cut.path.t1[k]).all()
         assert (cut.path.t1[k] <= corners.max(axis=0)).all()
-    assert cut.path.seed[2] == -1  # far above, as is what its segment sweeps
+    assert cut.path.seed[2] == -1  # far above the body, as is the area that its segment sweeps
 
 
-def test_the_normal_of_the_blade_is_across_its_edge_and_its_motion(begun):
-    cut, cells = begun
+def test_the_normal_of_the_blade_is_across_its_edge_and_its_motion(started):
+    cut, cells = started
     prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
     np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)
 
@@ -68,7 +68,7 @@ def test_an_edge_is_divided_into_pieces_no_longer_than_the_spacing():
     np.testing.assert_allclose(finer[1, :, 2], np.linspace(0.0, 2.0, 9))
 
 
-def test_an_edge_is_divided_into_no_more_samples_than_there_may_be():
+def test_an_edge_is_divided_into_no_more_samples_than_allowed():
     rows = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]] * 2)
     assert resampled(rows, 1e-6, 50).shape[1] == 50
 

@@ -1,4 +1,4 @@
-"""The side faces of the blade: pressure, friction, and that action is reaction."""
+"""The side faces of the blade: pressure, friction, and that action equals reaction."""
 
 import itertools
 import math
@@ -32,17 +32,17 @@ MATERIAL = Material(blade_friction=0.5)
 BLOCK = block((2, 2, 2), (0.01, 0.01, 0.01))
 LENGTH = 0.03
 NODE_SIZE = 4e-3
-"""Faces are searched for within half of it [m]."""
+"""Node size of the body [m]; faces are searched for within half of it."""
 
 
 def edge_at(x, y=0.015, z=-0.01, forward=Vec3(0.0, 1.0, 0.0)):
-    """An upright blade across x, whose edge is behind the block and whose side is at the block."""
+    """Return an upright blade with its edge behind the block and its side face at the block."""
     tip, heel = Vec3(x, y, z), Vec3(x, y, z + LENGTH)
     return Edge(tip, heel, forward, tip, heel, forward)
 
 
 class Pressed:
-    """The block, which ends at x = 0.01, and a blade beside it, whose side is at x - 1 mm."""
+    """The block, which ends at x = 10 mm, and a blade beside it with its side face at x - 1 mm."""
 
     def __init__(self, x=0.0115, material=MATERIAL):
         self.body = build_body(BLOCK, None, None)
@@ -106,12 +106,12 @@ def test_a_blade_that_does_not_reach_the_tissue_does_not_press_it(pressed):
 
 
 def test_pressure_is_stiffness_times_depth_times_area(pressed):
-    force = pressed.press(edge_at(0.0108))  # its side is 0.2 mm inside
+    force = pressed.press(edge_at(0.0108))  # its side face is 0.2 mm inside
     expected = pressed.sides.stiffness * 0.2e-3 * 0.01**2
     np.testing.assert_allclose(force, [-expected, 0.0, 0.0], rtol=1e-9, atol=1e-12)
 
 
-def test_what_the_blade_does_to_the_tissue_is_done_to_it(pressed):
+def test_the_impulses_on_tissue_and_blade_are_opposite(pressed):
     pressed.press(edge_at(0.0108))
     tissue, blade = pressed.totals.impulse_on_tissue, pressed.totals.impulse
     np.testing.assert_allclose(tissue, -blade, rtol=1e-12)
@@ -122,13 +122,13 @@ def test_what_the_blade_does_to_the_tissue_is_done_to_it(pressed):
     np.testing.assert_allclose(pressed.totals.angular_impulse, -torque, atol=1e-15)
 
 
-def test_a_point_that_is_first_seen_within_the_blade_is_not_thrown_out():
+def test_a_point_that_is_first_found_inside_the_blade_is_not_pushed_out():
     pressed = Pressed(x=0.0106)
     assert not pressed.press(edge_at(0.0106)).any()
 
 
-def test_the_bevel_reaches_such_a_point_as_the_blade_goes_on():
-    """2 mm further the bevel, of slope 1/4, is 0.5 mm thicker; the side of the blade is 0.4 in."""
+def test_the_bevel_pushes_such_a_point_as_the_blade_advances():
+    """After 2 mm the bevel of slope 1/4 is 0.5 mm thicker, and its side face 0.4 mm inside."""
     pressed = Pressed(x=0.0106)
     force = pressed.press(edge_at(0.0106, y=0.017))
     expected = pressed.sides.stiffness * 0.4e-3 * 0.01**2
@@ -136,7 +136,7 @@ def test_the_bevel_reaches_such_a_point_as_the_blade_goes_on():
 
 
 def test_a_rising_bevel_pushes_the_tissue_forward():
-    """The wedge pays for what it parts: forward force is outward force times the slope."""
+    """The forward force of the wedge is its outward force times the slope."""
     pressed = Pressed(x=0.0106, material=Material())
     force = pressed.press(edge_at(0.0106, y=0.0158))
     assert force[0] < 0.0
@@ -148,25 +148,25 @@ def test_friction_holds_below_its_limit_and_slides_above(pressed):
     pressed.press(edge)
     pressed.slide(edge)
     normal = -pressed.press(edge)[0]
-    little, far = edge_at(0.0108, y=0.0150499), edge_at(0.0108, y=0.016)
-    stuck = pressed.press(little)[1]
+    near, far = edge_at(0.0108, y=0.0150499), edge_at(0.0108, y=0.016)
+    stuck = pressed.press(near)[1]
     assert stuck == pytest.approx(pressed.sides.stiffness * 0.0499e-3 * 0.01**2, rel=1e-6)
     assert pressed.press(far)[1] == pytest.approx(0.5 * normal, rel=1e-9)
 
 
-def test_sliding_takes_friction_times_displacement(pressed):
+def test_sliding_dissipates_friction_times_displacement(pressed):
     pressed.slide(edge_at(0.0108))
     normal = -pressed.press(edge_at(0.0108))[0]
     for y in (0.0155, 0.0165):
         before = pressed.totals.work_of_friction
         pressed.press(edge_at(0.0108, y=y))
         pressed.slide(edge_at(0.0108, y=y))
-    taken = pressed.totals.work_of_friction - before
-    assert taken == pytest.approx(0.5 * normal * 1e-3, rel=1e-6)
+    dissipated = pressed.totals.work_of_friction - before
+    assert dissipated == pytest.approx(0.5 * normal * 1e-3, rel=1e-6)
 
 
 def test_viscosity_adds_stress_times_speed():
-    """The point slid 0.5 mm in 1 ms, but for the few percent by which its spring still grew."""
+    """The point slides 0.5 mm in 1 ms, less the few percent by which its spring is extended."""
     dry, wet = Pressed(), Pressed(material=Material(blade_friction=0.5, blade_viscosity=1e3))
     forces = []
     for one in (dry, wet):
@@ -178,7 +178,7 @@ def test_viscosity_adds_stress_times_speed():
 
 
 def test_the_force_is_the_slope_of_the_energy(pressed):
-    """Work of the blade from outside to 0.2 mm inside, in 200 parts, is what is stored."""
+    """The work of the blade from outside to 0.2 mm inside, in 200 steps, is the stored energy."""
     xs = np.linspace(0.0112, 0.0108, 201)
     for a, b in itertools.pairwise(xs):
         end, start = edge_at(b), edge_at(a)
@@ -193,7 +193,7 @@ def test_the_force_is_the_slope_of_the_energy(pressed):
     assert pressed.totals.released == pytest.approx(stored, rel=1e-12)
 
 
-def test_a_known_face_keeps_its_friction(pressed):
+def test_a_face_that_is_found_again_keeps_its_friction(pressed):
     edge = edge_at(0.0108)
     pressed.slide(edge)
     dragged = edge_at(0.0108, y=0.01503)
@@ -202,21 +202,21 @@ def test_a_known_face_keeps_its_friction(pressed):
     np.testing.assert_allclose(pressed.press(dragged), before, rtol=1e-9)
 
 
-def test_a_search_gives_no_energy_to_a_face_that_trembles_under_the_blade(pressed):
+def test_a_search_adds_no_energy_to_a_face_that_changes_size_under_the_blade(pressed):
     edge = edge_at(0.0108)
     pressed.slide(edge)
-    pressed.body.positions[:, 1] *= 1.1  # its faces are larger now
+    pressed.body.positions[:, 1] *= 1.1  # the faces are larger now
     pressed.slide(edge)
     before = pressed.totals.released
     areas = pressed.sides.states.area[pressed.rows()].copy()
-    held = pressed.sides.states.energy[pressed.rows()] > 0.0
-    assert held.any()
+    loaded = pressed.sides.states.energy[pressed.rows()] > 0.0
+    assert loaded.any()
     pressed.find(edge)
     assert pressed.totals.released == pytest.approx(before, abs=1e-18)
-    np.testing.assert_array_equal(pressed.sides.states.area[: len(areas)][held], areas[held])
+    np.testing.assert_array_equal(pressed.sides.states.area[: len(areas)][loaded], areas[loaded])
 
 
-def test_nodes_beside_the_blade_count_as_stiffer(pressed):
+def test_side_contacts_add_stiffness_to_their_nodes(pressed):
     rows = np.zeros_like(pressed.body.rest)
     add_side_stiffness(pressed.sides, rows)
     area = POINTS * pressed.sides.states.area[pressed.rows()].sum()
@@ -233,7 +233,7 @@ def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
 
 
 @pytest.mark.parametrize(
-    ("wrong", "why"),
+    ("fields", "message"),
     [
         ({"thickness": -1e-3}, "thickness"),
         ({"height": math.nan}, "height"),
@@ -242,16 +242,16 @@ def test_depth_is_measured_from_the_side_of_the_tissue(pressed):
         ({"edge_radius": -1.0}, "edge_radius"),
     ],
 )
-def test_a_blade_that_cannot_be_is_refused_by_name(wrong, why):
-    with pytest.raises(ValueError, match=why):
-        BladeShape(**wrong)
+def test_an_impossible_blade_is_refused_by_name(fields, message):
+    with pytest.raises(ValueError, match=message):
+        BladeShape(**fields)
 
 
-def test_a_blade_that_stays_in_its_cells_finds_what_a_new_search_would():
-    """To and fro by less than a cell, into another one, and away."""
+def test_a_blade_that_stays_in_its_grid_cells_finds_the_same_faces_as_a_new_search():
+    """The blade moves to and fro by less than a cell, into another cell, and away."""
     pressed = Pressed()
     kept = build_grid(pressed.body, pressed.body.positions, 0.5e-3)
-    numbers = []
+    n_found = []
     for x in (0.0115, 0.0113, 0.0109, 0.0131, 0.0045, 0.0115):
         faces = []
         for from_scratch in (False, True):
@@ -260,5 +260,5 @@ def test_a_blade_that_stays_in_its_cells_finds_what_a_new_search_would():
             pressed.find_in(kept, edge_at(x))
             faces.append(pressed.sides.face[pressed.rows()].tolist())
         assert faces[0] == faces[1]
-        numbers.append(len(faces[0]))
-    assert 0 < numbers.count(0) < len(numbers)
+        n_found.append(len(faces[0]))
+    assert 0 < n_found.count(0) < len(n_found)

@@ -1,4 +1,4 @@
-"""What a cut costs: slow, fast, through skin, and with a blunt edge."""
+"""The toughness law: speed, skin and a blunt edge."""
 
 import pytest
 
@@ -20,11 +20,11 @@ def test_toughness_doubles_at_its_speed_and_follows_a_power_law():
     assert toughness_at(law, 0.4) == pytest.approx(60.0)
 
 
-def test_without_an_exponent_speed_costs_nothing():
+def test_without_an_exponent_toughness_does_not_depend_on_speed():
     assert toughness_at(toughness_law_of(Material(toughness=20.0), None), 10.0) == 20.0
 
 
-def test_skin_is_never_weaker_than_what_is_under_it():
+def test_skin_is_never_weaker_than_the_tissue_below():
     skinned = Material(toughness=20.0, skin_toughness=50.0)
     assert toughness_law_of(skinned, None).skin_toughness == 50.0
     assert toughness_law_of(Material(toughness=20.0), None).skin_toughness == 20.0

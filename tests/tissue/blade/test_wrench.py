@@ -1,4 +1,4 @@
-"""Wrench, stiffness and contacts at an instant: three views of the same forces."""
+"""Wrench, stiffness and contacts at an instant: three descriptions of the same forces."""
 
 import itertools
 
@@ -22,7 +22,7 @@ def edge_at(y, x=0.0201, turned=0.0):
 
 
 def cut_to(y, material=TOUGH, blade=BladeShape()):
-    """Return a tissue that was cut from y = 0 to there, the last result, and where the edge is."""
+    """Return a tissue cut from y = 0 to `y` [m], the last result and the last pose of the edge."""
     tissue = Tissue(MESH, material, fixed=sides(MESH), gravity=NO_GRAVITY, blade=blade)
     poses = [edge_at(at) for at in np.arange(-0.002, y, 1e-4)]
     for a, b in itertools.pairwise(poses):
@@ -44,7 +44,7 @@ def test_the_contacts_add_up_to_the_wrench(cut):
     np.testing.assert_allclose(np.linalg.norm(contacts.normal, axis=1), 1.0, rtol=1e-12)
 
 
-def test_the_area_of_the_contacts_is_what_the_step_cut():
+def test_the_cut_areas_of_the_contacts_add_up_to_that_of_the_step():
     tissue, result, pose = cut_to(0.015)
     poses = [edge_at(pose.tip[1] + i * 1e-4) for i in range(21)]
     areas, works = [], [result.work_of_cutting]
@@ -63,16 +63,16 @@ def test_friction_is_within_its_cone(cut):
     assert faces.any()
     friction = np.linalg.norm(result.contacts.friction[faces], axis=1)
     along_normal = result.contacts.normal_force[faces]
-    # The normal leans forward on the bevels, where the pressure is the x of it.
+    # On the bevels the normal has a forward component; the pressure acts along x.
     assert (friction <= 0.3 * along_normal * (1.0 + 1e-9)).all()
 
 
-def test_views_cost_no_copy(cut):
+def test_contacts_are_views_without_a_copy(cut):
     _, result, _ = cut
     assert all(view.base is not None for view in result.contacts)
 
 
-def test_the_mean_wrench_is_that_at_the_end_where_nothing_changes():
+def test_the_mean_wrench_is_the_final_one_in_a_steady_state():
     tissue, _, pose = cut_to(0.02, Material(viscous_damping=100.0))
     for _ in range(300):
         result = tissue.step(BladeSweep(pose, pose), DT)
@@ -89,8 +89,8 @@ def test_stiffness_is_symmetric_and_positive(cut):
 
 @pytest.mark.parametrize("blade", [None, BladeShape()])
 @pytest.mark.parametrize("axis", [0, 2])
-def test_stiffness_is_how_the_force_changes_before_the_tissue_moves(blade, axis):
-    """A shift of a micrometre sideways or along the edge, in 0.1 us: the tissue stays."""
+def test_stiffness_is_the_derivative_of_the_force_before_the_tissue_moves(blade, axis):
+    """A shift by a micrometre sideways or along the edge, in 0.1 us: the tissue does not move."""
     forces = []
     for distance in (0.0, 1e-6):
         tissue, result, pose = cut_to(0.01, Material(toughness=2000.0), blade)
@@ -101,7 +101,7 @@ def test_stiffness_is_how_the_force_changes_before_the_tissue_moves(blade, axis)
     np.testing.assert_allclose(change, -result.stiffness[:3, axis], rtol=0.02, atol=5.0)
 
 
-def test_without_a_blade_nothing_acts(cut):
+def test_without_a_blade_wrench_and_stiffness_are_zero(cut):
     tissue, _, _ = cut_to(0.01)
     result = tissue.step(None, DT)
     assert not result.wrench_t1.force.any()

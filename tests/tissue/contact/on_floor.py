@@ -12,7 +12,15 @@ STEP = 1e-3
 
 
 def one_on_floor(velocity, depth=0.0, n_contacts=1, before=0.0, recovery=0.0):
-    """Return a body whose node 0 is on the floor, or in it."""
+    """Return a body with node 0 on the floor or in it, and the contact of that node.
+
+    Args:
+        velocity: Velocity of node 0 [m/s].
+        depth: Depth of node 0 in the floor now [m].
+        n_contacts: Capacity for contacts.
+        before: Depth of node 0 in the floor at the start of the step [m].
+        recovery: Speed at which an overlap is undone [m/s].
+    """
     body = build_body(block((1, 1, 1)), None, None)
     body.masses[:] = 0.5
     start = body.positions.copy()

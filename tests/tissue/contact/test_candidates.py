@@ -1,4 +1,4 @@
-"""The broad phase omits nothing that is near, and pairs again only what moved or changed."""
+"""The broad phase finds all pairs that are near, and updates only what moved or changed."""
 
 import itertools
 
@@ -36,8 +36,8 @@ def two_bodies(offset):
     )
 
 
-class Broad:
-    """The candidates of a body in two pieces: the tetrahedra before `first`, and the others."""
+class BroadPhase:
+    """The candidates of a body in two pieces, of the tetrahedra before and from number `first`."""
 
     def __init__(self, mesh, first=24, capacity=256):
         self.body = build_body(mesh, None, None)
@@ -67,13 +67,14 @@ class Broad:
         return set(alive)
 
     def near(self, reach):
-        """Return the pairs of the two pieces that are within reach [m], by testing all."""
+        """Return the pairs between the two pieces within `reach` [m], by testing every pair."""
         x, triangles = self.body.positions, self.triangles()
-        of = {node: triangle[-1] for triangle in triangles for node in triangle[:3]}
+        piece_of = {node: triangle[-1] for triangle in triangles for node in triangle[:3]}
         points = {
             (node, *t[:3])
-            for node, t in itertools.product(of, triangles)
-            if of[node] != t[3] and naive.distance_to_triangle(x[node], x[list(t[:3])]) <= reach
+            for node, t in itertools.product(piece_of, triangles)
+            if piece_of[node] != t[3]
+            and naive.distance_to_triangle(x[node], x[list(t[:3])]) <= reach
         }
         edges = {(a, b, t[3]) for t in triangles for a, b in sides(t) if a < b}
         return points, {
@@ -96,80 +97,82 @@ def sides(triangle):
 
 
 def distance(first, second):
-    """Return the distance of two segments [m], at most a little too large."""
+    """Return the distance of two segments [m] by sampling, so at most slightly too large."""
     s = np.linspace(0.0, 1.0, 41)[:, None]
     p, q = (ends[0] + s * (ends[1] - ends[0]) for ends in (first, second))
     return float(np.linalg.norm(p[:, None] - q[None], axis=2).min())
 
 
-def expect_complete(broad, reach=MARGIN):
-    points, edges = broad.near(reach)
-    assert points <= broad.pairs("point_triangle")
-    assert edges <= broad.pairs("edge_edge")
+def expect_complete(broad_phase, reach=MARGIN):
+    points, edges = broad_phase.near(reach)
+    assert points <= broad_phase.pairs("point_triangle")
+    assert edges <= broad_phase.pairs("edge_edge")
     return len(points), len(edges)
 
 
 @pytest.mark.parametrize("height", [0.0101, 0.012, 0.0135])
-def test_what_is_near_is_paired_once(height):
-    broad = Broad(two_bodies([0.008, 0.007, height]))
-    assert broad.update()
-    n_points, n_edges = expect_complete(broad)
+def test_all_near_pairs_are_found_once(height):
+    broad_phase = BroadPhase(two_bodies([0.008, 0.007, height]))
+    assert broad_phase.update()
+    n_points, n_edges = expect_complete(broad_phase)
     assert n_points > 0 and n_edges > 0
 
 
-def test_what_is_far_is_not():
-    broad = Broad(two_bodies([0.008, 0.007, 0.0101]))
-    broad.update()
-    x = broad.body.positions
-    for node, *corners in broad.pairs("point_triangle"):
+def test_far_pairs_are_not_listed():
+    broad_phase = BroadPhase(two_bodies([0.008, 0.007, 0.0101]))
+    broad_phase.update()
+    x = broad_phase.body.positions
+    for node, *corners in broad_phase.pairs("point_triangle"):
         assert naive.distance_to_triangle(x[node], x[corners]) <= 1.1 * MARGIN
-    for a, b, c, d in broad.pairs("edge_edge"):
+    for a, b, c, d in broad_phase.pairs("edge_edge"):
         assert distance(x[[a, b]], x[[c, d]]) <= 1.1 * MARGIN
 
 
-def test_skin_that_is_far_from_every_other_piece_is_left_out():
-    broad = Broad(two_bodies([0.0, 0.0, 0.1]))
-    broad.update()
-    assert not broad.found.node.any() and not broad.pairs("edge_edge")
+def test_skin_that_is_far_from_every_other_piece_is_omitted():
+    broad_phase = BroadPhase(two_bodies([0.0, 0.0, 0.1]))
+    broad_phase.update()
+    assert not broad_phase.found.node.any() and not broad_phase.pairs("edge_edge")
 
 
-def test_too_little_room_is_said():
-    assert not Broad(two_bodies([0.008, 0.007, 0.0105]), capacity=4).update()
+def test_too_little_capacity_is_reported():
+    assert not BroadPhase(two_bodies([0.008, 0.007, 0.0105]), capacity=4).update()
 
 
-def test_a_node_is_paired_again_when_it_has_moved_by_half_the_margin_and_not_before():
-    broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
-    broad.update()
-    moved = len(broad.body.positions) - 1
+def test_pairs_of_a_node_are_updated_once_it_has_moved_by_half_the_margin():
+    broad_phase = BroadPhase(two_bodies([0.008, 0.007, 0.0105]))
+    broad_phase.update()
+    moved = len(broad_phase.body.positions) - 1
     for displacement, n_faces in ((0.49 * MARGIN, 0), (0.02 * MARGIN, 3)):
-        broad.body.positions[moved, 0] += displacement
-        broad.found.n_dirty = 0
-        broad.update(has_changed=False)
-        assert broad.found.n_dirty == n_faces
+        broad_phase.body.positions[moved, 0] += displacement
+        broad_phase.found.n_dirty = 0
+        broad_phase.update(has_changed=False)
+        assert broad_phase.found.n_dirty == n_faces
 
 
-def test_pairs_stay_complete_while_a_piece_travels_over_another():
-    """A node is within half the margin of its reference: pairs are complete to the other half."""
-    broad = Broad(two_bodies([-0.01, 0.007, 0.0112]))
+def test_pairs_stay_complete_while_a_piece_moves_over_another():
+    """Nodes stay within half the margin of their reference, so pairs are complete to the rest."""
+    broad_phase = BroadPhase(two_bodies([-0.01, 0.007, 0.0112]))
     for i in range(40):
-        broad.update(has_changed=False)
+        broad_phase.update(has_changed=False)
         if i % 5 == 0:
-            expect_complete(broad, 0.5 * MARGIN)
-        broad.body.positions[-4:, 0] += 0.2 * MARGIN
-        broad.found.path_since_check += 0.2 * MARGIN
+            expect_complete(broad_phase, 0.5 * MARGIN)
+        broad_phase.body.positions[-4:, 0] += 0.2 * MARGIN
+        broad_phase.found.path_since_check += 0.2 * MARGIN
 
 
-def test_faces_that_a_cut_makes_are_paired_and_faces_that_go_are_dropped():
-    """The second piece's tetrahedron leaves the list and comes back, as one that is split."""
-    broad = Broad(two_bodies([0.008, 0.007, 0.0105]))
-    broad.update()
-    complete = expect_complete(broad)
-    body, last = broad.body, len(broad.body.tetrahedra) - 1
+def test_pairs_of_new_faces_are_added_and_those_of_removed_faces_are_dropped():
+    """The tetrahedron of the second piece is removed from the list and added, as in a split."""
+    broad_phase = BroadPhase(two_bodies([0.008, 0.007, 0.0105]))
+    broad_phase.update()
+    complete = expect_complete(broad_phase)
+    body, last = broad_phase.body, len(broad_phase.body.tetrahedra) - 1
     body.links[last] = 0
-    collect_faces(broad.faces, body)
-    broad.update()
-    assert not any(max(pair) >= len(body.positions) - 4 for pair in broad.pairs("point_triangle"))
+    collect_faces(broad_phase.faces, body)
+    broad_phase.update()
+    assert not any(
+        max(pair) >= len(body.positions) - 4 for pair in broad_phase.pairs("point_triangle")
+    )
     body.links[last] = CUT
-    collect_faces(broad.faces, body)
-    broad.update()
-    assert expect_complete(broad) == complete
+    collect_faces(broad_phase.faces, body)
+    broad_phase.update()
+    assert expect_complete(broad_phase) == complete

@@ -1,4 +1,4 @@
-"""What contacts may leave of an overlap, and what they carry over to the next step."""
+"""Slop: how much of an overlap contacts leave; warm start: what they carry to the next step."""
 
 import pytest
 
@@ -15,7 +15,7 @@ from tissue.contact.solver import solve_positions, solve_velocities
 pytestmark = pytest.mark.kernel
 
 
-def test_of_what_was_in_the_floor_before_the_step_a_little_is_undone():
+def test_an_overlap_from_before_the_step_is_undone_only_in_part():
     body, contacts = one_on_floor([0.0, 0.0, 0.0], depth=3e-4, before=2e-4, recovery=0.5e-4 / STEP)
     solve_positions(contacts, body, body.positions.copy(), 0.3, 0.0)
     assert gap(contacts, body.positions, 0) == pytest.approx(-1.5e-4, abs=1e-18)
@@ -23,7 +23,7 @@ def test_of_what_was_in_the_floor_before_the_step_a_little_is_undone():
 
 @pytest.mark.parametrize("n_steps", [1, 4])
 def test_an_overlap_is_undone_at_the_same_speed_in_steps_of_any_length(n_steps):
-    """Where a step undid as much however short, nodes that are pinched were thrown to and fro."""
+    """A correction that does not depend on the step length made pinched nodes oscillate."""
     body, contacts = one_on_floor([0.0, 0.0, 0.0], depth=3e-4, before=3e-4, recovery=0.1)
     body.positions[0, 2] = -3e-4
     for _ in range(n_steps):
@@ -34,13 +34,13 @@ def test_an_overlap_is_undone_at_the_same_speed_in_steps_of_any_length(n_steps):
 
 
 def fall(body, g=9.81):
-    """Let node 0 fall freely for a step, from where it is and as it moves."""
+    """Advance node 0 by one step of free fall."""
     body.positions[0, 2] += STEP * body.velocities[0, 2] - 0.5 * STEP**2 * g
     body.velocities[0, 2] -= STEP * g
 
 
-def test_what_rests_needs_no_more_than_what_it_took_in_the_step_before():
-    """Not in the second step: it is not known yet whether the first was an impact."""
+def test_a_resting_contact_needs_no_more_than_the_impulse_of_the_last_step():
+    """This does not hold in the second step: the first may have been an impact."""
     body, contacts = one_on_floor([0.0, 0.0, 0.0])
     for step in range(4):
         start = body.positions.copy()
@@ -66,8 +66,8 @@ def test_a_step_that_is_twice_as_long_begins_with_twice_the_impulse():
     assert contacts.position_impulse[0] == pytest.approx(4e-4)
 
 
-def test_sides_that_cannot_be_parted_take_no_more_in_each_step():
-    """What a contact begins with is bounded by its impulse; without one, by a share of the last."""
+def test_the_impulse_of_contacts_that_cannot_be_separated_does_not_grow():
+    """The position impulse starts below the velocity impulse or a share of the last one."""
     _, contacts = one_on_floor([0.0, 0.0, 0.0])
     contacts.seconds = STEP
     contacts.position_impulse[0] = 1.0

@@ -1,4 +1,4 @@
-"""Do two edges go through each other?"""
+"""The test whether two edges pass through each other."""
 
 import itertools
 
@@ -20,14 +20,14 @@ def edges(height, upper=UPPER):
     return Edges(*(Vec3(*row.tolist()) for row in rows))
 
 
-def met(height_t0, height_t1, outward=DOWN, other_outward=UP, residual=0.0, upper=UPPER):
+def crossing(height_t0, height_t1, outward=DOWN, other_outward=UP, residual=0.0, upper=UPPER):
     return edge_edge(
         edges(height_t0, upper), edges(height_t1, upper), outward, other_outward, residual, 1e-9
     )
 
 
-def test_crossed_edges_that_come_down_on_each_other_go_through():
-    found = met(0.1, -0.05)
+def test_crossed_edges_that_move_towards_each_other_pass_through():
+    found = crossing(0.1, -0.05)
     assert found.is_through
     assert np.allclose(found.normal, [0.0, 0.0, 1.0])
     assert (found.s, found.t) == pytest.approx((0.5, 0.5))
@@ -45,8 +45,8 @@ def test_crossed_edges_that_come_down_on_each_other_go_through():
     ],
     ids=["stay apart", "come out", "of one body", "face the same way", "pass beside", "parallel"],
 )
-def test_any_others_do_not(case):
-    assert not met(**case).is_through
+def test_other_pairs_of_edges_do_not_pass_through(case):
+    assert not crossing(**case).is_through
 
 
 def test_neither_the_order_nor_the_direction_of_edges_matters():

@@ -1,4 +1,4 @@
-"""Edges of blocks that one can draw: those of a box are ridges, those in its faces are flat."""
+"""Feature edges of simple bodies: edges of a box are ridges, those inside its sides are flat."""
 
 import numpy as np
 import pytest
@@ -21,14 +21,14 @@ def boundary_edges(body):
 
 
 def without(mesh, low):
-    """Return a mesh without the tetrahedra whose middle is beyond `low` [m] in every direction."""
+    """Return a mesh without the tetrahedra whose centroid is beyond `low` [m] along every axis."""
     middles = mesh.positions[mesh.tetrahedra].mean(axis=1)
     kept = mesh.tetrahedra[~(middles > low).all(axis=1)]
     nodes, renamed = np.unique(kept, return_inverse=True)
     return TetrahedralMesh(mesh.positions[nodes], renamed.reshape(-1, 4))
 
 
-def test_beyond_an_edge_is_the_other_face_that_has_it():
+def test_the_face_across_an_edge_is_the_other_face_with_that_edge():
     body = build_body(block((2, 2, 1), (0.02, 0.02, 0.01)), None, None)
     edges = boundary_edges(body)
     for t, f, k, a, b in edges:
@@ -38,7 +38,7 @@ def test_beyond_an_edge_is_the_other_face_that_has_it():
         assert tip == body.tetrahedra[beyond[0], OUTWARD[beyond[1], (beyond[2] + 2) % 3]]
 
 
-def test_of_a_block_only_the_edges_of_the_box_are_ridges():
+def test_only_the_box_edges_of_a_block_are_ridges():
     size = np.array([0.02, 0.02, 0.01])
     body = build_body(block((2, 2, 1), size), None, None)
     for t, f, k, a, b in boundary_edges(body):
@@ -47,7 +47,7 @@ def test_of_a_block_only_the_edges_of_the_box_are_ridges():
         assert is_ridge(body, t, f, k) == (n_sides == 2)
 
 
-def test_the_inner_edge_of_an_l_is_a_valley_and_no_ridge():
+def test_the_inner_edge_of_an_l_shape_is_not_a_ridge():
     mesh = without(block((2, 1, 2), (0.02, 0.01, 0.02)), [0.01, 0.0, 0.01])
     body = build_body(mesh, None, None)
     inner = outer = 0
@@ -62,8 +62,8 @@ def test_the_inner_edge_of_an_l_is_a_valley_and_no_ridge():
     assert inner == 2 and outer == 2
 
 
-def test_the_edge_of_a_blade_like_wedge_is_a_ridge():
-    """Its two faces are folded onto each other, two degrees apart."""
+def test_the_edge_of_a_thin_wedge_is_a_ridge():
+    """The two faces at the edge are only two degrees apart."""
     thin = 0.0175
     wedge = np.array([[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 0.5, thin], [1.0, 0.5, -thin]])
     body = build_body(TetrahedralMesh(0.01 * wedge, np.array([[0, 1, 2, 3]])), None, None)

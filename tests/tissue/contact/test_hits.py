@@ -1,4 +1,4 @@
-"""Hits do not depend on the order in which they are found."""
+"""The order of hits does not depend on the order in which they are found."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tissue.contact.hits import add_hit, new_hits, sort_hits
 pytestmark = pytest.mark.kernel
 
 
-def test_hits_come_in_the_order_of_their_nodes():
+def test_hits_are_sorted_by_their_nodes():
     random = np.random.default_rng(0)
     rows = [tuple(row) for row in random.integers(0, 6, (100, 4)).tolist()]
     hits = new_hits(100)

@@ -1,4 +1,4 @@
-"""Pairs sleep while they cannot have met, and no longer."""
+"""Pairs are skipped while they cannot have touched, and no longer."""
 
 import numpy as np
 import pytest
@@ -32,8 +32,8 @@ TOLERANCE = 1e-9
 FAST_MOVE = 1e-4
 
 
-class Wandering:
-    """Nodes that move about in a box, and pairs of edges between them."""
+class RandomMotion:
+    """Nodes that move at random in a box, and pairs of edges between them."""
 
     def __init__(self, seed, fast):
         self.random = np.random.default_rng(seed)
@@ -46,10 +46,10 @@ class Wandering:
             nodes = tuple(self.random.choice(self.n, 4, replace=False).tolist())
             add_pair(self.pairs, nodes, 0, 0, 0)
 
-    def go(self):
+    def step(self):
         start = self.body.positions.copy()
-        step = self.random.normal(size=(self.n, 3)) * self.speeds[:, None]
-        self.body.positions += step - 0.01 * (self.body.positions - self.body.rest)
+        moves = self.random.normal(size=(self.n, 3)) * self.speeds[:, None]
+        self.body.positions += moves - 0.01 * (self.body.positions - self.body.rest)
         self.motion.step += 1
         nodes = np.arange(self.n)
         measure_motion(self.motion, self.body, start, nodes, self.n)
@@ -64,42 +64,42 @@ class Wandering:
 
 @pytest.mark.parametrize("fast", [0, 2])
 @pytest.mark.parametrize("seed", range(3))
-def test_no_pair_sleeps_through_what_may_have_gone_through(seed, fast):
-    wandering = Wandering(seed, fast)
-    pairs, motion = wandering.pairs, wandering.motion
-    n_slept = n_met = 0
+def test_no_pair_that_may_have_passed_through_is_skipped(seed, fast):
+    moving = RandomMotion(seed, fast)
+    pairs, motion = moving.pairs, moving.motion
+    n_skipped = n_touched = 0
     for _ in range(400):
-        moved = wandering.go()
+        moved = moving.step()
         until = horizon(motion, TOLERANCE)
         for k in range(8):
             a, b, c, d = nodes_of_pair(pairs, k)
-            apart = wandering.distance(k)
-            may_have_met = apart <= max(moved[a], moved[b]) + max(moved[c], moved[d])
+            apart = moving.distance(k)
+            may_have_touched = apart <= max(moved[a], moved[b]) + max(moved[c], moved[d])
             if pairs.wake[k] <= until and can_touch(motion, pairs, k, TOLERANCE):
                 note_distance(motion, pairs, k, apart)
             else:
-                assert not may_have_met
-                n_slept += 1
-            n_met += may_have_met
-    assert n_slept > 100 and n_met > 0
+                assert not may_have_touched
+                n_skipped += 1
+            n_touched += may_have_touched
+    assert n_skipped > 100 and n_touched > 0
 
 
-def test_a_node_that_moves_much_is_fast_for_a_while_and_its_pairs_go_by_its_path():
-    wandering = Wandering(0, 1)
-    wandering.go()
-    assert is_fast(wandering.motion, 0) and not is_fast(wandering.motion, 1)
-    assert wandering.motion.slow_path < FAST_MOVE
-    with_it = (wandering.pairs.node.reshape(4, -1) == 0).any(axis=0)
+def test_a_node_that_moves_far_is_fast_for_a_while_and_its_pairs_use_node_paths():
+    moving = RandomMotion(0, 1)
+    moving.step()
+    assert is_fast(moving.motion, 0) and not is_fast(moving.motion, 1)
+    assert moving.motion.slow_path < FAST_MOVE
+    has_node_0 = (moving.pairs.node.reshape(4, -1) == 0).any(axis=0)
     for k in range(8):
-        note_distance(wandering.motion, wandering.pairs, k, 1.0)
-    np.testing.assert_array_equal(np.isinf(wandering.pairs.wake), with_it)
-    wandering.speeds[:] = 0.0
+        note_distance(moving.motion, moving.pairs, k, 1.0)
+    np.testing.assert_array_equal(np.isinf(moving.pairs.wake), has_node_0)
+    moving.speeds[:] = 0.0
     for _ in range(70):
-        wandering.go()
-    assert not is_fast(wandering.motion, 0)
+        moving.step()
+    assert not is_fast(moving.motion, 0)
 
 
-def test_pairs_are_dropped_and_made_near_and_far_and_none_is_lost():
+def test_dropping_and_moving_pairs_between_near_and_far_loses_none():
     pairs = new_pairs(5)
     for k in range(5):
         assert add_pair(pairs, (k, 10, 20, 30), k, k, k)

@@ -1,4 +1,4 @@
-"""The test of eight pairs at once omits none that the test of one would find."""
+"""The prefilter of eight pairs at once keeps every pair that the scalar test finds."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ TOLERANCE = 1e-3
 
 
 def near_pairs(seed):
-    """Return points at random, and pairs of any four; not a multiple of eight."""
+    """Return random points and pairs of any four of them; their number is no multiple of eight."""
     random = np.random.default_rng(seed)
     x, normal = room_for_points(N_NODES), room_for_points(N_NODES)
     x[:], normal[:] = random.normal(size=(2, N_NODES, 3))
@@ -39,7 +39,7 @@ def ends(x, pairs, k):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_nodes_that_are_under_a_triangle_by_more_than_nothing_may_be(seed):
+def test_nodes_below_a_triangle_by_more_than_the_tolerance_are_kept(seed):
     x, _, pairs, signs = near_pairs(seed)
     prefilter_points(pairs, x, signs)
     n_under = 0
@@ -53,7 +53,7 @@ def test_nodes_that_are_under_a_triangle_by_more_than_nothing_may_be(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_edges_that_overlap_may_be(seed):
+def test_edges_that_overlap_are_kept(seed):
     x, normal, pairs, signs = near_pairs(seed)
     prefilter_edges(pairs, x, normal, signs)
     n_crossed = 0

@@ -1,4 +1,4 @@
-"""What impulses keep: momentum, and that no energy is made."""
+"""Contact impulses conserve momentum and create no energy."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def momentum(body):
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.3, 2.0])
 @pytest.mark.parametrize("seed", range(5))
-def test_impulses_keep_momentum_and_only_take_energy(seed, coefficient):
+def test_impulses_conserve_momentum_and_only_dissipate_energy(seed, coefficient):
     body, contacts = bodies_of(seed)
     energy, before = kinetic(body), momentum(body)
     centre = body.masses @ body.positions
@@ -74,26 +74,26 @@ def test_a_node_that_hits_the_floor_stops_and_slides_on_as_coulomb_says():
     assert contacts.impulse[0] == pytest.approx(0.5 * 2.0)
 
 
-def test_within_the_cone_friction_stops_it():
+def test_friction_within_the_cone_stops_sliding():
     body, contacts = one_on_floor([0.5, 0.0, -2.0])
     solve_velocities(contacts, body, 0.3, STEP, 0.0)
     assert np.abs(body.velocities[0]).max() < 1e-15
 
 
-def test_a_node_that_leaves_is_not_held():
+def test_a_node_that_leaves_the_floor_gets_no_impulse():
     body, contacts = one_on_floor([1.0, 0.0, 2.0])
     solve_velocities(contacts, body, 0.3, STEP, 0.0)
     assert body.velocities[0].tolist() == [1.0, 0.0, 2.0]
     assert contacts.impulse[0] == 0.0
 
 
-def test_a_node_in_the_floor_is_put_on_it():
+def test_a_node_inside_the_floor_is_moved_on_to_it():
     body, contacts = one_on_floor([0.0, 0.0, 0.0], depth=1e-4)
     solve_positions(contacts, body, body.positions.copy(), 0.3, 0.0)
     assert gap(contacts, body.positions, 0) == pytest.approx(0.0, abs=1e-18)
 
 
-def test_fixed_nodes_take_any_impulse():
+def test_no_impulse_moves_a_fixed_node():
     body, contacts = bodies_of(n_fixed=13)
     x, v = body.positions.copy(), body.velocities.copy()
     solve_positions(contacts, body, x.copy(), 0.3, 0.0)
@@ -113,7 +113,7 @@ def test_a_contact_between_the_same_nodes_is_added_once():
 
 
 def test_a_contact_is_skipped_until_another_moves_its_nodes():
-    """One is of node 0 alone, the other of nodes 0 to 3."""
+    """One contact has node 0 alone, the other nodes 0 to 3."""
     body, contacts = one_on_floor([0.0, 0.0, -1.0], n_contacts=2)
     add_contact(contacts, body, (0, 1, 2, 3), ACROSS, 0.0, body.positions)
     begin_iterations(contacts)

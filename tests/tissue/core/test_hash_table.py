@@ -1,4 +1,4 @@
-"""A table finds what was inserted, and nothing else."""
+"""A hash table finds the keys that were inserted, and no others."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def slot_of(table, keys, key):
 
 
 def some_keys(n, seed=0):
-    """Return different keys at random, numbers below 0 among them."""
+    """Return distinct random keys, some with negative numbers."""
     random = np.random.default_rng(seed)
     rows = {tuple(row) for row in random.integers(-N_NUMBERS, N_NUMBERS, (2 * n, 4)).tolist()}
     return sorted(rows)[:n]
@@ -67,7 +67,7 @@ def test_the_slots_are_a_power_of_two(n_slots, rounded):
 
 
 def test_keys_that_follow_each_other_are_spread_over_the_table():
-    """Nodes of an edge or a face are near in number; long runs of filled slots cost time."""
+    """Nodes of an edge or a face have similar numbers; long runs of filled slots are slow."""
     table = new_hash_table(4096)
     slots = {first_slot(table, hash_of(a, a + b, 0, 0)) for a in range(256) for b in range(1, 5)}
     assert len(slots) > 700

@@ -1,4 +1,4 @@
-"""The cache of compiled kernels: where it is, and that an edit can never revive an old binary."""
+"""The cache of compiled kernels: its folder, and that an edit never reuses an old binary."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""Each operation on vectors gives in a kernel what its twin in NumPy gives, to the last bit."""
+"""Each SIMD operation gives the same bits in a kernel and in NumPy."""
 
 import numpy as np
 import pytest
@@ -58,7 +58,7 @@ def test_a_spread_point_has_its_coordinates_in_all_lanes():
     np.testing.assert_array_equal(out, np.repeat(POINTS[2], 8))
 
 
-def test_arithmetic_is_that_of_each_lane():
+def test_arithmetic_is_done_lane_by_lane():
     out, expected = np.zeros((2, 16))
     kernel(arithmetic)(VALUES, out)
     arithmetic(VALUES, expected)
@@ -74,7 +74,7 @@ def test_eight_points_are_gathered_and_summed_up():
     np.testing.assert_allclose(out[0], POINTS[OF[1:9]].sum(axis=0), rtol=1e-14)
 
 
-def test_all_arrays_whose_rows_are_gathered_have_room_behind_the_last():
+def test_all_arrays_whose_rows_are_gathered_have_padding_after_the_last():
     tissue = Tissue(
         block((1, 1, 1), (0.01, 0.01, 0.01)), solver=SolverSettings(relaxation="hierarchical")
     )
@@ -87,7 +87,7 @@ def test_all_arrays_whose_rows_are_gathered_have_room_behind_the_last():
         assert room - end >= 8
 
 
-def test_nothing_behind_the_last_row_is_read_or_written_of_a_single_point():
+def test_a_single_point_is_copied_without_what_follows_it():
     points = np.full((3, 4), np.nan)
     points[:, :3] = 1.0
     rows = np.full((2, 3), 7.0)

@@ -1,4 +1,4 @@
-"""Each operation on blocks gives in a kernel what its twin in NumPy gives, to the last bit."""
+"""Each gather operation gives the same bits in a kernel and in NumPy."""
 
 import numpy as np
 import pytest

@@ -1,11 +1,11 @@
-"""Stopwatches sum up the time of their blocks, and of no other."""
+"""A stage clock adds up the time of the blocks of each stage."""
 
 from time import perf_counter, sleep
 
 from tissue.core.stage_clock import StageClock
 
 
-def test_a_stopwatch_sums_its_blocks_and_leaves_the_others_at_zero():
+def test_a_stage_sums_its_blocks_and_the_others_stay_at_zero():
     clock = StageClock()
     started = perf_counter()
     for _ in range(2):
@@ -15,7 +15,7 @@ def test_a_stopwatch_sums_its_blocks_and_leaves_the_others_at_zero():
     assert clock.CD.seconds == clock.GC.seconds == 0.0
 
 
-def test_a_block_that_fails_counts_too():
+def test_a_block_that_raises_counts_too():
     clock = StageClock()
     try:
         with clock.GC:

@@ -1,4 +1,4 @@
-"""`Arrays`: what goes into a struct is what a kernel reads and writes."""
+"""`Arrays`: kernels read and write the fields of a struct."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def example(n=3):
 
 @kernel
 def summed(outer):
-    """Reads every field, through a struct in the struct."""
+    """Return a sum over every field, including those of a nested struct."""
     total = 0.0
     for i in range(len(outer.numbers)):
         total += outer.numbers[i] + outer.inner.weight * outer.inner.values[i]
@@ -72,7 +72,7 @@ def test_one_kernel_serves_arrays_of_any_size():
     assert summed(example(3)) != summed(example(3).replaced(numbers=np.arange(2)))
 
 
-def test_replaced_keeps_the_other_fields_and_leaves_the_first_alone():
+def test_replaced_keeps_the_other_fields_and_does_not_change_the_original():
     first = example()
     second = first.replaced(numbers=np.array([10, 20]))
     assert second.inner is first.inner

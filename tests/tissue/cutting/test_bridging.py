@@ -1,4 +1,4 @@
-"""An edge that still joins both sides of the sheet behind the blade: it is cut, or explained."""
+"""Bridges: edges that still join both sides of the cut surface behind the blade."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.kernel
 
 
 def corner(x: float, low: float = -1.0):
-    """Return the corner of a unit cube that was active a step ago; a blade beside it at `x`."""
+    """Return the corner of a unit cube, active in the last step, with a blade plane at `x`."""
     cut = cut_of(bodies.unit_tetrahedron())
     path = cut.path
     path.t1[:] = [[x, 0.3, low], [x, 0.3, 2.0]]
@@ -31,7 +31,7 @@ def corner(x: float, low: float = -1.0):
     return cut
 
 
-def test_an_edge_between_both_sides_is_cut_where_the_sheet_passes():
+def test_an_edge_between_both_sides_is_cut_where_the_cut_surface_crosses_it():
     cut = corner(0.5)
     note_side(cut.sheet, 0, -1, True)
     note_side(cut.sheet, 1, 1, True)
@@ -41,8 +41,8 @@ def test_an_edge_between_both_sides_is_cut_where_the_sheet_passes():
     assert on_sheet(cut.sheet, 4)
 
 
-def test_a_node_that_was_seen_on_the_wrong_side_from_afar_is_put_right():
-    cut = corner(-0.5)  # the whole tetrahedron is on side +1
+def test_the_wrong_side_of_a_node_far_from_the_cut_surface_is_corrected():
+    cut = corner(-0.5)  # the tetrahedron is wholly on side +1
     note_side(cut.sheet, 0, -1, True)
     note_side(cut.sheet, 1, 1, True)
     resolve_bridges(cut)
@@ -50,7 +50,7 @@ def test_a_node_that_was_seen_on_the_wrong_side_from_afar_is_put_right():
     assert side_of(cut.sheet, 0) == 1
 
 
-def test_a_node_seen_on_the_wrong_side_that_is_near_the_sheet_lies_on_it():
+def test_a_node_on_the_wrong_side_but_near_the_cut_surface_is_put_on_it():
     cut = corner(-0.05)
     note_side(cut.sheet, 0, -1, True)
     note_side(cut.sheet, 1, 1, True)
@@ -59,7 +59,7 @@ def test_a_node_seen_on_the_wrong_side_that_is_near_the_sheet_lies_on_it():
     assert on_sheet(cut.sheet, 0)
 
 
-def test_a_tetrahedron_beyond_the_tip_is_no_bridge():
+def test_a_tetrahedron_beyond_the_tip_is_not_a_bridge():
     cut = corner(0.5, low=1.5)
     note_side(cut.sheet, 0, -1, True)
     note_side(cut.sheet, 1, 1, True)
@@ -76,7 +76,7 @@ def test_a_tetrahedron_that_is_still_active_waits():
     assert cut.body.n_nodes == 4
 
 
-def test_changed_tetrahedra_are_remembered_beside_the_active_ones():
+def test_changed_tetrahedra_are_remembered_along_with_the_active_ones():
     cut = corner(0.5)
     cut.scratch.n_active = 1
     note_dirty(cut.change, 0)

@@ -1,4 +1,4 @@
-"""Collision detection against a look at every edge and every tetrahedron."""
+"""Collision detection against a test of every edge and every tetrahedron."""
 
 import itertools
 
@@ -13,7 +13,7 @@ from tissue.cutting.collision_detection import find_active_tetrahedra, find_cros
 
 pytestmark = [
     pytest.mark.kernel,
-    # The hash of an edge wraps around, as it is meant to; with the JIT off NumPy says so.
+    # The hash of an edge overflows on purpose; with the JIT off NumPy warns of it.
     pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning"),
 ]
 
@@ -29,7 +29,7 @@ def mesh(request):
 
 
 def swept(mesh, x, y, z, n_samples=4):
-    """Return a cut step of an upright edge at `x`, from y[0] to y[1], from z[0] up to z[1] [m]."""
+    """Return a cut step of an upright edge at `x` between z[0] and z[1], from y[0] to y[1] [m]."""
     cut = cut_of(mesh, n_samples)
     path = cut.path
     heights = np.linspace(*z, n_samples)
@@ -47,7 +47,7 @@ def swept(mesh, x, y, z, n_samples=4):
 
 
 def crossed(cut):
-    """Return the edges that were found to be crossed, and where along them."""
+    """Return the crossed edges that were found, with the fraction at which each is crossed."""
     scratch = cut.scratch
     rows = range(scratch.n_crossings)
     return {
@@ -57,7 +57,7 @@ def crossed(cut):
 
 
 def through_window(mesh, x, y, z):
-    """Return the edges that pass the plane at `x` within y[0]..y[1] and z[0]..z[1], and where."""
+    """Return the edges that cross the plane at `x` within y[0]..y[1] and z[0]..z[1], and where."""
     found = {}
     for nodes in mesh.tetrahedra.tolist():
         for a, b in itertools.combinations(sorted(nodes), 2):
@@ -78,16 +78,16 @@ WINDOWS = {
 
 
 @pytest.mark.parametrize("window", WINDOWS)
-def test_the_crossed_edges_are_those_that_pass_through_what_the_edge_swept(mesh, window):
+def test_the_crossed_edges_are_those_that_cross_the_swept_area(mesh, window):
     y, z = WINDOWS[window]
     expected = through_window(mesh, 0.0137, y, z)
     found = crossed(swept(mesh, 0.0137, y, z))
     assert found.keys() == expected.keys()
     for edge, at in found.items():
-        assert at == pytest.approx(expected[edge], abs=1e-4)  # to the lattice, 0.1 um
+        assert at == pytest.approx(expected[edge], abs=1e-4)  # to the lattice spacing, 0.1 um
 
 
-def test_two_steps_cross_what_one_long_step_crosses(mesh):
+def test_two_steps_cross_the_same_edges_as_one_long_step(mesh):
     z = (-0.001, 0.031)
     once = crossed(swept(mesh, 0.0137, (0.0021, 0.0277), z))
     first = crossed(swept(mesh, 0.0137, (0.0021, 0.0149), z))
@@ -96,7 +96,7 @@ def test_two_steps_cross_what_one_long_step_crosses(mesh):
     assert not first.keys() & second.keys()
 
 
-def test_no_tetrahedron_with_a_crossed_edge_is_missing_from_the_active_ones(mesh):
+def test_all_tetrahedra_with_a_crossed_edge_are_active(mesh):
     cut = swept(mesh, 0.0137, (0.0021, 0.0277), (-0.001, 0.031))
     active = set(cut.scratch.active[: cut.scratch.n_active].tolist())
     for t, nodes in enumerate(mesh.tetrahedra.tolist()):

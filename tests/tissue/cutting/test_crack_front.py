@@ -1,4 +1,4 @@
-"""The crack front: where the tip passes faces, and the edges of the mesh along its way."""
+"""The crack front: nodes where the tip passes faces, joined by edges of the mesh."""
 
 import itertools
 
@@ -14,7 +14,7 @@ from tissue.cutting.cut_surface import on_sheet
 
 pytestmark = [
     pytest.mark.kernel,
-    # The hash of an edge wraps around, as it is meant to; with the JIT off NumPy says so.
+    # The hash of an edge overflows on purpose; with the JIT off NumPy warns of it.
     pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning"),
 ]
 
@@ -22,7 +22,7 @@ X, DEPTH = 0.37, 0.41
 
 
 def swept(y0: float, y1: float, low: float = DEPTH):
-    """Return a unit cube in which an upright edge at X went from y0 to y1, its tip at `low`."""
+    """Return a unit cube in which an upright edge at X moved from y0 to y1, its tip at `low`."""
     cut = cut_of(bodies.jittered(3, 2, size=1.0), n_samples=5)
     cut = cut.replaced(limits=cut.limits.replaced(snap=0.1))
     path = cut.path
@@ -41,7 +41,7 @@ def swept(y0: float, y1: float, low: float = DEPTH):
     return cut
 
 
-def on_it(cut) -> list[int]:
+def nodes_on_sheet(cut) -> list[int]:
     return [n for n in range(cut.body.n_nodes) if on_sheet(cut.sheet, n)]
 
 
@@ -61,7 +61,7 @@ def expect_sound(cut) -> None:
 def test_nodes_lie_where_the_tip_passed_faces_and_edges_join_them():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    nodes = on_it(cut)
+    nodes = nodes_on_sheet(cut)
     along = sorted(nodes, key=lambda node: cut.body.rest[node, 1])
     assert len(along) >= 3
     rest = cut.body.rest[along]
@@ -76,30 +76,30 @@ def test_nodes_lie_where_the_tip_passed_faces_and_edges_join_them():
 def test_the_front_ends_at_the_last_face_that_the_tip_passed():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    last = max(on_it(cut), key=lambda node: cut.body.rest[node, 1])
+    last = max(nodes_on_sheet(cut), key=lambda node: cut.body.rest[node, 1])
     assert cut.sheet.front[0] == last
     assert cut.sheet.front[1] == -1  # the heel is above the body
 
 
-def test_a_tip_that_goes_out_at_the_other_side_leaves_no_front():
+def test_a_tip_that_leaves_at_the_far_side_leaves_no_front():
     cut = swept(-0.1, 1.1)
     extend_fronts(cut)
     assert cut.sheet.front[0] == -1
-    assert cut.body.rest[on_it(cut), 1].max() == pytest.approx(1.0)
+    assert cut.body.rest[nodes_on_sheet(cut), 1].max() == pytest.approx(1.0)
 
 
-def test_a_tip_outside_the_body_lays_no_front():
+def test_a_tip_outside_the_body_makes_no_front():
     cut = swept(-0.1, 0.45, low=-0.2)
     extend_fronts(cut)
-    assert on_it(cut) == []
+    assert nodes_on_sheet(cut) == []
 
 
-def test_a_front_laid_along_a_blade_that_rests_goes_from_its_tip_to_the_skin():
+def test_a_front_brought_to_a_resting_blade_runs_from_its_tip_to_the_skin():
     cut = swept(-0.1, 0.45)
     extend_fronts(cut)
-    before = set(on_it(cut))
+    before = set(nodes_on_sheet(cut))
     bring_front_to_blade(cut)
-    along_blade = sorted(set(on_it(cut)) - before, key=lambda node: cut.body.rest[node, 2])
+    along_blade = sorted(set(nodes_on_sheet(cut)) - before, key=lambda node: cut.body.rest[node, 2])
     rest = cut.body.rest[along_blade]
     assert np.abs(rest[:, :2] - [X, 0.45]).max() < 0.12
     assert rest[-1, 2] == pytest.approx(1.0)

@@ -1,4 +1,4 @@
-"""A hundred thousand stellar splits of stars at random: volumes stay positive and add up."""
+"""A hundred thousand random stellar splits: volumes stay positive and add up."""
 
 import numpy as np
 import pytest
@@ -16,12 +16,12 @@ from tissue.mesh.star import edge_star
 
 N_BODIES = 200
 N_SPLITS = 500
-"""Of each body; more make its tetrahedra so small that rounding is felt."""
+"""Splits of each body; with more, its tetrahedra become so small that rounding matters."""
 
 
 @njit
 def volume_around(cut: Cut, a: int, b: int, out: IntArray) -> tuple[float, float]:
-    """Sum and least of the volumes around edge ab."""
+    """Return the sum and the smallest of the volumes around edge ab."""
     n = edge_star(cut.body, cut.visits, a, b, out)
     total, least = 0.0, np.inf
     for i in range(n):
@@ -33,9 +33,13 @@ def volume_around(cut: Cut, a: int, b: int, out: IntArray) -> tuple[float, float
 
 @njit
 def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: FloatArray) -> float:
-    """Split an edge or a face for each row of numbers from 0 to 1; return the least volume.
+    """Split an edge or a face for each row of random numbers; return the smallest volume.
 
-    `before` and `after` are the volumes of the tetrahedra that were split, shape (n,).
+    Args:
+        cut: The body to split.
+        which: Numbers from 0 to 1 that choose the tetrahedron, nodes, place and kind, shape (n, 4).
+        before: Written: volumes of the split tetrahedra before each split, shape (n,).
+        after: Written: volumes of their children, shape (n,).
     """
     body = cut.body
     least = np.inf
@@ -54,7 +58,7 @@ def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: Floa
             second, least_b = volume_around(cut, node, b, cut.scratch.around)
             after[i] = first + second
             least = min(least, min(least_a, least_b))
-        else:  # a face split keeps edge ab; what was around it is now around it, or around c
+        else:  # after a face split the tetrahedra around edge ab are around it or around c
             face_before = 0.0
             n = edge_star(body, cut.visits, a, b, cut.scratch.around)
             for j in range(n):
@@ -82,5 +86,5 @@ def test_10_volumes_are_positive_and_sum_to_those_of_the_star_in_1e5_splits():
         cut = cut_of(bodies.jittered_grid(4, seed, size=1.0))
         before, after = np.empty(N_SPLITS), np.empty(N_SPLITS)
         assert split_at_random(cut, random.random((N_SPLITS, 4)), before, after) > 0.0
-        np.testing.assert_allclose(after, before, rtol=1e-12)  # of stars down to 1e-6
+        np.testing.assert_allclose(after, before, rtol=1e-12)  # of stars with volumes down to 1e-6
         assert after.sum() == pytest.approx(before.sum(), rel=1e-14)

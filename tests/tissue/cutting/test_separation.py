@@ -1,4 +1,4 @@
-"""Opening the sheet: two tetrahedra, a fan, a crumb; which faces are cut, which nodes doubled."""
+"""Separation along the cut surface: which faces are cut, and which nodes are doubled."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.kernel
 
 
 def blade_in_plane(cut, x: float, sideways: float = 1.0) -> None:
-    """Let an upright edge at `x` lie beside the whole body, facing along y."""
+    """Place an upright edge at `x`, longer than the body and facing along y."""
     path = cut.path
     path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
     path.t0[:] = path.t1 - [0.0, 0.1, 0.0]
@@ -29,7 +29,7 @@ def blade_in_plane(cut, x: float, sideways: float = 1.0) -> None:
 
 
 def two_halves():
-    """Return a unit cube of 2 x 1 x 1 cells, the nodes of its middle plane on the sheet."""
+    """Return a unit cube of 2 x 1 x 1 cells with its middle plane on the cut surface."""
     cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
     blade_in_plane(cut, 0.5)
     x = cut.body.rest[: cut.body.n_nodes, 0]
@@ -42,7 +42,7 @@ def mesh_of(cut):
     return cut.body.tetrahedra[: cut.body.n_tetrahedra]
 
 
-def test_faces_between_the_two_sides_of_the_sheet_are_cut_and_their_nodes_doubled():
+def test_faces_between_the_two_sides_of_the_cut_surface_are_cut_and_their_nodes_doubled():
     cut = two_halves()
     open_sheet(cut)
     assert cut.change.n_faces == 2  # the square in the middle
@@ -52,7 +52,7 @@ def test_faces_between_the_two_sides_of_the_sheet_are_cut_and_their_nodes_double
     assert cut.change.area == pytest.approx(1.0)
 
 
-def test_copies_lie_where_the_node_was_and_know_each_other():
+def test_copies_have_the_position_of_the_node_and_refer_to_each_other():
     cut = two_halves()
     open_sheet(cut)
     for copy in range(12, 16):
@@ -61,7 +61,7 @@ def test_copies_lie_where_the_node_was_and_know_each_other():
         np.testing.assert_array_equal(cut.body.rest[copy], cut.body.rest[node])
 
 
-def test_a_second_look_at_an_open_sheet_changes_nothing():
+def test_separating_an_open_cut_surface_again_changes_nothing():
     cut = two_halves()
     open_sheet(cut)
     tetrahedra = mesh_of(cut).copy()
@@ -71,7 +71,7 @@ def test_a_second_look_at_an_open_sheet_changes_nothing():
     assert cut.change.n_faces == 0
 
 
-def test_a_face_with_a_node_off_the_sheet_stays_whole():
+def test_a_face_with_a_node_off_the_cut_surface_is_not_cut():
     cut = cut_of(block((2, 1, 1), (1.0, 1.0, 1.0)))
     blade_in_plane(cut, 0.5)
     on = np.flatnonzero(cut.body.rest[:12, 0] == 0.5)
@@ -82,8 +82,8 @@ def test_a_face_with_a_node_off_the_sheet_stays_whole():
     assert cut.body.n_nodes == 12
 
 
-def test_a_single_cut_face_inside_opens_no_node():
-    """Around its rim the tetrahedra still hang together."""
+def test_a_single_cut_face_inside_doubles_no_node():
+    """The tetrahedra around its rim are still connected."""
     cut = cut_of(block((2, 2, 2), (1.0, 1.0, 1.0)))
     blade_in_plane(cut, 0.5)
     tetrahedra = mesh_of(cut)
@@ -98,7 +98,7 @@ def test_a_single_cut_face_inside_opens_no_node():
     assert (cut.body.links[: len(tetrahedra)] == CUT).sum() == 2
 
 
-def test_the_last_face_of_a_tetrahedron_holds():
+def test_the_last_face_of_a_tetrahedron_is_not_cut():
     cut = cut_of(bodies.two_tetrahedra())
     blade_in_plane(cut, 0.4)
     for node in (1, 2, 3):
@@ -116,18 +116,18 @@ def test_a_piece_smaller_than_a_crumb_stays_with_the_body():
     assert cut.body.n_nodes == 12
 
 
-def test_links_after_a_cut_are_those_of_the_new_tetrahedra_built_from_scratch():
+def test_links_after_a_cut_are_those_built_from_scratch():
     cut = two_halves()
     open_sheet(cut)
     links = cut.body.links[: len(mesh_of(cut))]
     np.testing.assert_array_equal(np.maximum(links, -1), naive.links(mesh_of(cut)))
 
 
-# which side a tetrahedron is on
+# The side of a tetrahedron.
 
 
 def one_tetrahedron(*on_sheet: int):
-    """Return the corner of a cube, its nodes of those numbers on the sheet at x = 0.3."""
+    """Return the corner of a cube with the given nodes on the cut surface at x = 0.3."""
     cut = cut_of(bodies.unit_tetrahedron())
     blade_in_plane(cut, 0.3)
     for node in on_sheet:
@@ -135,29 +135,29 @@ def one_tetrahedron(*on_sheet: int):
     return cut
 
 
-def test_a_side_that_was_decided_stays():
+def test_a_decided_side_stays():
     cut = one_tetrahedron(0, 2, 3)
     decide_side(cut.sheet, 0, -1)
     assert tetrahedron_side(cut, 0) == -1
 
 
-def test_a_side_that_a_node_was_seen_on_outweighs_where_it_lies():
+def test_the_noted_side_of_a_node_outweighs_its_position():
     cut = one_tetrahedron(0, 2, 3)
     assert tetrahedron_side(cut, 0) == 1  # node 1 is at x = 1
     note_side(cut.sheet, 1, -1, True)
     assert tetrahedron_side(cut, 0) == -1
 
 
-def test_a_tetrahedron_seen_on_both_sides_is_on_neither_yet():
+def test_a_tetrahedron_with_nodes_noted_on_both_sides_is_undecided():
     cut = one_tetrahedron(2, 3)
     note_side(cut.sheet, 0, -1, True)
     note_side(cut.sheet, 1, 1, True)
     assert tetrahedron_side(cut, 0) == 0
 
 
-def test_a_tetrahedron_that_lies_on_both_sides_is_on_neither_yet():
+def test_a_tetrahedron_that_lies_on_both_sides_is_undecided():
     assert tetrahedron_side(one_tetrahedron(2, 3), 0) == 0
 
 
-def test_a_tetrahedron_with_all_nodes_on_the_sheet_is_where_its_middle_is():
+def test_a_tetrahedron_with_all_nodes_on_the_cut_surface_is_on_the_side_of_its_centroid():
     assert tetrahedron_side(one_tetrahedron(0, 1, 2, 3), 0) == -1  # x = 0.25

@@ -1,4 +1,4 @@
-"""One crossing of one edge: when it splits the edge, when it uses an end, when it does nothing."""
+"""Snapping: whether a crossing splits its edge, uses a node of it, or does nothing."""
 
 import numpy as np
 import pytest
@@ -14,11 +14,11 @@ from tissue.cutting.workspace import flag
 pytestmark = pytest.mark.kernel
 
 SIZE = 1.0 / np.sqrt(3.0)
-"""Size of the node at the origin of the corner of a cube: its altitude; that of the others is 1."""
+"""Size (altitude) of the node at the origin of the corner of a cube; the others have size 1."""
 
 
 def corner(x: float, **quality):
-    """Return the corner of a unit cube, a blade across it at `x`, its side +1 towards +x."""
+    """Return the corner of a unit cube with a blade plane at `x`, its side +1 towards +x."""
     cut = cut_of(bodies.unit_tetrahedron())
     path = cut.path
     path.t1[:] = [[x, 0.5, -1.0], [x, 0.5, 2.0]]
@@ -39,7 +39,7 @@ def test_an_edge_crossed_in_its_middle_gets_a_node_there():
     assert on_sheet(cut.sheet, 4)
 
 
-def test_the_ends_of_a_crossed_edge_are_seen_on_their_sides():
+def test_the_sides_of_the_ends_of_a_crossed_edge_are_noted():
     cut = corner(0.5)
     insert_crossing(cut, 0, 1, 0, 0.5)
     assert (side_of(cut.sheet, 0), side_of(cut.sheet, 1)) == (-1, 1)
@@ -68,13 +68,13 @@ def test_a_split_that_would_break_the_guard_uses_the_nearest_node():
     assert on_sheet(cut.sheet, 0)
 
 
-def test_the_offset_of_a_node_is_how_far_it_lies_from_the_sheet():
+def test_the_offset_of_a_node_is_its_distance_from_the_cut_surface():
     cut = corner(0.1)
     insert_crossing(cut, 0, 1, 0, 0.1)
     assert cut.sheet.offset[0] == pytest.approx(0.1)
 
 
-def test_a_crossing_beside_a_node_on_the_sheet_is_explained_by_it():
+def test_a_crossing_near_a_node_on_the_cut_surface_adds_no_node():
     cut = corner(0.1)
     insert_crossing(cut, 0, 1, 0, 0.1)
     insert_crossing(cut, 0, 2, 0, 0.1)
@@ -82,7 +82,7 @@ def test_a_crossing_beside_a_node_on_the_sheet_is_explained_by_it():
     assert cut.change.n_flagged == 1
 
 
-def test_an_edge_with_both_ends_on_the_sheet_is_left_alone():
+def test_an_edge_with_both_ends_on_the_cut_surface_is_not_split():
     cut = corner(0.5)
     flag(cut, 0)
     flag(cut, 1)
@@ -90,9 +90,9 @@ def test_an_edge_with_both_ends_on_the_sheet_is_left_alone():
     assert cut.body.n_nodes == 4
 
 
-def test_a_node_of_an_earlier_sheet_draws_the_same_cut_again_from_as_far():
+def test_a_node_of_an_earlier_cut_surface_snaps_a_repeated_cut_from_further():
     cut = corner(0.4)
-    flag(cut, 0)  # 0.4 from the sheet, further than a new node may be
+    flag(cut, 0)  # 0.4 from the cut surface, further than a new node may be
     assert snap_distance(cut, 0) == pytest.approx(0.3 * SIZE)
     begin_sheet(cut.sheet)
     assert snap_distance(cut, 0) == pytest.approx(1.5 * 0.4)
@@ -106,7 +106,7 @@ def test_a_node_of_an_earlier_sheet_draws_the_same_cut_again_from_as_far():
         (Vec3(1 / 3, 1 / 3, 1 / 3), 4),
         (Vec3(0.5, 0.48, 0.02), 4),
     ],
-    ids=["at a corner", "at another", "in the middle", "at a side"],
+    ids=["at a corner", "at another corner", "in the middle", "at a side"],
 )
 def test_a_point_in_a_face_uses_its_corner_splits_its_side_or_itself(weights, place):
     cut = corner(0.5, snap=0.2)

@@ -1,4 +1,4 @@
-"""Stellar splits at random: whatever is split, the mesh stays sound and nothing is lost."""
+"""Random stellar splits: the mesh stays sound, and mass and momentum are conserved."""
 
 import itertools
 
@@ -25,7 +25,7 @@ MESHES = (block((1, 1, 1), (1.0, 1.0, 1.0)), bodies.jittered(2, 5, size=1.0))
 
 SHARE = st.floats(0.2, 0.8)
 SPLITS = st.lists(st.tuples(st.integers(0, 10**6), st.booleans(), SHARE, SHARE), max_size=8)
-"""Which tetrahedron, whether its face or its edge, and where."""
+"""Splits: which tetrahedron, whether a face (else an edge) of it, and where."""
 
 
 def split_all(cut, splits):
@@ -44,13 +44,13 @@ def split_all(cut, splits):
 
 
 def mesh_of(cut):
-    """Return rest positions and tetrahedra that are in use."""
+    """Return the rest positions and tetrahedra in use."""
     body = cut.body
     return body.rest[: body.n_nodes], body.tetrahedra[: body.n_tetrahedra]
 
 
-def moving(cut, seed=0):
-    """Let every node of the body be elsewhere and move."""
+def perturb(cut, seed=0):
+    """Give every node of the body a random displacement and velocity."""
     random = np.random.default_rng(seed)
     n = cut.body.n_nodes
     cut.body.positions[:n] += 0.1 * random.normal(size=(n, 3))
@@ -69,7 +69,7 @@ def test_volumes_stay_positive_and_their_sum_the_same(mesh, splits):
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.sampled_from(MESHES), SPLITS)
-def test_links_are_those_of_the_new_tetrahedra_built_from_scratch(mesh, splits):
+def test_links_are_those_built_from_scratch(mesh, splits):
     cut = cut_of(mesh)
     split_all(cut, splits)
     _, tetrahedra = mesh_of(cut)
@@ -78,8 +78,8 @@ def test_links_are_those_of_the_new_tetrahedra_built_from_scratch(mesh, splits):
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.sampled_from(MESHES), SPLITS)
-def test_no_node_is_left_hanging(mesh, splits):
-    """A node in the middle of a neighbour's face would add to the area of the skin."""
+def test_there_are_no_hanging_nodes(mesh, splits):
+    """A node inside a face of a neighbour would add to the area of the boundary."""
     cut = cut_of(mesh)
     split_all(cut, splits)
     rest, tetrahedra = mesh_of(cut)
@@ -92,10 +92,10 @@ def test_no_node_is_left_hanging(mesh, splits):
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.sampled_from(MESHES), SPLITS)
-def test_mass_and_momentum_are_kept(mesh, splits):
+def test_mass_and_momentum_are_conserved(mesh, splits):
     cut = cut_of(mesh)
     springs_of(cut.body)
-    moving(cut)
+    perturb(cut)
     before = cut.body.masses @ cut.body.velocities
     split_all(cut, splits)
     springs_of(cut.body)
@@ -105,7 +105,7 @@ def test_mass_and_momentum_are_kept(mesh, splits):
 
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.sampled_from(MESHES), SPLITS)
-def test_each_node_names_a_tetrahedron_that_holds_it(mesh, splits):
+def test_each_node_refers_to_a_tetrahedron_that_contains_it(mesh, splits):
     cut = cut_of(mesh)
     split_all(cut, splits)
     for node in range(cut.body.n_nodes):
@@ -120,16 +120,16 @@ def test_an_edge_split_doubles_the_tetrahedra_around_the_edge():
     assert cut.body.n_tetrahedra == 12
 
 
-def test_a_face_split_makes_three_of_each_tetrahedron_at_the_face():
+def test_a_face_split_divides_each_tetrahedron_at_the_face_into_three():
     cut = cut_of(bodies.two_tetrahedra())
     node = split_face(cut, 1, 2, 3, Vec3(0.2, 0.3, 0.5))
     assert cut.body.n_tetrahedra == 6
     np.testing.assert_allclose(cut.body.rest[node], [0.2, 0.3, 0.5])
 
 
-def test_a_new_node_is_where_its_edge_is_now_and_moves_with_it():
+def test_position_and_velocity_of_a_new_node_are_interpolated_along_its_edge():
     cut = cut_of(bodies.unit_tetrahedron())
-    moving(cut)
+    perturb(cut)
     node = split_edge(cut, 0, 1, 0.25)
     for field in (cut.body.rest, cut.body.positions, cut.body.velocities):
         np.testing.assert_allclose(field[node], 0.75 * field[0] + 0.25 * field[1], atol=1e-15)
@@ -151,7 +151,7 @@ def test_a_split_that_would_leave_a_flat_tetrahedron_is_not_good():
     assert not face_split_is_good(guarded, 0, 1, 2, Vec3(0.02, 0.49, 0.49))
 
 
-def test_without_room_nothing_is_split():
+def test_nothing_is_split_without_capacity():
     cut = cut_of(bodies.unit_tetrahedron())
     cut.body.n_nodes = len(cut.body.rest) - 1
     assert split_edge(cut, 0, 1, 0.5) == NO_ROOM

@@ -16,8 +16,8 @@ MESH = bodies.jittered(2, seed=5)
 
 @pytest.mark.parametrize("retardation_time", [0.0, 1e-4, 1e-3, 1e-2, 1.0])
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.45, 0.49])
-def test_no_motion_grows_in_a_step_however_much_dampers_brake(retardation_time, poisson_ratio):
-    """The Runge-Kutta step of M x'' + C x' + K x = 0 as a matrix: K of tetrahedra, C of springs."""
+def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poisson_ratio):
+    """The Runge-Kutta step of M x'' + C x' + K x = 0 as a matrix; K of tetrahedra, C of springs."""
     material = Material(law="neo_hookean", poisson_ratio=poisson_ratio)
     springs = Material(material.spring_modulus)
     root = 1.0 / np.sqrt(np.repeat(masses(MESH, material.density), 3))
@@ -28,7 +28,7 @@ def test_no_motion_grows_in_a_step_however_much_dampers_brake(retardation_time, 
     around = Surroundings(gravity=Vec3(0.0, 0.0, 0.0), drag=0.0, retardation_time=retardation_time)
     h = stable_step(elasticity, elasticity.frequency_squared, around) / SAFETY
     one, zero = np.eye(len(k)), np.zeros_like(k)
-    x, v = np.hstack([one, zero]), np.hstack([zero, one])  # of the state (x, v)
+    x, v = np.hstack([one, zero]), np.hstack([zero, one])  # as functions of the state (x, v)
     a1 = -k @ x - c @ v
     middle = x + h / 2.0 * v + h * h / 8.0 * a1
     a2 = -k @ middle - c @ (v + h / 2.0 * a1)
@@ -37,5 +37,5 @@ def test_no_motion_grows_in_a_step_however_much_dampers_brake(retardation_time, 
     step = np.vstack(
         [x + h * v + h * h / 6.0 * (a1 + a2 + a3), v + h / 6.0 * (a1 + 2.0 * (a2 + a3) + a4)]
     )
-    # Six motions as a whole have a double 1, which rounding splits.
+    # The six rigid motions have double eigenvalues of 1, which rounding separates.
     assert np.abs(np.linalg.eigvals(step)).max() < 1.0 + 1e-4

@@ -1,4 +1,4 @@
-"""Rest shapes and rows of a solid, and how they follow splits and cuts."""
+"""Rest shapes and node rows of a solid, built and updated after splits."""
 
 import numpy as np
 import pytest
@@ -38,13 +38,13 @@ def mesh(request):
 
 
 def corners(solid, node):
-    """Return the corners that the node is, as (tetrahedron, which of its four), in order."""
+    """Return the corners of tetrahedra at a node, as (tetrahedron, corner), in order."""
     first = int(solid.first[node])
     slots = range(first, first + int(solid.count[node]))
     return [(tetrahedron_of_slot(solid, slot), corner_of_slot(solid, slot)) for slot in slots]
 
 
-def test_a_row_names_each_tetrahedron_around_the_node_in_order(mesh):
+def test_a_row_lists_each_tetrahedron_around_the_node_in_order(mesh):
     solid = solid_of(mesh, law_of(0.45)).solid
     for node in range(len(mesh.positions)):
         around = corners(solid, node)
@@ -52,7 +52,7 @@ def test_a_row_names_each_tetrahedron_around_the_node_in_order(mesh):
         assert all(mesh.tetrahedra[t, k] == node for t, k in around)
 
 
-def test_a_row_is_filled_up_with_places_that_are_always_zero(mesh):
+def test_a_row_is_padded_with_slots_that_are_always_zero(mesh):
     body = solid_of(mesh, law_of(0.45))
     body.energy(moved(mesh))
     assert np.abs(body.forces(moved(mesh))).max() > 0.0
@@ -65,7 +65,7 @@ def test_a_row_is_filled_up_with_places_that_are_always_zero(mesh):
             assert (solid.forces[solid.corner[beyond] + c * WIDTH] == 0.0).all()
 
 
-def test_volumes_at_rest_are_those_of_tetrahedra_and_a_quarter_of_those_around_a_node(mesh):
+def test_node_volumes_are_a_quarter_of_the_rest_volumes_around_the_node(mesh):
     solid = solid_of(mesh, law_of(0.45)).solid
     volumes = naive_solid.volumes(mesh)
     for t, volume in enumerate(volumes):
@@ -75,11 +75,11 @@ def test_volumes_at_rest_are_those_of_tetrahedra_and_a_quarter_of_those_around_a
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_rows_renewed_where_a_cut_touched_are_those_built_from_scratch(law):
-    """The forces have the same bits, and the bound still holds the place of that from scratch."""
+def test_rows_updated_where_a_cut_changed_the_mesh_are_those_built_from_scratch(law):
+    """The forces have the same bits, and the frequency bound stays close."""
     cut = cut_of(bodies.jittered(3, 1, size=1.0))
     springs_of(cut.body)
-    renewed = built(cut.body, law)
+    updated = built(cut.body, law)
     visits, around = cut.visits, np.zeros(LARGEST_STAR, dtype=np.int64)
     nodes = np.zeros(len(cut.body.rest), dtype=np.int64)
     random = np.random.default_rng(5)
@@ -88,32 +88,32 @@ def test_rows_renewed_where_a_cut_touched_are_those_built_from_scratch(law):
         split_all(cut, [(int(random.integers(1000)), bool(random.integers(2)), 0.4, 0.5)])
         springs_of(cut.body)
         n = touched_nodes(cut.body, cut.change, visits, nodes)
-        build_tetrahedra(renewed.solid, cut.body, cut.change.dirty, cut.change.n_dirty)
-        assert build_stars(renewed.solid, cut.body, visits, nodes, n, around) == n
-        assert bound_solid_frequencies(renewed.solid, cut.body, visits, nodes, n) > n
-    afresh = built(cut.body, law)
+        build_tetrahedra(updated.solid, cut.body, cut.change.dirty, cut.change.n_dirty)
+        assert build_stars(updated.solid, cut.body, visits, nodes, n, around) == n
+        assert bound_solid_frequencies(updated.solid, cut.body, visits, nodes, n) > n
+    from_scratch = built(cut.body, law)
     for node in range(cut.body.n_nodes):
-        assert corners(renewed.solid, node) == corners(afresh.solid, node)
+        assert corners(updated.solid, node) == corners(from_scratch.solid, node)
     x = cut.body.rest[: cut.body.n_nodes]
     x = x + 0.01 * np.random.default_rng(2).normal(size=x.shape)
-    np.testing.assert_array_equal(renewed.forces(x), afresh.forces(x))
-    assert renewed.energy(x) == afresh.energy(x)
-    assert renewed.frequency() == pytest.approx(afresh.frequency(), rel=0.2)
+    np.testing.assert_array_equal(updated.forces(x), from_scratch.forces(x))
+    assert updated.energy(x) == from_scratch.energy(x)
+    assert updated.frequency() == pytest.approx(from_scratch.frequency(), rel=0.2)
 
 
-def test_no_room_for_a_row_is_said_and_nothing_is_lost():
-    whole = solid_of(MESHES["grid"], law_of(0.45))
-    body, n = whole.body, whole.body.n_nodes
+def test_too_little_capacity_for_a_row_is_reported_and_nothing_is_lost():
+    complete = solid_of(MESHES["grid"], law_of(0.45))
+    body, n = complete.body, complete.body.n_nodes
     room = (n, body.n_tetrahedra)
     visits, around = no_visits(*room), np.zeros(LARGEST_STAR, dtype=np.int64)
-    tight = no_solid(law_of(0.45), *room, STAR_POOL_MARGIN + 40)
-    build_tetrahedra(tight, body, tight.every, room[1])
-    done = build_stars(tight, body, visits, tight.every, n, around)
+    too_small = no_solid(law_of(0.45), *room, STAR_POOL_MARGIN + 40)
+    build_tetrahedra(too_small, body, too_small.every, room[1])
+    done = build_stars(too_small, body, visits, too_small.every, n, around)
     assert 0 < done < n
-    larger = grown_solid(tight, *room, room_for_stars(*room))
+    larger = grown_solid(too_small, *room, room_for_stars(*room))
     assert build_stars(larger, body, visits, larger.every[done:], n - done, around) == n - done
     for node in range(n):
-        assert corners(larger, node) == corners(whole.solid, node)
+        assert corners(larger, node) == corners(complete.solid, node)
 
 
 def test_forces_are_the_same_after_the_arrays_have_grown(mesh):
@@ -125,7 +125,7 @@ def test_forces_are_the_same_after_the_arrays_have_grown(mesh):
     np.testing.assert_array_equal(body._replace(solid=larger).forces(x), before)
 
 
-def test_the_law_at_small_strain_has_the_moduli_it_was_made_of():
+def test_the_law_has_the_given_moduli_at_small_strain():
     law = neo_hookean(3e3, 20e3)
     assert 0.75 * law.mu == pytest.approx(3e3)
     assert law.lam_of_nodes - 5.0 / 6.0 * 3e3 == pytest.approx(20e3)

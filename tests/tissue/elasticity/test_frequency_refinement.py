@@ -1,10 +1,10 @@
-"""Weights that bring the bound on frequencies near the truth, against eigenvalues."""
+"""Node weights that tighten the bound on frequencies, against eigenvalues."""
 
 import numpy as np
 import pytest
 
 from tests import bodies
-from tests.tissue.solids import LAWS, fastest, law_of, solid_of
+from tests.tissue.solids import LAWS, highest_frequency, law_of, solid_of
 from tissue import block
 from tissue.elasticity.frequency_refinement import tighten
 from tissue.mesh.star import no_visits
@@ -12,11 +12,11 @@ from tissue.mesh.star import no_visits
 pytestmark = pytest.mark.kernel
 
 SMALL_NODE = 31
-"""A node inside `bodies.jittered(3, ...)`, which the tests draw close to a neighbour."""
+"""A node inside `bodies.jittered(3, ...)` that the tests move close to a face."""
 
 
 def with_a_sliver():
-    """Return a mesh in which a node lies near a face opposite to it: one mode is fast."""
+    """Return a mesh with a node close to the face opposite: one mode has a high frequency."""
     mesh = bodies.jittered(3, 1)
     around = mesh.tetrahedra[(mesh.tetrahedra == SMALL_NODE).any(axis=1)][0]
     others = mesh.positions[around[around != SMALL_NODE]].mean(axis=0)
@@ -26,7 +26,7 @@ def with_a_sliver():
 
 
 def tightened(solid, allowed=0.0):
-    """Weigh the nodes anew; return those whose bound may have changed."""
+    """Tighten the bounds; return the nodes whose bound may have changed."""
     n = solid.body.n_nodes
     solid.solid.listed[:n] = np.arange(n)
     visits = no_visits(len(solid.body.rest), len(solid.body.tetrahedra))
@@ -35,21 +35,21 @@ def tightened(solid, allowed=0.0):
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
-def test_8_what_the_bound_is_above_the_fastest_mode_by_becomes_half_of_it_at_most(law):
+def test_8_tightening_at_least_halves_the_error_of_the_bound(law):
     solid = solid_of(with_a_sliver(), law)
-    before, truth = solid.frequency(), fastest(solid)
+    before, highest = solid.frequency(), highest_frequency(solid)
     tightened(solid)
-    assert 0.0 <= solid.frequency() - truth <= 0.5 * (before - truth)
+    assert 0.0 <= solid.frequency() - highest <= 0.5 * (before - highest)
 
 
-def test_in_a_regular_mesh_there_is_little_to_gain_and_the_bound_never_rises():
+def test_the_bound_of_a_regular_mesh_does_not_rise():
     solid = solid_of(block((3, 3, 3), (0.03, 0.03, 0.03)), law_of(0.45))
     before = solid.frequency()
     tightened(solid)
-    assert fastest(solid) <= solid.frequency() <= before
+    assert highest_frequency(solid) <= solid.frequency() <= before
 
 
-def test_what_is_allowed_elsewhere_is_left_as_it_is():
+def test_bounds_below_the_allowed_one_are_not_changed():
     solid = solid_of(with_a_sliver(), law_of(0.45))
     weights, bounds = solid.solid.weight.copy(), solid.solid.frequency_squared.copy()
     tightened(solid, allowed=bounds.max())
@@ -57,7 +57,7 @@ def test_what_is_allowed_elsewhere_is_left_as_it_is():
     np.testing.assert_array_equal(solid.solid.frequency_squared, bounds)
 
 
-def test_only_the_nodes_that_it_lists_have_another_bound():
+def test_only_the_listed_nodes_have_another_bound():
     solid = solid_of(with_a_sliver(), law_of(0.45))
     before = solid.solid.frequency_squared.copy()
     listed = tightened(solid, allowed=0.8 * before.max())
@@ -66,10 +66,10 @@ def test_only_the_nodes_that_it_lists_have_another_bound():
     assert np.isin(changed, listed).all()
 
 
-def test_nodes_that_are_fixed_keep_no_weight():
+def test_fixed_nodes_have_no_weight():
     mesh = with_a_sliver()
     solid = solid_of(mesh, law_of(0.45), bodies.sides(mesh))
     tightened(solid)
     held = np.flatnonzero(bodies.sides(mesh))
     assert (solid.solid.weight[held] == 0.0).all()
-    assert fastest(solid) <= solid.frequency()
+    assert highest_frequency(solid) <= solid.frequency()

@@ -1,4 +1,4 @@
-"""Forces of tetrahedra against their slow twin, against the energy, and against theory."""
+"""Forces of tetrahedra against a slow reference, the energy and theory."""
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ def test_force_is_the_downhill_gradient_of_energy(mesh, law):
         assert forces[node, axis] == pytest.approx(-slope, rel=1e-6, abs=1e-6 * np.ptp(forces))
 
 
-def test_forces_within_a_body_add_up_to_no_force_and_no_torque(mesh, law):
+def test_internal_forces_have_no_resultant_force_or_torque(mesh, law):
     x = moved(mesh)
     forces = solid_of(mesh, law).forces(x)
     total = np.abs(forces).sum()
@@ -78,13 +78,13 @@ def test_forces_within_a_body_add_up_to_no_force_and_no_torque(mesh, law):
     assert np.abs(np.cross(x, forces).sum(axis=0)).max() < 1e-14 * total * size(mesh)
 
 
-def test_25_a_body_turned_by_a_quarter_feels_no_force(mesh, law):
+def test_25_a_body_rotated_by_a_right_angle_has_no_internal_forces(mesh, law):
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     turned = mesh.positions @ quarter.T + [1.0, -2.0, 0.5]
     assert np.abs(solid_of(mesh, law).forces(turned)).max() < 1e-9 * YOUNG_MODULUS * size(mesh) ** 2
 
 
-def test_forces_turn_with_the_body(mesh, law):
+def test_forces_rotate_with_the_body(mesh, law):
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     solid, x = solid_of(mesh, law), moved(mesh)
@@ -95,20 +95,20 @@ def test_forces_turn_with_the_body(mesh, law):
 
 
 @pytest.mark.parametrize("averaged", [False, True])
-def test_22_affine_stretch_leaves_inner_nodes_in_balance(averaged):
-    """Patch test: where the boundary moves as an affine map says, so do the inner nodes."""
+def test_22_inner_nodes_are_in_equilibrium_under_an_affine_map(averaged):
+    """Patch test: if the boundary is moved by an affine map, so are the inner nodes."""
     mesh = bodies.jittered_grid(3, 1, size=1.0)
     inner = ((mesh.positions > 1e-9) & (mesh.positions < 1.0 - 1e-9)).all(axis=1)
     map_ = np.eye(3) + 0.1 * np.random.default_rng(2).normal(size=(3, 3))
     affine = mesh.positions @ map_.T
     shifted = affine + np.where(inner[:, None], moved(mesh, 0.01) - mesh.positions, 0.0)
     solid = solid_of(mesh, law_of(0.3, averaged), ~inner)
-    balanced = _balanced(solid, shifted, inner)
-    np.testing.assert_allclose(balanced, affine, atol=1e-10)
+    equilibrium = _equilibrium(solid, shifted, inner)
+    np.testing.assert_allclose(equilibrium, affine, atol=1e-10)
 
 
-def _balanced(solid: SolidBody, x, inner):
-    """Newton's method on the forces of the inner nodes, with a stiffness by differences."""
+def _equilibrium(solid: SolidBody, x, inner):
+    """Return the equilibrium of the inner nodes by Newton's method with finite differences."""
     x, places = x.copy(), np.argwhere(np.repeat(inner[:, None], 3, axis=1))
     for _ in range(8):
         stiffness = np.empty((len(places), len(places)))
@@ -123,7 +123,7 @@ def _balanced(solid: SolidBody, x, inner):
 
 @pytest.mark.parametrize("averaged", [False, True])
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.25, 0.45])
-def test_22_a_rod_pulled_a_little_bears_young_s_modulus_times_strain(poisson_ratio, averaged):
+def test_22_the_stress_in_a_rod_is_youngs_modulus_times_strain(poisson_ratio, averaged):
     mesh = bodies.jittered_grid(3, 1, size=1.0)
     strain = 1e-7
     narrowing = -poisson_ratio * strain
@@ -131,12 +131,12 @@ def test_22_a_rod_pulled_a_little_bears_young_s_modulus_times_strain(poisson_rat
     forces = solid_of(mesh, law_of(poisson_ratio, averaged)).forces(x)
     pulled = mesh.positions[:, 0] > 1.0 - 1e-9
     assert -forces[pulled, 0].sum() == pytest.approx(YOUNG_MODULUS * strain, rel=1e-6)
-    on_flanks = ~pulled & (mesh.positions[:, 0] > 1e-9)
-    assert np.abs(forces[on_flanks]).max() < 1e-6 * YOUNG_MODULUS * strain
+    on_free_sides = ~pulled & (mesh.positions[:, 0] > 1e-9)
+    assert np.abs(forces[on_free_sides]).max() < 1e-6 * YOUNG_MODULUS * strain
 
 
-def test_moduli_of_the_law_are_those_at_small_strain():
-    """Pure shear and pure dilatation: stresses 2 mu eps and (3 lam + 2 mu) eps."""
+def test_the_moduli_hold_at_small_strain():
+    """Pure shear and pure dilatation have stresses 2 mu eps and (3 lam + 2 mu) eps."""
     mesh, eps = MESHES["one tetrahedron"], 1e-7
     mu, lam = lame(0.45)
     for law in (law_of(0.45), law_of(0.45, averaged=False)):
@@ -150,31 +150,31 @@ def test_moduli_of_the_law_are_those_at_small_strain():
 @needs_speed
 @pytest.mark.parametrize("averaged", [False, True])
 @pytest.mark.parametrize("seed", range(3))
-def test_25_nodes_thrown_at_random_return_to_rest_inside_out_or_not(averaged, seed):
-    """A unit block between two plates; a free one can knot itself."""
+def test_25_a_block_recovers_from_random_positions_with_inverted_tetrahedra(averaged, seed):
+    """A unit block between two plates; a free block can get tangled."""
     mesh = block((3, 3, 3), (1.0, 1.0, 1.0))
     held = bodies.sides(mesh)
-    thrown = np.random.default_rng(seed).uniform(size=mesh.positions.shape)
-    thrown[held] = mesh.positions[held]
-    assert (j_of(mesh, thrown) < 0.0).sum() > 50
+    scattered = np.random.default_rng(seed).uniform(size=mesh.positions.shape)
+    scattered[held] = mesh.positions[held]
+    assert (j_of(mesh, scattered) < 0.0).sum() > 50
     law = law_of(0.45, averaged)
     stiffer = law.replaced(
         mu=10 * law.mu,
         lam_of_tetrahedra=10 * law.lam_of_tetrahedra,
         lam_of_nodes=10 * law.lam_of_nodes,
     )
-    at_rest = solid_of(mesh, stiffer, held).relaxed(thrown, seconds=2.0, drag=20.0)
+    at_rest = solid_of(mesh, stiffer, held).relaxed(scattered, seconds=2.0, drag=20.0)
     assert j_of(mesh, at_rest).min() > 0.999
     np.testing.assert_allclose(at_rest, mesh.positions, atol=1e-4)
 
 
 SPLITS = [(int(1e6 * a), bool(b > 0.5), 0.2 + 0.6 * c, 0.2 + 0.6 * d)
           for a, b, c, d in np.random.default_rng(7).random((100, 4))]  # fmt: skip
-"""A hundred stellar splits without a cut: which tetrahedron, its face or an edge, and where."""
+"""A hundred stellar splits without a cut: which tetrahedron, whether a face, and where."""
 
 
 def subdivided(mesh: TetrahedralMesh, x):
-    """Return the mesh and its positions after `SPLITS`."""
+    """Return a mesh and its positions after `SPLITS`."""
     cut = cut_of(mesh)
     cut.body.positions[: len(x)] = x
     split_all(cut, SPLITS)
@@ -183,27 +183,27 @@ def subdivided(mesh: TetrahedralMesh, x):
     return TetrahedralMesh(cut.body.rest[:n], tetrahedra), cut.body.positions[:n].copy()
 
 
-def test_26_splitting_tetrahedra_leaves_the_energy_as_it_was():
+def test_26_splits_without_a_cut_keep_the_energy():
     mesh = block((3, 3, 3), (1.0, 1.0, 1.0))
     x, law = moved(mesh, 0.03), law_of(0.45, averaged=False)
-    finer, there = subdivided(mesh, x)
+    finer, finer_x = subdivided(mesh, x)
     assert len(finer.tetrahedra) > len(mesh.tetrahedra) + 200
     before = solid_of(mesh, law).energy(x)
-    assert solid_of(finer, law).energy(there) == pytest.approx(before, rel=1e-12)
+    assert solid_of(finer, law).energy(finer_x) == pytest.approx(before, rel=1e-12)
 
 
 @needs_speed
 @pytest.mark.parametrize("averaged", [False, True])
-def test_26_a_slab_hangs_as_deep_after_tetrahedra_were_split(averaged):
-    """The paper's block between two plates, under its weight; splits only make it softer."""
+def test_26_a_slab_sags_as_far_after_splits(averaged):
+    """The paper's block between two plates under gravity; splits only make it softer."""
     mesh = block((4, 6, 4), (1.0, 1.5, 1.0))
     finer, _ = subdivided(mesh, mesh.positions)
-    before, after = (_depth(which, law_of(0.45, averaged)) for which in (mesh, finer))
+    before, after = (_sag(which, law_of(0.45, averaged)) for which in (mesh, finer))
     assert before < after < 1.02 * before
 
 
-def _depth(mesh, law):
-    """How far the middle of mass of a slab comes down [m]."""
+def _sag(mesh, law):
+    """Return the sag of the centre of mass of a slab [m]."""
     solid = solid_of(mesh, law, bodies.sides(mesh))
     masses = solid.body.masses
     weight = np.outer(masses, [0.0, 0.0, -1.0])

@@ -1,4 +1,4 @@
-"""Springs and masses against the plain sum over edges, and against mechanics."""
+"""Springs and masses against plain sums over edges, and against mechanics."""
 
 import numpy as np
 import pytest
@@ -35,14 +35,14 @@ def mesh(request):
 
 
 def moved(mesh, seed=0, share=0.05):
-    """Return positions and velocities at random around rest."""
+    """Return random positions and velocities around rest."""
     random = np.random.default_rng(seed)
     reach = share * np.ptp(mesh.positions)
     noise = random.normal(size=(2, *mesh.positions.shape)) * reach
     return mesh.positions + noise[0], noise[1]
 
 
-def test_a_row_holds_every_edge_with_its_stiffness_and_rest_length(mesh):
+def test_a_row_has_every_edge_of_its_node_with_stiffness_and_rest_pull(mesh):
     springs = springs_of(build_body(mesh, None, None))
     expected = naive.stiffnesses(mesh.positions, mesh.tetrahedra, YOUNG_MODULUS)
     for node in range(len(mesh.positions)):
@@ -63,7 +63,7 @@ def test_both_ends_of_a_spring_have_the_same_bits(mesh):
             assert rows[other][node] == spring
 
 
-def test_a_node_bears_a_quarter_of_each_tetrahedron_around_it(mesh):
+def test_the_mass_of_a_node_is_a_quarter_of_the_tetrahedra_around_it(mesh):
     body = build_body(mesh, None, None)
     springs_of(body)
     expected = naive.masses(mesh.positions, mesh.tetrahedra, DENSITY)
@@ -104,17 +104,17 @@ def test_force_is_the_downhill_gradient_of_energy(mesh):
     forces = network.forces()
     step = 1e-6 * np.ptp(mesh.positions)
     for node, axis in [(0, 0), (3, 1), (7, 2)]:
-        here = x[node, axis]
-        x[node, axis] = here + step
+        original = x[node, axis]
+        x[node, axis] = original + step
         above = spring_energy(network.springs, network.body)
-        x[node, axis] = here - step
+        x[node, axis] = original - step
         below = spring_energy(network.springs, network.body)
-        x[node, axis] = here
+        x[node, axis] = original
         slope = (above - below) / (2.0 * step)
         assert forces[node, axis] == pytest.approx(-slope, rel=1e-5, abs=1e-6)
 
 
-def test_a_turned_and_shifted_body_feels_no_force(mesh):
+def test_a_rigid_motion_causes_no_force(mesh):
     network = network_of(mesh, retardation_time=1e-3)
     turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
@@ -140,24 +140,24 @@ def test_a_fixed_node_has_no_acceleration(mesh):
 
 
 def test_the_frequency_bound_is_above_every_mode(mesh):
-    """Gershgorin's bound against the eigenvalues of M^-1/2 K M^-1/2: at most 1.8 times as fast."""
+    """Gershgorin's bound is at most 1.8 times the highest eigenfrequency of M^-1/2 K M^-1/2."""
     network = network_of(mesh)
     true = np.linalg.eigvalsh(dense_modes(network.body, network.springs))[-1]
     bound = network.springs.frequency_squared[: len(mesh.positions)].max()
     assert true <= bound <= 1.8**2 * true
 
 
-def test_no_room_for_a_row_is_said_and_nothing_is_lost():
+def test_too_little_capacity_for_a_row_is_reported_and_nothing_is_lost():
     mesh = MESHES["grid"]
     body = build_body(mesh, None, None)
     n = len(mesh.positions)
     arguments = (DENSITY, YOUNG_MODULUS, np.zeros(LARGEST_STAR, dtype=np.int64))
     visits = no_visits(n, len(mesh.tetrahedra))
-    tight = no_springs(n, SPRING_POOL_MARGIN + 20)
-    done = build_rows(body, visits, tight, np.arange(n), n, *arguments)
+    too_small = no_springs(n, SPRING_POOL_MARGIN + 20)
+    done = build_rows(body, visits, too_small, np.arange(n), n, *arguments)
     assert 0 < done < n
-    larger = grown_springs(tight, n, 4 * SPRING_POOL_MARGIN)
+    larger = grown_springs(too_small, n, 4 * SPRING_POOL_MARGIN)
     rest = np.arange(done, n)
     assert build_rows(body, visits, larger, rest, n - done, *arguments) == n - done
-    at_once = springs_of(build_body(mesh, None, None))
-    assert [row(larger, i) for i in range(n)] == [row(at_once, i) for i in range(n)]
+    expected = springs_of(build_body(mesh, None, None))
+    assert [row(larger, i) for i in range(n)] == [row(expected, i) for i in range(n)]

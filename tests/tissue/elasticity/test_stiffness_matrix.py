@@ -14,11 +14,11 @@ LAWS = {
 
 
 def motion_of(gradient):
-    """Displacements of the nodes by a constant gradient, flat."""
+    """Return the displacements of the nodes with a constant gradient, as a flat array [m]."""
     return (MESH.positions @ np.asarray(gradient, dtype=float).T).ravel()
 
 
-def test_springs_and_masses_are_those_of_the_slow_twin():
+def test_springs_and_masses_are_those_of_the_slow_reference():
     springs = edge_springs(MESH, 10e3)
     slow = naive.stiffnesses(*MESH, 10e3)
     fast = {(int(a), int(b)): k for (a, b), k in zip(*springs, strict=True)}
@@ -29,7 +29,7 @@ def test_springs_and_masses_are_those_of_the_slow_twin():
 
 @pytest.mark.parametrize("material", LAWS.values(), ids=LAWS)
 @pytest.mark.parametrize("averaged", [True, False])
-def test_a_body_that_moves_as_a_whole_feels_no_force(material, averaged):
+def test_a_rigid_motion_causes_no_force(material, averaged):
     matrix = stiffness_matrix(MESH, material, averaged=averaged)
     scale = matrix.diagonal().max() * 0.04
     for turn in ([[0, -1, 0], [1, 0, 0], [0, 0, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]]):
@@ -44,12 +44,12 @@ def test_every_deformation_costs_energy(material):
     dense = stiffness_matrix(block((2, 2, 2), (0.02, 0.02, 0.02)), material).toarray()
     np.testing.assert_allclose(dense, dense.T, atol=1e-12 * dense.max())
     values = np.linalg.eigvalsh(dense)
-    assert (np.abs(values[:6]) < 1e-9 * values[-1]).all()  # six motions as a whole
+    assert (np.abs(values[:6]) < 1e-9 * values[-1]).all()  # six rigid motions
     assert values[6] > 1e-4 * values[-1]
 
 
 @pytest.mark.parametrize("averaged", [True, False])
-def test_a_tetrahedron_is_hookes_law_where_strain_is_uniform(averaged):
+def test_tetrahedra_follow_hookes_law_under_uniform_strain(averaged):
     """Energy of an affine strain: V (mu eps:eps + lam (tr eps)^2 / 2)."""
     material = Material(law="neo_hookean", poisson_ratio=0.45)
     gradient = np.array([[0.3, 0.1, 0.0], [0.2, -0.4, 0.1], [0.0, 0.5, 0.2]])

@@ -1,4 +1,4 @@
-"""The kernels' form of the Runge-Kutta method against the classical one, on paper and in NumPy."""
+"""The kernels' form of the Runge-Kutta method against the classical one in NumPy."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def accelerations_of(network: Network):
     return accelerations
 
 
-def moving(network: Network):
+def perturb(network: Network):
     random = np.random.default_rng(0)
     network.body.positions[:] += 1e-3 * random.normal(size=MESH.positions.shape)
     network.body.velocities[:] = 0.1 * random.normal(size=MESH.positions.shape)
@@ -35,9 +35,9 @@ def moving(network: Network):
 
 
 @pytest.mark.parametrize("damping", [{}, {"viscous_damping": 3.0}, DAMPED])
-def test_a_step_is_that_of_nystroem_on_paper(damping):
+def test_a_step_is_that_of_nystroem_in_numpy(damping):
     network = network_of(MESH, **damping)
-    x, v = moving(network)
+    x, v = perturb(network)
     network.advance(STEP)
     x, v = naive_runge_kutta.nystroem(accelerations_of(network), x, v, STEP)
     np.testing.assert_allclose(network.body.positions, x, rtol=0.0, atol=1e-15)
@@ -46,23 +46,23 @@ def test_a_step_is_that_of_nystroem_on_paper(damping):
 
 def test_the_classical_method_on_two_levels_is_the_classical_method():
     network = network_of(MESH, **DAMPED)
-    x, v = moving(network)
-    on_two = naive_runge_kutta.two_levels(accelerations_of(network), x, v, STEP)
+    x, v = perturb(network)
+    two_level = naive_runge_kutta.two_levels(accelerations_of(network), x, v, STEP)
     np.testing.assert_allclose(
-        naive_runge_kutta.classical(accelerations_of(network), x, v, STEP), on_two, rtol=1e-13
+        naive_runge_kutta.classical(accelerations_of(network), x, v, STEP), two_level, rtol=1e-13
     )
 
 
-def test_both_forms_make_the_errors_that_theory_gives_them():
-    """x'' = -w^2 x - 2 zeta w x', zeta = 0.1, two swings in 640 steps: 4.07e-9 and 1.67e-9."""
+def test_both_forms_have_the_errors_of_theory():
+    """x'' = -w^2 x - 2 zeta w x', zeta = 0.1, two periods in 640 steps: 4.07e-9 and 1.67e-9."""
     w, zeta, n, seconds = 2.0 * np.pi, 0.1, 640, 2.0
     damped = w * np.sqrt(1.0 - zeta**2)
-    fall = np.exp(-zeta * w * seconds)
-    there = fall * (np.cos(damped * seconds) + zeta * w / damped * np.sin(damped * seconds))
-    then = -fall * w * w / damped * np.sin(damped * seconds)
+    decay = np.exp(-zeta * w * seconds)
+    exact_x = decay * (np.cos(damped * seconds) + zeta * w / damped * np.sin(damped * seconds))
+    exact_v = -decay * w * w / damped * np.sin(damped * seconds)
 
     def error(x, v):
-        return max(abs(x - there), abs(v - then) / w)
+        return max(abs(x - exact_x), abs(v - exact_v) / w)
 
     network = oscillator(w, viscous_damping=2.0 * zeta * w)
     network.body.positions[1, 0] = 1.5

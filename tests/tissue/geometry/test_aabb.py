@@ -1,4 +1,4 @@
-"""Boxes hold what they are made of, and overlap where they share a point."""
+"""Bounding boxes contain their points, and overlap where they share a point."""
 
 import itertools
 
@@ -29,7 +29,7 @@ def moved(box, x, y, z):
     )
 
 
-def test_a_box_of_points_is_the_smallest_that_holds_them():
+def test_a_box_of_points_is_the_smallest_that_contains_them():
     points = np.random.default_rng(0).normal(size=(20, 3))
     box = empty_box()
     for row in points.tolist():
@@ -39,25 +39,25 @@ def test_a_box_of_points_is_the_smallest_that_holds_them():
 
 @pytest.mark.parametrize("axis", range(3))
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
-def test_boxes_overlap_up_to_where_their_sides_meet(axis, sign):
-    for distance, meets in ((0.5, True), (1.0, True), (1.001, False)):
+def test_boxes_overlap_until_their_sides_separate(axis, sign):
+    for distance, overlaps in ((0.5, True), (1.0, True), (1.001, False)):
         d = [0.2, -0.3, 0.1]
         d[axis] = sign * distance
         other = moved(UNIT, *d)
-        assert overlap(UNIT, other) == overlap(other, UNIT) == meets
+        assert overlap(UNIT, other) == overlap(other, UNIT) == overlaps
 
 
-def test_boxes_that_share_a_corner_overlap_and_one_in_the_other_does():
+def test_boxes_that_share_a_corner_or_are_nested_overlap():
     for signs in itertools.product((-1.0, 1.0), repeat=3):
         assert overlap(UNIT, moved(UNIT, *signs))
     assert overlap(UNIT, Aabb(Vec3(0.4, 0.4, 0.4), Vec3(0.5, 0.5, 0.5)))
 
 
-def test_within_a_margin_boxes_overlap_as_if_one_were_wider():
-    for distance, meets in ((1.2, True), (1.3, False)):
+def test_overlap_within_a_margin_is_overlap_with_a_widened_box():
+    for distance, overlaps in ((1.2, True), (1.3, False)):
         other = moved(UNIT, 0.0, distance, 0.0)
-        assert overlap_within(UNIT, other, 0.25) == meets
-        assert overlap(UNIT, widened(other, 0.25)) == meets
+        assert overlap_within(UNIT, other, 0.25) == overlaps
+        assert overlap(UNIT, widened(other, 0.25)) == overlaps
 
 
 def test_an_empty_box_overlaps_nothing():

@@ -1,4 +1,4 @@
-"""Sides of planes and pierced triangles: exact, and nothing slips through where triangles meet."""
+"""Orientation and piercing tests: exact, with ties resolved consistently at shared edges."""
 
 import itertools
 
@@ -24,17 +24,17 @@ P, Q, R = LatticePoint(0, 0, 0), LatticePoint(4, 0, 0), LatticePoint(0, 4, 0)
 
 
 def points(random, n, reach=LATTICE_POINTS // 2):
-    """Return `n` lattice points of a body."""
+    """Return `n` random lattice points."""
     return [LatticePoint(*row) for row in random.integers(-reach, reach, (n, 3)).tolist()]
 
 
-def test_a_point_above_a_left_turn_is_positive():
+def test_a_point_above_a_counter_clockwise_triangle_is_positive():
     assert orient3d(P, Q, R, LatticePoint(0, 0, 1)) == 16
     assert orient3d(P, Q, R, LatticePoint(0, 0, -1)) == -16
     assert orient3d(P, Q, R, LatticePoint(7, -3, 0)) == 0
 
 
-def test_sides_are_exact_for_points_next_to_the_plane():
+def test_orientation_is_exact_for_points_next_to_the_plane():
     random = np.random.default_rng(1)
     for _ in range(2000):
         a, b, c = points(random, 3, LATTICE_POINTS // 8)
@@ -47,7 +47,7 @@ def test_sides_are_exact_for_points_next_to_the_plane():
 
 
 def adversarial(random: np.random.Generator) -> list[LatticePoint]:
-    """Return four points that nearly, or just, lie in one plane, on one line or in one point."""
+    """Return four points that are coplanar, collinear or coincident, exactly or almost."""
     reach = LATTICE_LIMIT // 8
     a, u, v = random.integers(-reach, reach + 1, (3, 3))
     if random.random() < 0.5:  # a thin or short triangle
@@ -58,7 +58,7 @@ def adversarial(random: np.random.Generator) -> list[LatticePoint]:
     return [LatticePoint(*p.clip(-LATTICE_LIMIT, LATTICE_LIMIT).tolist()) for p in four]
 
 
-def test_sides_are_exact_in_10000_cases_made_to_fail():
+def test_orientation_is_exact_in_10000_adversarial_cases():
     random = np.random.default_rng(7)
     zero = 0
     for _ in range(10_000):
@@ -105,28 +105,28 @@ def test_the_order_of_nodes_and_ends_does_not_matter():
             assert pierces(b, a, *nodes) == expected
 
 
-def test_turning_a_triangle_round_its_nodes_does_not_matter_even_for_ties():
+def test_cyclic_order_of_a_triangle_does_not_matter_even_for_ties():
     small = [LatticePoint(*p) for p in itertools.product(range(2), repeat=3)]
     for a, b, p, q, r in itertools.permutations(small, 5):
         assert pierces(a, b, p, q, r) == pierces(a, b, q, r, p) == pierces(a, b, r, p, q)
 
 
-def test_of_two_triangles_exactly_one_is_pierced_through_their_common_edge():
+def test_exactly_one_of_two_triangles_is_pierced_through_their_common_edge():
     random = np.random.default_rng(4)
     n = 0
     while n < 10_000:
-        p, step, way, r, s = random.integers(-1000, 1001, (5, 3))
+        p, step, direction, r, s = random.integers(-1000, 1001, (5, 3))
         q, middle = p + 7 * step, p + random.integers(1, 7) * step
-        a, b = middle - 2 * way, middle + 3 * way
+        a, b = middle - 2 * direction, middle + 3 * direction
         if naive.determinant(a, b, p, r) * naive.determinant(a, b, p, s) >= 0:
-            continue  # a fold: the segment touches it, or passes it by
+            continue  # a fold: the segment touches or misses it
         a, b, p, q, r, s = (LatticePoint(*x.tolist()) for x in (a, b, p, q, r, s))
         assert naive.determinant(a, b, p, q) == 0
         assert pierces(a, b, p, q, r) != pierces(a, b, q, p, s)
         n += 1
 
 
-def test_of_two_segments_exactly_one_pierces_the_triangle_they_meet_on():
+def test_exactly_one_of_two_joined_segments_pierces_the_triangle_at_their_joint():
     random = np.random.default_rng(5)
     for _ in range(2000):
         p, u, v, a, c = random.integers(-1000, 1001, (5, 3))
@@ -145,8 +145,8 @@ def test_a_flat_triangle_is_never_pierced():
         assert not pierces(LatticePoint(*a.tolist()), LatticePoint(*b.tolist()), *flat)
 
 
-def test_nothing_slips_between_the_triangles_of_an_edge_that_advances():
-    """Wherever a line meets what an edge sweeps, exactly one triangle of its quads is pierced."""
+def test_a_line_pierces_exactly_one_triangle_of_a_swept_area():
+    """The area swept by an advancing edge is a strip of quads, each of two triangles."""
     tips = [
         LatticePoint(0, 0, 0),
         LatticePoint(4, 1, 0),
@@ -175,7 +175,7 @@ def test_the_lattice_covers_the_body_from_its_centre():
     assert nearest(lattice, Vec3(0.1, 0.01, 0.02)) == LatticePoint(LATTICE_POINTS // 2, 0, 0)
 
 
-def test_a_blade_far_from_the_body_is_pulled_in_to_the_lattice():
+def test_a_point_far_from_the_body_is_clamped_to_the_lattice():
     lattice = lattice_around(np.array([[0.0, 0.0, 0.0], [0.1, 0.02, 0.04]]))
     far = nearest(lattice, Vec3(1e9, -1e9, 0.02))
     assert (far.x, far.y, far.z) == (LATTICE_LIMIT, -LATTICE_LIMIT, 0)

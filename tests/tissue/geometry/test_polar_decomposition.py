@@ -1,4 +1,4 @@
-"""The rotation in a deformation."""
+"""The polar decomposition: the rotation in a deformation."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ pytestmark = pytest.mark.kernel
 
 
 def turn_and_stretch():
-    """Return a random rotation, and a deformation that stretches before it turns."""
+    """Return a random rotation, and a deformation that stretches before it rotates."""
     turn, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     return turn, turn @ np.diag([1.3, 0.8, 1.1])
@@ -21,7 +21,7 @@ def columns(matrix):
     return Matrix3(*(Vec3(*column) for column in matrix.T.tolist()))
 
 
-def test_the_rotation_in_a_stretch_and_turn_is_the_turn():
+def test_the_rotation_after_a_stretch_is_found():
     turn, stretched = turn_and_stretch()
     np.testing.assert_allclose(np.transpose(nearest_rotation(columns(stretched))), turn, atol=1e-9)
 

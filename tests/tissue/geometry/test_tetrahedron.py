@@ -35,7 +35,7 @@ def test_the_corner_of_a_cube_is_a_sixth_of_it():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_volume_is_that_of_the_determinant(seed):
+def test_volume_is_a_sixth_of_the_determinant(seed):
     corners = random_corners(seed)
     by_kernel = signed_volume(*(vec3(corners, k) for k in range(4)))
     assert by_kernel == pytest.approx(naive.volume(corners))
@@ -70,7 +70,7 @@ def test_weights_in_a_flat_tetrahedron_are_equal_shares():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_weights_add_up_to_one_and_give_the_point_back(seed):
+def test_weights_add_up_to_one_and_reproduce_the_point(seed):
     corners = random_corners(seed)
     p = Vec3(0.3, -0.2, 0.9)
     w = barycentric(p, *(vec3(corners, k) for k in range(4)))
@@ -97,7 +97,7 @@ def test_a_unit_vector_has_length_one_and_zero_stays_zero():
     assert normalised(ORIGIN) == ORIGIN
 
 
-def test_vectors_turn_right_handed():
+def test_vector_operations_are_right_handed():
     assert cross(X, Y) == Z
     assert dot(X, Y) == 0.0
     assert norm(sub(X, Y)) == pytest.approx(np.sqrt(2.0))

@@ -1,4 +1,4 @@
-"""Networks of springs that are advanced by the kernels of the relaxations, without `Tissue`."""
+"""Networks of springs advanced by the kernels of the steppers, without `Tissue`."""
 
 import numpy as np
 
@@ -48,12 +48,12 @@ def block(
 
 
 def nearest(network: Network, point: FloatArray) -> int:
-    """Return the node that is nearest to a point at rest [m]."""
+    """Return the node whose rest position is nearest to a point [m]."""
     return int(np.argmin(np.linalg.norm(network.body.rest - point, axis=1)))
 
 
 def rings_around(network: Network, node: int, last_ring: int) -> Rings:
-    """Return the rings around one node."""
+    """Return the rings around one node, up to `last_ring`."""
     rings = new_rings(len(network.body.rest))
     begin_search(rings)
     add_focus(rings, node)
@@ -61,12 +61,12 @@ def rings_around(network: Network, node: int, last_ring: int) -> Rings:
     return rings
 
 
-def found(rings: Rings) -> list[int]:
-    """Return the nodes that were found, in order."""
+def found_nodes(rings: Rings) -> list[int]:
+    """Return the nodes that a ring search found, in order."""
     return rings.order[: rings.n_found].tolist()
 
 
-def frames(
+def hierarchical_frames(
     network: Network,
     focus: int,
     span: float,
@@ -76,7 +76,18 @@ def frames(
     frozen: bool,
     trails: Trails | None = None,
 ) -> None:
-    """Advance by `n` frames of `span` [s] of the hierarchical relaxation."""
+    """Advance by frames of the hierarchical relaxation.
+
+    Args:
+        network: The network to advance.
+        focus: Node in the middle of the rings.
+        span: Length of a frame [s].
+        n: Number of frames.
+        updates: Steps of ring 0 in a frame.
+        last_ring: Last ring that takes steps of its own.
+        frozen: Whether nodes beyond the last ring do not move.
+        trails: Scratch of the kernels, made if not given.
+    """
     n_nodes = len(network.body.rest)
     rings = rings_around(network, focus, last_ring + 1)
     trails = trails or new_trails(n_nodes)
@@ -87,7 +98,7 @@ def frames(
         hierarchical_frame(context, NOWHERE, rings, trails, every, frame)
 
 
-def leaps(
+def macro_steps(
     network: Network,
     fine: list[int],
     span: float,
@@ -95,7 +106,18 @@ def leaps(
     n_substeps: int,
     stabilisation: float = STABILISATION,
 ) -> None:
-    """Advance by `n` macro steps of `span` [s], all nodes awake, velocities of this instant."""
+    """Advance by macro steps of local time stepping, all nodes awake.
+
+    The first step starts from velocities at the same instant as the positions.
+
+    Args:
+        network: The network to advance.
+        fine: Nodes that take substeps.
+        span: Length of a macro step [s].
+        n: Number of macro steps.
+        n_substeps: Substeps of the fine nodes in a macro step.
+        stabilisation: Damping of the Chebyshev polynomials.
+    """
     body, elastic = network.body, elastic_of(network.springs)
     n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
     zone, activity = new_zone(n_nodes, n_tetrahedra), all_asleep(n_nodes)
@@ -116,14 +138,14 @@ def leaps(
         macro_step(context, NOWHERE, state, coefficients, step, 0.0)
 
 
-def highest_frequency(network: Network) -> float:
-    """Return the bound on the angular frequency [1/s] of the nodes that can move."""
+def frequency_bound(network: Network) -> float:
+    """Return the bound on the angular frequency of the free nodes [1/s]."""
     free = ~network.body.fixed
     return float(np.sqrt(network.springs.frequency_squared[free].max()))
 
 
 def stiffen(network: Network, nodes: list[int], factor: float) -> None:
-    """Make the springs between these nodes that many times as stiff."""
+    """Multiply the stiffness of the springs between these nodes by a factor."""
     springs, among = network.springs, set(nodes)
     for node in nodes:
         first = springs.first[node]
@@ -134,7 +156,7 @@ def stiffen(network: Network, nodes: list[int], factor: float) -> None:
 
 
 def shake(network: Network, size: float) -> None:
-    """Bend the body by waves of that size [m], at rest where it is fixed."""
+    """Displace the free nodes by waves of amplitude `size` [m], and set all velocities to zero."""
     body = network.body
     free: BoolArray = ~body.fixed
     body.positions[:] = body.rest + size * np.sin(200.0 * body.rest)[:, [1, 2, 0]] * free[:, None]

@@ -1,10 +1,10 @@
-"""The rings grow around the tip of the blade, and all that it holds is in ring 0."""
+"""Rings are centred on the tip of the blade; all anchored nodes are in ring 0."""
 
 import numpy as np
 import pytest
 
-from tests.tissue.integrators.networks import block, found
-from tests.tissue.kernels_of import tool_with
+from tests.tissue.integrators.networks import block, found_nodes
+from tests.tissue.kernels_of import line_blade
 from tissue.blade.anchors import ANCHORED, new_anchors
 from tissue.integrators.focus import find_held, find_rings
 from tissue.integrators.node_rings import (
@@ -27,14 +27,14 @@ TIP, HEEL = 0, len(BODY.tetrahedra) - 1
 
 def held_by(*tetrahedra):
     anchors = new_anchors(len(tetrahedra) + 1, 0.01, 10e3)
-    anchors.state[1:] = ANCHORED  # the very tip is out of the tissue
+    anchors.state[1:] = ANCHORED  # the sample at the tip is outside the tissue
     anchors.tetrahedron[1:] = tetrahedra
     held = new_rings(N_NODES)
-    assert find_held(held, BODY, tool_with(anchors))
+    assert find_held(held, BODY, line_blade(anchors))
     return held
 
 
-def around(held, last_ring):
+def rings_of(held, last_ring):
     rings = new_rings(N_NODES)
     find_rings(rings, held, SPRINGS, last_ring, np.zeros(N_NODES, np.int64))
     return rings
@@ -42,23 +42,23 @@ def around(held, last_ring):
 
 def test_the_first_anchor_from_the_tip_is_the_focus():
     corners = [BODY.tetrahedra[t].tolist() for t in (TIP, HEEL)]
-    assert found(held_by(TIP, HEEL)) == [*corners[0], *corners[1]]
+    assert found_nodes(held_by(TIP, HEEL)) == [*corners[0], *corners[1]]
 
 
-def test_rings_are_counted_from_the_tip_and_what_is_held_is_in_ring_0():
-    rings = around(held_by(TIP, HEEL), 2)
+def test_rings_are_counted_from_the_tip_and_anchored_nodes_are_in_ring_0():
+    rings = rings_of(held_by(TIP, HEEL), 2)
     expected = new_rings(N_NODES)
     begin_search(expected)
     for node in BODY.tetrahedra[TIP]:
         add_focus(expected, node)
     search(expected, SPRINGS, 2)
-    for node in found(expected):
+    for node in found_nodes(expected):
         assert ring_of(rings, node) == ring_of(expected, node)
     assert {ring_of(rings, node) for node in BODY.tetrahedra[HEEL]} == {0}
 
 
-def test_neighbours_of_what_is_held_far_away_are_seen_in_the_last_ring():
-    rings = around(held_by(TIP, HEEL), 2)
+def test_neighbours_of_distant_anchored_nodes_are_in_the_last_ring():
+    rings = rings_of(held_by(TIP, HEEL), 2)
     far = int(BODY.tetrahedra[HEEL, 0])
     first = SPRINGS.first[far]
     beside = SPRINGS.neighbour[first : first + SPRINGS.count[far]].tolist()
@@ -66,15 +66,15 @@ def test_neighbours_of_what_is_held_far_away_are_seen_in_the_last_ring():
 
 
 def test_the_order_is_ring_by_ring_and_each_node_once():
-    rings = around(held_by(TIP, 30, HEEL), 3)
-    order = found(rings)
+    rings = rings_of(held_by(TIP, 30, HEEL), 3)
+    order = found_nodes(rings)
     assert len(set(order)) == len(order)
     assert (np.diff(rings.ring[order]) >= 0).all()
 
 
-def test_when_the_blade_has_let_go_the_focus_stays():
+def test_the_focus_stays_when_no_anchor_is_left():
     held = held_by(TIP)
-    before = found(held)
-    assert not find_held(held, BODY, tool_with(new_anchors(2, 0.01, 10e3)))
-    assert found(held) == before
+    before = found_nodes(held)
+    assert not find_held(held, BODY, line_blade(new_anchors(2, 0.01, 10e3)))
+    assert found_nodes(held) == before
     assert ring_of(held, int(BODY.tetrahedra[HEEL, 0])) == UNREACHED

@@ -1,9 +1,9 @@
-"""Rings are distances in edges, and cost what they hold."""
+"""The ring of a node is its distance in edges from the focus."""
 
 import numpy as np
 import pytest
 
-from tests.tissue.integrators.networks import block, found, rings_around
+from tests.tissue.integrators.networks import block, found_nodes, rings_around
 from tissue.integrators.node_rings import (
     UNREACHED,
     add_focus,
@@ -20,7 +20,7 @@ N_NODES = len(NETWORK.body.rest)
 
 
 def edges_apart(start: int) -> list[int]:
-    """Return the distance of every node from one, by matrix powers: slow and plain."""
+    """Return the distance of every node from `start` in edges, by matrix powers."""
     springs = NETWORK.springs
     joined = np.eye(N_NODES, dtype=bool)
     for i in range(N_NODES):
@@ -41,25 +41,25 @@ def test_the_ring_of_a_node_is_its_distance_in_edges(start):
 
 def test_nodes_come_ring_by_ring_and_each_once():
     rings = rings_around(NETWORK, 21, N_NODES)
-    order = found(rings)
+    order = found_nodes(rings)
     assert sorted(order) == list(range(N_NODES))
     assert (np.diff(rings.ring[order]) >= 0).all()
 
 
 def test_a_search_ends_at_its_last_ring():
     rings = rings_around(NETWORK, 21, 1)
-    assert {ring_of(rings, i) for i in found(rings)} == {0, 1}
+    assert {ring_of(rings, i) for i in found_nodes(rings)} == {0, 1}
     expected = [i for i, ring in enumerate(edges_apart(21)) if ring <= 1]
-    assert sorted(found(rings)) == expected
+    assert sorted(found_nodes(rings)) == expected
     assert ring_of(rings, edges_apart(21).index(2)) == UNREACHED
 
 
-def test_a_new_search_forgets_the_last():
+def test_a_new_search_discards_the_last():
     rings = rings_around(NETWORK, 0, 1)
     begin_search(rings)
     add_focus(rings, N_NODES - 1)
     add_focus(rings, N_NODES - 1)
-    assert found(rings) == [N_NODES - 1]
+    assert found_nodes(rings) == [N_NODES - 1]
     assert ring_of(rings, 0) == UNREACHED
 
 

@@ -1,4 +1,4 @@
-"""What a user may choose, and what is said of a choice that cannot be."""
+"""Options of the relaxation, and the messages that refuse impossible ones."""
 
 import pytest
 
@@ -14,7 +14,7 @@ def test_a_name_stands_for_the_default_settings(name, settings):
     assert checked_relaxation(name, Material()) == settings
 
 
-def test_settings_are_taken_as_they_are():
+def test_settings_are_used_unchanged():
     chosen = Hierarchical(updates=16, rings=2, far="frozen")
     assert checked_relaxation(chosen, Material()) is chosen
 
@@ -46,7 +46,7 @@ def test_the_hierarchy_is_for_springs_alone(material):
         ({"far": "away"}, "far is 'away'; it must be one of moved, frozen"),
     ],
 )
-def test_a_hierarchy_that_cannot_be_is_refused(settings, message):
+def test_impossible_hierarchical_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         Hierarchical(**settings)
 
@@ -59,6 +59,6 @@ def test_a_hierarchy_that_cannot_be_is_refused(settings, message):
         ({"stabilisation": float("nan")}, "stabilisation is nan"),
     ],
 )
-def test_local_time_stepping_that_cannot_be_is_refused(settings, message):
+def test_impossible_settings_of_local_time_stepping_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         LocalTimeStepping(**settings)

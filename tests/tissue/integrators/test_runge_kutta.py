@@ -11,7 +11,7 @@ from tissue import Tissue, block
 from tissue.integrators.stability import STABILITY_LIMIT, largest_stable_step
 
 FREQUENCY = 2.0 * np.pi
-"""Of the oscillator [1/s]: one swing a second."""
+"""Angular frequency of the oscillator [1/s]: one period a second."""
 
 DAMPINGS = {
     "undamped": {},
@@ -22,33 +22,33 @@ DAMPINGS = {
 
 
 ROUNDED_TABLE = 0.01
-"""Growth a step that the three decimals of the table, and what lies between its entries, may add.
-`SAFETY` takes a fifth off the step; a step 2 % beyond the limit already grows by more."""
+"""Largest growth in a step due to rounding the table and interpolating between its entries.
+`SAFETY` shortens the step by a fifth; a step 2 % beyond the limit already grows by more."""
 
 
-def exact_swing(t, damping):
-    """Return x and x' of the oscillator released at rest 0.3 m from where it hangs."""
+def exact_state(t, damping):
+    """Return x and x' of the oscillator released at rest, 0.3 m from its equilibrium."""
     rate = damping.get("viscous_damping", 0.0)
     rate += damping.get("retardation_time", 0.0) * FREQUENCY**2
     decay = 0.5 * rate
     w = np.sqrt(FREQUENCY**2 - decay**2)
-    fall = np.exp(-decay * t)
-    x = 0.3 * fall * (np.cos(w * t) + decay / w * np.sin(w * t))
-    v = -0.3 * fall * FREQUENCY**2 / w * np.sin(w * t)
+    envelope = np.exp(-decay * t)
+    x = 0.3 * envelope * (np.cos(w * t) + decay / w * np.sin(w * t))
+    v = -0.3 * envelope * FREQUENCY**2 / w * np.sin(w * t)
     return np.array([x, v])
 
 
-def swing_error(n, damping):
+def oscillator_error(n, damping):
     """Return the error in x and x' after one second in `n` steps."""
     network = oscillator(FREQUENCY, **damping)
     network.body.positions[1, 0] = 1.3
     network.advance(1.0 / n, n)
     state = np.array([network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]])
-    return np.abs(state - exact_swing(1.0, damping)).max()
+    return np.abs(state - exact_state(1.0, damping)).max()
 
 
 def order(steps, errors):
-    """Return the slope of the error over the step, both logarithmic."""
+    """Return the order of convergence: minus the slope of log error over log steps."""
     return -np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
@@ -56,14 +56,14 @@ def order(steps, errors):
 @pytest.mark.parametrize("damping", DAMPINGS)
 def test_the_order_is_four_on_an_oscillator(damping):
     steps = [40, 80, 160, 320]
-    errors = [swing_error(n, DAMPINGS[damping]) for n in steps]
+    errors = [oscillator_error(n, DAMPINGS[damping]) for n in steps]
     assert order(steps, errors) >= 3.9
     assert errors[-1] < 1e-6
 
 
 @pytest.mark.parametrize("damping", DAMPINGS)
 def test_the_order_is_four_on_a_network_of_springs(damping):
-    """A block of 190 springs, bent far beyond small strains, against 16 times as many steps."""
+    """A block of 190 springs under large strains, against a run with 16 times as many steps."""
     per_second = {"viscous_damping": 20.0, "retardation_time": 1e-3}
     network = network_of(
         MESH, bodies.sides(MESH), **{name: per_second[name] for name in DAMPINGS[damping]}
@@ -88,7 +88,7 @@ MESH = block((3, 2, 2), (0.06, 0.04, 0.04))
 
 
 def growth(step, ratio, by_drag):
-    """Return by how much a step of `step` / w makes the oscillator grow, at most.
+    """Return the largest growth factor of the oscillator in a step of `step` / w.
 
     The oscillator is linear, so a step is a matrix; its columns are the steps from unit states.
     """
@@ -96,7 +96,7 @@ def growth(step, ratio, by_drag):
     network = oscillator(1.0, **damping)
     columns = []
     for x, v in ((1.0, 0.0), (0.0, 1.0)):
-        # Small, for a node that passes through its neighbour is no linear spring any more.
+        # The amplitude is small: the spring is not linear for a node that passes its neighbour.
         network.body.positions[1, 0], network.body.velocities[1, 0] = 1.0 + 1e-3 * x, 1e-3 * v
         network.advance(step)
         state = network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]
@@ -131,7 +131,7 @@ def test_no_entry_of_the_table_is_above_the_measured_limit(ratio, limit):
 
 
 @pytest.mark.parametrize("ratio", [0.02, 0.3, 0.55, 0.6, 0.65, 0.8, 1.2, 1.7, 2.5, 3.0, 4.0, 10.0])
-def test_the_largest_stable_step_is_stable_between_the_entries_too(ratio):
+def test_the_largest_stable_step_is_stable_between_the_entries_of_the_table(ratio):
     for drag, retardation in ((2.0 * ratio, 0.0), (0.0, 2.0 * ratio), (ratio, ratio)):
         step = largest_stable_step(1.0, retardation, drag)
         assert growth(step, ratio, drag > 0.0) <= 1.0 + ROUNDED_TABLE
@@ -148,11 +148,11 @@ def cut_body(mesh, stroke):
 
 
 LOOSEST_BOUND = 1.6
-"""Bound on the frequency over the highest true one, at most. 1.04 to 1.35 were measured."""
+"""Largest ratio of the bound to the highest frequency; 1.04 to 1.35 were measured."""
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_bound_on_frequency_of_a_cut_body_holds_and_is_not_far_off(seed):
+def test_the_frequency_bound_of_a_cut_body_holds_and_is_close(seed):
     mesh = bodies.jittered(3, seed)
     tissue = cut_body(mesh, strokes.slanted(mesh, lean=0.02 * seed))
     assert tissue.n_tetrahedra > len(mesh.tetrahedra)
@@ -164,8 +164,8 @@ def test_the_bound_on_frequency_of_a_cut_body_holds_and_is_not_far_off(seed):
     assert bound <= tissue._system.elasticity.frequency_squared
 
 
-def test_every_mode_of_every_body_is_stable_at_the_step_that_is_taken():
-    """For each mode w of the body, a step of the bound's length must not make it grow."""
+def test_every_mode_is_stable_at_the_step_that_is_taken():
+    """No mode w of the body grows in a step that is stable for the frequency bound."""
     dampings = [(0.0, 0.0), (2e-4, 5.0), (5e-3, 0.0)]
     for seed, (retardation, drag) in itertools.product(range(2), dampings):
         network = network_of(bodies.jittered(2, seed))

@@ -1,4 +1,4 @@
-"""Threads share the loops over a body, and change nothing but the time."""
+"""Threads share the loops over a body and change only the run time."""
 
 import hashlib
 import os
@@ -20,7 +20,7 @@ LAWS = {
 
 
 def state_after(threads, material, n_steps):
-    """Return a digest of a body, cut through and then swinging, after that many steps of 1 ms."""
+    """Return a digest of a body that is cut through and oscillates, after `n_steps` of 1 ms."""
     tissue = Tissue(
         MESH,
         material,
@@ -39,12 +39,12 @@ def state_after(threads, material, n_steps):
 @pytest.mark.parametrize(
     ("law", "n_steps"), [("springs", 1000), ("neo-Hookean", 300), ("undamped", 300)]
 )
-def test_two_threads_end_with_the_bits_of_one(law, n_steps):
+def test_two_threads_give_the_same_bits_as_one(law, n_steps):
     one = state_after(1, LAWS[law], n_steps)
     assert state_after(2, LAWS[law], n_steps) == one
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, True, 10_000])
-def test_a_number_of_threads_that_no_machine_has_is_refused(threads):
+def test_an_impossible_number_of_threads_is_refused(threads):
     with pytest.raises(ValueError, match="whole number from 1 to"):
         Tissue(MESH, solver=SolverSettings(threads=threads))

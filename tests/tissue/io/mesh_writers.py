@@ -1,6 +1,6 @@
-"""Small writers of the formats that `read_mesh` reads, straight from their specifications.
+"""Small writers of the formats that `read_mesh` reads, written from their specifications.
 
-Each file also holds a point, a line and a triangle, as meshers write them.
+Each file also has a point, a line and a triangle, as in the output of meshers.
 """
 
 import base64
@@ -12,11 +12,11 @@ import numpy as np
 from tissue import TetrahedralMesh
 
 FIRST_TAG = 7
-"""Gmsh's nodes are counted from here, for tags need not begin at 1."""
+"""Tag of the first node in Gmsh files; tags need not begin at 1."""
 
 
 def gmsh_1(mesh: TetrahedralMesh) -> bytes:
-    """Gmsh 1.0."""
+    """Return a mesh in the Gmsh 1.0 format."""
     nodes = [
         f"{i + FIRST_TAG} {x!r} {y!r} {z!r}" for i, (x, y, z) in enumerate(mesh.positions.tolist())
     ]
@@ -29,7 +29,7 @@ def gmsh_1(mesh: TetrahedralMesh) -> bytes:
 
 
 def gmsh_2(mesh: TetrahedralMesh, order: str = "") -> bytes:
-    """Gmsh 2.2: as text, or binary in byte order "<" or ">"."""
+    """Return a mesh in the Gmsh 2.2 format: as text, or binary in byte order "<" or ">"."""
     cells = _cells(mesh)
     if not order:
         nodes = "".join(
@@ -56,7 +56,10 @@ def gmsh_2(mesh: TetrahedralMesh, order: str = "") -> bytes:
 
 
 def gmsh_4(mesh: TetrahedralMesh, order: str = "") -> bytes:
-    """Gmsh 4.1: as text, or binary in byte order "<" or ">". Nodes in two blocks."""
+    """Return a mesh in the Gmsh 4.1 format, its nodes in two blocks.
+
+    It is text, or binary in byte order "<" or ">".
+    """
     n, cells = len(mesh.positions), _cells(mesh)
     nodes = [("Q", [2, n, FIRST_TAG, n + FIRST_TAG - 1])]
     for dimension, block in ((2, range(3)), (3, range(3, n))):
@@ -83,7 +86,10 @@ def gmsh_4(mesh: TetrahedralMesh, order: str = "") -> bytes:
 def vtk_legacy(
     mesh: TetrahedralMesh, version: str, is_binary: bool, dtype: str = "double"
 ) -> bytes:
-    """VTK legacy with cells as size and nodes (2.0), or as offsets and connectivity (5.1)."""
+    """Return a mesh in the VTK legacy format.
+
+    Cells are sizes and nodes in version 2.0, offsets and connectivity in version 5.1.
+    """
     cells = [(_VTK_KINDS[kind], [i - FIRST_TAG for i in c]) for kind, c in _cells(mesh)]
 
     def array(values: object, code: str) -> bytes:
@@ -120,7 +126,16 @@ def vtu(
     is_compressed: bool = False,
     appended_is_raw: bool = True,
 ) -> bytes:
-    """VTK XML in all its ways to write numbers; `form` is ascii, binary or appended."""
+    """Return a mesh in the VTK XML format, in any of its encodings of numbers.
+
+    Args:
+        mesh: The mesh.
+        form: "ascii", "binary" or "appended".
+        order: Byte order, "<" or ">".
+        header: Type of the sizes in front of binary data.
+        is_compressed: Whether binary data is compressed by zlib.
+        appended_is_raw: Whether appended data is raw, else base64.
+    """
     cells = [(_VTK_KINDS[kind], [i - FIRST_TAG for i in c]) for kind, c in _cells(mesh)]
     appended = b""
 
@@ -161,11 +176,11 @@ def vtu(
 
 
 _VTK_KINDS = {15: 1, 1: 3, 2: 5, 4: 10}
-"""Gmsh's number of a kind of cell to VTK's."""
+"""Number of a cell type in Gmsh to that in VTK."""
 
 
 def _cells(mesh: TetrahedralMesh) -> list[tuple[int, list[int]]]:
-    """List kind and node tags of all cells, in Gmsh's numbers."""
+    """Return the type and node tags of all cells, as Gmsh numbers them."""
     tetrahedra = (mesh.tetrahedra + FIRST_TAG).tolist()
     first = tetrahedra[0]
     return [(15, first[:1]), (1, first[:2]), (2, first[:3]), *((4, c) for c in tetrahedra)]
@@ -193,7 +208,7 @@ def _vtu_data(data: bytes, order: str, header: str, is_compressed: bool, is_raw:
     if not is_compressed:
         whole = struct.pack(order + code, len(data)) + data
         return whole if is_raw else base64.b64encode(whole)
-    size = 100  # small, for there to be many blocks
+    size = 100  # small, so that there are many blocks
     blocks = [zlib.compress(data[i : i + size]) for i in range(0, len(data), size)]
     numbers = [len(blocks), size, len(data) % size, *(len(b) for b in blocks)]
     parts = [struct.pack(f"{order}{len(numbers)}{code}", *numbers), b"".join(blocks)]

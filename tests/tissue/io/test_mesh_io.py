@@ -43,7 +43,7 @@ FILES = {
 
 
 def refusal(path):
-    """Return the message with which `path` is refused."""
+    """Return the message of the error that `path` causes."""
     with pytest.raises(MeshError) as caught:
         read_mesh(path)
     message = str(caught.value)
@@ -59,14 +59,14 @@ def refusal_of(folder, name, data):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_every_format_gives_back_the_mesh_to_the_last_bit(name, tmp_path):
+def test_every_format_reproduces_the_mesh_to_the_last_bit(name, tmp_path):
     (tmp_path / name).write_bytes(FILES[name])
     mesh = read_mesh(tmp_path / name)
     assert np.array_equal(mesh.positions, BLOCK.positions)
     assert np.array_equal(mesh.tetrahedra, BLOCK.tetrahedra)
 
 
-def test_single_precision_and_windows_lines_are_read_too(tmp_path):
+def test_single_precision_and_windows_line_ends_are_read_too(tmp_path):
     (tmp_path / "f.vtk").write_bytes(write.vtk_legacy(BLOCK, "2.0", True, "float"))
     assert np.array_equal(read_mesh(tmp_path / "f.vtk").positions, BLOCK.positions.astype("f4"))
     for name in ("gmsh 1.0.msh", "gmsh 2.2 .msh", "gmsh 4.1 .msh", "vtk 2.0 text.vtk"):
@@ -96,7 +96,7 @@ def test_a_scale_that_is_not_positive_is_refused(scale, tmp_path):
         read_mesh(tmp_path / "any.msh", scale)
 
 
-# ------------------------------------------------------------------ what is not a mesh at all
+# ------------------------------------------------------------------ files without a mesh
 
 
 def test_a_missing_file_a_directory_and_an_empty_file_are_refused(tmp_path):
@@ -107,7 +107,7 @@ def test_a_missing_file_a_directory_and_an_empty_file_are_refused(tmp_path):
     assert "empty" in refusal_of(tmp_path, "blank.vtk", b" \n \n")
 
 
-def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+def test_a_pipe_is_refused_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "pipe.msh")
     assert "pipe" in refusal(tmp_path / "pipe.msh")
     with socket.socket(socket.AF_UNIX) as listener:
@@ -122,13 +122,13 @@ def test_a_file_too_large_is_refused_before_it_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["", ".txt", ".mesh", ".inp"])
-def test_another_suffix_is_refused_with_those_that_are_read(suffix, tmp_path):
+def test_an_unknown_suffix_is_refused_with_the_known_ones(suffix, tmp_path):
     message = refusal_of(tmp_path, "mesh" + suffix, FILES["gmsh 1.0.msh"])
     assert ".msh, .vtk, .vtu" in message
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".OBJ", ".ply"])
-def test_a_file_of_a_surface_is_refused_with_what_to_do(suffix, tmp_path):
+def test_a_surface_file_is_refused_with_advice(suffix, tmp_path):
     assert "only a surface" in refusal_of(tmp_path, "organ" + suffix, b"solid organ")
 
 
@@ -145,7 +145,7 @@ def test_a_file_of_a_surface_is_refused_with_what_to_do(suffix, tmp_path):
         (b"\x00" * 1000, "expected"),
     ],
 )
-def test_what_is_no_mesh_is_refused_with_what_was_found(suffix, data, message, tmp_path):
+def test_a_file_without_a_mesh_is_refused_with_what_was_found(suffix, data, message, tmp_path):
     assert message in refusal_of(tmp_path, "file" + suffix, data)
 
 
@@ -156,7 +156,7 @@ def test_a_file_of_another_format_is_refused_with_what_was_expected_and_found(tm
     assert "line 1: expected '# vtk DataFile Version', found '$NOD'" in message
 
 
-# ------------------------------------------------------------------ what is broken
+# ------------------------------------------------------------------ broken meshes
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -167,7 +167,7 @@ def test_a_truncated_file_is_refused(name, part, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "lie", [b"10", b"-5", b"4000000000", b"99999999999999999999", b"x", b"1.5"]
+    "wrong", [b"10", b"-5", b"4000000000", b"99999999999999999999", b"x", b"1.5"]
 )
 @pytest.mark.parametrize(
     ("name", "count"),
@@ -194,11 +194,11 @@ def test_a_truncated_file_is_refused(name, part, tmp_path):
         ("appended < UInt64 zlib.vtu", b'NumberOfCells="%b'),
     ],
 )
-def test_a_count_that_lies_is_refused_with_what_was_expected_and_found(name, count, lie, tmp_path):
+def test_a_wrong_count_is_refused_with_what_was_expected_and_found(name, count, wrong, tmp_path):
     n_nodes, n_cells = len(BLOCK.positions), len(BLOCK.tetrahedra) + 3
-    truths = [count % b"%d" % n for n in (n_nodes, n_cells, n_cells + 1)]
-    (truth,) = (t for t in truths if t in FILES[name])
-    message = refusal_of(tmp_path, name, FILES[name].replace(truth, count % lie))
+    right_texts = [count % b"%d" % n for n in (n_nodes, n_cells, n_cells + 1)]
+    (right,) = (t for t in right_texts if t in FILES[name])
+    message = refusal_of(tmp_path, name, FILES[name].replace(right, count % wrong))
     assert "expected" in message
     assert "found" in message
 
@@ -226,12 +226,12 @@ def test_an_index_out_of_range_is_refused_by_its_tetrahedron(tmp_path):
         assert "index out of range" in message
 
 
-def test_a_node_that_is_there_twice_is_refused_by_its_tag(tmp_path):
+def test_a_duplicate_node_is_refused_by_its_tag(tmp_path):
     data = FILES["gmsh 1.0.msh"].replace(b"\n8 ", b"\n7 ", 1)
     assert "node 7 occurs twice" in refusal_of(tmp_path, "twice.msh", data)
 
 
-def test_a_broken_mesh_is_refused_under_the_name_of_its_file(tmp_path):
+def test_a_broken_mesh_is_refused_with_the_name_of_its_file(tmp_path):
     mesh = BLOCK._replace(positions=BLOCK.positions.copy())
     mesh.positions[3, 1] = np.nan
     for name, data in (("a.msh", write.gmsh_2(mesh)), ("a.vtu", write.vtu(mesh))):
@@ -260,9 +260,9 @@ def test_xml_that_defines_entities_is_refused(tmp_path):
     assert "document type" in refusal_of(tmp_path, "bomb.vtu", bomb)
 
 
-def test_a_block_that_unpacks_to_more_than_it_says_is_refused(tmp_path):
-    honest = write.vtu(BLOCK, "appended", is_compressed=True)
-    data = honest.replace(b'NumberOfPoints="18"', b'NumberOfPoints="17"')
+def test_a_block_that_unpacks_to_more_than_declared_is_refused(tmp_path):
+    original = write.vtu(BLOCK, "appended", is_compressed=True)
+    data = original.replace(b'NumberOfPoints="18"', b'NumberOfPoints="17"')
     assert "expected 408 bytes of numbers, found 432" in refusal_of(tmp_path, "z.vtu", data)
 
 
@@ -282,7 +282,7 @@ NUMBERS = [
 
 @st.composite
 def mutated(draw, data):
-    """Some bytes, words or stretches of `data` changed, doubled or taken away."""
+    """Return `data` with some bytes or words changed, or parts duplicated or removed."""
     for _ in range(draw(st.integers(1, 4))):
         if not data:
             return data
@@ -320,7 +320,7 @@ def test_a_damaged_file_is_refused_or_gives_a_sound_mesh(name, tmp_path, choice)
     assert checked(mesh).mesh.tetrahedra.shape == mesh.tetrahedra.shape
 
 
-# ------------------------------------------------------------------ what we write
+# ------------------------------------------------------------------ written files
 
 
 def snapshot():
@@ -344,7 +344,7 @@ def test_a_snapshot_is_read_by_meshio_to_the_last_bit(tmp_path):
     assert np.array_equal(mesh.point_data["fixed"].astype(bool), snapshot().fixed)
 
 
-def test_the_piece_of_each_tetrahedron_is_among_the_cell_data(tmp_path):
+def test_the_cell_data_has_the_piece_of_each_tetrahedron(tmp_path):
     alone = TetrahedralMesh(np.vstack([np.zeros(3), np.eye(3)]), np.array([[0, 1, 2, 3]]))
     n = len(BLOCK.positions)
     body = Snapshot(
@@ -360,7 +360,7 @@ def test_the_piece_of_each_tetrahedron_is_among_the_cell_data(tmp_path):
     assert piece.tolist() == [1] + [0] * len(BLOCK.tetrahedra)  # the largest at rest is 0
 
 
-def test_a_snapshot_is_a_mesh_that_we_read(tmp_path):
+def test_a_written_snapshot_is_read_as_a_mesh(tmp_path):
     write_vtu(tmp_path / "body.vtu", snapshot())
     mesh = read_mesh(tmp_path / "body.vtu")
     assert np.array_equal(mesh.positions, snapshot().positions)
@@ -368,7 +368,7 @@ def test_a_snapshot_is_a_mesh_that_we_read(tmp_path):
 
 
 class Interrupts:
-    """The user presses Ctrl-C while this is written."""
+    """An array that acts as if the user pressed Ctrl-C while it is written."""
 
     def __array__(self, *_, **__):
         raise KeyboardInterrupt
@@ -384,7 +384,7 @@ def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(tmp_path):
     assert os.listdir(tmp_path) == ["body.vtu"]
 
 
-# ------------------------------------------------------------------ meshes of others
+# ------------------------------------------------------------------ third-party meshes
 
 
 @pytest.mark.skipif("SCALPEL_SIM_TEST_MESHES" not in os.environ, reason="no folder of meshes given")

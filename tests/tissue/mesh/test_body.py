@@ -14,11 +14,11 @@ pytestmark = pytest.mark.kernel
 BLOCK = block((4, 1, 1), (4.0, 1.0, 1.0))
 
 
-def test_a_single_tetrahedron_ends_at_every_face():
+def test_every_face_of_a_single_tetrahedron_is_outer():
     assert (build_links(bodies.unit_tetrahedron().tetrahedra) == OUTER).all()
 
 
-def test_two_tetrahedra_name_each_other_across_their_face():
+def test_two_tetrahedra_are_linked_across_their_face():
     assert build_links(bodies.two_tetrahedra().tetrahedra).tolist() == [
         [4 * 1 + 0, OUTER, OUTER, OUTER],
         [4 * 0 + 0, OUTER, OUTER, OUTER],
@@ -26,7 +26,7 @@ def test_two_tetrahedra_name_each_other_across_their_face():
 
 
 @pytest.mark.parametrize("mesh", [block((2, 1, 2), (1.0, 1.0, 1.0)), bodies.jittered(2, 1)])
-def test_links_are_those_of_comparing_every_pair(mesh):
+def test_links_are_those_found_by_comparing_every_pair(mesh):
     np.testing.assert_array_equal(build_links(mesh.tetrahedra), naive.links(mesh.tetrahedra))
 
 
@@ -35,13 +35,13 @@ def test_a_face_of_three_tetrahedra_is_refused():
         build_links(np.array([[0, 1, 2, 3], [0, 1, 2, 4], [0, 1, 2, 5]]))
 
 
-def test_each_node_names_a_tetrahedron_that_holds_it():
+def test_each_node_refers_to_a_tetrahedron_that_contains_it():
     body = build_body(BLOCK, None, None)
     for node in range(len(BLOCK.positions)):
         assert local_index(body, body.node_tetrahedron[node], node) >= 0
 
 
-def test_growing_keeps_everything_and_leaves_room():
+def test_growing_keeps_the_content_and_adds_capacity():
     body = build_body(BLOCK, None, None)
     larger = grown_body(body, 100, 200)
     assert len(larger.rest) == len(larger.masses) == 100
@@ -58,7 +58,7 @@ def test_a_body_keeps_its_own_copy_of_the_mesh():
 
 
 @pytest.mark.parametrize("mesh", [BLOCK, bodies.jittered(3, 2, size=1.0)])
-def test_a_walk_finds_the_tetrahedron_that_holds_a_point(mesh):
+def test_a_walk_finds_the_tetrahedron_that_contains_a_point(mesh):
     body = build_body(mesh, None, None)
     random = np.random.default_rng(0)
     for share in random.random((100, 3)):
@@ -72,14 +72,14 @@ def test_a_walk_finds_the_tetrahedron_that_holds_a_point(mesh):
         assert weights[found.tetrahedron] == pytest.approx(max(weights), abs=1e-8)
 
 
-def test_a_walk_that_leaves_through_the_skin_says_so():
+def test_a_walk_that_leaves_through_the_skin_reports_it():
     body = build_body(BLOCK, None, None)
     found = walk(body, Vec3(9.0, 0.5, 0.5), 0)
     assert not found.inside
     assert found.link == OUTER
 
 
-def test_a_walk_does_not_go_through_a_cut():
+def test_a_walk_does_not_pass_a_cut():
     body = build_body(BLOCK, None, None)
     x = body.rest[body.tetrahedra, 0]
     for t, f in np.argwhere(body.links >= 0):

@@ -15,8 +15,8 @@ def body_of(mesh: TetrahedralMesh, positions=None):
     return build_body(mesh, positions, None)
 
 
-def is_held(boxes, points):
-    """Whether each point is in one box."""
+def in_some_box(boxes, points):
+    """Return whether each point is in some box."""
     inside = (boxes[:, None, 0] <= points) & (points <= boxes[:, None, 1])
     return inside.all(axis=2).any(axis=0)
 
@@ -32,16 +32,16 @@ def test_every_tetrahedron_is_wholly_in_one_box():
     assert inside.all(axis=2).any(axis=0).all()
 
 
-def test_boxes_of_a_bent_body_leave_the_hollow_free():
-    """A bar that is bent to a half circle: one box around it would hold its centre."""
+def test_boxes_of_a_bent_body_do_not_cover_its_hollow():
+    """A bar is bent to a half circle; a single box around it would contain its centre."""
     rest = BLOCK.positions
     turn = np.pi * rest[:, 0] / 0.08
     radius = 0.1 + rest[:, 1]
     bent = np.stack([radius * np.cos(turn), radius * np.sin(turn), rest[:, 2]], axis=1)
     body = body_of(BLOCK, bent)
     boxes = chunks_of(body, chunk_nodes(body)).boxes
-    assert is_held(boxes, bent).all()
-    assert not is_held(boxes, np.array([[0.0, 0.02, 0.02]])).any()
+    assert in_some_box(boxes, bent).all()
+    assert not in_some_box(boxes, np.array([[0.0, 0.02, 0.02]])).any()
 
 
 def test_a_body_of_one_tetrahedron_is_one_chunk():
@@ -52,13 +52,13 @@ def test_a_body_of_one_tetrahedron_is_one_chunk():
     )
 
 
-def test_the_fastest_node_is_told():
+def test_the_speed_of_the_fastest_node_is_reported():
     body = body_of(BLOCK)
     body.velocities[7] = 3.0, 0.0, -4.0
     assert chunks_of(body, chunk_nodes(body)).fastest == 5.0
 
 
-def test_room_to_grow_is_in_no_box():
+def test_spare_capacity_is_in_no_box():
     body = body_of(BLOCK)
     grown = grown_body(body, 1000, 9000)
     grown.positions[len(BLOCK.positions) :] = 1e6
@@ -67,7 +67,7 @@ def test_room_to_grow_is_in_no_box():
 
 
 def test_boxes_follow_a_body_that_is_cut():
-    """The blade goes half through: the boxes hold the nodes that it made, and their neighbours."""
+    """The blade cuts half through; the boxes contain the new nodes and their neighbours."""
     mesh = block((2, 2, 2), (0.02, 0.02, 0.02))
     tissue = Tissue(mesh, Material(toughness=5.0), fixed=mesh.positions[:, 0] == 0.0)
     before = None

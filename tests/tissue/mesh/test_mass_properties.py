@@ -1,9 +1,9 @@
-"""Mass properties of pieces against those of the solid that their surface encloses, by trimesh.
+"""Mass properties of pieces against those of the solid inside their surface, by trimesh.
 
-The engine puts a quarter of a tetrahedron's mass m at each of its nodes x_i. Its first moment is
-that of the solid: m times the centroid c. Its second moment is larger than that of the solid by
+The engine puts a quarter of the mass m of a tetrahedron at each of its nodes x_i. The first moment
+is that of the solid: m times the centroid c. The second moment is larger than that of the solid by
 m / 5 times the sum of (x_i - c)(x_i - c)^T. So at rest volume, mass and centre agree exactly, and
-the tensors of inertia differ by a sum that is known.
+the tensors of inertia differ by a known sum.
 """
 
 import numpy as np
@@ -14,13 +14,13 @@ from tissue import Material, Snapshot, Tissue, block, liver_lobe
 from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 
 DENSITY = 1060.0
-"""[kg/m3]."""
+"""Density of all bodies [kg/m3]."""
 
 BLOCK = block((4, 2, 2), (0.04, 0.02, 0.02))
 
 
 def cut_block() -> Tissue:
-    """Return a block that is held at one end and cut across at 3/4 of its length."""
+    """Return a block held at one end and cut across at 3/4 of its length."""
     material = Material(toughness=0.5, friction=0.0, density=DENSITY)
     tissue = Tissue(BLOCK, material, fixed=BLOCK.positions[:, 0] <= 0.02)
     strokes.make(tissue, strokes.straight(BLOCK, 0.75))
@@ -40,7 +40,7 @@ def tissue(request) -> Tissue:
 
 
 def solids(tissue: Tissue, *, at_rest: bool) -> list:
-    """Return the solid of each piece as trimesh has it, the largest first."""
+    """Return the solid of each piece as a trimesh object, the largest first."""
     surface = tissue.surface()
     if at_rest:
         surface = surface._replace(positions=surface.rest_positions)
@@ -51,7 +51,7 @@ def solids(tissue: Tissue, *, at_rest: bool) -> list:
 
 
 def inertia_of_lumping(body: Snapshot, tetrahedra: np.ndarray) -> np.ndarray:
-    """Return by how much lumped masses raise the tensor of inertia of a solid [kg m2]."""
+    """Return the inertia that lumped masses add to that of the solid [kg m2]."""
     corners = body.rest_positions[tetrahedra]
     edges = corners[:, 1:] - corners[:, :1]
     masses = DENSITY * np.linalg.det(edges) / 6.0
@@ -72,7 +72,7 @@ def test_at_rest_volume_mass_and_centre_of_a_piece_are_those_of_the_solid(tissue
         np.testing.assert_allclose(piece.centre, solid.center_mass, atol=1e-9 * size)
 
 
-def test_at_rest_the_inertia_of_a_piece_is_that_of_the_solid_and_of_the_lumping(tissue):
+def test_at_rest_the_inertia_of_a_piece_is_that_of_the_solid_plus_that_of_lumping(tissue):
     body = tissue.snapshot()
     pieces = pieces_of(body._replace(positions=body.rest_positions))
     of_tetrahedron = piece_of_tetrahedra(body)
@@ -83,7 +83,7 @@ def test_at_rest_the_inertia_of_a_piece_is_that_of_the_solid_and_of_the_lumping(
         np.testing.assert_allclose(piece.inertia, expected, atol=1e-9 * np.trace(expected))
 
 
-def test_deformed_a_piece_has_the_volume_of_the_solid_and_its_centre_within_the_strain(tissue):
+def test_a_deformed_piece_has_the_volume_of_the_solid_and_its_centre_within_a_bound(tissue):
     """The mass stays with the material, while the solid's density is uniform over its volume."""
     body = tissue.snapshot()
     of_tetrahedron = piece_of_tetrahedra(body)
@@ -101,4 +101,4 @@ def test_deformed_a_piece_has_the_volume_of_the_solid_and_its_centre_within_the_
         bound = np.abs(shares[0] - shares[1]) @ np.linalg.norm(arms, axis=1)
         size = float(np.linalg.norm(solid.extents))
         assert np.linalg.norm(piece.centre - solid.center_mass) <= bound + 1e-9 * size
-        assert bound < 0.01 * size, "nothing here is strained much"
+        assert bound < 0.01 * size, "the strain is too large for this test"

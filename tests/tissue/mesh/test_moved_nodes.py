@@ -12,14 +12,14 @@ def nodes(moved):
     return moved.nodes[: moved.n_nodes].tolist()
 
 
-def test_each_node_is_listed_once_in_the_order_in_which_it_came():
+def test_each_node_is_listed_once_in_the_order_of_its_first_note():
     moved = none_moved(10)
     note_moved(moved, np.array([7, 3, 7, 1]), 3)
     note_moved(moved, np.array([3, 2]), 2)
     assert nodes(moved) == [7, 3, 2]
 
 
-def test_a_list_that_was_read_begins_anew():
+def test_a_forgotten_list_is_empty_and_can_be_filled_again():
     moved = none_moved(10)
     note_moved(moved, np.array([7, 3]), 2)
     forget_moved(moved)

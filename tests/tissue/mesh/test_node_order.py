@@ -1,4 +1,4 @@
-"""Nodes in an order in which neighbours are near each other."""
+"""Renumbering that gives neighbouring nodes similar numbers."""
 
 import numpy as np
 
@@ -19,11 +19,11 @@ def shuffled(mesh):
 
 
 def spread(mesh):
-    """Return how far apart the numbers of two nodes of one tetrahedron are, on average."""
+    """Return the mean range of the node numbers of a tetrahedron."""
     return np.ptp(mesh.tetrahedra, axis=1).mean()
 
 
-def test_the_body_is_the_same():
+def test_renumbering_does_not_change_the_geometry():
     mesh = shuffled(bodies.jittered(4, 0))
     other, place = renumbered(mesh)
     np.testing.assert_array_equal(other.positions[place], mesh.positions)
@@ -34,7 +34,7 @@ def test_the_body_is_the_same():
     assert corners(other) == corners(mesh)
 
 
-def test_neighbours_are_about_as_near_each_other_as_in_the_order_of_a_grid():
+def test_numbers_of_neighbours_are_about_as_close_as_in_a_grid():
     mesh = bodies.jittered(6, 0)
     assert spread(renumbered(shuffled(mesh))[0]) < 1.3 * spread(mesh) < 0.4 * spread(shuffled(mesh))
 
@@ -48,6 +48,6 @@ def test_a_large_body_is_renumbered_as_it_is_read(tmp_path, monkeypatch):
     np.testing.assert_array_equal(read.tetrahedra, renumbered(mesh)[0].tetrahedra)
 
 
-def test_tetrahedra_follow_their_nodes():
+def test_tetrahedra_are_sorted_by_their_nodes():
     lowest = renumbered(shuffled(bodies.jittered(4, 0)))[0].tetrahedra.min(axis=1)
     assert (np.diff(lowest) >= 0).all()

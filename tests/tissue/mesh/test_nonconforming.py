@@ -1,4 +1,4 @@
-"""Lists of the tetrahedra around each node, where links do not tell."""
+"""Lists of the tetrahedra around each node of a nonconforming mesh."""
 
 import numpy as np
 import pytest
@@ -45,22 +45,22 @@ def test_a_tetrahedron_leaves_and_joins_the_list_of_a_node():
     for t in around:
         leave_list(hanging, 0, t)
         assert t not in listed(hanging, 0)
-        leave_list(hanging, 0, t)  # once more: it is not there, and nothing happens
+        leave_list(hanging, 0, t)  # removing it again has no effect
         join_list(hanging, 0, t, 0)
         assert listed(hanging, 0) == sorted(around)
 
 
-def test_lists_of_nodes_that_are_not_there_yet_are_empty():
+def test_lists_of_spare_nodes_are_empty():
     hanging = grown_hanging(block(), len(BLOCK.positions) + 3, 64)
     assert listed(hanging, len(BLOCK.positions) + 2) == []
 
 
-def test_a_body_that_leaves_nothing_hanging_keeps_no_lists():
+def test_a_conforming_body_keeps_no_lists():
     assert len(grown_hanging(nothing_hanging(), 100, 100).first) == 0
     assert len(build_body(bodies.unit_tetrahedron(), None, None).hanging.next) == 0
 
 
-def test_faces_on_the_skin_and_on_a_cut_are_open_and_others_are_not():
+def test_only_faces_on_the_skin_or_on_a_cut_are_open():
     assert [is_open(link) for link in (-1, -2, HANGING, HANGING - 5, 0, 7)] == [
         True, True, False, False, False, False,
     ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Each connected piece is known: its number, mass, motion, and whether it is held."""
+"""The connected pieces of a body: number, mass, motion, and whether each is held."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ BLOCK = block((4, 2, 2), (0.04, 0.02, 0.02))
 
 
 def cut_block(weight=0.0):
-    """Return a block of 16 g, held at its left half, and cut clean across at 3/4 of its length."""
+    """Return a block of 16 g, held at its left half and cut through at 3/4 of its length."""
     tissue = Tissue(
         BLOCK,
-        # So sharp that the blade does not push the block aside; and slippery, for with friction the
-        # soft piece, turned by the blade, catches on the corners of the other and hangs there.
+        # The toughness is low so that the blade does not push the block aside. With friction the
+        # soft piece, turned by the blade, would get caught on the corners of the other one.
         Material(toughness=0.5, friction=0.0),
         fixed=BLOCK.positions[:, 0] <= 0.02,
         gravity=(0.0, 0.0, -weight),
@@ -38,7 +38,7 @@ def test_a_whole_body_is_one_piece():
     np.testing.assert_allclose(piece.centre, [0.02, 0.01, 0.01], atol=1e-4)
 
 
-def test_the_pieces_of_a_cut_come_with_the_larger_first_and_know_who_holds_them(cut):
+def test_pieces_are_sorted_by_size_and_know_whether_they_are_held(cut):
     large, small = cut.pieces()
     assert large.is_held and not small.is_held
     assert large.rest_volume == pytest.approx(0.75 * 16e-6)
@@ -48,13 +48,13 @@ def test_the_pieces_of_a_cut_come_with_the_larger_first_and_know_who_holds_them(
     assert large.centre[0] < 0.03 < small.centre[0]
 
 
-def test_every_way_of_counting_pieces_agrees(cut):
+def test_all_counts_of_pieces_agree(cut):
     piece = cut.piece_of_tetrahedra()
     assert np.bincount(piece).tolist() == [p.n_tetrahedra for p in cut.pieces()]
     assert cut.n_pieces() == len(cut.pieces()) == soundness.n_pieces(cut.snapshot().tetrahedra) == 2
 
 
-def test_a_spinning_piece_has_the_velocities_that_it_was_given(cut):
+def test_a_spinning_piece_has_the_given_velocities(cut):
     body = cut.snapshot()
     nodes = np.unique(body.tetrahedra[piece_of_tetrahedra(body) == 1])
     v, w = np.array([0.1, -0.2, 0.3]), np.array([3.0, -1.0, 2.0])
@@ -76,7 +76,7 @@ def test_the_inertia_of_a_piece_is_that_of_its_nodes(cut):
     np.testing.assert_allclose(piece.inertia, expected, rtol=1e-9)
 
 
-def test_equal_pieces_come_in_the_order_of_their_tetrahedra():
+def test_equal_pieces_are_in_the_order_of_their_tetrahedra():
     two = bodies.unit_tetrahedron()
     mesh = two._replace(
         positions=np.vstack([two.positions, two.positions + 3.0]) * 0.01,

@@ -1,4 +1,4 @@
-"""Where a point is, by cells, against a look at every tetrahedron; and how far the body reaches."""
+"""Point location by a grid, against a test of every tetrahedron; and bounds of the body."""
 
 import numpy as np
 import pytest
@@ -25,47 +25,47 @@ MARGIN = 0.05
 
 @pytest.fixture
 def cut():
-    """A unit cube of some 150 tetrahedra."""
+    """Return a unit cube of about 150 tetrahedra."""
     return cut_of(bodies.jittered(3, 0, size=1.0))
 
 
-def first_that_holds(body, p: Vec3) -> int:
-    """Ask every tetrahedron."""
+def first_containing(body, p: Vec3) -> int:
+    """Return the first tetrahedron that contains a point, or -1, by testing all."""
     for t in range(body.n_tetrahedra):
         if smallest_weight(barycentric_in(p, body.positions, body.tetrahedra, t)) >= 0.0:
             return t
     return -1
 
 
-def holds(body, t: int, p: Vec3) -> bool:
+def contains(body, t: int, p: Vec3) -> bool:
     return smallest_weight(barycentric_in(p, body.positions, body.tetrahedra, t)) >= 0.0
 
 
 def expect_found(body, cells, seed: int) -> None:
-    """Fail unless a point is found if any tetrahedron holds it, and in one that does."""
+    """Fail unless each random point that is in a tetrahedron is found in one that contains it."""
     for row in np.random.default_rng(seed).uniform(-0.2, 1.2, (60, 3)).tolist():
         p = Vec3(*row)
         t = tetrahedron_at(body, cells, body.positions, p)
-        assert (t >= 0) == (first_that_holds(body, p) >= 0)
-        assert t < 0 or holds(body, t, p)
+        assert (t >= 0) == (first_containing(body, p) >= 0)
+        assert t < 0 or contains(body, t, p)
 
 
-def test_a_point_is_found_where_a_look_at_all_tetrahedra_finds_it(cut):
+def test_points_are_found_as_by_testing_all_tetrahedra(cut):
     expect_found(cut.body, build_grid(cut.body, cut.body.positions, MARGIN), seed=0)
 
 
-def test_a_grid_that_lists_nothing_finds_nothing(cut):
+def test_an_empty_grid_finds_nothing(cut):
     assert tetrahedron_at(cut.body, no_grid(), cut.body.positions, Vec3(0.5, 0.5, 0.5)) == -1
 
 
-def test_points_are_found_while_nodes_go_less_far_than_the_margin(cut):
+def test_points_are_found_while_nodes_move_by_less_than_the_margin(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
     n = cut.body.n_nodes
     cut.body.positions[:n] += np.random.default_rng(1).uniform(-0.02, 0.02, (n, 3))
     expect_found(cut.body, cells, seed=1)
 
 
-def test_points_are_found_when_nodes_that_went_far_are_listed_again(cut):
+def test_points_are_found_when_nodes_that_moved_far_are_listed_again(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
     n = cut.body.n_nodes
     cut.body.positions[:n] += [0.3, -0.2, 0.1]
@@ -81,7 +81,7 @@ def test_points_are_found_in_tetrahedra_that_were_appended(cut):
     expect_found(cut.body, cells, seed=3)
 
 
-def test_a_box_beside_the_body_meets_no_tetrahedron_and_one_across_it_does(cut):
+def test_a_box_beside_the_body_contains_no_tetrahedron_and_one_across_it_does(cut):
     x = cut.body.positions
     cells = build_grid(cut.body, x, MARGIN)
     beside = Vec3(1.1, 0.0, 0.0), Vec3(1.2, 1.0, 1.0)
@@ -94,15 +94,15 @@ def test_a_box_beside_the_body_meets_no_tetrahedron_and_one_across_it_does(cut):
     assert (corners.min(axis=0)[1:] <= 0.5).all()
 
 
-def test_the_body_reaches_from_its_lowest_to_its_highest_node(cut):
+def test_the_bounds_of_the_body_are_those_of_its_nodes(cut):
     cut.body.positions[7] = [-3.0, 0.5, 4.0]
-    seen = body_bounds(cut.body)
-    assert seen.is_finite
-    assert seen.low == (-3.0, 0.0, 0.0)
-    assert seen.high == (1.0, 1.0, 4.0)
+    bounds = body_bounds(cut.body)
+    assert bounds.is_finite
+    assert bounds.low == (-3.0, 0.0, 0.0)
+    assert bounds.high == (1.0, 1.0, 4.0)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_a_node_that_is_nowhere_is_seen(cut, value):
+def test_a_node_that_is_not_finite_is_detected(cut, value):
     cut.body.positions[7, 1] = value
     assert not body_bounds(cut.body).is_finite

@@ -1,4 +1,4 @@
-"""The tetrahedra around a node and an edge, against a look at all of them."""
+"""The tetrahedra around a node and an edge, against a search of all tetrahedra."""
 
 import numpy as np
 import pytest
@@ -20,12 +20,12 @@ def mesh(request):
 
 @pytest.fixture
 def around(mesh):
-    """The body, marks and scratch of a search in it."""
+    """Return the body, its visit marks and the scratch array of a search."""
     visits = no_visits(len(mesh.positions), len(mesh.tetrahedra))
     return build_body(mesh, None, None), visits, np.zeros(LARGEST_STAR, dtype=np.int64)
 
 
-def test_a_star_is_every_tetrahedron_that_names_the_node(mesh, around):
+def test_the_star_of_a_node_is_every_tetrahedron_with_that_node(mesh, around):
     body, visits, out = around
     for node in range(len(mesh.positions)):
         n = star(body, visits, node, body.node_tetrahedron[node], out)
@@ -33,7 +33,7 @@ def test_a_star_is_every_tetrahedron_that_names_the_node(mesh, around):
         assert set(out[:n].tolist()) == naive.star(mesh.tetrahedra, node)
 
 
-def test_the_star_of_an_edge_is_every_tetrahedron_that_names_both_ends(mesh, around):
+def test_the_star_of_an_edge_is_every_tetrahedron_with_both_ends(mesh, around):
     body, visits, out = around
     for a, b in mesh.tetrahedra[:, :2]:
         n = edge_star(body, visits, a, b, out)
@@ -49,7 +49,7 @@ def test_node_size_is_the_smallest_altitude_around(mesh, around):
     assert mean_node_size(body, visits, out) == pytest.approx(np.mean(sizes))
 
 
-def test_a_new_search_forgets_the_last(mesh, around):
+def test_a_new_search_does_not_depend_on_the_last(mesh, around):
     body, visits, out = around
     first = star(body, visits, 0, body.node_tetrahedron[0], out)
     assert star(body, visits, 0, body.node_tetrahedron[0], out) == first

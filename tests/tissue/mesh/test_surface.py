@@ -1,4 +1,4 @@
-"""The boundary of the body and its pieces, before and after a cut."""
+"""The surface of the body and its pieces, before and after a cut."""
 
 import numpy as np
 import pytest
@@ -22,20 +22,20 @@ def enclosed_volume(surface):
 def test_the_surface_of_a_cube_is_its_six_sides_facing_outwards():
     surface = boundary_surface(build_body(CUBE, None, None))
     assert len(surface.triangles) == 6 * 4 * 2
-    assert len(surface.positions) == 26  # all nodes but the one in the middle
+    assert len(surface.positions) == 26  # all nodes except the one in the middle
     assert enclosed_volume(surface) == pytest.approx(0.04**3)
     assert soundness.is_closed(surface.triangles)
     assert not surface.is_cut.any()
 
 
 @pytest.mark.kernel
-def test_a_single_tetrahedron_shows_its_four_faces():
+def test_the_surface_of_a_single_tetrahedron_is_its_four_faces():
     surface = boundary_surface(build_body(bodies.unit_tetrahedron(), None, None))
     assert enclosed_volume(surface) == pytest.approx(1 / 6)
 
 
 @pytest.mark.kernel
-def test_pieces_hang_together_through_faces_that_are_not_cut():
+def test_pieces_are_connected_by_faces_that_are_not_cut():
     body = build_body(bodies.two_tetrahedra(), None, None)
     piece, queue = np.zeros((2, 2), dtype=np.int64)
     assert label_pieces(body, piece, queue) == 1

@@ -59,7 +59,7 @@ def test_a_repeated_node_is_refused_by_its_tetrahedron():
 
 
 @pytest.mark.parametrize("order", [[0, 1, 2, 3], [1, 0, 2, 3], [3, 1, 0, 2]])
-def test_a_duplicate_tetrahedron_is_refused_in_whatever_order_its_nodes_are(order):
+def test_a_duplicate_tetrahedron_is_refused_in_any_order_of_its_nodes(order):
     positions, tetrahedra = sound_block()
     tetrahedra = np.concatenate([tetrahedra, tetrahedra[3:4, order]])
     expect_refusal(positions, tetrahedra, "duplicate tetrahedra: 3 and 48")
@@ -80,20 +80,20 @@ def test_tetrahedra_with_two_nodes_in_one_place_are_refused():
     expect_refusal(positions, tetrahedra, "flat tetrahedra, the worst: 0 ")
 
 
-def test_an_inverted_tetrahedron_among_others_is_refused_by_name():
+def test_an_inverted_tetrahedron_among_others_is_refused_by_number():
     positions, tetrahedra = sound_block()
     tetrahedra[4] = tetrahedra[4, [1, 0, 2, 3]]
     expect_refusal(positions, tetrahedra, r"inverted tetrahedra: 4 \(1 of 48\)")
 
 
-def test_the_odd_one_is_named_where_all_others_are_inverted():
+def test_the_only_tetrahedron_that_is_not_inverted_is_refused_by_number():
     positions, tetrahedra = sound_block()
     tetrahedra[:4] = tetrahedra[:4, [1, 0, 2, 3]]
     tetrahedra[5:] = tetrahedra[5:, [1, 0, 2, 3]]
     expect_refusal(positions, tetrahedra, "not inverted while the others are tetrahedra: 4 ")
 
 
-def test_a_mesh_whose_tetrahedra_all_turn_right_is_turned_with_a_warning():
+def test_a_mesh_of_inverted_tetrahedra_is_reoriented_with_a_warning():
     positions, tetrahedra = sound_block()
     result = checked(TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]))
     assert (signed_volumes(*result.mesh) > 0.0).all()
@@ -125,7 +125,7 @@ def test_arrays_of_the_wrong_shape_or_type_are_refused():
     ("scale", "message"),
     [(1e6, "over 1000 m: millimetres"), (1e-4, "under 1e-05 m")],
 )
-def test_an_extent_that_makes_no_sense_in_metres_is_refused(scale, message):
+def test_an_implausible_extent_in_metres_is_refused(scale, message):
     positions, tetrahedra = sound_block()
     expect_refusal(scale * positions, tetrahedra, message)
 
@@ -152,7 +152,7 @@ def test_unused_nodes_are_dropped_with_a_warning_and_the_rest_keep_their_origin(
         ([[1.0, 0, 0], [0.5, -1, 0], [0.5, 0, -1]], 2),  # shares edge 01
     ],
 )
-def test_tetrahedra_that_hang_together_by_a_node_or_an_edge_are_parted(other, n_split):
+def test_tetrahedra_connected_only_by_a_node_or_an_edge_are_separated(other, n_split):
     other = 0.01 * np.array(other)
     is_edge = n_split == 2
     positions = np.concatenate([CORNERS, other[1:] if is_edge else other])
@@ -174,7 +174,7 @@ def test_slivers_are_allowed_with_a_warning():
     assert warning.startswith("48 slivers")
 
 
-def test_warnings_and_errors_carry_the_name_of_the_mesh(caplog):
+def test_warnings_and_errors_give_the_name_of_the_mesh(caplog):
     positions, tetrahedra = sound_block()
     with caplog.at_level(logging.WARNING, logger="tissue"):
         checked(TetrahedralMesh(1000.0 * positions, tetrahedra), "liver.msh")
@@ -183,7 +183,7 @@ def test_warnings_and_errors_carry_the_name_of_the_mesh(caplog):
         checked(TetrahedralMesh(positions, tetrahedra[:0]), "liver.msh")
 
 
-def test_quality_is_one_for_a_regular_tetrahedron_whatever_its_size():
+def test_quality_is_one_for_a_regular_tetrahedron_of_any_size():
     regular = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
     for size in (1e-4, 1.0, 100.0):
         assert abs(quality(size * regular, np.array([[0, 1, 2, 3]]))) == pytest.approx(1.0)
@@ -195,10 +195,10 @@ def test_components_are_numbered_by_their_lowest_vertices():
     assert labels.tolist() == [0, 1, 0, 2, 0, 1]
 
 
-def test_a_mesh_that_would_have_to_be_repaired_is_refused_where_it_must_not_change():
+def test_a_mesh_that_needs_repair_is_refused_where_it_must_not_change():
     positions, tetrahedra = sound_block()
     expect_sound(TetrahedralMesh(positions, tetrahedra))
-    expect_sound(TetrahedralMesh(1000.0 * positions, tetrahedra))  # doubtful, but not wrong
+    expect_sound(TetrahedralMesh(1000.0 * positions, tetrahedra))  # implausible, but not wrong
     for broken in (
         TetrahedralMesh(np.concatenate([positions, CORNERS]), tetrahedra),
         TetrahedralMesh(positions, tetrahedra[:, [1, 0, 2, 3]]),

@@ -17,7 +17,7 @@ def test_the_default_grid_is_the_block_of_figure_10():
 
 
 @pytest.mark.parametrize("cells", [(1, 1, 1), (1, 2, 5), (4, 6, 4)])
-def test_the_six_tetrahedra_of_a_cell_are_equal_in_volume_and_turn_left(cells):
+def test_the_six_tetrahedra_of_a_cell_have_equal_positive_volumes(cells):
     volumes = signed_volumes(*block(cells, (0.1, 0.2, 0.3)))
     assert volumes == pytest.approx(0.1 * 0.2 * 0.3 / (6 * np.prod(cells)), rel=1e-12)
 
@@ -37,7 +37,7 @@ def test_neighbouring_cells_agree_on_the_diagonal_of_their_face(cells):
     assert len(boundary_faces(tetrahedra)) == 4 * (n_x * n_y + n_y * n_z + n_z * n_x)
 
 
-def test_the_boundary_faces_of_a_grid_turn_left_seen_from_outside():
+def test_the_boundary_faces_of_a_grid_are_counter_clockwise_seen_from_outside():
     mesh = block((2, 3, 1))
     a, b, c = (mesh.positions[boundary_faces(mesh.tetrahedra)[:, k]] for k in range(3))
     enclosed = np.einsum("ij,ij->i", np.cross(a, b), c).sum() / 6.0
@@ -56,18 +56,18 @@ def test_the_boundary_faces_of_a_grid_turn_left_seen_from_outside():
         (dict(size=0.1), "three lengths"),
     ],
 )
-def test_a_grid_that_cannot_be_is_refused_by_name(arguments, message):
+def test_an_impossible_grid_is_refused_with_the_reason(arguments, message):
     with pytest.raises(ValueError, match=message):
         block(**arguments)
 
 
-def test_the_organ_that_is_shipped_is_the_one_that_the_code_makes():
+def test_the_shipped_organ_is_the_one_that_the_code_makes():
     shipped, made = liver_lobe(), make_mesh()
     assert np.array_equal(shipped.tetrahedra, made.tetrahedra)
     assert np.allclose(shipped.positions, made.positions, rtol=0.0, atol=1e-12)
 
 
-def test_the_organ_is_of_the_size_of_a_liver_lobe_and_stands_at_the_origin():
+def test_the_organ_has_the_size_of_a_liver_lobe_and_is_at_the_origin():
     mesh = liver_lobe()
     assert 4500 <= len(mesh.tetrahedra) <= 5500
     assert mesh.positions.min(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)

@@ -61,6 +61,6 @@ def test_the_volume_converges_with_the_square_of_the_spacing():
         ((lambda points: np.full(len(points), np.nan), BOX, 0.01), "not finite"),
     ],
 )
-def test_what_cannot_be_filled_is_refused_by_name(arguments, message):
+def test_an_impossible_shape_is_refused_with_the_reason(arguments, message):
     with pytest.raises(ValueError, match=message):
         stuff(*arguments)

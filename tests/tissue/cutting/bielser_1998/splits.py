@@ -1,4 +1,4 @@
-"""Tetrahedra that are split by hand, without a blade."""
+"""Splits of tetrahedra by given crossings, without a blade."""
 
 from typing import NamedTuple
 
@@ -19,13 +19,13 @@ class Splits(NamedTuple):
     scheme: PaperScheme
 
     def cross(self, a: int, b: int, at: float = 0.5) -> None:
-        """Let the blade cross the edge from node `a` to node `b`, at that fraction of it."""
+        """Mark the edge from node `a` to node `b` as crossed, at a fraction of its length."""
         records = self.scheme._records
         edge = edge_between(records, min(a, b), max(a, b))
         records.crossed_at[edge] = at if a < b else 1.0 - at
 
     def split(self, t: int) -> int:
-        """Split tetrahedron `t`; return its code."""
+        """Split tetrahedron `t`; return its cut-edge code."""
         code = cut_edge_code(self.scheme._records, t)
         assert split_tetrahedron(self.scheme._split(self.body), t, code)
         return code
@@ -40,13 +40,13 @@ class Splits(NamedTuple):
 
     @property
     def momentum(self) -> FloatArray:
-        """[kg m/s]."""
+        """Return the linear momentum of the body [kg m/s]."""
         n = self.body.n_nodes
         return self.body.masses[:n] @ self.body.velocities[:n]
 
 
 def splits_of(mesh: TetrahedralMesh) -> Splits:
-    """Return a whole body, each node with its mass."""
+    """Return an uncut body with its masses, and a scheme to split it."""
     body = with_room_to_hang(build_body(mesh, None, None))
     n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     body = grown_body(body, n_nodes + 512, 32 * n_tetrahedra + 512)

@@ -1,4 +1,4 @@
-"""The lookup table: 37 oriented subcases of the five cases, turned and mirrored."""
+"""The lookup table: 37 oriented subcases of the five cases, rotated and mirrored."""
 
 from collections import Counter
 
@@ -46,7 +46,7 @@ CODES = {
 }
 
 SIGNATURES = {
-    # opened triangles, corners of each piece, copies of edge and of face nodes, states of faces
+    # opened triangles, corners in each piece, copies of edge nodes and of face nodes, face states
     "A": (4, (1, 3), 3, 3, {FULL: 3, WHOLE: 1}),
     "B": (6, (2, 2), 4, 4, {FULL: 4}),
     "C": (1, (4,), 1, 0, {TIP: 2, WHOLE: 2}),
@@ -56,7 +56,7 @@ SIGNATURES = {
 
 
 def groups(members, code, node=None):
-    """Return the tetrahedra that hang together through triangles, at a node, that stay closed."""
+    """Return groups of tetrahedra connected by closed triangles, those at `node` if given."""
     left, found = set(members), []
     while left:
         queue = [left.pop()]
@@ -115,8 +115,8 @@ def test_each_case_has_one_signature(code):
 
 
 @pytest.mark.parametrize("code", TABLE)
-def test_nodes_are_split_where_what_is_around_them_falls_apart(code):
-    """The actions, against connected components: copies of a node are the groups at it."""
+def test_a_node_is_split_where_the_tetrahedra_around_it_are_separated(code):
+    """The actions against connected components: a node has one copy for each group at it."""
     for e in range(6):
         assert len(groups_at(EDGE_NODE + e, code)) == (2 if is_edge_cut(code, e) else 1)
     for k in range(4):
@@ -136,14 +136,14 @@ def test_every_cut_face_is_inserted_from_both_sides(code):
     assert len(set(inserted)) == len(inserted)
 
 
-def test_references_are_numbered_as_printed():
+def test_references_are_numbered_as_in_the_paper():
     assert [reference("AB", c) for c in "AB"] == ["AB1", "AB2"]
     assert [reference("ABC", c) for c in "ABC"] == ["ABC3", "ABC1", "ABC2"]
     for name in ("CD", "ACD"):
         assert [corner_of(reference(name, c)) for c in name] == list(name)
 
 
-def test_the_bits_stand_in_the_printed_order():
+def test_the_bits_are_in_the_order_of_the_paper():
     names = ["".join(CORNERS[i] for i in ends) for ends in EDGES]
     assert names == ["AB", "BC", "BD", "AC", "CD", "AD"]
     assert [code_of(name) for name in names] == [32, 16, 8, 4, 2, 1]

@@ -1,4 +1,4 @@
-"""Where the nodes are: at the intersections, and what guards the centre."""
+"""Node placement: nodes at the intersections, and the guard of the central tetrahedron."""
 
 import numpy as np
 import pytest
@@ -31,9 +31,9 @@ def placed(crossings, tips=None, neighbours=None):
     """Return the placed nodes, and whether the guard moved any.
 
     Args:
-        crossings: Where edges are crossed, as fractions.
-        tips: Weights where the tip passed, of faces.
-        neighbours: Weights of nodes that a neighbour placed before, of faces.
+        crossings: Fraction at which each crossed edge is crossed.
+        tips: Weights of the point where the tip passed a face, by face.
+        neighbours: Weights of face nodes that a neighbour has placed, by face.
     """
     splits = splits_of(bodies.unit_tetrahedron())
     scheme, records = splits.scheme, splits.scheme._records
@@ -55,7 +55,7 @@ def volumes(weights):
 
 
 def crossed_by(normal, offset):
-    """Return where a plane crosses the edges of the unit tetrahedron."""
+    """Return the fractions at which a plane crosses the edges of the unit tetrahedron."""
     height = POINTS @ normal - offset
     return {
         (a, b): height[a] / (height[a] - height[b])
@@ -65,7 +65,7 @@ def crossed_by(normal, offset):
 
 
 def random_weights(random):
-    """Return nodes anywhere on their edges and in their faces."""
+    """Return the weights of nodes at random on their edges and in their faces."""
     weights = generic_weights()
     for e, (i, j) in enumerate(EDGES):
         at = random.uniform(0.05, 0.95)
@@ -87,7 +87,7 @@ def test_nodes_on_edges_and_faces_that_are_not_cut_are_midpoints_and_centroids()
     np.testing.assert_allclose(placing.weights[others], generic_weights()[others])
 
 
-def test_the_node_of_a_face_cut_across_is_in_the_middle_of_the_cut_but_for_the_lift():
+def test_the_node_of_a_face_cut_across_is_the_middle_of_the_cut_plus_the_lift():
     placing, _ = placed({(0, 1): 0.4, (0, 2): 0.6, (0, 3): 0.5})
     middle = np.array([0.5, 0.2, 0.3, 0.0])
     away = np.array([0.0, 0.5, 0.5, 0.0])
@@ -108,7 +108,7 @@ def test_no_node_comes_near_an_end_of_its_edge():
 
 
 def test_the_centre_of_a_planar_cut_is_not_flat():
-    """Without the lift it is where the plane has two corners on either side."""
+    """Without the lift it is flat where the plane has two corners on either side."""
     random = np.random.default_rng(0)
     seen = set()
     for _ in range(200):
@@ -124,7 +124,7 @@ def test_the_centre_of_a_planar_cut_is_not_flat():
     assert seen == {3, 4}
 
 
-def test_with_random_nodes_only_the_centre_can_be_inverted_and_8_percent_are():
+def test_random_nodes_invert_only_the_centre_in_8_percent_of_cases():
     random = np.random.default_rng(1)
     v = np.array([volumes(random_weights(random)) for _ in range(4000)])
     assert np.delete(v, CENTRE_CHILD, axis=1).min() > 0.0
@@ -141,10 +141,10 @@ def test_the_volume_of_the_centre_is_that_of_its_four_nodes():
 
 
 INVERTED = {0: (0.1, 0.1, 0.8), 1: (0.1, 0.8, 0.1), 2: (0.1, 0.8, 0.1), 3: (0.8, 0.1, 0.1)}
-"""Weights in the faces opposite A to D with which the centre is inverted."""
+"""Weights in the faces opposite A to D that invert the centre."""
 
 
-def test_free_face_nodes_are_drawn_to_the_centroids_until_the_centre_is_not_flat():
+def test_free_face_nodes_are_moved_to_the_centroids_until_the_centre_is_not_flat():
     inner = {k: INVERTED[k] for k in (0, 1)}
     tips = {2: (0.0, 1.0, 0.0), 3: (1.0, 0.0, 0.0)}
     placing, moved = placed({(0, 1): 0.5}, tips=tips, neighbours=inner)
@@ -153,7 +153,7 @@ def test_free_face_nodes_are_drawn_to_the_centroids_until_the_centre_is_not_flat
     assert not placing.is_own.any()
 
 
-def test_where_all_face_nodes_are_placed_a_tetrahedron_gets_some_of_its_own():
+def test_a_tetrahedron_whose_face_nodes_are_all_placed_gets_own_copies():
     placing, moved = placed({(0, 1): 0.5}, neighbours=INVERTED)
     assert moved
     assert volumes(placing.weights).min() >= LEAST_CENTRE

@@ -1,4 +1,4 @@
-"""Whole cuts by the paper's scheme: what it supports, and that nothing breaks where it does not."""
+"""Whole cuts by the paper's scheme: supported cuts, and soundness after unsupported ones."""
 
 import itertools
 
@@ -25,36 +25,38 @@ def uncut(mesh, scheme="paper", **options):
 
 
 def upright(mesh, x=0.4, depth=1.2, stop=1.15, rake=0.0, yaw=0.0):
-    """Return the places of an edge that goes in from the top and along y, as shares of the body.
+    """Return the positions of an edge that enters from the top and moves along y.
+
+    All lengths are shares of the size of the body.
 
     Args:
         mesh: The body.
-        x: Across the body, half way.
-        depth: How deep the tip is.
-        stop: How far along it goes.
-        rake: How much farther on than the tip the edge is, per height.
-        yaw: How much the way goes across, per length of the body.
+        x: Position across the body, in its middle along y.
+        depth: Depth of the tip.
+        stop: End of the motion along y.
+        rake: Advance of the edge ahead of its tip, per height.
+        yaw: Motion across the body, per length of the body.
     """
     size = mesh.positions.max(axis=0)
     low, high = (1.0 - depth) * size[2], 1.3 * size[2]
     ahead = rake * (high - low) / size[1]
-    places = []
+    edges = []
     for y in np.linspace(-0.4, stop, 41):
         tip = np.array([(x + yaw * (y - 0.5)) * size[0], y * size[1], low])
         heel = np.array([(x + yaw * (y + ahead - 0.5)) * size[0], (y + ahead) * size[1], high])
-        places.append([tip, heel])
-    return np.array(places)
+        edges.append([tip, heel])
+    return np.array(edges)
 
 
 def faults(before, tissue):
-    """Return what is wrong with the body, hanging nodes and all that comes of them set aside."""
+    """Return the faults of the body, except those that hanging nodes cause."""
     after = tissue.snapshot()
-    set_aside = ("open", "shares no face", "without a twin")
+    ignored = ("open", "share no face", "without a twin")
     found = soundness.faults(before, after, volume=1e-12)
-    return [fault for fault in found if not any(text in fault for text in set_aside)]
+    return [fault for fault in found if not any(text in fault for text in ignored)]
 
 
-TABLE_1 = {  # cells, a stroke, and initial and final tetrahedra as printed
+TABLE_1 = {  # cells, a stroke, initial and final number of tetrahedra as in the paper
     "2 x 2 x 2": ((2, 2, 2), {"depth": 0.5}, 48, 354),
     "2 x 4 x 3": ((2, 4, 3), {"depth": 0.5}, 144, 960),
     "4 x 6 x 4": ((4, 6, 4), {"depth": 0.7, "stop": 1.35, "rake": -0.5, "yaw": 0.2}, 576, 2446),
@@ -74,7 +76,7 @@ def test_the_counts_of_table_1_are_initial_and_17_for_each_tetrahedron_cut(cells
     assert statistics.n_unsupported == statistics.n_guarded == 0
 
 
-PLANES = {  # cells, then how many tetrahedra are cut, edge nodes hang, face nodes hang
+PLANES = {  # cells, then the numbers of cut tetrahedra, hanging edge nodes, hanging face nodes
     "along the block": ((4, 6, 4), 144, 164, 96),
     "across the block": ((6, 4, 4), 96, 112, 64),
 }
@@ -93,7 +95,7 @@ def test_a_planar_cut_of_the_paper_s_block_leaves_as_many_hanging_nodes_as_expec
     assert statistics.n_hanging_face_nodes == face_nodes
 
 
-def test_it_grows_2_to_3_times_as_much_as_ours():
+def test_the_mesh_grows_2_to_3_times_as_much_as_with_the_stellar_scheme():
     mesh = block_of(4, 6, 4)
     ours = uncut(mesh, scheme="stellar")
     paper = uncut(mesh)
@@ -121,12 +123,12 @@ def test_random_planar_strokes_lose_nothing_and_leave_positive_volumes(seed):
     assert after.masses @ after.velocities == pytest.approx(momentum, abs=1e-12)
 
 
-def in_depth(mesh, *ways):
-    """Return a stroke of an upright edge, its tip inside, along y from place to place [m]."""
+def in_depth(mesh, *stops):
+    """Return the stroke of an upright edge along y through the given stops, tip inside [m]."""
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     x = 0.45 * low[0] + 0.55 * high[0]
     z = 0.6 * low[2] + 0.4 * high[2]
-    ys = np.concatenate([strokes.along_y(a, b) for a, b in itertools.pairwise(ways)])
+    ys = np.concatenate([strokes.along_y(a, b) for a, b in itertools.pairwise(stops)])
     return [strokes.pose((x, y, z), (x, y, high[2] + 0.02), Y) for y in ys]
 
 
@@ -146,7 +148,7 @@ UNSUPPORTED = {
 
 @pytest.mark.parametrize("mesh", ["grid", "jittered"])
 @pytest.mark.parametrize("stroke", UNSUPPORTED)
-def test_a_blade_in_the_tissue_breaks_nothing_whatever_it_does(stroke, mesh):
+def test_unsupported_strokes_leave_the_mesh_sound(stroke, mesh):
     body = block((2, 3, 2), (0.04, 0.06, 0.04)) if mesh == "grid" else bodies.jittered(3, 1)
     tissue = uncut(body, fixed=bodies.sides(body))
     before = tissue.snapshot()
@@ -157,7 +159,7 @@ def test_a_blade_in_the_tissue_breaks_nothing_whatever_it_does(stroke, mesh):
     assert faults(before, tissue) == []
 
 
-def test_a_tetrahedron_is_cut_once_and_crossings_of_it_later_are_counted():
+def test_a_tetrahedron_is_cut_once_and_later_crossings_are_counted():
     mesh = block_of(2, 2, 2)
     tissue = uncut(mesh)
     tissue.incise(upright(mesh), Y)
@@ -170,8 +172,8 @@ def test_a_tetrahedron_is_cut_once_and_crossings_of_it_later_are_counted():
     assert again.n_ignored_crossings > 0
 
 
-def test_codes_that_are_not_in_the_table_are_left_whole_and_counted():
-    """Two cuts, each of one edge of a tetrahedron, that do not meet: opposite edges are cut."""
+def test_tetrahedra_with_codes_that_are_not_in_the_table_are_left_whole_and_counted():
+    """Two opposite edges of a tetrahedron are cut, by cuts that do not touch."""
     mesh = bodies.unit_tetrahedron()
     tissue = uncut(mesh)
     records = tissue._incision.scheme._records
@@ -182,7 +184,7 @@ def test_codes_that_are_not_in_the_table_are_left_whole_and_counted():
     assert tissue.n_tetrahedra == 1
 
 
-def test_a_tetrahedron_is_split_when_the_blade_has_left_it_and_not_before():
+def test_a_tetrahedron_is_split_once_the_blade_has_left_it():
     mesh = block_of(2, 6, 2)
     tissue = uncut(mesh, fixed=bodies.sides(mesh))
     for sweep in strokes.sweeps(strokes.upright(0.008, -0.005, 0.03, -0.01, 0.03)):
@@ -198,8 +200,8 @@ def test_a_tetrahedron_is_split_when_the_blade_has_left_it_and_not_before():
     assert tissue.scheme_statistics().n_waiting > 0
 
 
-def test_springs_and_masses_follow_from_the_split_mesh():
-    """Each edge that is there has its spring: a whole neighbour keeps its long ones."""
+def test_springs_and_masses_are_those_of_the_split_mesh():
+    """Each existing edge has a spring; an uncut neighbour keeps its long edges."""
     mesh = block_of(2, 2, 2)
     tissue = uncut(mesh)
     tissue.incise(upright(mesh, depth=0.5), Y)
@@ -233,7 +235,7 @@ def test_the_same_stroke_gives_the_same_bits():
     assert run() == run()
 
 
-def test_a_cut_that_needs_more_room_than_there_is_takes_several_passes():
+def test_a_cut_that_exceeds_the_capacity_takes_several_passes():
     mesh = block_of(2, 14, 14)
     tissue = uncut(mesh)
     before = tissue.snapshot()

@@ -1,4 +1,4 @@
-"""Tetrahedra split by hand: what becomes of nodes, links, masses and momentum."""
+"""Splits of single tetrahedra: nodes, links, masses and momentum."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def n_pieces(splits):
     return label_pieces(splits.body, piece, queue)
 
 
-def split_one(code, mesh=None, at=0.4):
-    """Return a tetrahedron split by that code."""
+def split_by(code, mesh=None, at=0.4):
+    """Return a tetrahedron split by a cut-edge code."""
     splits = splits_of(mesh or bodies.unit_tetrahedron())
     for e, (a, b) in enumerate(EDGES):
         if is_edge_cut(code, e):
@@ -38,8 +38,8 @@ def split_one(code, mesh=None, at=0.4):
     return splits
 
 
-def drifting(splits, seed=0):
-    """Let every node go its own way."""
+def set_random_velocities(splits, seed=0):
+    """Give every node a random velocity."""
     random = np.random.default_rng(seed)
     n = splits.body.n_nodes
     splits.body.velocities[:n] = random.normal(size=(n, 3))
@@ -47,7 +47,7 @@ def drifting(splits, seed=0):
 
 @pytest.mark.parametrize("code", TABLE)
 def test_a_tetrahedron_falls_apart_by_its_code(code):
-    splits = split_one(code)
+    splits = split_by(code)
     case = TABLE[code].case
     assert len(splits.tetrahedra) == 17
     assert len(splits.rest) == 14 + COPIES[case]
@@ -60,9 +60,9 @@ def test_a_tetrahedron_falls_apart_by_its_code(code):
 
 
 @pytest.mark.parametrize("code", TABLE)
-def test_mass_and_momentum_are_kept(code):
+def test_mass_and_momentum_are_conserved(code):
     splits = splits_of(bodies.unit_tetrahedron())
-    drifting(splits)
+    set_random_velocities(splits)
     before = splits.momentum
     for e, ends in enumerate(EDGES):
         if is_edge_cut(code, e):
@@ -74,8 +74,8 @@ def test_mass_and_momentum_are_kept(code):
     np.testing.assert_allclose(splits.body.masses[: len(expected)], expected, rtol=1e-12)
 
 
-def two(order=(0, 1)):
-    """Return two tetrahedra on either side of face 1 2 3, split in that order, 0 and 4 cut off."""
+def two_split(order=(0, 1)):
+    """Return tetrahedra on either side of face 1 2 3 with nodes 0 and 4 cut off, split in order."""
     splits = splits_of(bodies.two_tetrahedra())
     for edge in ((0, 1), (1, 4), (1, 2), (1, 3)):
         splits.cross(*edge, 0.4)
@@ -86,7 +86,7 @@ def two(order=(0, 1)):
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_two_neighbours_share_the_nodes_between_them(order):
-    splits = two(order)
+    splits = two_split(order)
     assert len(splits.tetrahedra) == 34
     np.testing.assert_array_equal(
         np.where(splits.body.links[:34] < 0, OUTER, splits.body.links[:34]),
@@ -98,8 +98,8 @@ def test_two_neighbours_share_the_nodes_between_them(order):
     assert len(splits.rest) == 2 * 20 - shared
 
 
-def test_a_neighbour_that_stays_whole_has_six_small_faces_behind_its_large_one():
-    splits = two(order=(0,))
+def test_an_uncut_neighbour_has_six_small_faces_behind_its_large_one():
+    splits = two_split(order=(0,))
     body = splits.body
     link = int(body.links[1, 0])
     assert link <= HANGING
@@ -116,11 +116,11 @@ def test_a_neighbour_that_stays_whole_has_six_small_faces_behind_its_large_one()
     assert statistics.n_hanging_edge_nodes == 3
 
 
-def test_a_body_hangs_together_through_a_whole_neighbour():
-    assert n_pieces(two(order=(0,))) == 1
+def test_an_uncut_neighbour_connects_the_body():
+    assert n_pieces(two_split(order=(0,))) == 1
 
 
-def test_every_child_is_found_from_a_whole_neighbour_and_the_other_way():
+def test_every_child_is_found_from_an_uncut_neighbour_and_vice_versa():
     splits = splits_of(bodies.two_tetrahedra())
     splits.cross(1, 2)
     splits.split(0)
@@ -131,16 +131,16 @@ def test_every_child_is_found_from_a_whole_neighbour_and_the_other_way():
             assert locate(splits.body, visits, centroid, start, queue)[:2] == (t, True)
 
 
-def test_a_node_that_moved_by_itself_and_mass_that_joins_it_keep_their_momentum():
-    splits = two(order=(0,))
-    drifting(splits)
+def test_momentum_is_conserved_when_mass_joins_a_hanging_node():
+    splits = two_split(order=(0,))
+    set_random_velocities(splits)
     before = splits.momentum
     splits.split(1)
     assert splits.momentum == pytest.approx(before, rel=1e-12)
     assert splits.body.masses.sum() == pytest.approx(DENSITY * 0.5, rel=1e-13)
 
 
-def test_an_edge_that_a_split_neighbour_holds_together_stays_one():
+def test_an_edge_that_a_split_neighbour_has_uncut_is_not_separated():
     splits = splits_of(bodies.two_tetrahedra())
     splits.cross(0, 1)
     splits.split(0)
@@ -153,7 +153,7 @@ def test_an_edge_that_a_split_neighbour_holds_together_stays_one():
     assert len(splits.rest) == n + 3 + 3  # only nodes on the edges and in the faces at node 4
 
 
-def test_fixed_nodes_have_fixed_nodes_between_them():
+def test_new_nodes_between_fixed_nodes_are_fixed():
     splits = splits_of(bodies.unit_tetrahedron())
     splits.body.fixed[[0, 1]] = True
     splits.cross(0, 1)
@@ -163,7 +163,7 @@ def test_fixed_nodes_have_fixed_nodes_between_them():
     np.testing.assert_array_equal(splits.body.velocities[midpoints], 0.0)
 
 
-def test_without_room_nothing_is_split():
+def test_nothing_is_split_without_capacity():
     splits = splits_of(bodies.unit_tetrahedron())
     splits.cross(0, 1)
     splits.body.n_tetrahedra = len(splits.body.tetrahedra) - 15

@@ -20,14 +20,14 @@ from tissue.cutting.bielser_1998.template_1_to_17 import (
 pytestmark = pytest.mark.kernel
 
 VOLUMES = np.linalg.det(generic_weights()[PRESPLIT.children])
-"""As shares of the tetrahedron's."""
+"""Volumes of the children, as shares of that of the tetrahedron."""
 
 
 def parts_at(node):
     return {int(PRESPLIT.part[c]) for c in range(N_CHILDREN) if node in PRESPLIT.children[c]}
 
 
-def test_it_has_17_tetrahedra_of_14_nodes():
+def test_the_template_has_17_tetrahedra_of_14_nodes():
     assert PRESPLIT.children.shape == (17, 4)
     assert set(PRESPLIT.children.ravel()) == set(range(N_LOCAL_NODES)) == set(range(14))
 
@@ -55,7 +55,7 @@ def test_edge_nodes_are_referenced_by_two_corners_and_face_nodes_by_three_and_th
         assert CENTRE in parts_at(node)
 
 
-def test_links_inside_lead_back_and_share_a_triangle():
+def test_inner_links_are_symmetric_and_share_a_triangle():
     for c, f in itertools.product(range(N_CHILDREN), range(4)):
         if PRESPLIT.inner[c, f] >= 0:
             other, g = divmod(int(PRESPLIT.inner[c, f]), 4)

@@ -1,4 +1,4 @@
-"""The paper's hierarchical relaxation: its equilibrium, its order, and what it gives up."""
+"""The paper's hierarchical relaxation: its equilibrium, its order and its limits."""
 
 import numpy as np
 import pytest
@@ -6,8 +6,8 @@ import pytest
 from tests.tissue.integrators.networks import (
     FREE_FALL,
     block,
-    frames,
-    highest_frequency,
+    frequency_bound,
+    hierarchical_frames,
     nearest,
     rings_around,
     shake,
@@ -20,13 +20,13 @@ TOP = np.array([0.02, 0.02, 0.04])
 
 
 def sagging(n):
-    """Return a block between two walls that sags under its weight, in thick oil."""
+    """Return a block between two walls that sags under gravity, with strong drag."""
     return block(n, gravity=FREE_FALL, drag=60.0, retardation_time=2e-4)
 
 
 def at_rest(network):
-    """Return where the nodes are when all were moved together until they stopped [m]."""
-    h = 1.5 / highest_frequency(network)
+    """Return the equilibrium positions from steps of all nodes together; reset the network [m]."""
+    h = 1.5 / frequency_bound(network)
     network.advance(h, int(2.0 / h))
     positions = network.body.positions.copy()
     network.body.positions[:] = network.body.rest
@@ -34,56 +34,58 @@ def at_rest(network):
     return positions
 
 
-def wrong_by(network, expected):
-    """Return the largest error in units of the largest displacement."""
+def relative_error(network, expected):
+    """Return the largest error of the positions over the largest displacement."""
     largest = np.abs(expected - network.body.rest).max()
     return np.abs(network.body.positions - expected).max() / largest
 
 
 def relaxed(n, last_ring, *, frozen, seconds=2.0):
-    """Relax a sagging block hierarchically around the middle of its top; return how wrong it is."""
+    """Relax a sagging block hierarchically around the middle of its top; return its error."""
     network = sagging(n)
     expected = at_rest(network)
-    span = 1.0 / highest_frequency(network)
+    span = 1.0 / frequency_bound(network)
     focus = nearest(network, TOP)
-    frames(network, focus, span, int(seconds / span), 1 << last_ring, last_ring, frozen)
-    return wrong_by(network, expected)
+    hierarchical_frames(
+        network, focus, span, int(seconds / span), 1 << last_ring, last_ring, frozen
+    )
+    return relative_error(network, expected)
 
 
-def test_the_equilibrium_is_that_of_all_nodes_together_where_rings_reach_every_node():
+def test_the_equilibrium_is_the_global_one_if_the_rings_include_every_node():
     """No node of the block is more than 5 edges away."""
     assert relaxed(3, 5, frozen=True) < 1e-6
 
 
-def test_the_equilibrium_is_the_same_where_far_nodes_are_moved_once_a_frame():
+def test_the_equilibrium_is_the_global_one_if_far_nodes_move_once_a_frame():
     assert relaxed(4, 2, frozen=False) < 1e-6
 
 
 @pytest.mark.parametrize("last_ring", [1, 2])
-def test_where_far_nodes_are_frozen_they_do_not_come_to_equilibrium(last_ring):
+def test_frozen_far_nodes_do_not_reach_equilibrium(last_ring):
     """The paper's printed rule, i(s) = 0 beyond s_max: most of the sag is missing."""
     assert 0.3 < relaxed(4, last_ring, frozen=True) <= 1.0
 
 
-def test_a_node_frozen_for_ten_seconds_comes_back_without_a_leap():
-    """Its clock is that of the frame: the time stamp of when it was moved last would leap."""
+def test_a_node_frozen_for_ten_seconds_moves_again_without_a_jump():
+    """Its time is that of the frame; a step from its last time stamp would be a jump."""
     network = sagging(4)
-    span = 1.0 / highest_frequency(network)
+    span = 1.0 / frequency_bound(network)
     near, far = nearest(network, [0.01, 0.0, 0.0]), nearest(network, [0.03, 0.04, 0.04])
     body = network.body
     size = 0.04 / 4
     body.velocities[:] = 0.1
     trails = new_trails(len(body.rest))
-    frames(network, near, span, int(10.0 / span), 2, 1, True, trails)
+    hierarchical_frames(network, near, span, int(10.0 / span), 2, 1, True, trails)
     before = body.positions.copy()
-    frames(network, far, span, 1, 2, 1, True, trails)
+    hierarchical_frames(network, far, span, 1, 2, 1, True, trails)
     assert 0.0 < np.abs(body.positions - before).max() < 0.01 * size
 
 
 def naive_frame(network, focus, span, updates, last_ring):
-    """Do a frame with far nodes frozen, one node after the other: the paper's scheme word by word.
+    """Advance by a frame with far nodes frozen, node by node: a literal version of the paper.
 
-    Each neighbour q is seen at time t as x_q + (t - tau_q) v_q.
+    The position of each neighbour q at time t is taken as x_q + (t - tau_q) v_q.
     """
     body, springs, around = network.body, network.springs, network.surroundings
     rings = rings_around(network, focus, last_ring + 1)
@@ -121,7 +123,7 @@ def naive_frame(network, focus, span, updates, last_ring):
 
 @pytest.mark.kernel
 @pytest.mark.parametrize("retardation_time", [0.0, 1e-3])
-def test_a_frame_is_that_of_the_paper_written_plainly(retardation_time):
+def test_a_frame_is_that_of_the_literal_version_of_the_paper(retardation_time):
     results = []
     for advance in (naive_frame, None):
         network = block(2, gravity=FREE_FALL, drag=5.0, retardation_time=retardation_time)
@@ -131,7 +133,7 @@ def test_a_frame_is_that_of_the_paper_written_plainly(retardation_time):
             if advance:
                 advance(network, focus, 2e-3, 4, 1)
         if not advance:
-            frames(network, focus, 2e-3, 3, 4, 1, True)
+            hierarchical_frames(network, focus, 2e-3, 3, 4, 1, True)
         results.append((network.body.positions.copy(), network.body.velocities.copy()))
     np.testing.assert_allclose(results[1][0], results[0][0], rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(results[1][1], results[0][1], rtol=0.0, atol=1e-11)
@@ -140,31 +142,31 @@ def test_a_frame_is_that_of_the_paper_written_plainly(retardation_time):
 def error(retardation_time, n):
     """Return the error after 40 ms in `n` frames of one ring, every node moved once in each."""
     ends = []
-    for advance in ("together", "one by one"):
+    for advance in ("global", "hierarchical"):
         network = block(3, retardation_time=retardation_time)
         shake(network, 2e-4)
-        if advance == "together":
+        if advance == "global":
             network.advance(0.04 / 2000, 2000)
         else:
-            frames(network, nearest(network, TOP), 0.04 / n, n, 1, 0, False)
+            hierarchical_frames(network, nearest(network, TOP), 0.04 / n, n, 1, 0, False)
         ends.append(network.body.positions.copy())
     return np.abs(ends[1] - ends[0]).max()
 
 
 @pytest.mark.parametrize(("retardation_time", "least"), [(0.0, 1.8), (2e-4, 0.9)])
-def test_the_order_is_two_and_one_with_damping_along_springs(retardation_time, least):
-    """A neighbour seen on a straight line is wrong by the square of the time."""
+def test_the_order_is_two_without_and_one_with_damping_along_springs(retardation_time, least):
+    """The linear extrapolation of a neighbour has an error of second order in time."""
     coarse, fine = (error(retardation_time, n) for n in (200, 800))
     assert np.log2(coarse / fine) / 2 > least
 
 
-def test_a_free_body_keeps_its_momentum_only_nearly():
-    """The two ends of a spring see each other at different times: that is the scheme's price."""
+def test_a_free_body_conserves_momentum_only_approximately():
+    """The forces at the two ends of a spring are evaluated at different times."""
     network = block(3, held=False)
     shake(network, 2e-4)
     masses, v = network.body.masses[:, None], network.body.velocities
-    span = 0.25 / highest_frequency(network)
-    frames(network, nearest(network, TOP), span, int(0.1 / span), 1, 0, False)
+    span = 0.25 / frequency_bound(network)
+    hierarchical_frames(network, nearest(network, TOP), span, int(0.1 / span), 1, 0, False)
     scale = np.sqrt((masses * v**2).sum() * masses.sum())
     drift = np.linalg.norm((masses * v).sum(axis=0)) / scale
     assert 1e-12 < drift < 0.05

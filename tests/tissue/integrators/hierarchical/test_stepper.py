@@ -1,4 +1,4 @@
-"""How many steps each ring takes in a frame."""
+"""The number of steps that each ring takes in a frame."""
 
 import itertools
 
@@ -15,17 +15,17 @@ def steps(options, needed):
     return [n // e for e in every.tolist()]
 
 
-def test_each_ring_takes_half_the_steps_of_the_last_as_the_paper_prints_it():
+def test_each_ring_takes_half_the_steps_of_the_one_inside_as_in_the_paper():
     options = Hierarchical(updates=16, rings=4)
     assert steps(options, [0.5] * 6) == [16, 8, 4, 2, 1, 1]
 
 
-def test_a_ring_that_would_be_unstable_takes_twice_as_many_or_four_times():
+def test_a_ring_that_would_be_unstable_takes_twice_or_four_times_as_many_steps():
     options = Hierarchical(updates=16, rings=4)
     assert steps(options, [9.0, 0.5, 0.5, 0.5, 3.5, 1.5]) == [16, 8, 4, 4, 4, 2]
 
 
-def test_rings_inside_of_a_stiff_one_take_no_fewer():
+def test_rings_inside_a_stiff_one_take_no_fewer_steps():
     options = Hierarchical(updates=8, rings=3)
     assert steps(options, [0.5, 0.5, 14.0, 0.5, 0.5]) == [16, 16, 16, 1, 1]
 

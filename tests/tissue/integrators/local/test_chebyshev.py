@@ -1,4 +1,4 @@
-"""The coefficients against the polynomials that they are made of."""
+"""The coefficients of the recursion against Chebyshev polynomials."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def stretch(p: int, nu: float, phase: float) -> float:
 
 
 @pytest.mark.parametrize(("p", "nu"), EACH)
-def test_a_steady_force_moves_a_node_as_leap_frog_does(p, nu):
+def test_a_constant_force_gives_the_impulse_of_leap_frog(p, nu):
     """The weights add up to 1: an impulse is the force times the time."""
     assert chebyshev(p, nu).weight.sum() == pytest.approx(1.0, rel=1e-13)
     assert (chebyshev(p, nu).weight > 0.0).all()
@@ -50,7 +50,7 @@ def test_one_substep_is_leap_frog():
     assert stretch(1, 1.0, 0.7) == pytest.approx(-0.5 * 0.7**2)
 
 
-def test_limits_grow_by_a_steady_share_of_the_substeps():
+def test_stability_limits_grow_in_proportion_to_the_substeps():
     limits = substep_limits()
     assert len(limits) == MOST_SUBSTEPS + 1
     assert (np.diff(limits[1:]) > 1.4).all()

@@ -34,7 +34,7 @@ def elastic_forces(elastic, body, nodes, n, out):
 
 @pytest.fixture(params=MATERIALS)
 def shaken(request):
-    """Return a body with random displacements, and what its forces follow from."""
+    """Return a body with random displacements, and its elastic arrays."""
     body = build_body(MESH, None, None)
     elastic = Elasticity(MATERIALS[request.param], body, no_visits(N_NODES, N_TETRAHEDRA)).arrays
     body.positions[:] += np.random.default_rng(0).uniform(-1e-3, 1e-3, (N_NODES, 3))
@@ -56,15 +56,15 @@ def rings_around(elastic, node, last_ring):
     return rings
 
 
-def patch_of(elastic, rings, moving, feeling):
+def patch_of(elastic, rings, moving, affected):
     patch = new_patch(N_NODES, N_TETRAHEDRA)
-    find_patch(patch, elastic, rings, moving, feeling)
+    find_patch(patch, elastic, rings, moving, affected)
     return patch
 
 
 @pytest.mark.parametrize("node", [0, 21, 40])
-def test_the_force_on_a_node_needs_what_is_around_it_and_no_more(shaken, node):
-    """From scratch: nothing else was evaluated."""
+def test_the_force_on_a_node_needs_only_its_patch(shaken, node):
+    """All values outside the patch are zero."""
     elastic, body = shaken
     expected = all_forces(elastic, body)[node]
     for name in ("volume", "pressure", "forces"):
@@ -77,8 +77,8 @@ def test_the_force_on_a_node_needs_what_is_around_it_and_no_more(shaken, node):
 
 
 @pytest.mark.parametrize("node", [0, 21, 40])
-def test_where_one_node_moves_all_that_feel_it_are_found(shaken, node):
-    """After an evaluation of all: the forces on the nodes in the rings follow, and no others."""
+def test_the_patch_of_a_moved_node_has_all_nodes_whose_force_changes(shaken, node):
+    """After a full evaluation, updating the rings gives all forces, and no others change."""
     elastic, body = shaken
     before = all_forces(elastic, body)
     reach = reach_of(elastic)

@@ -1,4 +1,4 @@
-"""Local time stepping against the scheme written plainly, against theory, and at its limits."""
+"""Local time stepping against a literal version, against theory, and at its limits."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,9 @@ import pytest
 from tests.tissue.integrators.networks import (
     FREE_FALL,
     block,
-    found,
-    highest_frequency,
-    leaps,
+    found_nodes,
+    frequency_bound,
+    macro_steps,
     nearest,
     rings_around,
     shake,
@@ -22,11 +22,11 @@ MIDDLE = np.array([0.02, 0.02, 0.02])
 
 def middle_of(network, last_ring=1):
     """Return the nodes in rings around the middle of the body."""
-    return found(rings_around(network, nearest(network, MIDDLE), last_ring))
+    return found_nodes(rings_around(network, nearest(network, MIDDLE), last_ring))
 
 
-def naive_leap(network, fine, span, n_substeps, kick):
-    """One macro step in which every node takes part in the recursion: slow and plain."""
+def naive_macro_step(network, fine, span, n_substeps, kick):
+    """Take one macro step with every node in the recursion: a slow, literal version."""
     body, c = network.body, chebyshev(n_substeps)
     selected = np.isin(np.arange(len(body.rest)), fine)[:, None]
     start, v = body.positions.copy(), body.velocities
@@ -46,53 +46,53 @@ def naive_leap(network, fine, span, n_substeps, kick):
 
 @pytest.mark.kernel
 @pytest.mark.parametrize("n_substeps", [1, 3])
-def test_a_step_is_that_of_the_scheme_written_plainly(n_substeps):
-    """Nodes that feel no fine node leap in one go; here all go through the recursion."""
+def test_a_step_is_that_of_the_literal_version_of_the_scheme(n_substeps):
+    """Nodes away from fine nodes take one step; in the literal version all use the recursion."""
     plain, quick = (block(2, gravity=FREE_FALL) for _ in range(2))
     for network in (plain, quick):
         shake(network, 1e-3)
     fine = [i for i in middle_of(plain, 0) if not plain.body.fixed[i]]
     for i in range(3):
-        naive_leap(plain, fine, 1e-3, n_substeps, 0.5 if i == 0 else 1.0)
-    leaps(quick, fine, 1e-3, 3, n_substeps)
+        naive_macro_step(plain, fine, 1e-3, n_substeps, 0.5 if i == 0 else 1.0)
+    macro_steps(quick, fine, 1e-3, 3, n_substeps)
     np.testing.assert_allclose(quick.body.positions, plain.body.positions, rtol=0.0, atol=1e-15)
     np.testing.assert_allclose(quick.body.velocities, plain.body.velocities, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("n_substeps", [1, 2, 4, 8])
-def test_the_equilibrium_is_that_of_all_nodes_together(n_substeps):
+def test_the_equilibrium_is_that_of_global_steps(n_substeps):
     network = block(3, gravity=FREE_FALL, drag=20.0, retardation_time=2e-4)
-    span = 1.0 / highest_frequency(network)
+    span = 1.0 / frequency_bound(network)
     network.advance(span, int(3.0 / span))
     expected = network.body.positions.copy()
     network.body.positions[:] = network.body.rest
     network.body.velocities[:] = 0.0
-    leaps(network, middle_of(network), span, int(3.0 / span), n_substeps)
+    macro_steps(network, middle_of(network), span, int(3.0 / span), n_substeps)
     error = np.abs(network.body.positions - expected).max()
     assert error < 1e-9 * np.abs(expected - network.body.rest).max()
 
 
 @pytest.mark.parametrize("retardation_time", [0.0, 2e-4])
-def test_a_free_body_keeps_its_momentum(retardation_time):
+def test_a_free_body_conserves_momentum(retardation_time):
     network = block(3, held=False, retardation_time=retardation_time)
     shake(network, 2e-4)
     body = network.body
     body.velocities[:] = np.random.default_rng(0).normal(size=body.velocities.shape) * 0.02
     momentum = body.masses @ body.velocities
-    leaps(network, middle_of(network), 1.0 / highest_frequency(network), 2000, 4)
+    macro_steps(network, middle_of(network), 1.0 / frequency_bound(network), 2000, 4)
     scale = 0.02 * body.masses.sum()
     np.testing.assert_allclose(body.masses @ body.velocities, momentum, atol=1e-12 * scale)
 
 
-def test_dampers_keep_angular_momentum_and_take_energy():
-    """Impulses along the springs, at one instant: no drag, all nodes fine, one short step."""
-    for retardation_time in (1e-4, 1.0):  # the second far stiffer than any explicit step bears
+def test_dampers_conserve_angular_momentum_and_dissipate_energy():
+    """Impulses along the springs in one short step, without drag, with all nodes fine."""
+    for retardation_time in (1e-4, 1.0):  # the second is far too stiff for any explicit step
         network = block(2, held=False, retardation_time=retardation_time)
         body = network.body
         body.velocities[:] = np.random.default_rng(0).normal(size=body.velocities.shape)
         before = np.cross(body.positions, body.masses[:, None] * body.velocities).sum(axis=0)
         energy = float((body.masses[:, None] * body.velocities**2).sum())
-        leaps(network, list(range(len(body.rest))), 1e-9, 1, 1)
+        macro_steps(network, list(range(len(body.rest))), 1e-9, 1, 1)
         after = np.cross(body.positions, body.masses[:, None] * body.velocities).sum(axis=0)
         np.testing.assert_allclose(after, before, atol=1e-7 * np.abs(before).max())
         left = float((body.masses[:, None] * body.velocities**2).sum())
@@ -103,13 +103,13 @@ def test_dampers_keep_angular_momentum_and_take_energy():
 def test_the_order_is_two(n_substeps):
     def error(n):
         ends = []
-        for together in (True, False):
+        for is_global in (True, False):
             network = block(3)
             shake(network, 2e-4)
-            if together:
+            if is_global:
                 network.advance(0.02 / 1000, 1000)
             else:
-                leaps(network, middle_of(network), 0.02 / n, n, n_substeps)
+                macro_steps(network, middle_of(network), 0.02 / n, n, n_substeps)
             ends.append(network.body.positions.copy())
         return np.abs(ends[1] - ends[0]).max()
 
@@ -130,7 +130,7 @@ def shaken_about_a_stiff_zone(size, n_substeps, stabilisation):
     noise = np.random.default_rng(1).normal(size=network.body.rest.shape)
     network.body.velocities[:] = 40.0 * size * (noise - noise.mean(axis=0))
     span = 0.9 * 2.0 / coarse
-    leaps(network, zone, span, int(2.0 / span), n_substeps, stabilisation)
+    macro_steps(network, zone, span, int(2.0 / span), n_substeps, stabilisation)
     moved = np.abs(network.body.positions - network.body.rest).max()
     return moved if np.isfinite(moved) else np.inf
 
@@ -141,10 +141,10 @@ def test_a_zone_16_times_as_stiff_is_stable_in_4_substeps_at_the_limit_of_the_ot
 
 
 def test_too_few_substeps_are_unstable():
-    """Two substeps bear twice the frequency; the zone has 3.2 times that of the others."""
+    """Two substeps allow twice the frequency; the zone has 3.2 times that of the other nodes."""
     assert shaken_about_a_stiff_zone(1e-6, 2, 0.05) > 1.0
 
 
 def test_large_strains_need_the_stabilisation_that_is_the_default():
-    """Waves of half a millimetre strain the springs by 6 %, and no damping takes anything."""
+    """Waves of half a millimetre strain the springs by 6 %, without damping."""
     assert shaken_about_a_stiff_zone(5e-4, 5, STABILISATION) < 0.1

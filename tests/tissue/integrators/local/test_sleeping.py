@@ -1,9 +1,9 @@
-"""What is at rest sleeps, and what is pulled wakes."""
+"""Nodes at rest fall asleep, and accelerated nodes wake."""
 
 import numpy as np
 import pytest
 
-from tests.tissue.integrators.networks import block, found, nearest, rings_around
+from tests.tissue.integrators.networks import block, found_nodes, nearest, rings_around
 from tissue.integrators.local.sleeping import (
     ASLEEP,
     AWAKE,
@@ -36,14 +36,14 @@ def listed(activity):
 
 
 def one_awake():
-    """Return the activity in which one node in the middle is awake."""
+    """Return the activity of a body with one node in the middle awake."""
     activity = all_asleep(N_NODES)
     wake(activity, BODY, SPRINGS, INNER)
     return activity
 
 
-def calm_for(activity, seconds, speed=0.0, acceleration=0.0):
-    """Let time pass in which every node moves and is pulled like that along x."""
+def pass_time(activity, seconds, speed=0.0, acceleration=0.0):
+    """Advance the activity with the same speed and acceleration of every node along x."""
     BODY.velocities[:] = [speed, 0.0, 0.0]
     pull = np.tile([acceleration, 0.0, 0.0], (N_NODES, 1))
     doze(activity, BODY, SPRINGS, pull, seconds)
@@ -51,7 +51,7 @@ def calm_for(activity, seconds, speed=0.0, acceleration=0.0):
 
 def test_a_node_that_wakes_has_its_neighbours_watched():
     activity = one_awake()
-    neighbours = found(rings_around(NETWORK, INNER, 1))[1:]
+    neighbours = found_nodes(rings_around(NETWORK, INNER, 1))[1:]
     assert listed(activity) == [INNER, *neighbours]
     assert states(activity)[INNER] == AWAKE
     assert {states(activity)[i] for i in neighbours} == {WATCHED}
@@ -68,43 +68,43 @@ def test_fixed_nodes_never_wake():
     ).tolist()
 
 
-def test_a_calm_node_sleeps_after_a_while_and_not_before():
+def test_a_calm_node_falls_asleep_after_the_waiting_time_and_not_before():
     activity = one_awake()
-    calm_for(activity, 0.6 * CALM)
+    pass_time(activity, 0.6 * CALM)
     assert states(activity)[INNER] == AWAKE
-    calm_for(activity, 0.6 * CALM)
+    pass_time(activity, 0.6 * CALM)
     assert listed(activity) == []
     assert set(states(activity)) == {ASLEEP}
 
 
 @pytest.mark.parametrize(
-    "restless", [{"speed": 1.1 * SLEEP_SPEED}, {"acceleration": 1.1 * SLEEP_ACCELERATION}]
+    "motion", [{"speed": 1.1 * SLEEP_SPEED}, {"acceleration": 1.1 * SLEEP_ACCELERATION}]
 )
-def test_a_node_that_moves_or_is_pulled_stays_awake(restless):
+def test_a_node_that_moves_or_is_accelerated_stays_awake(motion):
     activity = one_awake()
     for _ in range(3):
-        calm_for(activity, CALM, **restless)
+        pass_time(activity, CALM, **motion)
     assert states(activity)[INNER] == AWAKE
 
 
-def test_an_instant_of_unrest_begins_the_wait_anew():
+def test_a_moment_of_motion_restarts_the_waiting_time():
     activity = one_awake()
-    calm_for(activity, 0.9 * CALM)
-    calm_for(activity, 0.9 * CALM, speed=2.0 * SLEEP_SPEED)
-    calm_for(activity, 0.9 * CALM)
+    pass_time(activity, 0.9 * CALM)
+    pass_time(activity, 0.9 * CALM, speed=2.0 * SLEEP_SPEED)
+    pass_time(activity, 0.9 * CALM)
     assert states(activity)[INNER] == AWAKE
 
 
 def test_the_momentum_given_up_is_counted():
     activity = one_awake()
-    calm_for(activity, 2.0 * CALM, speed=0.5 * SLEEP_SPEED)
+    pass_time(activity, 2.0 * CALM, speed=0.5 * SLEEP_SPEED)
     expected = BODY.masses[INNER] * 0.5 * SLEEP_SPEED
     np.testing.assert_allclose(activity.given_up, [expected, 0.0, 0.0], rtol=1e-14)
     assert not BODY.velocities[INNER].any()
 
 
 @pytest.mark.parametrize("share", [0.9, 1.1])
-def test_a_watched_node_wakes_when_it_is_pulled_hard_enough(share):
+def test_a_watched_node_wakes_above_the_wake_acceleration(share):
     activity = one_awake()
     neighbour = listed(activity)[1:]
     free = next(i for i in neighbour if not BODY.fixed[i])
@@ -114,12 +114,12 @@ def test_a_watched_node_wakes_when_it_is_pulled_hard_enough(share):
     assert states(activity)[free] == (AWAKE if share > 1.0 else WATCHED)
 
 
-def test_a_watched_node_is_forgotten_when_nothing_beside_it_is_awake():
+def test_a_watched_node_is_dropped_when_no_neighbour_is_awake():
     activity = one_awake()
     other = next(i for i in listed(activity)[1:] if not BODY.fixed[i])
     wake(activity, BODY, SPRINGS, other)
-    activity.calm[INNER] = CALM  # falls asleep at the next look; the other does not
-    calm_for(activity, 0.1 * CALM)
-    around = found(rings_around(NETWORK, other, 1))
+    activity.calm[INNER] = CALM  # falls asleep at the next update; the other does not
+    pass_time(activity, 0.1 * CALM)
+    around = found_nodes(rings_around(NETWORK, other, 1))
     assert sorted(listed(activity)) == sorted(around)
     assert states(activity)[INNER] == WATCHED

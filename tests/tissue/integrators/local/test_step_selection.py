@@ -1,10 +1,10 @@
-"""Which nodes are fine, and how a step is divided."""
+"""The choice of fine nodes, and the division of a step."""
 
 import numpy as np
 import pytest
 
-from tests.tissue.integrators.networks import block, found
-from tests.tissue.kernels_of import elastic_of, tool_with
+from tests.tissue.integrators.networks import block, found_nodes
+from tests.tissue.kernels_of import elastic_of, line_blade
 from tissue.blade.anchors import ANCHORED, new_anchors
 from tissue.integrators.local.chebyshev import STABILISATION, substep_limits
 from tissue.integrators.local.kernels import new_zone
@@ -31,7 +31,7 @@ LIMITS = substep_limits()
 TABLES = new_step_tables(STABILISATION)
 
 
-def divided(frequencies, span, n_near=0):
+def plan_for(frequencies, span, n_near=0):
     """Return the plan for a body whose nodes have these bounds on w [1/s]."""
     activity = awake()
     squared = np.array(frequencies) ** 2
@@ -39,13 +39,13 @@ def divided(frequencies, span, n_near=0):
     return plan_steps(activity, still, squared, n_near, span, 0.0, TABLES)
 
 
-def test_a_body_that_bears_the_step_takes_one():
-    assert divided(np.full(N_NODES, 1000.0), 1e-3)[:2] == (1, 1)
+def test_a_step_that_is_stable_is_not_divided():
+    assert plan_for(np.full(N_NODES, 1000.0), 1e-3)[:2] == (1, 1)
 
 
-def test_a_body_of_equal_nodes_is_divided_and_has_no_fine_ones():
-    """3,000 /s bear 0.8 * 2 / 3,000 s."""
-    n, p, limit = divided(np.full(N_NODES, 3000.0), 1e-3)
+def test_the_step_of_a_body_of_equal_nodes_is_divided_without_fine_nodes():
+    """At 3,000 /s a step of 0.8 * 2 / 3,000 s is stable."""
+    n, p, limit = plan_for(np.full(N_NODES, 3000.0), 1e-3)
     assert (n, p) == (2, 1)
     assert limit >= 3000.0**2
 
@@ -56,21 +56,21 @@ def test_a_few_stiff_nodes_take_substeps_and_the_others_do_not():
     stiff[:30] = False
     stiff[34:] = False
     frequencies[stiff] = 5000.0
-    n, p, limit = divided(frequencies, 1e-3)
+    n, p, limit = plan_for(frequencies, 1e-3)
     assert n == 1
     assert 4 <= p <= 5
     assert 1000.0**2 < limit < 5000.0**2
 
 
-def test_what_anchors_add_counts():
-    """To the bound of each node that they pull on, and to no other."""
-    elastic, tool, activity, zone = elastic_of(SPRINGS), held_tool(), awake(), new_zone(*ROOM)
+def test_anchors_raise_the_bound_of_the_nodes_they_pull_on():
+    """The bounds of other nodes do not change."""
+    elastic, blade, activity, zone = elastic_of(SPRINGS), anchored_blade(), awake(), new_zone(*ROOM)
     elastic.frequency_squared[:] = 1e6
     scratch = np.zeros((N_NODES, 3))
-    find_bounds(BODY, elastic, tool, activity, zone, scratch)
+    find_bounds(BODY, elastic, blade, activity, zone, scratch)
     added = zone.bound - 1e6
     expected = np.zeros(N_NODES)
-    stiffness, weights = tool.anchors.stiffness[0], tool.anchors.weights[0]
+    stiffness, weights = blade.anchors.stiffness[0], blade.anchors.weights[0]
     expected[BODY.tetrahedra[5]] = stiffness * weights / BODY.masses[BODY.tetrahedra[5]]
     free = ~BODY.fixed
     np.testing.assert_allclose(added[free], expected[free], rtol=1e-9)
@@ -78,7 +78,7 @@ def test_what_anchors_add_counts():
 
 
 @pytest.mark.parametrize("phase", [0.5, 1.5, 3.0, 10.0, 50.0])
-def test_as_many_substeps_as_stability_needs_and_no_more(phase):
+def test_the_substeps_are_as_many_as_stability_needs_and_no_more(phase):
     p = n_substeps((phase / 1e-3) ** 2, 1e-3, LIMITS)
     assert phase <= STEP_SAFETY * LIMITS[p]
     assert p == 1 or phase > STEP_SAFETY * LIMITS[p - 1]
@@ -96,30 +96,30 @@ def test_the_coarse_limit_is_that_of_leap_frog_with_lagging_dampers(retardation_
     assert roots.real.min() == pytest.approx(-1.0, abs=1e-6)
 
 
-def held_tool():
-    """Return a blade one of whose samples holds the middle of a tetrahedron."""
+def anchored_blade():
+    """Return a blade with one sample anchored in the middle of a tetrahedron."""
     anchors = new_anchors(2, 0.01, 10e3)
     anchors.state[0] = ANCHORED
     anchors.tetrahedron[0] = 5
     anchors.weights[0] = 0.25
-    return tool_with(anchors)
+    return line_blade(anchors)
 
 
 def awake():
-    """Return the activity of a body all of whose nodes are awake."""
+    """Return the activity of a body with all nodes awake."""
     activity = all_asleep(N_NODES)
     wake_all(activity, BODY, SPRINGS)
     return activity
 
 
-def test_fine_are_the_nodes_at_the_blade_and_those_that_are_stiff():
+def test_the_fine_nodes_are_those_at_the_blade_and_the_stiff_ones():
     elastic, activity, zone = elastic_of(SPRINGS), awake(), new_zone(*ROOM)
-    held = [int(i) for i in BODY.tetrahedra[5] if not BODY.fixed[i]]
+    anchored = [int(i) for i in BODY.tetrahedra[5] if not BODY.fixed[i]]
     stiff = int(np.flatnonzero(~BODY.fixed)[-1])
     zone.bound[stiff] = 2.0
-    n_near = find_near(BODY, SPRINGS, held_tool(), zone, 0)
-    assert sorted(zone.fine[:n_near].tolist()) == sorted(held)
+    n_near = find_near(BODY, SPRINGS, anchored_blade(), zone, 0)
+    assert sorted(zone.fine[:n_near].tolist()) == sorted(anchored)
     find_zone(elastic, activity, zone, n_near, 1.0)
-    fine = [i for i in found(zone.rings) if ring_of(zone.rings, i) == 0]
-    assert sorted(fine) == sorted([*held, stiff])
-    assert find_near(BODY, SPRINGS, tool_with(new_anchors(2, 0.01, 10e3)), zone, 0) == 0
+    fine = [i for i in found_nodes(zone.rings) if ring_of(zone.rings, i) == 0]
+    assert sorted(fine) == sorted([*anchored, stiff])
+    assert find_near(BODY, SPRINGS, line_blade(new_anchors(2, 0.01, 10e3)), zone, 0) == 0
