@@ -31,7 +31,7 @@ from tissue.input_checks import (
     warn_of_ratio,
     warn_of_toughness,
 )
-from tissue.integrators.dynamic_relaxation import settle
+from tissue.integrators.equilibrium import settle
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.options import LocalTimeStepping

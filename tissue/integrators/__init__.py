@@ -7,5 +7,5 @@
 - `step_end`: contact and slip of the blade after a step.
 - `local`, `hierarchical`: local time stepping, and the paper's section 5.2; both search
   `node_rings` around a `focus`.
-- `dynamic_relaxation`: equilibrium of a body that nothing cuts.
+- `equilibrium`: the state of rest of a body, by dynamic relaxation.
 """

@@ -26,7 +26,7 @@ UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
 
 WRONG_USE = {
     "an unknown command": (["rnu"], "Did you mean .run."),
-    "an unknown option": (["run", "slab", "--tougness", "3"], "Did you mean --toughness"),
+    "an unknown option": (["run", "slab", "--tougness", "3"], 'Did you mean "?--toughness'),
     "a word for a number": (["run", "slab", "--young", "soft"], "soft"),
     "too many words": (["run", "slab", "grid2"], "grid2"),
     "an unknown scene": (["run", "slap"], "Did you mean 'slab'.*organ"),
