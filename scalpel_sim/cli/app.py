@@ -86,7 +86,8 @@ def _run(
 
         options = RunOptions(tissue, arm, client, output, printing)
         with prepared_run(scene, options, audits=True) as prepared:
-            print_report(_perform(prepared, options, plotter), prepared.folder, printing)
+            summary = _perform(prepared, options, plotter)
+            print_report(summary, prepared.folder, output.export, printing)
 
 
 @app.command(name="view")
@@ -138,7 +139,7 @@ def _view(
                 _wait_for_start(viewer.url)
                 summary = _perform(prepared, options, plotter, at_most_real_time=True)
                 show_in(viewer, simulation)
-                print_report(summary, prepared.folder, printing)
+                print_report(summary, prepared.folder, output.export, printing)
                 _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
 
 

@@ -4,7 +4,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -88,7 +88,9 @@ def progress(seconds: float, options: PrintOptions) -> Iterator[Callable[["Simul
         yield advance
 
 
-def print_report(summary: "Summary", folder: Path, options: PrintOptions) -> None:
+def print_report(
+    summary: "Summary", folder: Path, exports: Sequence[Path], options: PrintOptions
+) -> None:
     """Print the summary of a run, as a table or as JSON, and the names of its files."""
     if options.json:
         from scalpel_sim.output.run_folder import summary_json
@@ -101,3 +103,5 @@ def print_report(summary: "Summary", folder: Path, options: PrintOptions) -> Non
 
         print_summary(summary, Console())
         print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+        if exports:
+            print(f"exported: {', '.join(map(str, exports))}")

@@ -213,6 +213,13 @@ def test_a_run_exports_the_body_to_each_file_that_is_asked_for(tmp_path):
     assert all(trimesh.load(file).area > 0.0 for file in files)
 
 
+def test_the_report_of_a_run_names_what_was_exported(tmp_path, capsys):
+    file = tmp_path / "body.stl"
+    words = ["run", "grid2", "--seconds", "0.01", "--out", str(tmp_path / "out")]
+    assert command_line([*words, "--export", str(file)]) == 0
+    assert f"exported: {file}" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("name", "expected"),
     [
