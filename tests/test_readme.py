@@ -53,13 +53,16 @@ def in_folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("case", blocks("python"), ids=page_of)
 def test_every_python_block_runs_on_its_own(case, in_folder):
     where, code = case
-    exec(compile(code, where, "exec"), {"__name__": "__main__"})
+    names: dict[str, object] = {"__name__": "__main__"}
+    exec(compile(code, where, "exec"), names)
+    assert len(names) > 2, f"{where} defines and imports nothing"
 
 
 @pytest.mark.parametrize("case", commands(), ids=lambda case: " ".join(case[1]))
 def test_the_program_accepts_every_command(case):
     program: App = app
-    program.parse_args(case[1], exit_on_error=False, print_error=False)
+    command, _, unused = program.parse_args(case[1], exit_on_error=False, print_error=False)
+    assert callable(command) and not unused
 
 
 def test_commands_and_code_are_found_at_all():

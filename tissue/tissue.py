@@ -177,8 +177,8 @@ class Tissue(BodyQueries):
                 elif has_blade and not interaction.is_engaged:
                     self._end_incision()
         with clock.GC:
-            if has_blade:
-                incision.open_if_at_rest(self._hooks, travel, dt)
+            if has_blade and incision.has_rested(travel, dt):
+                incision.open_to_edge(self._hooks)
         return self._result(edge, has_blade, dt, n_substeps, clock)
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:

@@ -87,23 +87,21 @@ class Incision:
         self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True
 
-    def open_if_at_rest(self, hooks: CutHooks, travel: float, dt: float) -> None:
-        """Cut up to the edge if it has rested for a while.
+    def has_rested(self, travel: float, dt: float) -> bool:
+        """Return whether the edge has rested for a while ahead of the open cut.
 
         Args:
-            hooks: Calls of the owner of the mesh.
             travel: How far the edge moved in this step [m].
-            dt: Length of the step [s].
+            dt: Length of the step [s]; it counts.
         """
         if not self.has_begun or self._is_open:
-            return
+            return False
         travel = max(travel, path_travel(self.path))
         if travel > RESTING_SPEED * self._node_size * dt:
             self._resting_time = 0.0
         else:
             self._resting_time += dt
-        if self._resting_time >= RESTING_TIME:
-            self.open_to_edge(hooks)
+        return self._resting_time >= RESTING_TIME
 
     def end(self, hooks: CutHooks) -> None:
         """Resolve what the blade left uncut; the next contact begins another incision."""
