@@ -124,9 +124,8 @@ class ReplayWriter:
 
     def _elements(self, frames: list[_Frame]) -> Iterator[str]:
         """Yield the script elements that hold the run: the opening packet, then the frames."""
-        shapes = shapes_of(
-            self._model
-        )  # here and not at the start, which trimesh would delay by 0.3 s
+        # The shapes are made here and not at the start, which loading trimesh would delay by 0.3 s.
+        shapes = shapes_of(self._model)
         packets = ScenePackets(shapes, self._tissue_frame, wireframe=self._wireframe)
         first = frames[0].state
         opening = packets.opening(first.surface, first.body_poses)
