@@ -58,7 +58,9 @@ class MeshMeasures(NamedTuple):
     frequency: float
     """Bound on the body's angular frequencies [rad/s]."""
     time_step: float
-    """Longest stable Runge-Kutta step of the body alone, without a blade [s]."""
+    """Longest stable step of the body alone, without a blade [s]."""
+    added_mass: float
+    """Mass that mass scaling has added, as a share of the body's own."""
 
 
 class CutReport(NamedTuple):
@@ -92,6 +94,6 @@ class CutReport(NamedTuple):
 
     @property
     def substep_growth(self) -> float:
-        """Runge-Kutta steps of a second now over those before."""
+        """Steps of a second now over those before."""
         before, now = self.initial.time_step, self.now.time_step
         return before / now if math.isfinite(before) else 1.0

@@ -7,24 +7,26 @@ from tissue.blade.side_contact import sides_energy
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.energy import body_energy, kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
-from tissue.integrators.audited import Audited
 from tissue.integrators.system import System
 from tissue.types import Energies
 
 
 class Audit:
-    """The account of one body. It costs a pass over the body in each step, and two in each cut."""
+    """The account of one body.
+
+    It costs a sum over the body in each step, two in each cut, and two in each substep in which
+    parts of the body touch.
+    """
 
     def __init__(self, gravity: Vec3) -> None:
         self._gravity = gravity
-        self.audited = Audited()
-        """Takes the steps of the body, and counts the losses in damping and contact."""
         self._topology = 0.0
         self._at_first = (0.0, 0.0, 0.0)
 
     def begin(self, system: System) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
-        self.audited.damping = self.audited.contact = self._topology = 0.0
+        system.contact_loss.is_counted = 1
+        system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
         clear_works(system.interaction.state.totals)
         self._at_first = self._stored(system)
 
@@ -49,11 +51,11 @@ class Audit:
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,
             held=held + sides_energy(blade.sides),
-            damping=self.audited.damping,
+            damping=system.damping.dissipated,
             cutting=totals.work_of_cutting,
             breaking=totals.work_of_breaking,
             friction=totals.work_of_friction,
-            contact=self.audited.contact,
+            contact=system.contact_loss.dissipated,
             topology=self._topology,
             released=totals.released,
         )

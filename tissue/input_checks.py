@@ -13,7 +13,7 @@ from tissue.blade.edge import Edge
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
-from tissue.integrators.options import Global, IntegratorOptions, checked_relaxation
+from tissue.integrators.options import Global, IntegratorOptions, Verlet, checked_relaxation
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.solver_settings import SolverSettings
 from tissue.types import BladeSweep
@@ -229,10 +229,26 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
     checked_scheme(solver.scheme)
     checked_threads(solver.threads)
     options = checked_relaxation(solver.relaxation, material)
-    if solver.audit and not isinstance(options, Global):
+    if solver.audit and not isinstance(options, Global | Verlet):
         raise ValueError(
-            "an audit needs relaxation='global': in the others nodes are at different instants, "
-            "so that the energy of the whole is not known. Omit the audit, or use the global one"
+            "an audit needs relaxation='global' or 'verlet': in the others nodes are at different "
+            "instants, so that the energy of the whole is not known. Omit the audit, or use one of "
+            "these"
+        )
+    if solver.audit and options == Global(damping="stage"):
+        raise ValueError(
+            "an audit needs damping once a step: what is lost in the stages of a step is not "
+            "counted. Omit the audit, or use Global(damping='step')"
+        )
+    if solver.threads > 1 and isinstance(options, Verlet):
+        raise ValueError(
+            f"threads is {solver.threads}; relaxation='verlet' runs on one. Use threads=1, or "
+            "relaxation='global'"
+        )
+    if solver.mass_scaling is not None and not solver.mass_scaling > 0.0:
+        raise ValueError(
+            f"mass_scaling is {solver.mass_scaling}; it is an angular frequency [1/s] and must be "
+            "positive, or None for no added mass"
         )
     return options
 

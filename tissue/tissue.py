@@ -32,9 +32,8 @@ from tissue.input_checks import (
     warn_of_toughness,
 )
 from tissue.integrators.equilibrium import settle
-from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
-from tissue.integrators.options import LocalTimeStepping
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import assembled
 from tissue.material import Material
@@ -120,8 +119,16 @@ class Tissue(BodyQueries):
             from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
 
             body = with_room_to_hang(body)
-        is_tight = isinstance(options, LocalTimeStepping)
-        self._system = assembled(body, self.material, surroundings, blade, floor, is_tight)
+        method = method_of(options)
+        self._system = assembled(
+            body,
+            self.material,
+            surroundings,
+            blade,
+            floor,
+            mass_scaling=solver.mass_scaling,
+            damps_each_step=method.damps_each_step,
+        )
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
@@ -129,9 +136,8 @@ class Tissue(BodyQueries):
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
         self._incision = Incision(scheme, self.node_size)
         self._audit = Audit(surroundings.gravity) if solver.audit else None
-        audited = self._audit.audited if self._audit else None
-        self._global_stepper = GlobalStepper(solver.threads, audited)
-        self._at_first = self._system.measures()
+        self._global_stepper = GlobalStepper(method, solver.threads)
+        self._at_first = self._system.measures(method.stable_step)
         elasticity = self._system.elasticity
         self._integrator = integrator_of(options, self._global_stepper, body, elasticity)
         self._box = body_bounds(body)
@@ -234,7 +240,7 @@ class Tissue(BodyQueries):
             node_size=self.node_size,
             guard=0.0 if solver.scheme == "paper" else solver.cut.guard * self.node_size,
             initial=self._at_first,
-            now=self._system.measures(),
+            now=self._system.measures(self._global_stepper.method.stable_step),
         )
 
     def scheme_statistics(self) -> SchemeStatistics | None:

@@ -11,7 +11,8 @@ from tissue.contact.state import REBUILD
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.elasticity.finite_elements import neo_hookean
-from tissue.integrators.global_stepper import GlobalStepper
+from tissue.integrators.global_stepper import GlobalStepper, method_of
+from tissue.integrators.options import Global
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.step_context import Increment
 from tissue.mesh.body import Body
@@ -72,7 +73,7 @@ class EngineLoops:
         is_averaged: bool = True,
     ) -> None:
         material = block_material(law, is_damped=is_damped)
-        self._stepper = GlobalStepper()
+        self._stepper = GlobalStepper(method_of(Global()))
         self._tissue = Tissue(
             mesh, material, fixed=held_nodes(mesh), solver=SolverSettings(relaxation="global")
         )

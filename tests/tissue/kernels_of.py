@@ -21,6 +21,8 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
+from tissue.integrators.damping import Damping
+from tissue.integrators.losses import ContactLoss
 from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
 from tissue.integrators.stages import Stages, new_stages
 from tissue.integrators.step_context import StepContext
@@ -129,6 +131,8 @@ class Network(NamedTuple):
             blade=self.blade,
             contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
             surroundings=self.surroundings,
+            damping=Damping(owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
+            contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
         )

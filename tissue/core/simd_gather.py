@@ -79,6 +79,16 @@ def _larger(builder: Any, a: Any, b: Any) -> Any:
     return builder.select(builder.fcmp_ordered(">", a, b), a, b)
 
 
+def where_larger(a: Lanes, b: Lanes, this: Lanes, other: Lanes) -> Lanes:
+    """Return `this` in lanes where `a` is larger than `b`, and `other` in the others."""
+    return np.where(a > b, this, other)
+
+
+@_compiled(where_larger, LANES, LANES, LANES, LANES)
+def _where_larger(builder: Any, a: Any, b: Any, this: Any, other: Any) -> Any:
+    return builder.select(builder.fcmp_ordered(">", a, b), this, other)
+
+
 def largest(a: Lanes) -> float:
     """Return the largest of eight numbers."""
     return float(a.max())

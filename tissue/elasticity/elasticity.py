@@ -1,5 +1,7 @@
 """`Elasticity`: the arrays from which the forces inside a body are computed, kept true to cuts."""
 
+import math
+
 import numpy as np
 
 from tissue.core.array_types import IntArray
@@ -8,7 +10,6 @@ from tissue.elasticity.finite_elements import (
     build_stars,
     build_tetrahedra,
     grown_solid,
-    n_blocks,
     neo_hookean,
     no_solid,
     room_for_stars,
@@ -17,8 +18,9 @@ from tissue.elasticity.finite_elements import (
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.frequency_refinement import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
+from tissue.elasticity.mass_scaling import scale_masses
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
-from tissue.elasticity.strained_frequency import strained_frequency
+from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
 from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.changes import Change, largest_frequency
@@ -35,13 +37,13 @@ class Elasticity:
         material: What the body is made of.
         body: The body; its masses are written.
         visits: For searches.
-        is_tight: Whether the bound of tetrahedra is brought near the truth. Not for the Runge-Kutta
-            method: near its limit it damps the fastest modes by itself, which no account of the
-            energy includes (0.7 % of the work of a blade that presses and withdraws).
+        mass_scaling: Angular frequency [1/s] above which nodes get mass where tetrahedra carry the
+            shear; None for no added mass. Where the uncut body has a higher one, that: only what a
+            cut makes faster gets mass.
     """
 
     def __init__(
-        self, material: Material, body: Body, visits: Visits, *, is_tight: bool = False
+        self, material: Material, body: Body, visits: Visits, *, mass_scaling: float | None = None
     ) -> None:
         self._material = material
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
@@ -56,8 +58,8 @@ class Elasticity:
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
-        self._is_tight = is_tight
         self._solid_frequency_squared = 0.0
+        self._allowed = math.inf
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
         self.damper_frequency_squared = 0.0
@@ -65,6 +67,8 @@ class Elasticity:
         the stiffness of springs under either law."""
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
+        if mass_scaling is not None and material.law == "neo_hookean":
+            self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
@@ -85,16 +89,20 @@ class Elasticity:
         """Whether stiffness depends on how far the body is strained."""
         return self._has_solid
 
-    def strained_frequency_squared(self, body: Body) -> float:
+    def strained_frequency_squared(self, body: Body, visits: Visits, allowed: float) -> float:
         """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
 
         It takes a tenth of the time of a Runge-Kutta step. To test only a part of the tetrahedra in
         each frame is not enough: a lip that snaps back from the blade doubles its length in 2 ms.
+
+        Args:
+            body: Positions of the nodes.
+            visits: For searches.
+            allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
         """
         if not self._has_solid:
             return 0.0
-        blocks = n_blocks(body.n_tetrahedra)
-        return strained_frequency(self.arrays, body.positions, self.arrays.solid.every, 0, blocks)
+        return strained_frequency(self.arrays, body, visits, allowed)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
@@ -112,20 +120,22 @@ class Elasticity:
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
         self._write_springs(body, visits, nodes)
+        if self._has_solid:
+            build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
+            self._write_stars(body, visits, nodes)
+            springs, solid = self.arrays.springs, self.arrays.solid
+            n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
+            n = tighten(solid, body, visits, n, self._solid_frequency_squared)
+            nodes = solid.listed[:n]
+            if self._allowed < math.inf:
+                scale_masses(body, springs, solid, nodes, n, self._allowed)
+            forget_tests(solid, nodes, n)
+            highest = largest_frequency(body, solid.frequency_squared, nodes, n)
+            self._solid_frequency_squared = max(self._solid_frequency_squared, highest)
         bound_frequencies(body, self.arrays.springs, nodes, len(nodes))
         of_dampers = self.arrays.springs.frequency_squared
         highest = largest_frequency(body, of_dampers, nodes, len(nodes))
         self.damper_frequency_squared = max(self.damper_frequency_squared, highest)
-        if self._has_solid:
-            build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
-            self._write_stars(body, visits, nodes)
-            solid = self.arrays.solid
-            n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
-            if self._is_tight:
-                n = tighten(solid, body, visits, n, self._solid_frequency_squared)
-                highest = largest_frequency(body, solid.frequency_squared, solid.listed, n)
-                self._solid_frequency_squared = max(self._solid_frequency_squared, highest)
-            nodes = solid.listed[:n]
         bound_both_frequencies(self.arrays, nodes, len(nodes))
         largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
         self.frequency_squared = max(self.frequency_squared, largest)

@@ -23,7 +23,8 @@ def potential_energy(body: Body, gravity: Vec3) -> float:
     """Return the potential energy of all nodes in gravity [J]."""
     energy = 0.0
     for node in range(body.n_nodes):
-        energy -= body.masses[node] * dot(gravity, vec3(body.positions, node))
+        weight = body.masses[node] - body.added_masses[node]
+        energy -= weight * dot(gravity, vec3(body.positions, node))
     return energy
 
 

@@ -88,8 +88,6 @@ class Solid(Arrays):
     weight: FloatArray
     """Weight of each node in the bound on frequencies [1/kg^0.5] (`frequency_bound`), shape
     (nodes,)."""
-    weighed: FloatArray
-    """Mass of each node when it was given that weight [kg], shape (nodes,)."""
     dilatation: FloatArray
     """Term of the averaged volume of each node in that bound [N/m3/kg^0.5], shape (nodes,)."""
     frequency_squared: FloatArray
@@ -109,7 +107,21 @@ class Solid(Arrays):
     volume: FloatArray
     """Scratch: signed volume of tetrahedron t now [m3] at 8 + t; the first eight are 0."""
     growth: FloatArray
-    """Scratch of `strained_frequency`: growth of the faces of tetrahedron t, at 8 + t."""
+    """Scratch of `strained_frequency` and of energies: growth of the faces of tetrahedron t, at
+    8 + t."""
+    tested_growth: FloatArray
+    """Growth of the faces of tetrahedron t at which its nodes were slow enough, at 8 + t
+    (`strained_frequency`); 1 where it was not tested."""
+    strained_dilatation: FloatArray
+    """Scratch of `strained_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
+    strained_frequency_squared: FloatArray
+    """Scratch of `strained_frequency`: `frequency_squared` as it is deformed, shape (nodes,)."""
+    dilatation_test: IntArray
+    """Test in which `strained_dilatation` was written, shape (nodes,)."""
+    frequency_test: IntArray
+    """Test in which `strained_frequency_squared` was written, shape (nodes,)."""
+    test: IntCell
+    """Number of the test of strained frequencies."""
     pressure: FloatArray
     """Scratch: lam (J - a) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
@@ -150,6 +162,8 @@ def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> 
     capacity = WIDTH * n_blocks(n_tetrahedra)
     shape = aligned(8 * capacity)
     shape[:] = 1.0  # for tetrahedra not in use: any value that avoids division by 0
+    tested_growth = aligned(WIDTH + capacity)
+    tested_growth[:] = 1.0
     return Solid(
         law=law,
         nodes=aligned(4 * capacity, np.int32),
@@ -161,7 +175,6 @@ def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> 
         corner=np.zeros(pool, dtype=np.int32),
         node_volume=np.zeros(n_nodes),
         weight=np.zeros(n_nodes),
-        weighed=np.zeros(n_nodes),
         dilatation=np.zeros(n_nodes),
         frequency_squared=np.zeros(n_nodes),
         ring=np.zeros((LARGEST_RING, 3)),
@@ -172,6 +185,12 @@ def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> 
         every=np.arange(max(n_nodes, n_tetrahedra)),
         volume=aligned(WIDTH + capacity),
         growth=aligned(WIDTH + capacity),
+        tested_growth=tested_growth,
+        strained_dilatation=np.zeros(n_nodes),
+        strained_frequency_squared=np.zeros(n_nodes),
+        dilatation_test=np.zeros(n_nodes, dtype=np.int64),
+        frequency_test=np.zeros(n_nodes, dtype=np.int64),
+        test=0,
         pressure=np.zeros(n_nodes),
         forces=aligned(4 * 3 * (WIDTH + capacity)),
     )
@@ -180,10 +199,10 @@ def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> 
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool)
-    for name in set(Solid.__annotations__) - {"law", "every", "used"}:
+    for name in set(Solid.__annotations__) - {"law", "every", "used", "test"}:
         old = getattr(solid, name)
         getattr(larger, name)[: len(old)] = old
-    larger.used = solid.used
+    larger.used, larger.test = solid.used, solid.test
     return larger
 
 
@@ -238,10 +257,22 @@ def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> 
 @kernel
 def rest_normals(body: Body, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
     """Return 6 V grad N of nodes 1, 2 and 3 of a tetrahedron at rest [m2], and V [m3]."""
-    x0 = vec3(body.rest, body.tetrahedra[t, 0])
-    d1 = sub(vec3(body.rest, body.tetrahedra[t, 1]), x0)
-    d2 = sub(vec3(body.rest, body.tetrahedra[t, 2]), x0)
-    d3 = sub(vec3(body.rest, body.tetrahedra[t, 3]), x0)
+    return normals(body, body.rest, t)
+
+
+@kernel
+def normals(body: Body, points: FloatArray, t: int) -> tuple[Vec3, Vec3, Vec3, float]:
+    """Return twice the area vectors of the faces opposite nodes 1, 2 and 3, and the volume.
+
+    Args:
+        body: For the nodes of the tetrahedron.
+        points: Where the nodes are [m].
+        t: The tetrahedron.
+    """
+    x0 = vec3(points, body.tetrahedra[t, 0])
+    d1 = sub(vec3(points, body.tetrahedra[t, 1]), x0)
+    d2 = sub(vec3(points, body.tetrahedra[t, 2]), x0)
+    d3 = sub(vec3(points, body.tetrahedra[t, 3]), x0)
     n1 = cross(d2, d3)
     return n1, cross(d3, d1), cross(d1, d2), dot(d1, n1) / 6.0
 

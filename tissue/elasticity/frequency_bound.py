@@ -19,13 +19,14 @@ A fixed node does not move: it counts as infinitely heavy.
 
 import math
 
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, add, axpy, norm, scale, store, vec3
 from tissue.elasticity.finite_elements import (
     Solid,
     corner_of_slot,
     node_place,
+    normals,
     rest_normals,
     tetrahedron_of_slot,
 )
@@ -34,10 +35,10 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 STALE = 2.0
-"""Factor by which the mass of a node may differ from the mass that its weight was computed from.
-Any weight gives a bound, and that of the mass now is near the best; but another weight changes the
-bound two rings further. If weights never change, nodes that were split several times make the bound
-twice too high."""
+"""Factor by which the mass of a node may differ from that which its weight stands for. Any weight
+gives a bound, and that of the mass now is near the best; but another weight changes the bound two
+rings further. If weights never change, nodes that were split several times, or were given a larger
+weight for a neighbour that is gone, make the bound twice too high."""
 
 
 @kernel
@@ -81,7 +82,8 @@ def bound_around(solid: Solid, body: Body, visits: Visits, listed: IntArray, n: 
     """
     if solid.law.lam_of_nodes != 0.0:
         for i in range(n):
-            _measure_dilatation(solid, body, visits, listed[i])
+            node = listed[i]
+            solid.dilatation[node] = dilatation_term(solid, body, body.rest, visits, node)
     n = with_neighbours(solid, visits, listed, n)
     for i in range(n):
         solid.frequency_squared[listed[i]] = _bound(solid, body, visits, listed[i])
@@ -94,9 +96,9 @@ def _reweighted(solid: Solid, body: Body, node: int) -> bool:
     if body.fixed[node]:
         return False
     mass = body.masses[node]
-    if mass <= STALE * solid.weighed[node] and solid.weighed[node] <= STALE * mass:
+    ratio = solid.weight[node] * solid.weight[node] * mass
+    if 1.0 / STALE <= ratio <= STALE:
         return False
-    solid.weighed[node] = mass
     solid.weight[node] = 1.0 / math.sqrt(mass)
     return True
 
@@ -150,29 +152,39 @@ def _list(visits: Visits, listed: IntArray, n: int, node: int) -> int:
 
 
 @kernel
-def _measure_dilatation(solid: Solid, body: Body, visits: Visits, node: int) -> None:
-    """Write the factor of the averaged volume of a node in the bounds of the nodes around it.
+def dilatation_term(
+    solid: Solid, body: Body, points: FloatArray, visits: Visits, node: int
+) -> float:
+    """Return the factor of the averaged volume of a node in the bounds of the nodes around it.
 
     The averaged volume V_a J changes by the sum of C_b . u_b, C_b = sum of V grad N_b / 4 over the
     tetrahedra around node a. Its energy is lam / (2 V_a) times the square of that.
+
+    Args:
+        solid: Weights and the row of the node.
+        body: The body.
+        points: Where the nodes are [m]; at rest for the bound at rest.
+        visits: For searches.
+        node: Node a.
     """
     visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t = tetrahedron_of_slot(solid, slot)
-        n1, n2, n3, _ = rest_normals(body, t)
-        n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
-        n = _add_to_ring(solid, visits, n, t, 1, n1)
-        n = _add_to_ring(solid, visits, n, t, 2, n2)
-        n = _add_to_ring(solid, visits, n, t, 3, n3)
+        n1, n2, n3, _ = normals(body, points, t)
+        n = add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
+        n = add_to_ring(solid, visits, n, t, 1, n1)
+        n = add_to_ring(solid, visits, n, t, 2, n2)
+        n = add_to_ring(solid, visits, n, t, 3, n3)
     total = 0.0
     for i in range(n):
         total += solid.weight[solid.ring_nodes[i]] * norm(vec3(solid.ring, i))
-    solid.dilatation[node] = solid.law.lam_of_nodes / solid.node_volume[node] * total
+    term: float = solid.law.lam_of_nodes / solid.node_volume[node] * total
+    return term
 
 
 @inlined
-def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
+def add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
     """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
     node = solid.nodes[node_place(t, k)]
     if visits.nodes[node] != visits.epoch:
@@ -189,6 +201,30 @@ def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: V
 @kernel
 def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     """Return |N_b| / m_b of a node, its bound on w^2 [1/s2]."""
+    return bound_of_node(solid, body, body.rest, solid.dilatation, visits, node)
+
+
+@kernel
+def bound_of_node(
+    solid: Solid,
+    body: Body,
+    points: FloatArray,
+    dilatation: FloatArray,
+    visits: Visits,
+    node: int,
+) -> float:
+    """Return the bound on w^2 at a node with its tetrahedra deformed [1/s2].
+
+    The shear part of the law is never stiffer than at rest: it is taken there.
+
+    Args:
+        solid: Weights and the row of the node.
+        body: Rest positions and masses.
+        points: Where the nodes are [m]; at rest for the bound at rest.
+        dilatation: `dilatation_term` at the same points, of all nodes around, shape (nodes,).
+        visits: For searches.
+        node: The node.
+    """
     weight = solid.weight[node]
     if weight == 0.0:
         return 0.0
@@ -201,7 +237,7 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
     visits.epoch += 1
     n = 0
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-        t = tetrahedron_of_slot(solid, slot)
+        t, k = tetrahedron_of_slot(solid, slot), corner_of_slot(solid, slot)
         n1, n2, n3, volume = rest_normals(body, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
         ratios = (
@@ -210,21 +246,24 @@ def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
             + solid.weight[solid.nodes[node_place(t, 2)]] * norm(n2)
             + solid.weight[solid.nodes[node_place(t, 3)]] * norm(n3)
         )
-        k = corner_of_slot(solid, slot)
-        normal = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
-        length = norm(normal)
+        at_rest = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
+        n1, n2, n3, _ = normals(body, points, t)
+        normal = n1 if k == 1 else (n2 if k == 2 else n3)
+        if k == 0:
+            normal = scale(-1.0, add(n1, add(n2, n3)))
+        length = norm(at_rest)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
         isotropic += mu * share * length
         c = (mu + lam) * share / length
         stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
-                n = _add_to_ring(solid, visits, n, t, other, normal)
+                n = add_to_ring(solid, visits, n, t, other, normal)
     for i in range(n):
         normal = vec3(solid.ring, i)
         length = norm(normal)
         if length > 0.0:
-            c = solid.dilatation[solid.ring_nodes[i]] / (weight * length)
+            c = dilatation[solid.ring_nodes[i]] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
     bound: float = (isotropic + largest_eigenvalue(stiffness)) / body.masses[node]
     return bound

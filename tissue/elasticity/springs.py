@@ -154,6 +154,7 @@ def _build_row(
                 springs.stiffness[slot] += volume
     springs.count[node] = n
     body.masses[node] = mass
+    body.added_masses[node] = 0.0
     here = vec3(body.rest, node)
     for slot in range(first, first + n):
         length = norm(sub(vec3(body.rest, springs.neighbour[slot]), here))

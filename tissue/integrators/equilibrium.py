@@ -10,7 +10,6 @@ import numpy as np
 from tissue.blade.edge import Edge
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
-from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
 
@@ -34,9 +33,11 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
     n, energy = body.n_nodes, 0.0
     velocities, masses = body.velocities[:n], body.masses[:n, None]
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
-        strained = elasticity.strained_frequency_squared(body)
-        highest = max(elasticity.frequency_squared, strained)
-        dt = STEPS_BETWEEN_PEAKS * stable_step(elasticity, highest, system.surroundings)
+        at_rest = elasticity.frequency_squared
+        strained = elasticity.strained_frequency_squared(body, system.visits, at_rest)
+        highest = max(at_rest, strained)
+        step = stepper.method.stable_step(elasticity, highest, system.surroundings)
+        dt = STEPS_BETWEEN_PEAKS * step
         velocities_t0 = velocities.copy()
         stepper.take_steps(system, Increment(edge, dt, 0.0, 1.0), STEPS_BETWEEN_PEAKS)
         if system.contact.is_awake:  # what holds a body on the floor is not in its forces

@@ -1,50 +1,83 @@
-"""The default integrator: all nodes together, in as many Runge-Kutta steps as stability needs."""
+"""Integrators of all nodes together, in as many equal steps as stability needs."""
 
 import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 from tissue.blade.forces import frequency_with_blade
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
-from tissue.integrators.audited import Audited
-from tissue.integrators.runge_kutta import runge_kutta_steps
-from tissue.integrators.stability import SAFETY, stable_step
+from tissue.integrators.options import Global, IntegratorOptions, Verlet
+from tissue.integrators.stability import (
+    StableStep,
+    runge_kutta_step,
+    stage_damped_step,
+    verlet_step,
+)
 from tissue.integrators.step_context import Increment
+from tissue.integrators.substeps import runge_kutta_steps, verlet_steps
 from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
 from tissue.mesh.body import Body
 
 STEPS_BETWEEN_STRAIN_BOUNDS = 2
-"""Runge-Kutta steps between two bounds on the frequencies of the strained body. A lip that snaps
-back, or is pinched, is as much shorter within a frame of eight steps as an element is long."""
+"""Steps between two bounds on the frequencies of the strained body. A lip that snaps back, or is
+pinched, is as much shorter within a frame of eight steps as an element is long."""
+
+_ROUNDING = 1e-9
+"""Share by which a frequency stays below that which would take another step."""
+
+
+class Method(NamedTuple):
+    """A method that advances all nodes together."""
+
+    take_steps: Callable[..., int]
+    """Takes a number of steps, as `tissue.integrators.substeps.runge_kutta_steps`."""
+    stable_step: StableStep
+    """The largest step."""
+    damps_each_step: bool
+    """Whether damping acts once a step; if not, in every stage of it."""
+
+
+def method_of(options: IntegratorOptions) -> Method:
+    """Return the method of a choice; for integrators that do not move all nodes, Runge-Kutta.
+
+    These move all nodes where a body settles.
+    """
+    if isinstance(options, Verlet):
+        return Method(verlet_steps, verlet_step, True)
+    if isinstance(options, Global) and options.damping == "step":
+        return Method(runge_kutta_steps, runge_kutta_step, True)
+    return Method(runge_kutta_steps, stage_damped_step, False)
 
 
 class GlobalStepper:
-    """All nodes together, by the two-level Runge-Kutta method. An `Integrator` without memory.
+    """All nodes together. An `Integrator` without memory.
 
     Args:
-        threads: How many threads share the loops over the body.
-        audited: What keeps an account of the energy, where one is wanted; by one thread.
+        method: How they are moved.
+        threads: How many threads share the loops over the body; for the Runge-Kutta method.
     """
 
     moved = None
     moving = None
 
-    def __init__(self, threads: int = 1, audited: Audited | None = None) -> None:
-        self._stepper: Audited | Threads | None = audited
-        if audited is None and threads > 1:
-            self._stepper = Threads(threads)
+    def __init__(self, method: Method, threads: int = 1) -> None:
+        self.method = method
+        self._threads = Threads(threads) if threads > 1 else None
 
     def advance(self, system: System, increment: Increment) -> int:
-        """Advance the motion by an increment; return the Runge-Kutta steps taken."""
+        """Advance the motion by an increment; return the steps taken."""
         elasticity, blade = system.elasticity, system.interaction.state
         by_node = elasticity.arrays.frequency_squared
         near = frequency_with_blade(blade, system.body, by_node, system.stages.external)
+        least = max(elasticity.frequency_squared, near)
+        longest = self.method.stable_step(elasticity, least, system.surroundings)
         done = 0
         while True:
-            # The bound of the strained body is so wide of the truth that it needs no safety on top.
-            strained = SAFETY**2 * elasticity.strained_frequency_squared(system.body)
-            highest = max(elasticity.frequency_squared, near, strained)
-            step = stable_step(elasticity, highest, system.surroundings)
+            allowed = _without_another_step(least, longest, increment.span)
+            strained = elasticity.strained_frequency_squared(system.body, system.visits, allowed)
+            step = self.method.stable_step(elasticity, max(least, strained), system.surroundings)
             n = max(1, math.ceil(increment.span / step))
             if not elasticity.follows_strain or n <= STEPS_BETWEEN_STRAIN_BOUNDS:
                 self.take_steps(system, increment, n)
@@ -56,13 +89,13 @@ class GlobalStepper:
             done += STEPS_BETWEEN_STRAIN_BOUNDS
 
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
-        """Advance the motion by an increment in `n` Runge-Kutta steps."""
-        if self._stepper is not None:
-            self._stepper.take_steps(system, increment, n)
+        """Advance the motion by an increment in `n` steps."""
+        if self._threads is not None:
+            self._threads.take_steps(system, increment, n)
             return
         done = 0
         while True:
-            done = runge_kutta_steps(system.context, *increment, done, n)
+            done = self.method.take_steps(system.context, *increment, done, n)
             if done == n:
                 return
             system.contact.make_room()
@@ -75,3 +108,17 @@ class GlobalStepper:
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Do nothing: there are no arrays."""
+
+
+def _without_another_step(frequency_squared: float, longest: float, span: float) -> float:
+    """Return up to which w^2 [1/s2] no more steps are needed than for `frequency_squared`.
+
+    Args:
+        frequency_squared: A bound on w^2 [1/s2].
+        longest: The longest step with it [s].
+        span: Time to advance by [s].
+    """
+    if math.isinf(longest):
+        return math.inf
+    n = max(1, math.ceil(span / longest))
+    return (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2

@@ -6,13 +6,38 @@ from typing import Literal, get_args
 
 from tissue.material import Material
 
+WhenDamped = Literal["step", "stage"]
+"""How often the damping acts: once a step, or in every stage of it."""
+
 Far = Literal["moved", "frozen"]
 """What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
 
 
 @dataclass(frozen=True)
 class Global:
-    """All nodes together, by the two-level Runge-Kutta method."""
+    """All nodes together, by the two-level Runge-Kutta method.
+
+    Raises:
+        ValueError: a setting is none that it can have.
+    """
+
+    damping: WhenDamped = "step"
+    """When the damping acts: once a `step`, of second order, or in every `stage`, of fourth order
+    as the elastic motion, for a third more time. Without damping both are the same."""
+
+    def __post_init__(self) -> None:
+        known = get_args(WhenDamped)
+        if self.damping not in known:
+            raise ValueError(f"damping is {self.damping!r}; it must be one of {', '.join(known)}")
+
+
+@dataclass(frozen=True)
+class Verlet:
+    """All nodes together, by position Verlet: one evaluation of the forces a step, second order.
+
+    Two to three times as fast as the Runge-Kutta method. Forces on the blade differ from its by
+    less than a hundredth of their peak.
+    """
 
 
 @dataclass(frozen=True)
@@ -73,10 +98,11 @@ class LocalTimeStepping:
             )
 
 
-IntegratorOptions = Global | Hierarchical | LocalTimeStepping
+IntegratorOptions = Global | Verlet | Hierarchical | LocalTimeStepping
 
 BY_NAME: dict[str, IntegratorOptions] = {
     "global": Global(),
+    "verlet": Verlet(),
     "hierarchical": Hierarchical(),
     "local": LocalTimeStepping(),
 }
@@ -95,8 +121,8 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
         choice = BY_NAME[choice]
     if not isinstance(choice, IntegratorOptions):
         raise ValueError(
-            f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Hierarchical "
-            "or LocalTimeStepping with settings"
+            f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Global, "
+            "Verlet, Hierarchical or LocalTimeStepping with settings"
         )
     has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
     if isinstance(choice, Hierarchical) and has_tetrahedra:

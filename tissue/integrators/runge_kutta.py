@@ -11,12 +11,13 @@ Nystroem's form (Collatz, chapter 2: the paper's reference [4]):
     x <- x + h v + h^2/6 (a1 + a2 + a3)        the paper's correction terms are those in h^2
     v <- v + h/6 (a1 + 2 a2 + 2 a3 + a4)
 
-Elastic forces are evaluated three times a step, damping four times.
+Elastic forces are evaluated three times a step. Damping is evaluated four times where it acts in
+every stage, for the full order; by default it acts between the steps
+(`tissue.integrators.damping`).
 """
 
 from tissue.blade.edge import Edge
-from tissue.blade.forces import apply_blade_forces, apply_slip
-from tissue.contact.resolve import note_all_positions, resolve
+from tissue.blade.forces import apply_blade_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
@@ -24,42 +25,6 @@ from tissue.elasticity.internal_forces import deform, internal_force, viscous_fo
 from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body
-
-
-@kernel
-def runge_kutta_steps(
-    context: StepContext, edge: Edge, dt: float, begin: float, end: float, first: int, n: int
-) -> int:
-    """Take Runge-Kutta steps, each with its contact and its slip of the blade; return how many.
-
-    Fewer than `n` means that contact needs room: give it some, and go on from the step returned.
-
-    Args:
-        context: What takes part.
-        edge: The cutting edge over the time step.
-        dt: Length of the time step [s].
-        begin: Fraction of the time step at which to begin.
-        end: Fraction of the time step at which to end.
-        first: Step to begin with: 0, or where it stopped for want of room.
-        n: Number of steps from `begin` to `end`.
-    """
-    body, contact, external = context.body, context.contact, context.stages.external
-    share = (end - begin) / n
-    is_awake = contact.is_awake == 1
-    for i in range(first, n):
-        at = begin + i * share
-        if contact.is_pending == 0:
-            if is_awake:
-                note_all_positions(contact, body)
-            runge_kutta_nystroem(context, edge, dt, at, share)
-        if is_awake:
-            contact.is_pending = 1
-            if not resolve(contact, body, share * dt):
-                return i
-            contact.is_pending = 0
-        now, seconds = at + share, share * dt
-        apply_slip(context.blade, body, context.visits, edge, external, now, seconds)
-    return n
 
 
 @kernel
@@ -106,9 +71,11 @@ def acceleration(
     time = surroundings.retardation_time
     force = internal_force(context.elastic, node, positions, velocities, time)
     force = force + point(context.stages.external, node)
-    gravity = point_of(*surroundings.gravity)
+    per_mass = 1.0 / body.masses[node]
+    heavy = 1.0 - body.added_masses[node] * per_mass  # what mass scaling added has no weight
+    gravity = times(heavy, point_of(*surroundings.gravity))
     free = gravity - times(surroundings.drag, point(velocities, node))
-    total: Point = free + times(1.0 / body.masses[node], force)
+    total: Point = free + times(per_mass, force)
     return total
 
 

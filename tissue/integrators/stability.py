@@ -1,7 +1,8 @@
-"""The largest stable step of the two-level Runge-Kutta method."""
+"""The largest stable steps of the methods that move all nodes together."""
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 
 import numpy as np
 
@@ -22,8 +23,19 @@ STABILITY_LIMIT = np.array(
         [5.0, 0.278],
     ]
 )
-"""Where the method is stable for x'' = -w^2 x - 2 zeta w x' (the tests measure it). Between 0.05
-and 0.5 the limit is higher; the table stays at its lowest."""
+"""Where the Runge-Kutta method is stable for x'' = -w^2 x - 2 zeta w x', if damping acts in every
+stage (the tests measure it). Between 0.05 and 0.5 the limit is higher; the table stays at its
+lowest."""
+
+RUNGE_KUTTA_LIMIT = 2.585
+"""Largest angular frequency times step of the Runge-Kutta method where damping acts once a step."""
+
+VERLET_LIMIT = 2.0
+"""Largest angular frequency times step of position Verlet."""
+
+DAMPING_LIMIT = 2.0
+"""Largest rate of damping times step where damping acts once a step, with either method: beyond it
+the damping turns a velocity round and makes it larger."""
 
 _RATIOS = STABILITY_LIMIT[:, 0].tolist()
 _INVERSES = (1.0 / STABILITY_LIMIT[:, 1]).tolist()
@@ -54,10 +66,14 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     return limit / frequency
 
 
-def stable_step(
+StableStep = Callable[[Elasticity, float, Surroundings], float]
+"""Returns a stable step [s] for frequencies up to w^2 [1/s2]."""
+
+
+def stage_damped_step(
     elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
 ) -> float:
-    """Return a stable Runge-Kutta step [s] for frequencies up to that, w^2 [1/s2].
+    """Return a stable Runge-Kutta step [s] where damping acts in every stage.
 
     Dampers along edges brake a mode by retardation_time times their own w^2, and not by that of
     tetrahedra, which is several times as high where tissue hardly changes its volume. What is
@@ -69,3 +85,26 @@ def stable_step(
         retardation_time *= elasticity.damper_frequency_squared / frequency_squared
     frequency = math.sqrt(frequency_squared)
     return SAFETY * largest_stable_step(frequency, retardation_time, surroundings.drag)
+
+
+def runge_kutta_step(
+    elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
+) -> float:
+    """Return a stable Runge-Kutta step [s] where damping acts once a step."""
+    return _step(RUNGE_KUTTA_LIMIT, elasticity, frequency_squared, surroundings)
+
+
+def verlet_step(
+    elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
+) -> float:
+    """Return a stable step of position Verlet [s]."""
+    return _step(VERLET_LIMIT, elasticity, frequency_squared, surroundings)
+
+
+def _step(
+    limit: float, elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
+) -> float:
+    """Return a stable step [s]; the elastic motion and the damping limit it each by itself."""
+    rate = surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag
+    most = max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)
+    return SAFETY / most if most > 0.0 else math.inf

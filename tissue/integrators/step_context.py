@@ -7,6 +7,8 @@ from tissue.blade.edge import Edge
 from tissue.contact.state import ContactState
 from tissue.core.structs import Arrays
 from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.integrators.damping import Damping
+from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stages import Stages
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -24,7 +26,11 @@ class StepContext(Arrays):
     contact: ContactState
     """What may touch; positions and velocities are corrected after every step."""
     surroundings: Surroundings
-    """Gravity and damping."""
+    """Gravity, and the damping that acts in every stage."""
+    damping: Damping
+    """The damping that acts once a step."""
+    contact_loss: ContactLoss
+    """What contact takes from the energy, where that is counted."""
     stages: Stages
     """Scratch of a step, and the forces of the blade."""
     visits: Visits

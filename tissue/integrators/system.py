@@ -11,7 +11,10 @@ from tissue.core.array_types import IntArray
 from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.integrators.stability import stable_step
+from tissue.elasticity.mass_scaling import added_mass_share
+from tissue.integrators.damping import Damping
+from tissue.integrators.losses import ContactLoss
+from tissue.integrators.stability import StableStep
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
 from tissue.material import Material
@@ -32,6 +35,7 @@ class System:
         surroundings: Gravity and damping.
         visits: Scratch for searches, with room for the body.
         node_size: Mean node size of the body [m].
+        damps_each_step: Whether damping acts once a step; if not, in every stage of it.
     """
 
     def __init__(
@@ -43,6 +47,8 @@ class System:
         surroundings: Surroundings,
         visits: Visits,
         node_size: float,
+        *,
+        damps_each_step: bool,
     ) -> None:
         self.body = body
         self.elasticity = elasticity
@@ -52,6 +58,18 @@ class System:
         self.visits = visits
         self.node_size = node_size
         self.stages = new_stages(len(body.rest))
+        undamped = surroundings.replaced(drag=0.0, retardation_time=0.0)
+        damped = surroundings if damps_each_step else undamped
+        self._in_stages = undamped if damps_each_step else surroundings
+        self.damping = Damping(
+            owed=0.0,
+            dissipated=0.0,
+            retardation_time=damped.retardation_time,
+            drag=damped.drag,
+        )
+        """The damping that acts once a step, and what it has dissipated."""
+        self.contact_loss = ContactLoss(is_counted=0, dissipated=0.0)
+        """What contact takes from the energy, where that is counted."""
         self._context: StepContext | None = None
 
     @property
@@ -71,7 +89,9 @@ class System:
                 elastic=self.elasticity.arrays,
                 blade=self.interaction.state,
                 contact=self.contact.arrays,
-                surroundings=self.surroundings,
+                surroundings=self._in_stages,
+                damping=self.damping,
+                contact_loss=self.contact_loss,
                 stages=self.stages,
                 visits=self.visits,
             )
@@ -92,14 +112,15 @@ class System:
         self.interaction.grow(n_tetrahedra)
         self.contact.grow(n_nodes, n_tetrahedra)
 
-    def measures(self) -> MeshMeasures:
-        """Return what bounds the time step of the body now."""
+    def measures(self, stable_step: StableStep) -> MeshMeasures:
+        """Return what bounds the time step of the body now, with a method of that stable step."""
         squared = self.elasticity.frequency_squared
         return MeshMeasures(
             n_tetrahedra=self.body.n_tetrahedra,
             altitude=lowest_altitude(self.body),
             frequency=math.sqrt(squared),
             time_step=stable_step(self.elasticity, squared, self.surroundings),
+            added_mass=added_mass_share(self.body),
         )
 
 
@@ -109,7 +130,9 @@ def assembled(
     surroundings: Surroundings,
     blade: BladeShape | None,
     floor: float | None,
-    is_tight: bool,
+    *,
+    mass_scaling: float | None,
+    damps_each_step: bool,
 ) -> System:
     """Return a body with its elasticity, its contact and the blade.
 
@@ -119,11 +142,13 @@ def assembled(
         surroundings: Gravity and damping.
         blade: The body of the blade; None for a line that cuts.
         floor: Height of a floor below the body [m]; None for no floor.
-        is_tight: Whether the bound on frequencies is brought near the truth; see `Elasticity`.
+        mass_scaling: Frequency above which nodes get mass [1/s]; see `Elasticity`.
+        damps_each_step: Whether damping acts once a step; if not, in every stage of it.
     """
     visits = no_visits(body.n_nodes, body.n_tetrahedra)
-    elasticity = Elasticity(material, body, visits, is_tight=is_tight)
+    elasticity = Elasticity(material, body, visits, mass_scaling=mass_scaling)
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
     contact = SelfContact(body, node_size, material.friction, floor)
-    return System(body, elasticity, contact, interaction, surroundings, visits, node_size)
+    owners = (body, elasticity, contact, interaction, surroundings, visits, node_size)
+    return System(*owners, damps_each_step=damps_each_step)

@@ -11,14 +11,13 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from tissue.blade.forces import apply_blade_forces
-from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
 from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
 from tissue.integrators.step_context import Increment, StepContext
-from tissue.integrators.step_end import end_step
+from tissue.integrators.substeps import begin_substep, end_substep
 from tissue.integrators.system import System
 from tissue.mesh.body import Body
 
@@ -39,10 +38,11 @@ class Threads:
         share = (increment.end - increment.begin) / n
         for i in range(n):
             at = increment.begin + i * share
-            if system.contact.is_awake:
-                note_all_positions(system.contact.arrays, system.body)
+            seconds, when = share * increment.dt, at + share
+            begin_substep(system.context, seconds)
             self._step(system.context, increment, at, share)
-            end_step(system, increment, share * increment.dt, at + share)
+            while not end_substep(system.context, increment.edge, seconds, when):
+                system.contact.make_room()
 
     def _step(self, context: StepContext, increment: Increment, at: float, share: float) -> None:
         """Take one step of Nystroem's form, as `runge_kutta_nystroem`."""

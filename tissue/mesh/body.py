@@ -44,7 +44,10 @@ class Body(Arrays):
     velocities: FloatArray
     """Velocities [m/s], shape (capacity, 3)."""
     masses: FloatArray
-    """Lumped masses [kg]: a quarter of each tetrahedron around the node. Shape (capacity,)."""
+    """Masses that are moved [kg]: a quarter of each tetrahedron around the node, and what mass
+    scaling added. Shape (capacity,)."""
+    added_masses: FloatArray
+    """The part of the masses that mass scaling added [kg]: it has no weight. Shape (capacity,)."""
     fixed: BoolArray
     """Whether each node is fixed, shape (capacity,)."""
     off_path: FloatArray
@@ -106,6 +109,7 @@ def build_body(
         positions=grown(rest if positions is None else positions, n),
         velocities=room_for_points(n),
         masses=np.zeros(n),
+        added_masses=np.zeros(n),
         fixed=np.zeros(n, dtype=np.bool_) if fixed is None else fixed.copy(),
         off_path=np.zeros(n),
         node_tetrahedron=node_tetrahedron,

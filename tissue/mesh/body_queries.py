@@ -46,7 +46,7 @@ class BodyQueries(ABC):
             body.positions[:n].copy(),
             body.rest[:n].copy(),
             body.velocities[:n].copy(),
-            body.masses[:n].copy(),
+            body.masses[:n] - body.added_masses[:n],
             body.tetrahedra[: self.n_tetrahedra].copy(),
             body.fixed[:n].copy(),
         )

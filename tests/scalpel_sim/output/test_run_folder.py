@@ -35,8 +35,8 @@ CUT_REPORT = CutReport(
     path_error_largest=6e-4,
     node_size=2e-3,
     guard=3e-4,
-    initial=MeshMeasures(6, 2e-3, 1000.0, 2e-3),
-    now=MeshMeasures(9, 4e-4, 3000.0, 5e-4),
+    initial=MeshMeasures(6, 2e-3, 1000.0, 2e-3, 0.0),
+    now=MeshMeasures(9, 4e-4, 3000.0, 5e-4, 1e-3),
 )
 
 PIECES = pieces_of(

@@ -1,0 +1,51 @@
+"""Mass scaling: nodes that would limit the time step by their high frequency get mass.
+
+A cut leaves slivers, whose nodes have next to no mass and whose fastest modes live on one or two of
+them. Explicit dynamics slows such modes by added mass where they are faster than the motion that is
+asked for (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite Elements, 6.3). The
+added mass is moved and has no weight: equilibrium is the same.
+"""
+
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.elasticity.finite_elements import Solid
+from tissue.elasticity.springs import Springs
+from tissue.mesh.body import Body
+
+
+@kernel
+def scale_masses(
+    body: Body, springs: Springs, solid: Solid, nodes: IntArray, n: int, allowed: float
+) -> None:
+    """Give the first `n` of `nodes` the mass with which their bound on w^2 is at most `allowed`.
+
+    Nodes get no more than that, and none if their bound is lower with their own mass.
+
+    Args:
+        body: Masses are written.
+        springs: The stiffness per mass of the nodes is written.
+        solid: The bounds of the nodes are up to date for their masses now, and are written.
+        nodes: The nodes.
+        n: How many of them.
+        allowed: Bound on w^2 [1/s2].
+    """
+    for i in range(n):
+        node = nodes[i]
+        if body.fixed[node]:
+            continue
+        before = body.masses[node]
+        own = before - body.added_masses[node]
+        stiffness = solid.frequency_squared[node] * before  # [N/m]
+        after = max(own, stiffness / allowed)
+        if after == before:
+            continue
+        body.masses[node] = after
+        body.added_masses[node] = after - own
+        solid.frequency_squared[node] = stiffness / after
+        springs.stiffness_per_mass[node] *= before / after
+
+
+def added_mass_share(body: Body) -> float:
+    """Return the mass that mass scaling has added, as a share of the body's own."""
+    added = float(body.added_masses[: body.n_nodes].sum())
+    return added / (float(body.masses[: body.n_nodes].sum()) - added)

@@ -1,0 +1,140 @@
+"""What every step of an integrator of all nodes begins and ends with: damping, contact, slip."""
+
+from tissue.blade.edge import Edge
+from tissue.blade.forces import apply_slip, edge_energy
+from tissue.contact.resolve import note_all_positions, resolve
+from tissue.core.jit import kernel
+from tissue.core.simd import point, store_point
+from tissue.elasticity.energy import body_energy
+from tissue.integrators.damping import damp
+from tissue.integrators.runge_kutta import runge_kutta_nystroem
+from tissue.integrators.stages import Stages
+from tissue.integrators.step_context import StepContext
+from tissue.integrators.verlet import position_verlet
+from tissue.mesh.body import Body
+
+
+@kernel
+def runge_kutta_steps(
+    context: StepContext, edge: Edge, dt: float, begin: float, end: float, first: int, n: int
+) -> int:
+    """Take Runge-Kutta steps, each with its contact and its slip of the blade; return how many.
+
+    Fewer than `n` means that contact needs room: give it some, and go on from the step returned.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        first: Step to begin with: 0, or where it stopped for want of room.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(first, n):
+        at = begin + i * share
+        if context.contact.is_pending == 0:
+            begin_substep(context, share * dt)
+            runge_kutta_nystroem(context, edge, dt, at, share)
+        if not end_substep(context, edge, share * dt, at + share):
+            return i
+    return n
+
+
+@kernel
+def verlet_steps(
+    context: StepContext, edge: Edge, dt: float, begin: float, end: float, first: int, n: int
+) -> int:
+    """Take steps of position Verlet; see `runge_kutta_steps`.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        first: Step to begin with: 0, or where it stopped for want of room.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(first, n):
+        at = begin + i * share
+        if context.contact.is_pending == 0:
+            begin_substep(context, share * dt)
+            position_verlet(context, edge, dt, at, share)
+        if not end_substep(context, edge, share * dt, at + share):
+            return i
+    return n
+
+
+@kernel
+def begin_substep(context: StepContext, h: float) -> None:
+    """Note where the nodes are, where contact needs it, and let the damping act; `h` in [s]."""
+    if context.contact.is_awake == 1:
+        note_all_positions(context.contact, context.body)
+    damp(context.damping, context.body, context.elastic, context.stages, h)
+
+
+@kernel
+def end_substep(context: StepContext, edge: Edge, seconds: float, when: float) -> bool:
+    """Resolve contact, then let the blade slip.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        seconds: Length of the step [s].
+        when: End of the step, as a fraction of the time step.
+
+    Returns:
+        Whether contact had room. If not, make room and call again.
+    """
+    body, contact, stages = context.body, context.contact, context.stages
+    if contact.is_awake == 1:
+        if contact.is_pending == 0 and context.contact_loss.is_counted == 1:
+            _note_state(body, stages)
+        contact.is_pending = 1
+        if not resolve(contact, body, seconds):
+            return False
+        contact.is_pending = 0
+        # Without contacts `resolve` has changed nothing.
+        if context.contact_loss.is_counted == 1 and contact.contacts.n_contacts > 0:
+            _count_loss(context, edge, when)
+    apply_slip(context.blade, body, context.visits, edge, stages.external, when, seconds)
+    return True
+
+
+@kernel
+def _note_state(body: Body, stages: Stages) -> None:
+    for i in range(body.n_nodes):
+        store_point(stages.positions, i, point(body.positions, i))
+        store_point(stages.velocities, i, point(body.velocities, i))
+
+
+@kernel
+def _count_loss(context: StepContext, edge: Edge, when: float) -> None:
+    """Count what contact took since the state was noted."""
+    after = _energy(context, edge, when)
+    _swap_state(context.body, context.stages)
+    before = _energy(context, edge, when)
+    _swap_state(context.body, context.stages)
+    context.contact_loss.dissipated += before - after
+
+
+@kernel
+def _swap_state(body: Body, stages: Stages) -> None:
+    """Swap positions and velocities with those that were noted."""
+    for i in range(body.n_nodes):
+        x, v = point(body.positions, i), point(body.velocities, i)
+        store_point(body.positions, i, point(stages.positions, i))
+        store_point(body.velocities, i, point(stages.velocities, i))
+        store_point(stages.positions, i, x)
+        store_point(stages.velocities, i, v)
+
+
+@kernel
+def _energy(context: StepContext, edge: Edge, when: float) -> float:
+    """Return the energy of the body and of the anchors [J]."""
+    stored = body_energy(context.body, context.elastic, context.surroundings.gravity)
+    total: float = stored + edge_energy(context.blade, context.body, edge, when)
+    return total
