@@ -225,7 +225,7 @@ def energy_of(body, material, averaged):
     assert (
         build_stars(solid, body, no_visits(*rooms), np.arange(n_nodes), n_nodes, around) == n_nodes
     )
-    return solid_energy(solid, body.positions, n_tets, n_nodes)
+    return solid_energy(solid, body, body.positions)
 
 
 def test_26_splits_without_a_cut_keep_the_elastic_energy():

@@ -128,6 +128,7 @@ class Tissue(BodyQueries):
             floor,
             mass_scaling=solver.mass_scaling,
             damps_each_step=method.damps_each_step,
+            is_single=solver.precision == "single",
         )
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)

@@ -131,7 +131,7 @@ class Network(NamedTuple):
             blade=self.blade,
             contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
             surroundings=self.surroundings,
-            damping=Damping(owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
+            damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),

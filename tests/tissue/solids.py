@@ -56,15 +56,13 @@ class SolidBody(NamedTuple):
 
     def forces(self, positions: FloatArray) -> FloatArray:
         """Return the forces on the nodes at `positions` [N]."""
-        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
-        out = np.zeros((n, 3))
-        evaluate(self.solid, self.placed(positions), n_tetrahedra, n, out)
+        out = np.zeros((self.body.n_nodes, 3))
+        evaluate(self.solid, self.body, self.placed(positions), out)
         return out
 
     def energy(self, positions: FloatArray) -> float:
         """Return the elastic energy of the nodes at `positions`, less that at rest [J]."""
-        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
-        return solid_energy(self.solid, self.placed(positions), n_tetrahedra, n)
+        return solid_energy(self.solid, self.body, self.placed(positions))
 
     def placed(self, positions: FloatArray) -> FloatArray:
         """Copy the positions into the body; return its array, which has spare capacity."""
@@ -82,12 +80,12 @@ class SolidBody(NamedTuple):
 
         The step is a sixth of the stable one at rest: crushed tetrahedra are stiffer.
         """
-        n, n_tetrahedra = self.body.n_nodes, self.body.n_tetrahedra
+        n = self.body.n_nodes
         x = self.placed(positions).copy()
         h = 2.0 / self.frequency() / 6.0
         load = np.zeros((n, 3)) if pull is None else pull
         scratch = np.zeros((2, n, 3))
-        integrate(self.solid, self.body, x, load, scratch, h, drag, n_tetrahedra, int(seconds / h))
+        integrate(self.solid, self.body, x, load, scratch, h, drag, int(seconds / h))
         return x[:n]
 
 
@@ -149,12 +147,10 @@ def highest_frequency(solid: SolidBody, positions: FloatArray | None = None) -> 
 
 
 @kernel
-def evaluate(
-    solid: Solid, positions: FloatArray, n_tetrahedra: int, n: int, out: FloatArray
-) -> None:
+def evaluate(solid: Solid, body: Body, positions: FloatArray, out: FloatArray) -> None:
     """Write the forces on all nodes to `out`."""
-    blocks = n_blocks(n_tetrahedra)
-    solid_forces(solid, positions, solid.every, blocks, solid.every, n)
+    blocks, n = n_blocks(solid, body.n_tetrahedra), body.n_nodes
+    solid_forces(solid, body, positions, solid.every, blocks, solid.every, n)
     for i in range(n):
         store_point(out, i, solid_force(solid, i))
 
@@ -168,14 +164,13 @@ def integrate(
     scratch: FloatArray,
     h: float,
     drag: float,
-    n_tetrahedra: int,
     n_steps: int,
 ) -> None:
     """Take symplectic Euler steps, which are accurate enough for a test of forces."""
     v, f = scratch[0], scratch[1]
     n = body.n_nodes
     for _ in range(n_steps):
-        evaluate(solid, x, n_tetrahedra, n, f)
+        evaluate(solid, body, x, n, f)
         for i in range(n):
             if not body.fixed[i]:
                 for c in range(3):

@@ -52,14 +52,16 @@ def room_for_points(n: int) -> FloatArray:
 
 
 class LanesType(types.Type):
-    """Numba's type of a vector of doubles."""
+    """Numba's type of a vector of doubles, or of singles."""
 
-    def __init__(self, width: int) -> None:
+    def __init__(self, width: int, *, is_single: bool = False) -> None:
         self.width = width
-        super().__init__(name=f"Lanes({width})")
+        self.is_single = is_single
+        super().__init__(name=f"Lanes({width}{', single' * is_single})")
 
 
 LANES = LanesType(WIDTH)
+LANES_OF_SINGLES = LanesType(2 * WIDTH, is_single=True)
 POINT = LanesType(4)
 _THREE = cast(Any, types).UniTuple(LANES, 3)
 _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
@@ -74,7 +76,8 @@ _I64 = ir.IntType(64)
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, fe_type: LanesType) -> None:
-        vector = ir.VectorType(ir.DoubleType(), fe_type.width)
+        element = ir.FloatType() if fe_type.is_single else ir.DoubleType()
+        vector = ir.VectorType(element, fe_type.width)
         cast(Any, super()).__init__(manager, fe_type, vector)
 
 
@@ -82,11 +85,12 @@ _Function = Callable[..., Any]
 
 
 def _compiled(
-    function: _Function, *kinds: Any, result: types.Type = LANES
+    function: _Function, *kinds: Any, result: types.Type | _Function = LANES
 ) -> Callable[[_Function], _Function]:
     """Give `function`, on arguments of these kinds, the code that the decorated one builds.
 
-    It is called with the builder, the numba types of the arguments, and their values.
+    It is called with the builder and the values of the arguments. `result` is the type of what it
+    returns, or a function that finds it from the types of the arguments.
     """
 
     def fits(kind: Any, argument: types.Type) -> bool:
@@ -96,7 +100,7 @@ def _compiled(
     def _types(_: Any) -> _Function:
         def typer(*arguments: types.Type) -> types.Type | None:
             if len(arguments) == len(kinds) and all(map(fits, kinds, arguments)):
-                return result
+                return result if isinstance(result, types.Type) else result(*arguments)
             return None
 
         names = [f"argument_{i}" for i in range(len(kinds))]
@@ -124,6 +128,7 @@ class _Array:
 
     def __init__(self, context: Any, builder: Any, kind: types.Array, value: Any) -> None:
         self._data = context.make_array(kind)(context, builder, value).data
+        self.element = self._data.type.pointee
         self._builder = builder
 
     def at(self, i: Any, n_columns: int = 1) -> Any:
@@ -149,7 +154,7 @@ def _operator(function: _Function, instruction: str, kind: LanesType) -> None:
         return getattr(builder, instruction)(a, b, flags=("contract",))
 
 
-for _kind in (LANES, POINT):
+for _kind in (LANES, LANES_OF_SINGLES, POINT):
     _operator(operator.add, "fadd", _kind)
     _operator(operator.sub, "fsub", _kind)
     _operator(operator.mul, "fmul", _kind)

@@ -48,7 +48,8 @@ def sum_of_eight(values: FloatArray, of: SlotArray, i: int) -> float:
 @_compiled(sum_of_eight, types.Array, types.Array, types.Integer, result=types.float64)
 def _sum_of_eight(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
     places = (builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH))
-    return _tree([builder.load(values.at(place)) for place in places], builder.fadd)
+    total = _tree([builder.load(values.at(place)) for place in places], builder.fadd)
+    return total if total.type == ir.DoubleType() else builder.fpext(total, ir.DoubleType())
 
 
 def sum_of_eight_points(values: FloatArray, of: SlotArray, i: int) -> Point:

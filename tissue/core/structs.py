@@ -95,18 +95,23 @@ class Arrays:
 
     A subclass annotates its fields in order and is made from keywords. Only the elements of arrays
     and the fields annotated as `IntCell` or `FloatCell` change. All objects of a subclass have
-    fields of the same types.
+    fields of the same types, unless it is made with `two_precisions=True`: then arrays may be of
+    doubles in one object and of singles in another, and kernels are compiled for each.
 
     Raises:
         TypeError: fields are missing or unknown, or an array is not C-contiguous.
     """
 
-    _numba_type_: ClassVar[ArraysType | None] = None
+    _numba_type_: ArraysType | None = None
+    _types: ClassVar[dict[Any, ArraysType]] = {}
+    _most_types: ClassVar[int] = 1
     _cells: ClassVar[tuple[str, ...]] = ()
     address: int
     """Where the table is in memory; the object keeps it and the arrays alive."""
 
-    def __init_subclass__(cls) -> None:
+    def __init_subclass__(cls, *, two_precisions: bool = False) -> None:
+        cls._types = {}
+        cls._most_types = 2 if two_precisions else 1
         fields = inspect.get_annotations(cls)
         cls._cells = tuple(name for name, kind in fields.items() if kind in (IntCell, FloatCell))
         for place, name in enumerate(cls._cells):
@@ -146,13 +151,12 @@ class Arrays:
         self._table = np.array(words, dtype=np.int64)
         self._float_cells = self._table.view(np.float64)
         self.address = self._table.ctypes.data
-        known = type(self)._numba_type_
-        if known is None:
-            type(self)._numba_type_ = ArraysType(
-                type(self).__name__, tuple(kinds), len(self._cells)
-            )
-        elif known.fields != tuple(kinds):
-            raise TypeError(f"{type(self).__name__} has fields of other types than before")
+        known, fields_now = self._types, tuple(kinds)
+        if fields_now not in known:
+            if len(known) == self._most_types:
+                raise TypeError(f"{type(self).__name__} has fields of other types than before")
+            known[fields_now] = ArraysType(type(self).__name__, fields_now, len(self._cells))
+        self._numba_type_ = known[fields_now]
 
     def replaced(self, **fields: Any) -> Self:
         """Return a struct with these fields in place of its own; cells are copied."""
@@ -187,7 +191,7 @@ class Vectors(Arrays):
 
 @typeof_impl.register(Arrays)
 def _typeof(value: Arrays, _: Any) -> ArraysType | None:
-    return type(value)._numba_type_
+    return value._numba_type_
 
 
 @register_model(ArraysType)

@@ -40,10 +40,17 @@ class Elasticity:
         mass_scaling: Angular frequency [1/s] above which nodes get mass where tetrahedra carry the
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
             cut makes faster gets mass.
+        is_single: Whether forces of tetrahedra are computed in single precision.
     """
 
     def __init__(
-        self, material: Material, body: Body, visits: Visits, *, mass_scaling: float | None = None
+        self,
+        material: Material,
+        body: Body,
+        visits: Visits,
+        *,
+        mass_scaling: float | None = None,
+        is_single: bool = False,
     ) -> None:
         self._material = material
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
@@ -52,7 +59,9 @@ class Elasticity:
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
         self.arrays = Elastic(
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
-            solid=no_solid(law or volume_term(0.0), *room, room_for_stars(*room)),
+            solid=no_solid(
+                law or volume_term(0.0), *room, room_for_stars(*room), is_single=is_single
+            ),
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
             frequency_squared=np.zeros(n_nodes),

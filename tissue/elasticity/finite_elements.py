@@ -3,14 +3,13 @@
 The force on a node is the sum over its row, in order: a gather, no scatter, no race. After a cut
 only the changed tetrahedra and the rows of touched nodes are written again.
 
-With linear shape functions N_k and positions x_k the deformation gradient F is the sum of
-x_k (grad N_k)^T. All that the law needs of the rest shape is the volume V and, for |F|^2, the six
-numbers V grad N_i . grad N_j: with d_i = x_i - x_0,
+With linear shape functions N_k and displacements u_k the gradient of the displacement is
+H = sum of u_k (grad N_k)^T, and the deformation gradient F = 1 + H. Displacements, and not
+positions, keep the digits: where nothing is displaced, H and the forces are zero in any precision.
 
-    V |F|^2 = sum over i, j = 1..3 of (V grad N_i . grad N_j) d_i . d_j
-
-Tetrahedra are stored in blocks of eight: block b holds tetrahedra 8 b to 8 b + 7, and the eight
-values of each quantity stand in a row, so that one vector holds them.
+Tetrahedra are stored in blocks of as many as a vector holds, eight in double precision and sixteen
+in single: block b of width w holds tetrahedra w b to w b + w - 1, and the values of each quantity
+stand in a row. The state, positions and velocities, is always double.
 """
 
 import numpy as np
@@ -18,8 +17,10 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, aligned, filled
+from tissue.core.simd_blocks import row_of_lane, width_of
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
+from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
+from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
 
@@ -30,9 +31,9 @@ little: at 0 some 4 % were inverted in a block at half its height, with this sha
 alone fold at 0.8 of the height. Bending locks a little: a bar of four cells deflects 0.68 of
 theory, not 0.73."""
 
-VOLUME, PER_VOLUME = 6, 7
-"""Quantities of `Solid.shape`: V and 1/V. Before them are the gradient products 11, 22, 33, 12, 13
-and 23."""
+VOLUME, N_SHAPE = 9, 10
+"""Place of V among the quantities of `Solid.shape`, and how many these are. Before it are grad N_1,
+grad N_2 and grad N_3; grad N_0 is minus their sum."""
 
 STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
 """Free slots below which `build_stars` asks for a larger pool; more than any one row needs."""
@@ -62,16 +63,16 @@ class EnergyDensity(Arrays):
     """J at which the last term is 0: 1 + 3 mu / (4 lam), so that the body at rest is at rest."""
 
 
-class Solid(Arrays):
+class Solid(Arrays, two_precisions=True):
     """Every tetrahedron and the star of every node. Rows beyond the body's counts are spare."""
 
     law: EnergyDensity
     """The law of the tetrahedra."""
     nodes: SlotArray
-    """Nodes of each tetrahedron, in blocks of four rows of eight (`node_place`)."""
+    """Nodes of each tetrahedron, in blocks of four rows (`node_place`)."""
     shape: FloatArray
-    """V grad N_i . grad N_j for ij = 11, 22, 33, 12, 13, 23 [m], V [m3] and 1/V [1/m3] of each
-    tetrahedron, in blocks of eight rows of eight (`shape_place`)."""
+    """grad N_1, grad N_2, grad N_3 [1/m] and V [m3] of each tetrahedron, in blocks of ten rows
+    (`shape_place`). Its precision is that of all scratch but the node's own."""
     first: IntArray
     """Where each node's row begins in the pool, shape (nodes,)."""
     room: IntArray
@@ -80,9 +81,9 @@ class Solid(Arrays):
     """Tetrahedra around each node, shape (nodes,). Its row is padded to a multiple of eight slots
     with places that always hold 0."""
     around: SlotArray
-    """Place in `volume` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
+    """Place in `dilated` of the tetrahedron of each slot, in order of tetrahedra; shape (pool,)."""
     corner: SlotArray
-    """Place in `forces` of the force on the corner of each slot, shape (pool,)."""
+    """Row of `forces` with the force on the corner of each slot, shape (pool,)."""
     node_volume: FloatArray
     """A quarter of each tetrahedron around the node, at rest [m3], shape (nodes,)."""
     weight: FloatArray
@@ -104,14 +105,19 @@ class Solid(Arrays):
     """Number of slots of the pool in use."""
     every: IntArray
     """The list 0, 1, 2 ... of all blocks, of all nodes, or of all tetrahedra."""
-    volume: FloatArray
-    """Scratch: signed volume of tetrahedron t now [m3] at 8 + t; the first eight are 0."""
+    displacement: FloatArray
+    """Scratch: displacements of the nodes [m], shape (nodes, 4), the last column 0."""
+    gradient: FloatArray
+    """Scratch, in single precision: H of each tetrahedron, in blocks of nine rows, xx, xy, xz and
+    so on."""
+    dilated: FloatArray
+    """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
     growth: FloatArray
-    """Scratch of `strained_frequency` and of energies: growth of the faces of tetrahedron t, at
-    8 + t."""
+    """Scratch of `strained_frequency` and of energies: growth of the faces of tetrahedron t,
+    behind a first block."""
     tested_growth: FloatArray
-    """Growth of the faces of tetrahedron t at which its nodes were slow enough, at 8 + t
-    (`strained_frequency`); 1 where it was not tested."""
+    """Growth of the faces of tetrahedron t at which its nodes were slow enough, behind a first
+    block (`strained_frequency`); 1 where it was not tested."""
     strained_dilatation: FloatArray
     """Scratch of `strained_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
     strained_frequency_squared: FloatArray
@@ -123,10 +129,10 @@ class Solid(Arrays):
     test: IntCell
     """Number of the test of strained frequencies."""
     pressure: FloatArray
-    """Scratch: lam (J - a) of each node [Pa], tension is positive; shape (nodes,)."""
+    """Scratch: lam (J - 1) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
-    """Scratch: force on each corner of each tetrahedron [N], in blocks of four times three rows of
-    eight, x, y and z (`corner_place`); the first block is 0."""
+    """Scratch: force on each corner of each tetrahedron [N], as rows x, y, z, 0, shape (rows, 4):
+    a block of rows that are 0, then for each block its corners 0, 1, 2 and 3 (`corner_row`)."""
 
 
 def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensity:
@@ -157,17 +163,28 @@ def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0
     return EnergyDensity(mu=mu, lam_of_tetrahedra=own, lam_of_nodes=lam - own, a=a)
 
 
-def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
-    """Return empty rows with room for that many nodes, tetrahedra and slots."""
-    capacity = WIDTH * n_blocks(n_tetrahedra)
-    shape = aligned(8 * capacity)
-    shape[:] = 1.0  # for tetrahedra not in use: any value that avoids division by 0
-    tested_growth = aligned(WIDTH + capacity)
+def no_solid(
+    law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int, *, is_single: bool = False
+) -> Solid:
+    """Return empty rows with room for that many nodes, tetrahedra and slots.
+
+    Args:
+        law: The law of the tetrahedra.
+        n_nodes: Number of nodes.
+        n_tetrahedra: Number of tetrahedra.
+        pool: Number of slots.
+        is_single: Whether forces are computed in single precision.
+    """
+    real = np.float32 if is_single else np.float64
+    width = 2 * WIDTH if is_single else WIDTH
+    blocks = (n_tetrahedra + width - 1) // width
+    room = width * (1 + blocks)
+    tested_growth = aligned(room, real)
     tested_growth[:] = 1.0
     return Solid(
         law=law,
-        nodes=aligned(4 * capacity, np.int32),
-        shape=shape,
+        nodes=aligned(4 * width * blocks, np.int32),
+        shape=aligned(N_SHAPE * width * blocks, real),
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
         count=np.zeros(n_nodes, dtype=np.int64),
@@ -183,22 +200,25 @@ def no_solid(law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int) -> 
         raised=np.zeros(n_nodes, dtype=np.int64),
         used=0,
         every=np.arange(max(n_nodes, n_tetrahedra)),
-        volume=aligned(WIDTH + capacity),
-        growth=aligned(WIDTH + capacity),
+        displacement=aligned(4 * n_nodes, real).reshape(-1, 4),
+        gradient=aligned(9 * width * blocks if is_single else 0, real),
+        dilated=aligned(room, real),
+        growth=aligned(room, real),
         tested_growth=tested_growth,
         strained_dilatation=np.zeros(n_nodes),
         strained_frequency_squared=np.zeros(n_nodes),
         dilatation_test=np.zeros(n_nodes, dtype=np.int64),
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
-        pressure=np.zeros(n_nodes),
-        forces=aligned(4 * 3 * (WIDTH + capacity)),
+        pressure=np.zeros(n_nodes, real),
+        forces=aligned(4 * 4 * room, real).reshape(-1, 4),
     )
 
 
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
-    larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool)
+    is_single = solid.shape.dtype == np.float32
+    larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool, is_single=is_single)
     for name in set(Solid.__annotations__) - {"law", "every", "used", "test"}:
         old = getattr(solid, name)
         getattr(larger, name)[: len(old)] = old
@@ -212,27 +232,34 @@ def room_for_stars(n_nodes: int, n_tetrahedra: int) -> int:
 
 
 @kernel
-def n_blocks(n_tetrahedra: int) -> int:
+def n_blocks(solid: Solid, n_tetrahedra: int) -> int:
     """Return how many blocks hold that many tetrahedra."""
-    return (n_tetrahedra + WIDTH - 1) // WIDTH
+    width = width_of(solid.shape)
+    return (n_tetrahedra + width - 1) // width
 
 
 @kernel
-def node_place(t: int, k: int) -> int:
+def node_place(solid: Solid, t: int, k: int) -> int:
     """Return where node `k` of tetrahedron `t` is in `nodes`."""
-    return WIDTH * (4 * (t // WIDTH) + k) + t % WIDTH
+    width = width_of(solid.shape)
+    place: int = width * (4 * (t // width) + k) + t % width
+    return place
 
 
 @kernel
-def shape_place(t: int, which: int) -> int:
+def shape_place(solid: Solid, t: int, which: int) -> int:
     """Return where quantity `which` of tetrahedron `t` is in `shape`."""
-    return WIDTH * (8 * (t // WIDTH) + which) + t % WIDTH
+    width = width_of(solid.shape)
+    place: int = width * (N_SHAPE * (t // width) + which) + t % width
+    return place
 
 
 @kernel
-def corner_place(t: int, k: int) -> int:
-    """Return where x of the force on corner `k` of tetrahedron `t` is in `forces`."""
-    return 3 * WIDTH * (4 * (1 + t // WIDTH) + k) + t % WIDTH
+def corner_row(solid: Solid, t: int, k: int) -> int:
+    """Return the row of `forces` with the force on corner `k` of tetrahedron `t`."""
+    width = width_of(solid.shape)
+    row: int = width * (4 * (1 + t // width) + k) + row_of_lane(t % width, width)
+    return row
 
 
 @kernel
@@ -241,17 +268,20 @@ def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> 
     for i in range(n):
         t = tetrahedra[i]
         for k in range(4):
-            solid.nodes[node_place(t, k)] = body.tetrahedra[t, k]
+            solid.nodes[node_place(solid, t, k)] = body.tetrahedra[t, k]
         n1, n2, n3, volume = rest_normals(body, t)
-        per = 1.0 / (36.0 * volume)
-        solid.shape[shape_place(t, 0)] = per * dot(n1, n1)
-        solid.shape[shape_place(t, 1)] = per * dot(n2, n2)
-        solid.shape[shape_place(t, 2)] = per * dot(n3, n3)
-        solid.shape[shape_place(t, 3)] = per * dot(n1, n2)
-        solid.shape[shape_place(t, 4)] = per * dot(n1, n3)
-        solid.shape[shape_place(t, 5)] = per * dot(n2, n3)
-        solid.shape[shape_place(t, VOLUME)] = volume
-        solid.shape[shape_place(t, PER_VOLUME)] = 1.0 / volume
+        per = 1.0 / (6.0 * volume)
+        _store_gradient(solid, t, 0, scale(per, n1))
+        _store_gradient(solid, t, 3, scale(per, n2))
+        _store_gradient(solid, t, 6, scale(per, n3))
+        solid.shape[shape_place(solid, t, VOLUME)] = volume
+
+
+@kernel
+def _store_gradient(solid: Solid, t: int, first: int, gradient: Vec3) -> None:
+    solid.shape[shape_place(solid, t, first)] = gradient.x
+    solid.shape[shape_place(solid, t, first + 1)] = gradient.y
+    solid.shape[shape_place(solid, t, first + 2)] = gradient.z
 
 
 @kernel
@@ -317,21 +347,21 @@ def _build_star(solid: Solid, body: Body, visits: Visits, node: int, around: Int
         k = 0
         while body.tetrahedra[t, k] != node:
             k += 1
-        solid.around[first + i] = WIDTH + t
-        solid.corner[first + i] = corner_place(t, k)
-        volume += 0.25 * solid.shape[shape_place(t, VOLUME)]
+        solid.around[first + i] = width_of(solid.shape) + t
+        solid.corner[first + i] = corner_row(solid, t, k)
+        volume += 0.25 * tetrahedron_volume(body.rest, body.tetrahedra, t)
     solid.node_volume[node] = volume
 
 
 @kernel
 def tetrahedron_of_slot(solid: Solid, slot: int) -> int:
     """Return the tetrahedron of a slot of a row."""
-    t: int = solid.around[slot] - WIDTH
+    t: int = solid.around[slot] - width_of(solid.shape)
     return t
 
 
 @kernel
 def corner_of_slot(solid: Solid, slot: int) -> int:
     """Return which of the four corners of its tetrahedron a slot of a row is."""
-    corner: int = solid.corner[slot] // (3 * WIDTH) % 4
+    corner: int = solid.corner[slot] // width_of(solid.shape) % 4
     return corner

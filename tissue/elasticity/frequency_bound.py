@@ -130,7 +130,7 @@ def with_neighbours(solid: Solid, visits: Visits, listed: IntArray, n: int) -> i
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             t = tetrahedron_of_slot(solid, slot)
             for k in range(4):
-                n_listed = _list(visits, listed, n_listed, solid.nodes[node_place(t, k)])
+                n_listed = _list(visits, listed, n_listed, solid.nodes[node_place(solid, t, k)])
     return n_listed
 
 
@@ -186,7 +186,7 @@ def dilatation_term(
 @inlined
 def add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
     """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
-    node = solid.nodes[node_place(t, k)]
+    node = solid.nodes[node_place(solid, t, k)]
     if visits.nodes[node] != visits.epoch:
         visits.nodes[node] = visits.epoch
         visits.place[node] = n
@@ -241,10 +241,10 @@ def bound_of_node(
         n1, n2, n3, volume = rest_normals(body, t)
         n0 = scale(-1.0, add(n1, add(n2, n3)))
         ratios = (
-            solid.weight[solid.nodes[node_place(t, 0)]] * norm(n0)
-            + solid.weight[solid.nodes[node_place(t, 1)]] * norm(n1)
-            + solid.weight[solid.nodes[node_place(t, 2)]] * norm(n2)
-            + solid.weight[solid.nodes[node_place(t, 3)]] * norm(n3)
+            solid.weight[solid.nodes[node_place(solid, t, 0)]] * norm(n0)
+            + solid.weight[solid.nodes[node_place(solid, t, 1)]] * norm(n1)
+            + solid.weight[solid.nodes[node_place(solid, t, 2)]] * norm(n2)
+            + solid.weight[solid.nodes[node_place(solid, t, 3)]] * norm(n3)
         )
         at_rest = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
         n1, n2, n3, _ = normals(body, points, t)

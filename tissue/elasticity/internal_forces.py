@@ -16,7 +16,7 @@ from tissue.elasticity.springs import Springs, spring_energy
 from tissue.mesh.body import Body
 
 
-class Elastic(Arrays):
+class Elastic(Arrays, two_precisions=True):
     """All that forces inside the body are computed from."""
 
     springs: Springs
@@ -47,8 +47,8 @@ def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
     """Evaluate all tetrahedra at `positions` [m], for `internal_force`."""
     if elastic.has_tetrahedra:
         solid = elastic.solid
-        blocks, nodes = n_blocks(body.n_tetrahedra), body.n_nodes
-        solid_forces(solid, positions, solid.every, blocks, solid.every, nodes)
+        blocks, nodes = n_blocks(solid, body.n_tetrahedra), body.n_nodes
+        solid_forces(solid, body, positions, solid.every, blocks, solid.every, nodes)
 
 
 @inlined
@@ -122,6 +122,5 @@ def elastic_energy(elastic: Elastic, body: Body) -> float:
     if elastic.has_springs:
         energy += spring_energy(elastic.springs, body)
     if elastic.has_tetrahedra:
-        n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
-        energy += solid_energy(elastic.solid, body.positions, n_tetrahedra, n_nodes)
+        energy += solid_energy(elastic.solid, body, body.positions)
     return energy

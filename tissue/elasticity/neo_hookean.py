@@ -1,69 +1,77 @@
-"""Forces of tetrahedra under a stable neo-Hookean law, a block of eight tetrahedra at a time.
+"""Forces of tetrahedra under a stable neo-Hookean law, a block of tetrahedra at a time.
 
-With d_i = x_i - x_0, the products of `Solid.shape`, e_i = sum over j of (V grad N_i . grad N_j) d_j
-and the cofactors n_1 = d_2 x d_3, n_2 = d_3 x d_1, n_3 = d_1 x d_2, the forces on nodes 1, 2, 3 are
+With H the gradient of the displacement, F = 1 + H, K = cof F - 1 = (tr H) 1 - H^T + cof H and
+|F|^2 - 3 = 2 tr H + |H|^2, the force on node k is -V P grad N_k, where
 
-    f_i = -(mu (1 - 1 / (|F|^2 + 1)) e_i + p n_i / 6),     f_0 = -(f_1 + f_2 + f_3)
+    P = mu (1 - 1 / (|F|^2 + 1)) F + lam (J - a) cof F
 
-(V grad N_i times P = mu (1 - 1 / (|F|^2 + 1)) F + p cof F). The pressure p = lam (J - a) is that of
-the tetrahedron, or the mean of those at its nodes, where J is averaged over the tetrahedra around
-the node: the exact gradient of the energy either way.
+What is not zero at rest cancels, which leaves
 
-Three loops, each over a list: volumes of blocks, pressures of nodes, forces of blocks; then the
-force on a node is the sum over its row. Threads may share a loop, each taking a part of its list.
+    s = mu (|F|^2 - 3) / (4 (|F|^2 + 1)),   p = lam (J - 1)
+    P = (3/4 mu + s) H + (p - 3/4 mu) K + (s + p) 1
+
+every term of which is small where the strain is. The pressure p is that of the tetrahedron, or the
+mean of those at its nodes, where J is averaged over the tetrahedra around the node: the exact
+gradient of the energy either way.
+
+Four loops: displacements of nodes, gradients of blocks, pressures of nodes, forces of blocks; then
+the force on a node is the sum over its row. Threads may share a loop, each taking a part of it.
 """
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import (
-    WIDTH,
-    Lanes,
-    Point,
-    eight_points,
-    lanes,
-    load_lanes,
-    logarithm,
-    point_of,
-    store_lanes,
+from tissue.core.simd import WIDTH, Lanes, Point, logarithm, point, point_of
+from tissue.core.simd_blocks import (
+    alike,
+    gathered_alike,
+    load_block,
+    points_of_rows,
+    store_block,
+    store_row,
+    store_rows,
+    sum_of_eight_rows,
+    sum_of_lanes,
+    width_of,
 )
-from tissue.core.simd_gather import gathered, sum_of_eight, sum_of_eight_points
-from tissue.core.vec3 import Vec3, add, axpy, cross, dot, scale, sub
-from tissue.elasticity.finite_elements import (
-    PER_VOLUME,
-    VOLUME,
-    Solid,
-    corner_place,
-    n_blocks,
-)
+from tissue.core.simd_gather import sum_of_eight
+from tissue.core.vec3 import Vec3, add, cross, dot, scale
+from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid, n_blocks
+from tissue.mesh.body import Body
+
+NO_VOLUME = 1e-30
+"""Added to volumes [m3], far below any: rows without a tetrahedron have none."""
 
 
 @kernel
 def solid_forces(
     solid: Solid,
+    body: Body,
     positions: FloatArray,
     blocks: IntArray,
     n_blocks: int,
     nodes: IntArray,
     n_nodes: int,
 ) -> None:
-    """Run all three loops, so that `solid_force` gives the force on a node.
+    """Run all loops, so that `solid_force` gives the force on a node.
 
-    For the forces on some nodes only, `blocks` are those of the tetrahedra around them. Where
-    volumes are averaged, `nodes` are then the nodes of those tetrahedra, and `solid.volume` must be
-    up to date around all of these.
+    For the forces on some nodes only, `blocks` are those of the tetrahedra around them, and `nodes`
+    the nodes of those tetrahedra. Where volumes are averaged, `solid.dilated` must then be up to
+    date around all of these.
 
     Args:
-        solid: Volumes, pressures and forces are written.
+        solid: Scratch is written.
+        body: Rest positions.
         positions: Positions of the nodes [m].
         blocks: Blocks of tetrahedra.
         n_blocks: How many of them.
-        nodes: Nodes whose pressure is needed.
+        nodes: Nodes that the blocks read.
         n_nodes: How many of them.
     """
+    displacements(solid, body, positions, nodes, 0, n_nodes)
+    gradients(solid, blocks, 0, n_blocks)
     if has_averaged_volumes(solid):
-        volumes(solid, positions, blocks, 0, n_blocks)
         pressures(solid, nodes, 0, n_nodes)
-    corner_forces(solid, positions, blocks, 0, n_blocks)
+    corner_forces(solid, blocks, 0, n_blocks)
 
 
 @inlined
@@ -72,175 +80,294 @@ def solid_force(solid: Solid, node: int) -> Point:
     total = point_of(0.0, 0.0, 0.0)
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
-        total = total + sum_of_eight_points(solid.forces, solid.corner, slot)
+        total = total + sum_of_eight_rows(solid.forces, solid.corner, slot)
     return total
 
 
 @kernel
 def has_averaged_volumes(solid: Solid) -> bool:
-    """Return whether forces need the first two loops, `volumes` and `pressures`."""
+    """Return whether forces need the loop `pressures`."""
     return solid.law.lam_of_nodes != 0.0
 
 
 @kernel
-def volumes(solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, end: int) -> None:
-    """Write the signed volumes of tetrahedra to `solid.volume`.
+def displacements(
+    solid: Solid,
+    body: Body,
+    positions: FloatArray,
+    nodes: IntArray | SlotArray,
+    begin: int,
+    end: int,
+) -> None:
+    """Write the displacements of `nodes[begin:end]` from rest to `positions` [m].
 
     Args:
         solid: Written.
+        body: Rest positions.
         positions: Positions of the nodes [m].
-        blocks: Blocks of tetrahedra.
-        begin: First block, as an index in `blocks`.
-        end: End of the blocks.
+        nodes: The nodes.
+        begin: First of them.
+        end: End of them.
     """
     for i in range(begin, end):
+        node = nodes[i]
+        store_row(solid.displacement, node, point(positions, node) - point(body.rest, node))
+
+
+@kernel
+def displacements_of_blocks(
+    solid: Solid, body: Body, positions: FloatArray, blocks: IntArray, n: int
+) -> None:
+    """Write the displacements of the nodes of the first `n` of `blocks` to `positions` [m]."""
+    width = width_of(solid.shape)
+    for i in range(n):
+        first = 4 * width * blocks[i]
+        displacements(solid, body, positions, solid.nodes, first, first + 4 * width)
+
+
+@kernel
+def gradients(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
+    """Write H and V (J - 1) of the tetrahedra of `blocks[begin:end]`, after `displacements`."""
+    width = width_of(solid.shape)
+    for i in range(begin, end):
         block = blocks[i]
-        d1, d2, d3 = edges(solid, positions, block)
-        store_lanes(solid.volume, WIDTH * (1 + block), lanes(1.0 / 6.0) * dot(d1, cross(d2, d3)))
+        x, y, z = gradient_of_displacement(solid, block)
+        if keeps_gradients(solid):
+            at = 9 * width * block
+            _store_vector(solid, at, x)
+            _store_vector(solid, at + 3 * width, y)
+            _store_vector(solid, at + 6 * width, z)
+        cofactors = _cofactors(x, y, z)
+        store_block(solid.dilated, width * (1 + block), _dilated(solid, block, x, y, z, cofactors))
 
 
 @kernel
 def pressures(solid: Solid, nodes: IntArray, begin: int, end: int) -> None:
-    """Write lam (J - a) of `nodes[begin:end]` to `solid.pressure`, from the volumes around them."""
-    lam, a = solid.law.lam_of_nodes, solid.law.a
+    """Write lam (J - 1) of `nodes[begin:end]`, from the volumes around them."""
     for i in range(begin, end):
         node = nodes[i]
-        solid.pressure[node] = lam * (_volume_around(solid, node) / solid.node_volume[node] - a)
+        grown = _dilated_around(solid, node) / solid.node_volume[node]
+        solid.pressure[node] = solid.law.lam_of_nodes * grown
 
 
 @kernel
-def corner_forces(
-    solid: Solid, positions: FloatArray, blocks: IntArray, begin: int, end: int
-) -> None:
-    """Write the forces on the corners of tetrahedra to `solid.forces`.
+def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
+    """Write the forces on the corners of the tetrahedra of `blocks[begin:end]`.
 
     Args:
-        solid: Written; volumes and pressures are up to date where volumes are averaged.
-        positions: Positions of the nodes [m].
+        solid: Written; gradients, and pressures where volumes are averaged, are up to date.
         blocks: Blocks of tetrahedra.
         begin: First block, as an index in `blocks`.
         end: End of the blocks.
     """
-    law = solid.law
+    law, width = solid.law, width_of(solid.shape)
     for i in range(begin, end):
         block = blocks[i]
-        d1, d2, d3 = edges(solid, positions, block)
-        n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
-        p = lanes(0.0)
+        x, y, z = _known_gradient(solid, block)
+        v = shape_of(solid, block, VOLUME)
+        p = alike(0.0, v)
         if law.lam_of_nodes != 0.0:
-            p = lanes(0.25) * _pressure_of_nodes(solid, block)
+            p = alike(0.25, v) * _pressure_of_nodes(solid, block, v)
         if law.lam_of_tetrahedra != 0.0:
-            dilatation = lanes(1.0 / 6.0) * dot(d1, n1) * shape_of(solid, block, PER_VOLUME)
-            p = p + lanes(law.lam_of_tetrahedra) * (dilatation - lanes(law.a))
-        p = lanes(-1.0 / 6.0) * p
-        f1, f2, f3 = scale(p, n1), scale(p, n2), scale(p, n3)
-        if law.mu != 0.0:
-            e1, e2, e3 = _weighted(solid, block, d1, d2, d3)
-            squared = dot(d1, e1) + dot(d2, e2) + dot(d3, e3)  # V |F|^2
-            s = lanes(-law.mu) * squared / (squared + shape_of(solid, block, VOLUME))
-            f1, f2, f3 = axpy(s, e1, f1), axpy(s, e2, f2), axpy(s, e3, f3)
-        f0 = scale(lanes(-1.0), add(f1, add(f2, f3)))
-        _store(solid, block, 0, f0)
-        _store(solid, block, 1, f1)
-        _store(solid, block, 2, f2)
-        _store(solid, block, 3, f3)
+            own = load_block(solid.dilated, width * (1 + block)) / (v + alike(NO_VOLUME, v))
+            p = p + alike(law.lam_of_tetrahedra, v) * own
+        trace = x.x + y.y + z.z
+        grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
+        s = alike(0.25 * law.mu, v) * grown / (grown + alike(4.0, v))
+        rest = alike(0.75 * law.mu, v)
+        # The factors of H, K and 1, times -V:
+        minus_v = alike(-1.0, v) * v
+        a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
+        cx, cy, cz = _cofactors(x, y, z)
+        px = Vec3(
+            a * x.x + b * (trace - x.x + cx.x) + c,
+            a * x.y + b * (cx.y - y.x),
+            a * x.z + b * (cx.z - z.x),
+        )
+        py = Vec3(
+            a * y.x + b * (cy.x - x.y),
+            a * y.y + b * (trace - y.y + cy.y) + c,
+            a * y.z + b * (cy.z - z.y),
+        )
+        pz = Vec3(
+            a * z.x + b * (cz.x - x.z),
+            a * z.y + b * (cz.y - y.z),
+            a * z.z + b * (trace - z.z + cz.z) + c,
+        )
+        f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
+        f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
+        f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
+        f0 = scale(alike(-1.0, v), add(f1, add(f2, f3)))
+        row = 4 * width * (1 + block)
+        store_rows(solid.forces, row, f0.x, f0.y, f0.z)
+        store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
+        store_rows(solid.forces, row + 2 * width, f2.x, f2.y, f2.z)
+        store_rows(solid.forces, row + 3 * width, f3.x, f3.y, f3.z)
 
 
 @inlined
-def _store(solid: Solid, block: int, k: int, force: Vec3) -> None:
-    """Write the forces on corners `k` of eight tetrahedra."""
-    place = corner_place(WIDTH * block, k)
-    store_lanes(solid.forces, place, force.x)
-    store_lanes(solid.forces, place + WIDTH, force.y)
-    store_lanes(solid.forces, place + 2 * WIDTH, force.z)
-
-
-@inlined
-def edges(solid: Solid, positions: FloatArray, block: int) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the edges from node 0 to nodes 1, 2 and 3 of eight tetrahedra, as `Lanes`."""
-    x0 = _corners(solid, positions, block, 0)
+def gradient_of_displacement(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the rows of H of the tetrahedra of a block, after `displacements`."""
+    x0, y0, z0 = _corners(solid, block, 0)
+    x1, y1, z1 = _corners(solid, block, 1)
+    x2, y2, z2 = _corners(solid, block, 2)
+    x3, y3, z3 = _corners(solid, block, 3)
+    g1 = gradient_of_shape(solid, block, 0)
+    g2 = gradient_of_shape(solid, block, 3)
+    g3 = gradient_of_shape(solid, block, 6)
     return (
-        sub(_corners(solid, positions, block, 1), x0),
-        sub(_corners(solid, positions, block, 2), x0),
-        sub(_corners(solid, positions, block, 3), x0),
+        _row_of_gradient(x1 - x0, x2 - x0, x3 - x0, g1, g2, g3),
+        _row_of_gradient(y1 - y0, y2 - y0, y3 - y0, g1, g2, g3),
+        _row_of_gradient(z1 - z0, z2 - z0, z3 - z0, g1, g2, g3),
     )
 
 
 @inlined
-def _corners(solid: Solid, positions: FloatArray, block: int, k: int) -> Vec3:
-    x, y, z = eight_points(positions, solid.nodes, WIDTH * (4 * block + k))
-    return Vec3(x, y, z)
+def keeps_gradients(solid: Solid) -> bool:
+    """Return whether H is kept between two loops over the tetrahedra, not computed twice.
+
+    In single precision that takes a sixth less time. Doubles would not fit the cache.
+    """
+    return width_of(solid.shape) > WIDTH
+
+
+@inlined
+def _known_gradient(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the rows of H of the tetrahedra of a block, after `gradients`."""
+    if keeps_gradients(solid):
+        width = width_of(solid.shape)
+        at = 9 * width * block
+        return (
+            _load_vector(solid, at),
+            _load_vector(solid, at + 3 * width),
+            _load_vector(solid, at + 6 * width),
+        )
+    return gradient_of_displacement(solid, block)
+
+
+@inlined
+def _row_of_gradient(d1: Lanes, d2: Lanes, d3: Lanes, g1: Vec3, g2: Vec3, g3: Vec3) -> Vec3:
+    return Vec3(
+        d1 * g1.x + d2 * g2.x + d3 * g3.x,
+        d1 * g1.y + d2 * g2.y + d3 * g3.y,
+        d1 * g1.z + d2 * g2.z + d3 * g3.z,
+    )
+
+
+@inlined
+def _cofactors(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the rows of cof H from the rows of H."""
+    return cross(y, z), cross(z, x), cross(x, y)
+
+
+@inlined
+def _dilated(
+    solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3, cofactors: tuple[Vec3, Vec3, Vec3]
+) -> Lanes:
+    """Return V (J - 1) of the tetrahedra of a block, J - 1 = tr H + tr cof H + det H."""
+    cx, cy, cz = cofactors
+    growth = (x.x + y.y + z.z) + (cx.x + cy.y + cz.z) + dot(x, cx)
+    return shape_of(solid, block, VOLUME) * growth
+
+
+@inlined
+def _product(px: Vec3, py: Vec3, pz: Vec3, g: Vec3) -> Vec3:
+    return Vec3(dot(px, g), dot(py, g), dot(pz, g))
+
+
+@inlined
+def _corners(solid: Solid, block: int, k: int) -> tuple[Lanes, Lanes, Lanes]:
+    """Return the displacements of corner `k` of the tetrahedra of a block."""
+    width = width_of(solid.shape)
+    return points_of_rows(solid.displacement, solid.nodes, width * (4 * block + k))
+
+
+@inlined
+def _store_vector(solid: Solid, at: int, v: Vec3) -> None:
+    width = width_of(solid.shape)
+    store_block(solid.gradient, at, v.x)
+    store_block(solid.gradient, at + width, v.y)
+    store_block(solid.gradient, at + 2 * width, v.z)
+
+
+@inlined
+def _load_vector(solid: Solid, at: int) -> Vec3:
+    width = width_of(solid.shape)
+    return Vec3(
+        load_block(solid.gradient, at),
+        load_block(solid.gradient, at + width),
+        load_block(solid.gradient, at + 2 * width),
+    )
 
 
 @inlined
 def shape_of(solid: Solid, block: int, which: int) -> Lanes:
-    """Return a quantity of `Solid.shape` for eight tetrahedra."""
-    return load_lanes(solid.shape, WIDTH * (WIDTH * block + which))
+    """Return a quantity of `Solid.shape` for the tetrahedra of a block."""
+    return load_block(solid.shape, width_of(solid.shape) * (N_SHAPE * block + which))
 
 
 @inlined
-def _weighted(solid: Solid, block: int, d1: Vec3, d2: Vec3, d3: Vec3) -> tuple[Vec3, Vec3, Vec3]:
-    """Return e_i = sum over j of (V grad N_i . grad N_j) d_j [m2], for i = 1, 2, 3."""
-    k11, k22, k33 = shape_of(solid, block, 0), shape_of(solid, block, 1), shape_of(solid, block, 2)
-    k12, k13, k23 = shape_of(solid, block, 3), shape_of(solid, block, 4), shape_of(solid, block, 5)
-    return (
-        axpy(k11, d1, axpy(k12, d2, scale(k13, d3))),
-        axpy(k12, d1, axpy(k22, d2, scale(k23, d3))),
-        axpy(k13, d1, axpy(k23, d2, scale(k33, d3))),
+def gradient_of_shape(solid: Solid, block: int, first: int) -> Vec3:
+    """Return the gradient of a shape function [1/m], which begins at that quantity of `shape`."""
+    return Vec3(
+        shape_of(solid, block, first),
+        shape_of(solid, block, first + 1),
+        shape_of(solid, block, first + 2),
     )
 
 
 @inlined
-def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
-    """Return the sum of the pressures at the four nodes [Pa]."""
-    first = 4 * WIDTH * block
-    ends = gathered(solid.pressure, solid.nodes, first)
-    ends = ends + gathered(solid.pressure, solid.nodes, first + WIDTH)
-    others = gathered(solid.pressure, solid.nodes, first + 2 * WIDTH)
-    return ends + (others + gathered(solid.pressure, solid.nodes, first + 3 * WIDTH))
+def _pressure_of_nodes(solid: Solid, block: int, a: Lanes) -> Lanes:
+    """Return the sum of the pressures at the four nodes [Pa], as a vector of the type of `a`."""
+    width = width_of(solid.shape)
+    first = 4 * width * block
+    ends = gathered_alike(a, solid.pressure, solid.nodes, first)
+    ends = ends + gathered_alike(a, solid.pressure, solid.nodes, first + width)
+    others = gathered_alike(a, solid.pressure, solid.nodes, first + 2 * width)
+    return ends + (others + gathered_alike(a, solid.pressure, solid.nodes, first + 3 * width))
 
 
 @inlined
-def _volume_around(solid: Solid, node: int) -> float:
-    """Return a quarter of the volume of the tetrahedra around a node, from `solid.volume` [m3]."""
+def _dilated_around(solid: Solid, node: int) -> float:
+    """Return a quarter of V (J - 1) of the tetrahedra around a node [m3]."""
     total = 0.0
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
-        total += sum_of_eight(solid.volume, solid.around, slot)
+        total += sum_of_eight(solid.dilated, solid.around, slot)
     return 0.25 * total
 
 
 @kernel
-def solid_energy(solid: Solid, positions: FloatArray, n_tetrahedra: int, n_nodes: int) -> float:
+def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
     """Return the elastic energy of the body at `positions` [m], less that at rest [J]."""
-    law = solid.law
-    n = n_blocks(n_tetrahedra)
-    volumes(solid, positions, solid.every, 0, n)
-    total = lanes(0.0)
-    for block in range(n - 1):
-        total = total + _energies(solid, positions, block)
-    store_lanes(solid.growth, 0, total)
-    store_lanes(solid.growth, WIDTH, _energies(solid, positions, n - 1))
+    law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
+    displacements(solid, body, positions, solid.every, 0, body.n_nodes)
+    gradients(solid, solid.every, 0, blocks)
     energy = 0.0
-    for lane in range(WIDTH + n_tetrahedra - WIDTH * (n - 1)):  # the last block may not be full
-        energy += solid.growth[lane]
-    at_rest = (1.0 - law.a) ** 2
-    for node in range(n_nodes):
+    for block in range(blocks):
+        energy += sum_of_lanes(_energies(solid, block))
+    for node in range(body.n_nodes):
         v = solid.node_volume[node]
-        j = _volume_around(solid, node) / v
-        energy += 0.5 * law.lam_of_nodes * v * ((j - law.a) ** 2 - at_rest)
+        energy += v * _bulk_energy(law.lam_of_nodes, _dilated_around(solid, node) / v, law.a)
     return energy
 
 
 @inlined
-def _energies(solid: Solid, positions: FloatArray, block: int) -> Lanes:
-    """Return the energies of eight tetrahedra by themselves [J], after `volumes`."""
-    law, v = solid.law, shape_of(solid, block, VOLUME)
-    d1, d2, d3 = edges(solid, positions, block)
-    e1, e2, e3 = _weighted(solid, block, d1, d2, d3)
-    per_volume, one = shape_of(solid, block, PER_VOLUME), lanes(1.0)
-    squared = (dot(d1, e1) + dot(d2, e2) + dot(d3, e3)) * per_volume  # |F|^2
-    shear = squared - lanes(3.0) - logarithm(lanes(0.25) * (squared + one))
-    change = load_lanes(solid.volume, WIDTH * (1 + block)) * per_volume - lanes(law.a)
-    bulk = change * change - lanes((1.0 - law.a) ** 2)
-    return v * (lanes(0.5 * law.mu) * shear + lanes(0.5 * law.lam_of_tetrahedra) * bulk)
+def _energies(solid: Solid, block: int) -> Lanes:
+    """Return the energies of the tetrahedra of a block by themselves [J], after `gradients`."""
+    law, width = solid.law, width_of(solid.shape)
+    x, y, z = _known_gradient(solid, block)
+    v = shape_of(solid, block, VOLUME)
+    trace = x.x + y.y + z.z
+    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
+    shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
+    dilatation = load_block(solid.dilated, width * (1 + block))
+    ratio = dilatation / (v + alike(NO_VOLUME, v))
+    bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))
+    return alike(0.5 * law.mu, v) * v * shear + alike(0.5 * law.lam_of_tetrahedra, v) * bulk
+
+
+@kernel
+def _bulk_energy(lam: float, dilatation: float, a: float) -> float:
+    """Return lam/2 ((J - a)^2 - (1 - a)^2) [J/m3], `dilatation` is J - 1."""
+    return 0.5 * lam * dilatation * (dilatation + 2.0 * (1.0 - a))

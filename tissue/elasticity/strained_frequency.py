@@ -13,21 +13,21 @@ after a cut that concerns 20 of 5,900 tetrahedra. What was found slow enough is 
 before it has grown further.
 """
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, lanes, load_lanes, store_lanes
-from tissue.core.simd_gather import gathered, larger, largest, where_larger
-from tissue.core.vec3 import add, cross, dot
-from tissue.elasticity.finite_elements import (
-    VOLUME,
-    Solid,
-    n_blocks,
-    node_place,
-    tetrahedron_of_slot,
-)
+from tissue.core.simd import Lanes
+from tissue.core.simd_blocks import alike, gathered_alike, load_block, store_block, width_of
+from tissue.core.simd_gather import larger, largest, where_larger
+from tissue.core.vec3 import Vec3, add, cross, dot
+from tissue.elasticity.finite_elements import Solid, n_blocks, node_place, tetrahedron_of_slot
 from tissue.elasticity.frequency_bound import bound_of_node, dilatation_term
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
-from tissue.elasticity.neo_hookean import edges, shape_of
+from tissue.elasticity.neo_hookean import (
+    displacements,
+    displacements_of_blocks,
+    gradient_of_displacement,
+    gradient_of_shape,
+)
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
@@ -47,36 +47,46 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
         visits: For searches.
         allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
     """
-    solid, nodes = elastic.solid, elastic.solid.nodes
-    worst, too_high = lanes(0.0), 0.0
+    solid = elastic.solid
+    width, highest = width_of(solid.shape), 0.0
     solid.test += 1
-    for block in range(n_blocks(body.n_tetrahedra)):
-        first = 4 * WIDTH * block
-        at_rest = larger(
-            larger(
-                gathered(elastic.frequency_squared, nodes, first),
-                gathered(elastic.frequency_squared, nodes, first + WIDTH),
-            ),
-            larger(
-                gathered(elastic.frequency_squared, nodes, first + 2 * WIDTH),
-                gathered(elastic.frequency_squared, nodes, first + 3 * WIDTH),
-            ),
-        )
-        growth = _growth(solid, body.positions, block)
-        tested = lanes(FURTHER) * load_lanes(solid.tested_growth, WIDTH * (1 + block))
-        bound = where_larger(growth, tested, growth * at_rest, lanes(0.0))
+    displacements(solid, body, body.positions, solid.every, 0, body.n_nodes)
+    for block in range(n_blocks(solid, body.n_tetrahedra)):
+        growth = _growth(solid, block)
+        tested = load_block(solid.tested_growth, width * (1 + block))
+        tested = alike(FURTHER, growth) * tested
+        at_rest = _highest_at_rest(elastic, block, growth)
+        bound = where_larger(growth, tested, growth * at_rest, alike(0.0, growth))
         if largest(bound) <= allowed:
-            worst = larger(worst, bound)
+            highest = max(highest, largest(bound))
             continue
-        store_lanes(solid.growth, 0, bound)
-        store_lanes(solid.growth, WIDTH * (1 + block), growth)
-        for lane in range(WIDTH):
-            t = WIDTH * block + lane
-            if solid.growth[lane] > allowed and t < body.n_tetrahedra:
-                too_high = max(too_high, _tested_bound(elastic, body, visits, t, allowed))
+        store_block(solid.growth, 0, bound)
+        store_block(solid.growth, width * (1 + block), growth)
+        for lane in range(width):
+            if solid.growth[lane] <= allowed:
+                highest = max(highest, float(solid.growth[lane]))
             else:
-                too_high = max(too_high, min(solid.growth[lane], allowed))
-    return max(largest(worst), too_high)
+                t = width * block + lane
+                highest = max(highest, _tested_bound(elastic, body, visits, t, allowed))
+    return highest
+
+
+@inlined
+def _highest_at_rest(elastic: Elastic, block: int, a: Lanes) -> Lanes:
+    """Return the highest bound on w^2 at rest at the nodes of the tetrahedra of a block [1/s2]."""
+    values, nodes = elastic.frequency_squared, elastic.solid.nodes
+    width = width_of(elastic.solid.shape)
+    first = 4 * width * block
+    return larger(
+        larger(
+            gathered_alike(a, values, nodes, first),
+            gathered_alike(a, values, nodes, first + width),
+        ),
+        larger(
+            gathered_alike(a, values, nodes, first + 2 * width),
+            gathered_alike(a, values, nodes, first + 3 * width),
+        ),
+    )
 
 
 @kernel
@@ -85,11 +95,12 @@ def _tested_bound(elastic: Elastic, body: Body, visits: Visits, t: int, allowed:
     solid = elastic.solid
     highest = 0.0
     for k in range(4):
-        node = solid.nodes[node_place(t, k)]
+        node = solid.nodes[node_place(solid, t, k)]
         if not body.fixed[node]:
             highest = max(highest, _strained_bound(elastic, body, visits, node))
     if FURTHER * highest <= allowed:
-        solid.tested_growth[WIDTH + t] = solid.growth[WIDTH + t]
+        place = width_of(solid.shape) + t
+        solid.tested_growth[place] = solid.growth[place]
     return highest
 
 
@@ -104,7 +115,7 @@ def _strained_bound(elastic: Elastic, body: Body, visits: Visits, node: int) -> 
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             t = tetrahedron_of_slot(solid, slot)
             for k in range(4):
-                other = solid.nodes[node_place(t, k)]
+                other = solid.nodes[node_place(solid, t, k)]
                 if solid.dilatation_test[other] != solid.test:
                     term = dilatation_term(solid, body, body.positions, visits, other)
                     solid.strained_dilatation[other] = term
@@ -123,13 +134,13 @@ def forget_tests(solid: Solid, nodes: IntArray, n: int) -> None:
     for i in range(n):
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            solid.tested_growth[WIDTH + tetrahedron_of_slot(solid, slot)] = 1.0
+            solid.tested_growth[solid.around[slot]] = 1.0
 
 
 @kernel
 def strain_frequencies(
     elastic: Elastic,
-    positions: FloatArray,
+    body: Body,
     blocks: IntArray,
     n_blocks: int,
     nodes: IntArray,
@@ -139,37 +150,48 @@ def strain_frequencies(
 
     Args:
         elastic: Written.
-        positions: Positions of the nodes [m].
+        body: Positions of the nodes.
         blocks: Blocks that hold the tetrahedra around the nodes.
         n_blocks: How many of them.
         nodes: The nodes.
         n: How many of them.
     """
     solid = elastic.solid
+    width = width_of(solid.shape)
+    displacements_of_blocks(solid, body, body.positions, blocks, n_blocks)
     for i in range(n_blocks):
-        growth = _growth(solid, positions, blocks[i])
-        store_lanes(solid.growth, WIDTH * (1 + blocks[i]), growth)
+        store_block(solid.growth, width * (1 + blocks[i]), _growth(solid, blocks[i]))
     bound_both_frequencies(elastic, nodes, n)
     for i in range(n):
         node = nodes[i]
-        growth = lanes(1.0)
-        first = solid.first[node]
-        for slot in range(first, first + solid.count[node], WIDTH):
-            growth = larger(growth, gathered(solid.growth, solid.around, slot))
-        more = largest(growth) - 1.0
-        elastic.frequency_squared[node] += more * solid.frequency_squared[node]
+        growth = 1.0
+        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
+            growth = max(growth, float(solid.growth[solid.around[slot]]))
+        elastic.frequency_squared[node] += (growth - 1.0) * solid.frequency_squared[node]
 
 
 @inlined
-def _growth(solid: Solid, positions: FloatArray, block: int) -> Lanes:
-    """Return the largest growth of the square of a face of eight tetrahedra, at least 1."""
-    d1, d2, d3 = edges(solid, positions, block)
-    n1, n2, n3 = cross(d2, d3), cross(d3, d1), cross(d1, d2)
-    n0 = add(n1, add(n2, n3))
-    k1, k2, k3 = shape_of(solid, block, 0), shape_of(solid, block, 1), shape_of(solid, block, 2)
-    mixed = shape_of(solid, block, 3) + shape_of(solid, block, 4) + shape_of(solid, block, 5)
-    k0 = k1 + k2 + k3 + mixed + mixed
+def _growth(solid: Solid, block: int) -> Lanes:
+    """Return the largest growth of the square of a face of each tetrahedron, at least 1.
+
+    The area vector of the face opposite node k is 3 V cof F grad N_k. After `displacements`.
+    """
+    x, y, z = gradient_of_displacement(solid, block)
+    g1 = gradient_of_shape(solid, block, 0)
+    g2 = gradient_of_shape(solid, block, 3)
+    g3 = gradient_of_shape(solid, block, 6)
+    one = alike(1.0, x.x)
+    f1, f2, f3 = Vec3(x.x + one, x.y, x.z), Vec3(y.x, y.y + one, y.z), Vec3(z.x, z.y, z.z + one)
+    c1, c2, c3 = cross(f2, f3), cross(f3, f1), cross(f1, f2)
     growth = larger(
-        larger(dot(n0, n0) / k0, dot(n1, n1) / k1), larger(dot(n2, n2) / k2, dot(n3, n3) / k3)
+        larger(_square(c1, c2, c3, g1), _square(c1, c2, c3, g2)),
+        larger(_square(c1, c2, c3, g3), _square(c1, c2, c3, add(g1, add(g2, g3)))),
     )
-    return larger(growth / (lanes(36.0) * shape_of(solid, block, VOLUME)), lanes(1.0))
+    return larger(growth, one)
+
+
+@inlined
+def _square(c1: Vec3, c2: Vec3, c3: Vec3, g: Vec3) -> Lanes:
+    """Return |C g|^2 / |g|^2 from the rows of C."""
+    a, b, c = dot(c1, g), dot(c2, g), dot(c3, g)
+    return (a * a + b * b + c * c) / dot(g, g)

@@ -1,8 +1,8 @@
 """Damping once a step: dampers and drag change the velocities between two elastic steps.
 
 With D the damping and E the elastic motion the steps are D(h/2) E(h) D(h) E(h) D(h) ..., Strang's
-splitting: of second order in the damping, whatever the order of E. Each D is one explicit step at
-the positions as they are:
+splitting: of second order in the damping, whatever the order of E. Where the damping is weak, it
+acts once every few steps, for as long. Each D is one explicit step at the positions as they are:
 
     v <- v + s (viscous force / m - drag v)
 
@@ -12,7 +12,7 @@ the kinetic energy is what the dampers dissipate, so that no integral of a power
 
 from tissue.core.jit import kernel
 from tissue.core.simd import point, point_of, store_point, times
-from tissue.core.structs import Arrays, FloatCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import Elastic, viscous_force
 from tissue.integrators.stages import Stages
@@ -20,10 +20,12 @@ from tissue.mesh.body import Body
 
 
 class Damping(Arrays):
-    """Damping that acts once a step."""
+    """Damping that acts once a step, or once every few steps."""
 
+    interval: IntCell
+    """Number of steps for which it acts at once."""
     owed: FloatCell
-    """Time for which it has yet to act [s]: the second half of the last step."""
+    """Time for which it has yet to act [s]: the second half of what it acted for last."""
     dissipated: FloatCell
     """Energy lost in viscosity and drag so far [J]."""
     retardation_time: float
@@ -34,14 +36,14 @@ class Damping(Arrays):
 
 @kernel
 def damp(damping: Damping, body: Body, elastic: Elastic, stages: Stages, h: float) -> None:
-    """Let half of the damping of the last step act, and half of that of the step to come.
+    """Let half of the damping of the steps before act, and half of that of the steps to come.
 
     Args:
         damping: What is owed and what is dissipated are written.
         body: Velocities are written.
         elastic: The dampers.
         stages: Scratch.
-        h: Length of the step to come [s].
+        h: Length of the steps to come, until it acts again [s].
     """
     seconds = damping.owed + 0.5 * h
     damping.owed = 0.5 * h

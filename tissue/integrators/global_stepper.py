@@ -10,6 +10,7 @@ from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
     StableStep,
+    damping_interval,
     runge_kutta_step,
     stage_damped_step,
     verlet_step,
@@ -90,6 +91,8 @@ class GlobalStepper:
 
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
+        step = increment.span / n
+        system.damping.interval = damping_interval(system.elasticity, system.surroundings, step)
         if self._threads is not None:
             self._threads.take_steps(system, increment, n)
             return

@@ -14,7 +14,7 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 
-class StepContext(Arrays):
+class StepContext(Arrays, two_precisions=True):
     """Everything that the kernels of an integrator read and write."""
 
     body: Body

@@ -35,7 +35,7 @@ def runge_kutta_steps(
     for i in range(first, n):
         at = begin + i * share
         if context.contact.is_pending == 0:
-            begin_substep(context, share * dt)
+            begin_substep(context, share * dt, i, n)
             runge_kutta_nystroem(context, edge, dt, at, share)
         if not end_substep(context, edge, share * dt, at + share):
             return i
@@ -61,7 +61,7 @@ def verlet_steps(
     for i in range(first, n):
         at = begin + i * share
         if context.contact.is_pending == 0:
-            begin_substep(context, share * dt)
+            begin_substep(context, share * dt, i, n)
             position_verlet(context, edge, dt, at, share)
         if not end_substep(context, edge, share * dt, at + share):
             return i
@@ -69,11 +69,21 @@ def verlet_steps(
 
 
 @kernel
-def begin_substep(context: StepContext, h: float) -> None:
-    """Note where the nodes are, where contact needs it, and let the damping act; `h` in [s]."""
+def begin_substep(context: StepContext, h: float, i: int, n: int) -> None:
+    """Note where the nodes are, where contact needs it, and let the damping act where it is due.
+
+    Args:
+        context: What takes part.
+        h: Length of the step [s].
+        i: Number of the step.
+        n: How many steps of that length follow one another.
+    """
     if context.contact.is_awake == 1:
         note_all_positions(context.contact, context.body)
-    damp(context.damping, context.body, context.elastic, context.stages, h)
+    every = context.damping.interval
+    if i % every == 0:
+        seconds = min(every, n - i) * h
+        damp(context.damping, context.body, context.elastic, context.stages, seconds)
 
 
 @kernel

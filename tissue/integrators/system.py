@@ -62,6 +62,7 @@ class System:
         damped = surroundings if damps_each_step else undamped
         self._in_stages = undamped if damps_each_step else surroundings
         self.damping = Damping(
+            interval=1,
             owed=0.0,
             dissipated=0.0,
             retardation_time=damped.retardation_time,
@@ -133,6 +134,7 @@ def assembled(
     *,
     mass_scaling: float | None,
     damps_each_step: bool,
+    is_single: bool,
 ) -> System:
     """Return a body with its elasticity, its contact and the blade.
 
@@ -144,9 +146,10 @@ def assembled(
         floor: Height of a floor below the body [m]; None for no floor.
         mass_scaling: Frequency above which nodes get mass [1/s]; see `Elasticity`.
         damps_each_step: Whether damping acts once a step; if not, in every stage of it.
+        is_single: Whether forces of tetrahedra are computed in single precision.
     """
     visits = no_visits(body.n_nodes, body.n_tetrahedra)
-    elasticity = Elasticity(material, body, visits, mass_scaling=mass_scaling)
+    elasticity = Elasticity(material, body, visits, mass_scaling=mass_scaling, is_single=is_single)
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
     contact = SelfContact(body, node_size, material.friction, floor)

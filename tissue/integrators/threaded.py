@@ -14,7 +14,13 @@ from tissue.blade.forces import apply_blade_forces
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
+from tissue.elasticity.neo_hookean import (
+    corner_forces,
+    displacements,
+    gradients,
+    has_averaged_volumes,
+    pressures,
+)
 from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
 from tissue.integrators.step_context import Increment, StepContext
 from tissue.integrators.substeps import begin_substep, end_substep
@@ -39,7 +45,7 @@ class Threads:
         for i in range(n):
             at = increment.begin + i * share
             seconds, when = share * increment.dt, at + share
-            begin_substep(system.context, seconds)
+            begin_substep(system.context, seconds, i, n)
             self._step(system.context, increment, at, share)
             while not end_substep(system.context, increment.edge, seconds, when):
                 system.contact.make_room()
@@ -67,11 +73,12 @@ class Threads:
         if not elastic.has_tetrahedra:
             return
         solid = elastic.solid
-        blocks = n_blocks(body.n_tetrahedra)
+        blocks = n_blocks(solid, body.n_tetrahedra)
+        self._share(body.n_nodes, displacements, solid, body, positions, solid.every)
+        self._share(blocks, gradients, solid, solid.every)
         if has_averaged_volumes(solid):
-            self._share(blocks, volumes, solid, positions, solid.every)
             self._share(body.n_nodes, pressures, solid, solid.every)
-        self._share(blocks, corner_forces, solid, positions, solid.every)
+        self._share(blocks, corner_forces, solid, solid.every)
 
     def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:
         """Run `loop(*arguments, begin, end)` over 0 to `n`, a part of it on each thread."""

@@ -9,18 +9,26 @@ import numpy as np
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH
+from tissue.core.simd_blocks import width_of
 from tissue.core.structs import Arrays, IntCell
-from tissue.elasticity.finite_elements import Solid, n_blocks, tetrahedron_of_slot
+from tissue.elasticity.finite_elements import Solid, tetrahedron_of_slot
 from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.neo_hookean import corner_forces, has_averaged_volumes, pressures, volumes
+from tissue.elasticity.neo_hookean import (
+    corner_forces,
+    displacements_of_blocks,
+    gradients,
+    has_averaged_volumes,
+    pressures,
+)
 from tissue.integrators.node_rings import Rings
+from tissue.mesh.body import Body
 
 
 class Patch(Arrays):
     """What to evaluate: lists of blocks of tetrahedra, and of nodes."""
 
     volumes: IntArray
-    """Blocks whose volumes are needed, shape (block capacity,)."""
+    """Blocks whose gradients and volumes are needed, shape (block capacity,)."""
     pressures: IntArray
     """Nodes whose pressures are needed, shape (node capacity,)."""
     forces: IntArray
@@ -45,7 +53,7 @@ class Patch(Arrays):
 
 def new_patch(n_nodes: int, n_tetrahedra: int) -> Patch:
     """Return an empty patch with room for that many nodes and tetrahedra."""
-    blocks = n_blocks(n_tetrahedra)
+    blocks = (n_tetrahedra + WIDTH - 1) // WIDTH  # the larger number of the two precisions
     return Patch(
         volumes=np.zeros(blocks, np.int64),
         pressures=np.zeros(n_nodes, np.int64),
@@ -81,8 +89,8 @@ def find_patch(patch: Patch, elastic: Elastic, rings: Rings, moving: int, affect
         return
     solid = elastic.solid
     patch.n_forces = _blocks_around(patch, solid, rings, affected, patch.forces)
+    patch.n_volumes = _blocks_around(patch, solid, rings, moving, patch.volumes)
     if has_averaged_volumes(solid):
-        patch.n_volumes = _blocks_around(patch, solid, rings, moving, patch.volumes)
         for k in range(rings.n_found):
             if rings.ring[rings.order[k]] > 1:
                 break
@@ -101,7 +109,7 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
             break
         first = solid.first[node]
         for slot in range(first, first + solid.count[node]):
-            block = tetrahedron_of_slot(solid, slot) // WIDTH
+            block = tetrahedron_of_slot(solid, slot) // width_of(solid.shape)
             if patch.seen[block] != patch.epoch:
                 patch.seen[block] = patch.epoch
                 out[n] = block
@@ -110,11 +118,12 @@ def _blocks_around(patch: Patch, solid: Solid, rings: Rings, last_ring: int, out
 
 
 @kernel
-def deform_patch(patch: Patch, elastic: Elastic, positions: FloatArray) -> None:
+def deform_patch(patch: Patch, elastic: Elastic, body: Body, positions: FloatArray) -> None:
     """Evaluate the tetrahedra of a patch at `positions` [m], for `internal_force`."""
     if elastic.has_tetrahedra:
         solid = elastic.solid
+        displacements_of_blocks(solid, body, positions, patch.volumes, patch.n_volumes)
+        gradients(solid, patch.volumes, 0, patch.n_volumes)
         if has_averaged_volumes(solid):
-            volumes(solid, positions, patch.volumes, 0, patch.n_volumes)
             pressures(solid, patch.pressures, 0, patch.n_pressures)
-        corner_forces(solid, positions, patch.forces, 0, patch.n_forces)
+        corner_forces(solid, patch.forces, 0, patch.n_forces)

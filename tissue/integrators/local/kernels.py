@@ -190,7 +190,7 @@ def macro_step(
     external, share, kick, dt = context.stages.external, step.share, step.kick, step.dt
     h = share * dt
     springs = elastic.springs
-    deform_patch(state.listed, elastic, body.positions)
+    deform_patch(state.listed, elastic, body, body.positions)
     for m in range(len(chebyshev.push)):
         part = kick * share * chebyshev.weight[m]
         apply_blade_forces(blade, body, edge, body.positions, at, part, dt, external)
@@ -198,7 +198,7 @@ def macro_step(
             _accelerate_coarse(context, activity, zone)
             _begin_fine(body, springs, zone, surroundings)
         else:
-            deform_patch(zone.patch, elastic, body.positions)
+            deform_patch(zone.patch, elastic, body, body.positions)
         _substep(context, state, chebyshev, h, m)
     clear_blade_forces(blade, body, external)
     _kick(body, activity, zone, surroundings.drag, h, kick)

@@ -151,7 +151,7 @@ class LocalStepper:
             self._update_listed(system)
             patch, nodes = self._listed, self._activity.listed
             blocks = (patch.forces, patch.n_forces)
-            strain_frequencies(elastic, system.body.positions, *blocks, nodes, self.n_awake)
+            strain_frequencies(elastic, system.body, *blocks, nodes, self.n_awake)
 
     def _update_listed(self, system: System) -> None:
         """Find the tetrahedra around the listed nodes, if the list or the mesh has changed."""

@@ -1,0 +1,274 @@
+"""Vectors of one block of tetrahedra inside kernels: eight doubles, or sixteen singles.
+
+The loops over tetrahedra read the same for both: how many numbers a vector holds follows from the
+array that it is loaded from. A row is x, y, z of a point and a 0, in either precision.
+
+As in `tissue.core.simd` each function is also a plain Python function, which runs when the JIT is
+off.
+"""
+
+from typing import Any, cast
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+
+from tissue.core.array_types import FloatArray, SlotArray
+from tissue.core.jit import kernel
+from tissue.core.simd import (
+    _EVEN,
+    _FIRST,
+    _I32,
+    _I64,
+    _ODD,
+    _POINT,
+    _SECOND,
+    LANES,
+    LANES_OF_SINGLES,
+    POINT,
+    Lanes,
+    LanesType,
+    Point,
+    _Array,
+    _compiled,
+    _declared,
+    _everywhere,
+    _shuffled,
+    _tuple_of,
+)
+from tissue.core.simd_gather import _tree
+
+_BOTH = (LANES, LANES_OF_SINGLES)
+_LOW = [x for q in range(0, 16, 4) for x in (q, 16 + q, q + 1, 17 + q)]
+_HIGH = [x for q in range(0, 16, 4) for x in (q + 2, 18 + q, q + 3, 19 + q)]
+_FORMER = [x for q in range(0, 16, 4) for x in (q, q + 1, 16 + q, 17 + q)]
+_LATTER = [x for q in range(0, 16, 4) for x in (q + 2, q + 3, 18 + q, 19 + q)]
+"""Orders of a transposition of four by four within each quarter of a vector of singles."""
+
+
+def _kind_of(array: types.Array, *_: types.Type) -> LanesType:
+    return LANES_OF_SINGLES if array.dtype == types.float32 else LANES
+
+
+def _vector_of(array: _Array) -> Any:
+    """Return LLVM's type of the vectors of an array."""
+    return ir.VectorType(array.element, 16 if isinstance(array.element, ir.FloatType) else 8)
+
+
+def width_of(array: FloatArray) -> int:
+    """Return how many numbers of an array are in a vector: 8 doubles or 16 singles."""
+    return 16 if array.dtype == np.float32 else 8
+
+
+@_compiled(width_of, types.Array, result=types.int64)
+def _width_of(_: Any, array: _Array) -> Any:
+    return ir.Constant(_I64, _vector_of(array).count)
+
+
+def alike(value: float, a: Lanes) -> Lanes:
+    """Return a number in all lanes of a vector of the type of `a`."""
+    return np.full_like(a, value)
+
+
+def load_block(array: FloatArray, i: int) -> Lanes:
+    """Return the elements of a vector from `i` on."""
+    return array[i : i + width_of(array)].copy()
+
+
+@_compiled(load_block, types.Array, types.Integer, result=_kind_of)
+def _load_block(builder: Any, array: _Array, i: Any) -> Any:
+    pointer = builder.bitcast(array.at(i), _vector_of(array).as_pointer())
+    return builder.load(pointer, align=_size_of(array.element))
+
+
+def store_block(array: FloatArray, i: int, values: Lanes) -> None:
+    """Write the elements of a vector from `i` on."""
+    array[i : i + len(values)] = values
+
+
+def sum_of_lanes(a: Lanes) -> float:
+    """Return the sum of the numbers of a vector, neighbours first."""
+    return float(_tree(list(a)))
+
+
+for _kind in _BOTH:
+
+    @_compiled(alike, types.Float, _kind, result=_kind)
+    def _alike(builder: Any, value: Any, a: Any) -> Any:
+        return _everywhere(builder, _converted(builder, value, a.type.element), a.type)
+
+    @_compiled(store_block, types.Array, types.Integer, _kind, result=types.void)
+    def _store_block(builder: Any, array: _Array, i: Any, values: Any) -> None:
+        pointer = builder.bitcast(array.at(i), values.type.as_pointer())
+        builder.store(values, pointer, align=_size_of(array.element))
+
+    @_compiled(sum_of_lanes, _kind, result=types.float64)
+    def _sum_of_lanes(builder: Any, a: Any) -> Any:
+        terms = [builder.extract_element(a, _I32(k)) for k in range(a.type.count)]
+        return _converted(builder, _tree(terms, builder.fadd), ir.DoubleType())
+
+
+def gathered_alike(a: Lanes, values: FloatArray, of: SlotArray, i: int) -> Lanes:
+    """Return `values` at `of[i]` and the places behind it, as a vector of the type of `a`."""
+    return values[of[i : i + len(a)]].astype(a.dtype)
+
+
+for _kind in _BOTH:
+
+    @_compiled(gathered_alike, _kind, types.Array, types.Array, types.Integer, result=_kind)
+    def _gathered_alike(builder: Any, a: Any, values: _Array, of: _Array, i: Any) -> Any:
+        made = ir.Constant(a.type, ir.Undefined)
+        for lane in range(a.type.count):
+            place = builder.load(of.at(builder.add(i, i.type(lane))))
+            value = _converted(builder, builder.load(values.at(place)), a.type.element)
+            made = builder.insert_element(made, value, _I32(lane))
+        return made
+
+
+def _converted(builder: Any, value: Any, element: Any) -> Any:
+    """Return a number in the precision of that element."""
+    if value.type == element:
+        return value
+    if isinstance(element, ir.FloatType):
+        return builder.fptrunc(value, element)
+    return builder.fpext(value, element)
+
+
+def _size_of(element: Any) -> int:
+    return 4 if isinstance(element, ir.FloatType) else 8
+
+
+# rows of four: points, and forces on corners
+
+
+def store_row(rows: FloatArray, i: int, a: Point) -> None:
+    """Write a point into row `i` of an array of shape (n, 4), in its precision."""
+    rows[i] = a
+
+
+@_compiled(store_row, types.Array, types.Integer, POINT, result=types.void)
+def _store_row(builder: Any, rows: _Array, i: Any, a: Any) -> None:
+    kind = ir.VectorType(rows.element, 4)
+    values = a if kind == _POINT else builder.fptrunc(a, kind)
+    pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
+    builder.store(values, pointer, align=4 * _size_of(rows.element))
+
+
+def _row(builder: Any, rows: _Array, i: Any) -> Any:
+    kind = ir.VectorType(rows.element, 4)
+    pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
+    return builder.load(pointer, align=4 * _size_of(rows.element))
+
+
+def sum_of_eight_rows(rows: FloatArray, of: SlotArray, i: int) -> Point:
+    """Return the sum of rows `of[i]` to `of[i + 7]` of an array of shape (n, 4), in doubles."""
+    return np.asarray(_tree(list(rows[of[i : i + 8]])), dtype=np.float64)
+
+
+@_compiled(sum_of_eight_rows, types.Array, types.Array, types.Integer, result=POINT)
+def _sum_of_eight_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
+    places = [builder.load(of.at(builder.add(i, i.type(k)))) for k in range(8)]
+    total = _tree([_row(builder, rows, place) for place in places], builder.fadd)
+    return total if total.type == _POINT else builder.fpext(total, _POINT)
+
+
+def points_of_rows(rows: FloatArray, of: SlotArray, i: int) -> tuple[Lanes, Lanes, Lanes]:
+    """Return x, y and z of the rows at `of[i]` and the places behind it, shape (n, 4)."""
+    found = rows[of[i : i + width_of(rows)]]
+    return found[:, 0].copy(), found[:, 1].copy(), found[:, 2].copy()
+
+
+def _three(rows: types.Array, *_: types.Type) -> Any:
+    return cast(Any, types).UniTuple(_kind_of(rows), 3)
+
+
+@_compiled(points_of_rows, types.Array, types.Array, types.Integer, result=_three)
+def _points_of_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
+    def shuffled(a: Any, b: Any, order: Any) -> Any:
+        return _shuffled(builder, a, b, order)
+
+    n = _vector_of(rows).count
+    found = [_row(builder, rows, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(n)]
+    if n == 8:
+        a, b, c, d = (shuffled(found[k], found[k + 4], range(8)) for k in range(4))
+        ab, cd = shuffled(a, b, _EVEN), shuffled(c, d, _EVEN)
+        x, z = shuffled(ab, cd, _FIRST), shuffled(ab, cd, _SECOND)
+        y = shuffled(shuffled(a, b, _ODD), shuffled(c, d, _ODD), _FIRST)
+        return _tuple_of(builder, [x, y, z])
+    quarters = []
+    for k in range(4):
+        low = shuffled(found[k], found[4 + k], range(8))
+        high = shuffled(found[8 + k], found[12 + k], range(8))
+        quarters.append(shuffled(low, high, range(16)))
+    a, b, c, d = quarters
+    ab, cd = shuffled(a, b, _LOW), shuffled(c, d, _LOW)
+    x, y = shuffled(ab, cd, _FORMER), shuffled(ab, cd, _LATTER)
+    z = shuffled(shuffled(a, b, _HIGH), shuffled(c, d, _HIGH), _FORMER)
+    return _tuple_of(builder, [x, y, z])
+
+
+@kernel
+def row_of_lane(lane: int, width: int) -> int:
+    """Return in which of `width` rows `store_rows` writes that lane: without a last shuffle."""
+    return lane % 4 * (width // 4) + lane // 4
+
+
+def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
+    """Write the points of a vector into as many rows from `i` on, lane k into `row_of_lane`."""
+    n = len(x)
+    for lane in range(n):
+        rows[i + row_of_lane(lane, n)] = (x[lane], y[lane], z[lane], 0.0)
+
+
+for _kind in _BOTH:
+
+    @_compiled(store_rows, types.Array, types.Integer, _kind, _kind, _kind, result=types.void)
+    def _store_rows(builder: Any, rows: _Array, i: Any, x: Any, y: Any, z: Any) -> None:
+        def shuffled(a: Any, b: Any, order: Any) -> Any:
+            return _shuffled(builder, a, b, order)
+
+        n = x.type.count
+        zero = ir.Constant(x.type, [0.0] * n)
+        if n == 8:
+            a, b = shuffled(x, y, _EVEN), shuffled(z, zero, _EVEN)
+            c, d = shuffled(x, y, _ODD), shuffled(z, zero, _ODD)
+            orders = (a, b, _FIRST), (c, d, _FIRST), (a, b, _SECOND), (c, d, _SECOND)
+        else:
+            a, b = shuffled(x, y, _LOW), shuffled(z, zero, _LOW)
+            c, d = shuffled(x, y, _HIGH), shuffled(z, zero, _HIGH)
+            orders = (a, b, _FORMER), (a, b, _LATTER), (c, d, _FORMER), (c, d, _LATTER)
+        for k, order in enumerate(orders):
+            place = rows.at(builder.add(i, i.type(k * n // 4)), 4)
+            pointer = builder.bitcast(place, x.type.as_pointer())
+            builder.store(shuffled(*order), pointer, align=4 * _size_of(rows.element))
+
+
+# functions of `tissue.core.simd` for singles
+
+
+def _register_singles() -> None:
+    from tissue.core import simd, simd_gather
+
+    kind = LANES_OF_SINGLES
+
+    @_compiled(simd.logarithm, kind, result=kind)
+    def _logarithm(builder: Any, a: Any) -> Any:
+        function = _declared(builder.module, "llvm.log.v16f32", ir.FunctionType(a.type, [a.type]))
+        return builder.call(function, [a])
+
+    _compiled(simd_gather.larger, kind, kind, result=kind)(simd_gather._larger)
+    _compiled(simd_gather.where_larger, kind, kind, kind, kind, result=kind)(
+        simd_gather._where_larger
+    )
+
+    @_compiled(simd_gather.largest, kind, result=types.float64)
+    def _largest(builder: Any, a: Any) -> Any:
+        values = [builder.extract_element(a, _I32(k)) for k in range(16)]
+
+        def fold(b: Any, c: Any) -> Any:
+            return builder.select(builder.fcmp_ordered(">", b, c), b, c)
+
+        return builder.fpext(_tree(values, fold), ir.DoubleType())
+
+
+_register_singles()
