@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +21,7 @@ from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink, link_to
-from bridge.poses import check_pose, half_length, motion
+from bridge.poses import Axes, axes_of, check_pose, half_length, motion_of
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -91,7 +92,7 @@ class Bridge:
         self._tissue_every = tissue_every
         # With an answer in each frame the model has nothing to add to the answer itself.
         self._is_direct = waits and tissue_every == 1 and coupling is None
-        self._segment: BladeSegment | None = None
+        self._arm: tuple[BladeSegment, Axes] | None = None
         self._asked_at: BladeSegment | None = None
         self._path: list[tuple[BladeSegment, float]] = []
         self._result: StepResult | None = None
@@ -127,8 +128,10 @@ class Bridge:
             raise ValueError(f"the frame lasts {dt} s; it must be positive and finite")
         check_pose(segment)
         arm = self._frame.segment_to_tissue(segment)
-        arm_motion = motion(self._segment or arm, arm)
-        self._segment = arm
+        axes = axes_of(arm)
+        before, axes_before = (arm, axes) if self._arm is None else self._arm
+        arm_motion = motion_of(before, axes_before, arm, axes)
+        self._arm = arm, axes
         self._n_frames += 1
         balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
         blade = arm if self._proxy is None else self._proxy.pose
@@ -147,9 +150,8 @@ class Bridge:
         self._wrench_raw = Wrench(raw[:3], raw[3:], arm.tip)
         work = 0.0 if self._result is None else self._result.work_of_blade
         travel = Travel(arm_motion, half_length(arm), work)
-        return self._frame.wrench_to_world(
-            self._coupling.render(self._wrench_raw, dt, travel, self._silence)
-        )
+        felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
+        return self._frame.wrench_to_world(Wrench(felt[:3], felt[3:], arm.tip))
 
     @property
     def result(self) -> StepResult | None:
@@ -214,31 +216,36 @@ class Bridge:
         hold tissue may run into it: it moves as the arm did, frame by frame, or the tissue would
         find it deep inside.
         """
-        blade = self._path[-1][0]
-        seconds = sum(dt for _, dt in self._path)
         path = self._path
-        if self._holds_as_much and len(path) > 2:
-            path = [(path[-2][0], seconds - path[-1][1]), path[-1]]
-        before, sweeps = self._asked_at or blade, []
-        for pose, _ in path:
-            sweeps.append(BladeSweep(before, pose))
-            before = pose
-        engaged = self._engaged()
-        found = [self._broad_phase.overlaps(sweep, seconds, engaged=engaged) for sweep in sweeps]
-        self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
-        if any(one.tissue for one in found):
-            parts = [TimedSweep(sweep, dt) for sweep, (_, dt) in zip(sweeps, path, strict=True)]
+        blade, engaged = path[-1][0], self._engaged()
+        if len(path) == 1:
+            sweep, seconds = BladeSweep(self._asked_at or blade, blade), path[0][1]
+            touches, self._touching = self._broad_phase.overlaps(sweep, seconds, engaged=engaged)
+            parts = [TimedSweep(sweep, seconds)]
         else:
+            seconds = sum(dt for _, dt in path)
+            if self._holds_as_much and len(path) > 2:
+                path = [(path[-2][0], seconds - path[-1][1]), path[-1]]
+            ends = [self._asked_at or blade, *(pose for pose, _ in path)]
+            sweeps = [BladeSweep(*pair) for pair in pairwise(ends)]
+            overlaps = self._broad_phase.overlaps
+            found = [overlaps(sweep, seconds, engaged=engaged) for sweep in sweeps]
+            self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
+            touches = any(one.tissue for one in found)
+            parts = [TimedSweep(sweep, dt) for sweep, (_, dt) in zip(sweeps, path, strict=True)]
+        if not touches:
             parts = [TimedSweep(None, seconds)]
             self._n_rejected += 1
         self._query.ask(parts, blade)
-        self._impulse.end_period()
+        if not self._is_direct:
+            self._impulse.end_period()
         self._asked_at, self._path = blade, []
 
     def _process(self, answer: TissueAnswer) -> None:
         """Update broad phase, local model and impulse from an answer."""
         result = answer.result
-        if not math.isfinite(sum(result.bounds.ravel().tolist())):
+        low, high = result.bounds.tolist()
+        if not math.isfinite(sum(low) + sum(high)):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
         self._broad_phase.update_bounds(result.bounds, answer.seconds)
         if not self._is_direct:

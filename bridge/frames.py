@@ -57,26 +57,35 @@ class TissueFrame:
 
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
+        tip, heel, forward = segment
+        if not self._is_rotated:
+            return BladeSegment(tip - self.origin, heel - self.origin, forward.copy())
         return BladeSegment(
-            self.points_to_tissue(segment.tip),
-            self.points_to_tissue(segment.heel),
-            self.vectors_to_tissue(segment.forward),
+            self.points_to_tissue(tip),
+            self.points_to_tissue(heel),
+            self.vectors_to_tissue(forward),
         )
 
     def segment_to_world(self, segment: BladeSegment) -> BladeSegment:
         """Return a segment of the tissue frame in the world."""
+        tip, heel, forward = segment
+        if not self._is_rotated:
+            return BladeSegment(tip + self.origin, heel + self.origin, forward.copy())
         return BladeSegment(
-            self.points_to_world(segment.tip),
-            self.points_to_world(segment.heel),
-            self.vectors_to_world(segment.forward),
+            self.points_to_world(tip),
+            self.points_to_world(heel),
+            self.vectors_to_world(forward),
         )
 
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
         """Return a wrench of the tissue frame in the world, about the same point."""
+        force, torque, point = wrench
+        if not self._is_rotated:
+            return Wrench(force.copy(), torque.copy(), point + self.origin)
         return Wrench(
-            self.vectors_to_world(wrench.force),
-            self.vectors_to_world(wrench.torque),
-            self.points_to_world(wrench.point),
+            self.vectors_to_world(force),
+            self.vectors_to_world(torque),
+            self.points_to_world(point),
         )
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:

@@ -17,6 +17,11 @@ _UNIT_TOLERANCE = 1e-6
 """Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
 
+_Axis = tuple[float, float, float]
+Axes = tuple[_Axis, _Axis, _Axis]
+"""Unit vectors along the edge of a blade, forward across it, and normal to its flat."""
+
+
 def check_pose(segment: BladeSegment) -> None:
     """Check that a pose is finite and has a plane.
 
@@ -48,15 +53,22 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
     The rotation carries edge and flat of the first pose to those of the second, by less than half
     a turn.
     """
-    a, b = _axes(before), _axes(after)
-    # Over the three axes, the sum of a x b is the axis of rotation times twice the sine, and the
-    # sum of a . b is one plus twice the cosine.
-    sx = sy = sz = trace = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip(a, b, strict=True):
-        sx += ay * bz - az * by
-        sy += az * bx - ax * bz
-        sz += ax * by - ay * bx
-        trace += ax * bx + ay * by + az * bz
+    return motion_of(before, axes_of(before), after, axes_of(after))
+
+
+def motion_of(
+    before: BladeSegment, axes_before: Axes, after: BladeSegment, axes_after: Axes
+) -> FloatArray:
+    """Return `motion` between two poses whose axes are known, shape (6,)."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = axes_before
+    (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = axes_after
+    # Over the three axes, the sum of a x u is the axis of rotation times twice the sine, and the
+    # sum of a . u is one plus twice the cosine.
+    sx = (ay * uz - az * uy) + (by * vz - bz * vy) + (cy * wz - cz * wy)
+    sy = (az * ux - ax * uz) + (bz * vx - bx * vz) + (cz * wx - cx * wz)
+    sz = (ax * uy - ay * ux) + (bx * vy - by * vx) + (cx * wy - cy * wx)
+    trace = (ax * ux + ay * uy + az * uz) + (bx * vx + by * vy + bz * vz)
+    trace += cx * wx + cy * wy + cz * wz
     sine = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
     half = 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 0.0 else 0.5
     x, y, z = before.tip.tolist()
@@ -81,7 +93,7 @@ def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
 
 def half_length(segment: BladeSegment) -> float:
     """Return half the length of the edge [m]."""
-    return 0.5 * math.hypot(*(segment.tip - segment.heel).tolist())
+    return 0.5 * math.dist(segment.tip.tolist(), segment.heel.tolist())
 
 
 def _rotation(vector: FloatArray, angle: float) -> FloatArray:
@@ -98,10 +110,7 @@ def _rotation(vector: FloatArray, angle: float) -> FloatArray:
     )
 
 
-_Axis = tuple[float, float, float]
-
-
-def _axes(segment: BladeSegment) -> tuple[_Axis, _Axis, _Axis]:
+def axes_of(segment: BladeSegment) -> Axes:
     """Return unit vectors along the edge, forward across it, and normal to the flat."""
     tx, ty, tz = segment.tip.tolist()
     hx, hy, hz = segment.heel.tolist()

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from scalpel_sim.output.force_parts import force_parts
 from tissue import (
     BladeSegment,
     BladeShape,
@@ -50,8 +51,9 @@ def warm_up() -> None:
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 0.6, N_STEPS):
         after = _edge(fraction)
-        tissue.step(BladeSweep(before, after), _DT)
+        result = tissue.step(BladeSweep(before, after), _DT)
         before = after
+    force_parts(result.contacts, before.forward)
     tissue.step(None, _DT)
     tissue.surface()
     tissue.snapshot()

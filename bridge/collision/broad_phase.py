@@ -16,6 +16,7 @@ import numpy as np
 from bridge.collision.chunk_boxes import ChunkBoxes
 from bridge.collision.collision_objects import MovableBox, Obstacles, are_colliding, fixture_objects
 from bridge.collision.fixtures import Fixture
+from bridge.collision.separating_axis import SeparatingAxis
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
 from tissue import BladeShape, BladeSweep, Chunks, FloatArray
 
@@ -42,6 +43,9 @@ class BroadPhase:
       around the body, that of its fastest side in the last step; for the chunks, that of the
       fastest node.
 
+    Where they were apart, and the axis that separated them still does (`SeparatingAxis`), they are
+    not compared by the collision library.
+
     Args:
         bounds: Lowest and highest corner of the tissue now [m], shape (2, 3).
         sound_speed: Speed of compression waves in the tissue [m/s].
@@ -63,13 +67,14 @@ class BroadPhase:
         blade: BladeShape | None = None,
         chunks: Callable[[], Chunks] | None = None,
     ) -> None:
-        self._bounds = bounds.copy()
+        self._bounds = _corners(bounds)
         self._sound_speed = sound_speed
         self._bounds_speed = 0.0
         self._blade_shape = blade
         self._chunks = chunks
         self._blade = MovableBox()
         self._chunk_boxes = ChunkBoxes()
+        self._separating = SeparatingAxis(blade)
         self._tissue = MovableBox()
         obstacles = fixture_objects(list(fixtures))
         self._has_fixtures = bool(obstacles)
@@ -84,7 +89,10 @@ class BroadPhase:
             engaged: Whether the blade holds tissue already, which it may drag out of any box.
         """
         if engaged and not self._has_fixtures:
-            return _Overlaps(True, ())
+            return _ONLY_TISSUE
+        travel = (self._sound_speed + self._bounds_speed) * dt
+        if not self._has_fixtures and self._separating.separates(sweep, self._bounds, travel):
+            return _NOTHING
         box = swept_blade(sweep, self._blade_shape)
         self._blade.place(box)
         fixtures = self._fixtures.colliding_with(self._blade.object)
@@ -92,15 +100,19 @@ class BroadPhase:
 
     def update_bounds(self, bounds: FloatArray, dt: float) -> None:
         """Set the bounds of the tissue after a step of `dt` [s], shape (2, 3)."""
-        self._bounds_speed = float(np.abs(bounds - self._bounds).max()) / dt
-        self._bounds = bounds.copy()
+        (ax, ay, az), (bx, by, bz) = self._bounds
+        self._bounds = _corners(bounds)
+        (ux, uy, uz), (vx, vy, vz) = self._bounds
+        moved = max(abs(ux - ax), abs(uy - ay), abs(uz - az))
+        self._bounds_speed = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz)) / dt
 
     def _reaches_tissue(self, box: SweptBox, dt: float) -> bool:
-        low, high = self._bounds
-        size = high - low + 2.0 * TOUCHING_MARGIN
-        self._tissue.place(SweptBox(0.5 * (low + high), size, _WORLD_AXES))
+        low, high = np.array(self._bounds)
+        tissue = SweptBox(0.5 * (low + high), high - low + 2.0 * TOUCHING_MARGIN, _WORLD_AXES)
+        self._tissue.place(tissue)
         self._blade.place(_inflated(box, (self._sound_speed + self._bounds_speed) * dt))
         if not are_colliding(self._tissue.object, self._blade.object):
+            self._separating.find(box, tissue)
             return False
         if self._chunks is None:
             return True
@@ -111,6 +123,13 @@ class BroadPhase:
 
 
 _WORLD_AXES = np.eye(3)
+_ONLY_TISSUE, _NOTHING = _Overlaps(True, ()), _Overlaps(False, ())
+
+
+def _corners(bounds: FloatArray) -> tuple[list[float], list[float]]:
+    """Return lowest and highest corner in plain numbers."""
+    low, high = bounds.tolist()
+    return low, high
 
 
 def _inflated(box: SweptBox, distance: float) -> SweptBox:

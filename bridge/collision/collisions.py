@@ -9,7 +9,8 @@ import numpy as np
 
 from bridge.collision.arm_geoms import ArmGeom
 from bridge.collision.collision_objects import MovableBox, are_colliding, fixture_objects
-from bridge.collision.fixtures import Fixture, bounds_of
+from bridge.collision.fixtures import Fixture, FixtureBox, bounds_of
+from bridge.collision.separation import gap_between
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, box_around
 from tissue import BoolArray, FloatArray
 
@@ -46,6 +47,7 @@ class Collisions:
         self._half_thickness = self._half_extents.min(axis=1, initial=np.inf)
         self._positions: FloatArray | None = None
         self._axes = np.zeros((0, 3, 3))
+        self._fixture_boxes = [_oriented_box(fixture) for fixture in obstacles]
         self._swept = MovableBox()
         self._pairs = self._possible_pairs()
         self._first = np.array([pair.geom for pair in self._pairs], np.int64)
@@ -93,8 +95,39 @@ class Collisions:
                 tested = self._swept.object
             if are_colliding(tested, self._pairs[k].object):
                 found.append((self._geoms[i].name, self._pairs[k].name))
-        self._positions, self._axes = positions.copy(), axes.copy()
+        self.pass_by(positions, axes)
         return tuple(found)
+
+    def pass_by(self, positions: FloatArray, axes: FloatArray) -> None:
+        """Take the poses of a frame in which nothing can collide, instead of testing them.
+
+        Args:
+            positions: Origins of the geoms [m], shape (n_geoms, 3).
+            axes: Axes of the geoms as columns, shape (n_geoms, 3, 3).
+        """
+        self._positions, self._axes = positions.copy(), axes.copy()
+
+    def clearance(self) -> float:
+        """Return a distance [m] that no pair came nearer than in the poses that were tested last.
+
+        It is that of bounding boxes, by `gap_between`, so zero does not mean that a pair collides.
+        """
+        assert self._positions is not None
+        first, second, boxes = self._first, self._second, self._boxes
+        gaps = np.maximum(boxes[first, 0] - boxes[second, 1], boxes[second, 0] - boxes[first, 1])
+        distances = np.sqrt(np.square(np.maximum(gaps, 0.0)).sum(axis=1))
+        # Boxes along the world's axes are larger than those along the geoms' own.
+        for k in np.flatnonzero(distances == 0.0).tolist():
+            pair = self._pairs[k]
+            distances[k] = gap_between(self._box(pair.geom), self._box(pair.other))
+        return float(distances.min(initial=math.inf))
+
+    def _box(self, i: int) -> SweptBox:
+        """Return the bounding box of a geom in its last pose, or of a fixture by its number."""
+        if i >= len(self._geoms):
+            return self._fixture_boxes[i - len(self._geoms)]
+        assert self._positions is not None
+        return SweptBox(self._positions[i], 2.0 * self._half_extents[i], self._axes[i])
 
     def _possible_pairs(self) -> list["_Pair"]:
         """Return all pairs whose collision is to be reported."""
@@ -153,6 +186,14 @@ class Collisions:
         return box_around(
             np.concatenate((before, now)), axes, 0.5 * chord * float(np.tan(0.25 * angle))
         )
+
+
+def _oriented_box(fixture: Fixture) -> SweptBox:
+    """Return the box of a fixture: its own, or one along the world's axes around a mesh."""
+    if isinstance(fixture, FixtureBox):
+        return SweptBox(fixture.centre, fixture.size, fixture.rotation)
+    low, high = bounds_of(fixture)
+    return SweptBox(0.5 * (low + high), high - low, np.eye(3))
 
 
 class _Pair(NamedTuple):

@@ -64,6 +64,11 @@ def swept_blade(sweep: BladeSweep, shape: BladeShape | None = None) -> SweptBox:
 
 def edge_axes(segment: BladeSegment) -> FloatArray:
     """Return orthonormal axes as columns: forward, along the edge, across the blade."""
+    return np.array(axes_across(segment)).reshape(3, 3)
+
+
+def axes_across(segment: BladeSegment) -> tuple[float, ...]:
+    """Return the nine numbers of `edge_axes`, row by row."""
     # Plain floats: a tenth of the time of np.cross on single vectors.
     ex, ey, ez = (segment.tip - segment.heel).tolist()
     length = math.hypot(ex, ey, ez)
@@ -73,4 +78,4 @@ def edge_axes(segment: BladeSegment) -> FloatArray:
     length = math.hypot(nx, ny, nz)
     nx, ny, nz = nx / length, ny / length, nz / length
     fx, fy, fz = ey * nz - ez * ny, ez * nx - ex * nz, ex * ny - ey * nx
-    return np.array(((fx, ex, nx), (fy, ey, ny), (fz, ez, nz)))
+    return (fx, ex, nx, fy, ey, ny, fz, ez, nz)

@@ -1,6 +1,7 @@
 """From the tissue's wrench to the one that the arm feels: finite, within limits, passive."""
 
 import math
+from typing import NoReturn
 
 import numpy as np
 
@@ -73,13 +74,42 @@ class Coupling:
         Raises:
             CouplingError: the wrench is not finite, or was implausible for too long.
         """
-        wanted = self._plausible(wrench)
-        wanted = self._within_limits(wanted, self._watchdog.gain(silence, dt))
+        six = np.concatenate([wrench.force, wrench.torque])
+        felt = self.felt(six, wrench.point, dt, travel, silence)
+        return Wrench(felt[:3], felt[3:], wrench.point)
+
+    def felt(
+        self, wrench: FloatArray, point: FloatArray, dt: float, travel: Travel, silence: float
+    ) -> FloatArray:
+        """Return what `render` does for force [N] and torque [N m] about a point, shape (6,).
+
+        Args:
+            wrench: Wrench of the tissue on the blade, about the tip, shape (6,).
+            point: The tip [m], shape (3,).
+            dt: Length of the frame [s].
+            travel: Motion and work of the blade since the last frame, in the frame of the wrench.
+            silence: How long the arm has waited for the tissue by now [s].
+        """
+        fx, fy, fz, tx, ty, tz = wrench.tolist()
+        force_size, torque_size = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
+        if not math.isfinite(force_size + torque_size + math.hypot(*point.tolist())):
+            self._refuse(wrench, point)
+        if force_size <= MAX_PLAUSIBLE_FORCE and torque_size <= MAX_PLAUSIBLE_TORQUE:
+            self._n_implausible_in_a_row = 0
+            wanted = wrench
+        else:
+            self._count_implausible(force_size, torque_size)
+            force_size = torque_size = 0.0
+            wanted = np.zeros(6)
+        gain = self._watchdog.gain(silence, dt)
+        factor = self._factor_within_limits(gain, force_size, torque_size)
+        if factor != 1.0:
+            wanted = factor * wanted
         passive = self._passivity.correct(wanted, travel)
         felt = self._within_slew(passive, dt)
         self._passivity.record(felt, wanted, travel)
         self._felt = felt
-        return Wrench(felt[:3], felt[3:], wrench.point)
+        return felt
 
     @property
     def passivity(self) -> PassivityCounters:
@@ -96,19 +126,17 @@ class Coupling:
         """Frames in which the arm felt less than the full wrench, by silence or the ramp."""
         return self._watchdog.n_faded
 
-    def _plausible(self, wrench: Wrench) -> FloatArray:
-        """Return force and torque, shape (6,), or zeros for an implausible wrench."""
-        force_size, torque_size = magnitude(wrench.force), magnitude(wrench.torque)
-        if not math.isfinite(force_size + torque_size + magnitude(wrench.point)):
-            self.n_not_finite += 1
-            raise CouplingError(
-                f"the tissue answered with a force of {wrench.force.tolist()} N and a torque of "
-                f"{wrench.torque.tolist()} N m at {wrench.point.tolist()} m, which is not finite: "
-                "its simulation has diverged. Try a smaller time step or a slower stroke"
-            )
-        if force_size <= MAX_PLAUSIBLE_FORCE and torque_size <= MAX_PLAUSIBLE_TORQUE:
-            self._n_implausible_in_a_row = 0
-            return np.concatenate([wrench.force, wrench.torque])
+    def _refuse(self, wrench: FloatArray, point: FloatArray) -> NoReturn:
+        """Raise the error of a wrench that is not finite."""
+        self.n_not_finite += 1
+        raise CouplingError(
+            f"the tissue answered with a force of {wrench[:3].tolist()} N and a torque of "
+            f"{wrench[3:].tolist()} N m at {point.tolist()} m, which is not finite: "
+            "its simulation has diverged. Try a smaller time step or a slower stroke"
+        )
+
+    def _count_implausible(self, force_size: float, torque_size: float) -> None:
+        """Count an implausible wrench, which is replaced by zero; raise if it persists."""
         self.n_implausible += 1
         self._n_implausible_in_a_row += 1
         if self._n_implausible_in_a_row == MAX_IMPLAUSIBLE_FRAMES:
@@ -119,18 +147,16 @@ class Coupling:
                 "smaller time step or a slower stroke"
             )
         self._watchdog.reset()
-        return np.zeros(6)
 
-    def _within_limits(self, wrench: FloatArray, gain: float) -> FloatArray:
-        """Return force and torque, both scaled by the factor that the stricter limit requires."""
-        force_size, torque_size = gain * magnitude(wrench[:3]), gain * magnitude(wrench[3:])
+    def _factor_within_limits(self, gain: float, force_size: float, torque_size: float) -> float:
+        """Return the factor of the whole wrench that the stricter limit requires."""
+        force_size, torque_size = gain * force_size, gain * torque_size
         limits = self._limits
         self.n_force_limited += force_size > limits.force
         self.n_torque_limited += torque_size > limits.torque
-        factor = gain * min(
+        return gain * min(
             factor_to_limit(limits.force, force_size), factor_to_limit(limits.torque, torque_size)
         )
-        return wrench if factor == 1.0 else factor * wrench
 
     def _within_slew(self, wrench: FloatArray, dt: float) -> FloatArray:
         """Return the wrench that can be reached in `dt` on a straight line from the one felt now.
@@ -138,7 +164,9 @@ class Coupling:
         Both ends are within the other limits, so every wrench between them is too.
         """
         reach = self._limits.slew * dt
-        change = 0.0 if reach == math.inf else magnitude(wrench[:3] - self._felt[:3])
+        if reach == math.inf:
+            return wrench
+        change = magnitude(wrench[:3] - self._felt[:3])
         if change <= reach:
             return wrench
         factor = factor_to_limit(reach, change)

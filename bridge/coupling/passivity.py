@@ -4,6 +4,8 @@ After Hannaford and Ryu, Time-domain passivity control of haptic interfaces (200
 of freedom.
 """
 
+from collections.abc import Sequence
+from operator import add
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +81,7 @@ class Passivity:
     def __init__(self, limits: DeviceLimits = DeviceLimits(), acts: bool = True) -> None:
         self._limits = limits
         self._acts = acts
-        self._felt = np.zeros(6)
+        self._felt_numbers = [0.0] * 6
         self._feels = False
         self._taken = _ZERO_WRENCH
         self._energy = 0.0
@@ -96,13 +98,13 @@ class Passivity:
             wanted: Force [N] and torque about the tip [N m], within the device's limits.
             travel: Motion and work of the blade since the last frame.
         """
-        if not (self._feels or any(wanted.tolist())):
+        numbers, motion = wanted.tolist(), travel.motion.tolist()
+        if not (self._feels or any(numbers)):
             self._energy, self._work_at_start = 0.0, travel.work_on_tissue
         self._given = min(0.0, travel.work_on_tissue - self._work_at_start)
         if not self._acts:
             return wanted
-        spent = float(self._felt @ travel.motion)
-        power = float(wanted @ travel.motion)
+        spent, power = _work(self._felt_numbers, motion), _work(numbers, motion)
         left = self._energy - 0.5 * spent - self._given + ENERGY_TOLERANCE
         # While energy is left, both halves of the work are reserved. A deficit must be recovered in
         # the half that is being decided; reversing the last wrench is always enough, unless the
@@ -116,7 +118,7 @@ class Passivity:
             return damped
         if most >= 0.0:
             return wanted * (most / power)
-        opposite = self._felt if spent < 0.0 else -self._felt
+        opposite = np.array(self._felt_numbers) if spent < 0.0 else -np.array(self._felt_numbers)
         share = (power - most) / (power + abs(spent))
         return (1.0 - share) * wanted + share * opposite
 
@@ -128,13 +130,14 @@ class Passivity:
             wanted: Wrench without the controller, shape (6,).
             travel: Motion and work of the blade as given to `correct`.
         """
-        self._energy -= 0.5 * float((self._felt + wrench) @ travel.motion)
+        felt, motion = wrench.tolist(), travel.motion.tolist()
+        both = list(map(add, self._felt_numbers, felt))
+        self._energy -= 0.5 * _work(both, motion)
         self._least = min(self._least, self._energy - self._given)
         taken = _ZERO_WRENCH if wrench is wanted else wanted - wrench
         if taken is not self._taken:
-            self._injected += 0.5 * float((self._taken + taken) @ travel.motion)
-        self._feels = any(wrench.tolist())
-        self._felt, self._taken = wrench, taken
+            self._injected += 0.5 * _work((self._taken + taken).tolist(), motion)
+        self._felt_numbers, self._feels, self._taken = felt, any(felt), taken
 
     @property
     def counters(self) -> PassivityCounters:
@@ -142,6 +145,12 @@ class Passivity:
         return PassivityCounters(
             self._energy - self._given, self._least, self._injected, self._n_acted
         )
+
+
+def _work(wrench: Sequence[float], motion: Sequence[float]) -> float:
+    """Return the work of a wrench on a motion [J]. Plain floats: half the time of small arrays."""
+    (fx, fy, fz, tx, ty, tz), (x, y, z, u, v, w) = wrench, motion
+    return fx * x + fy * y + fz * z + tx * u + ty * v + tz * w
 
 
 def _unit_damper(travel: Travel) -> FloatArray:

@@ -94,6 +94,10 @@ class Query:
         return answer
 
     def _step(self, path: Sequence[TimedSweep], pose: BladeSegment) -> TissueAnswer:
+        if len(path) == 1:
+            sweep, duration = path[0]
+            result = self._link.step(sweep, min(duration, _LONGEST_STEP))
+            return TissueAnswer(result, pose, duration, result.wrench, sweep)
         results = [self._link.step(part.sweep, min(part.seconds, _LONGEST_STEP)) for part in path]
         seconds = [part.seconds for part in path]
         last_wrench = results[-1].wrench
@@ -105,8 +109,6 @@ class Query:
 def _combined(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:
     """Return the last result, with the mean wrench and summed times and counts of all steps."""
     last = results[-1]
-    if len(results) == 1:
-        return last
     force, torque = np.zeros(3), np.zeros(3)
     for result, duration in zip(results, seconds, strict=True):
         share = duration / sum(seconds)

@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
+from scalpel_sim.arm.joint_reach import JointReach
 from tissue import FloatArray
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
@@ -58,8 +59,20 @@ class ArmParts:
                     checked_against_fixtures=int(model.body_weldid[body]) != WORLD,
                 )
             )
-        self._positions = data.geom_xpos
-        self._axes = data.geom_xmat
+        self.reach = JointReach(model, data, self._geoms)
+        """How far the parts can have moved."""
+        self._positions, self._axes = data.geom_xpos, data.geom_xmat
+        self._positions_before, self._axes_before = self._positions.copy(), self._axes.copy()
+
+    def remember(self) -> None:
+        """Keep where the parts are now, for `before`."""
+        self._positions_before[:] = self._positions
+        self._axes_before[:] = self._axes
+
+    def before(self) -> tuple[FloatArray, FloatArray]:
+        """Return positions and axes of the parts when they were last remembered. Copies."""
+        axes = self._axes_before[self._geoms]
+        return self._positions_before[self._geoms], axes.reshape(-1, 3, 3)
 
     def positions(self) -> FloatArray:
         """Return where the parts are now [m], world frame, shape (n, 3). A copy."""

@@ -15,6 +15,10 @@ FLOOR_MARGIN = 0.02
 """How far the floor reaches beyond the body [m]. For the tissue it is infinite, but it must not
 reach the arm's base."""
 
+CLEARANCE_SHARE = 0.9
+"""Share of a clearance that the arm may use up before it is tested again. The rest is far above the
+rounding of both lengths."""
+
 _log = logging.getLogger("scalpel_sim")
 
 
@@ -23,6 +27,9 @@ class CollisionMonitor:
 
     Nothing pushes back where they collide, for neither MuJoCo nor the tissue knows of it: such a
     run is not what the device would do, so its user gets a warning.
+
+    As long as the joints cannot have moved the parts as far as the clearance that was found in the
+    last test (`JointReach`), nothing can collide, and nothing is tested.
 
     Args:
         arm: Its model's planes are fixtures too: the table.
@@ -36,6 +43,8 @@ class CollisionMonitor:
         self._arm = arm
         self._parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
         self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])
+        self._free_way = 0.0
+        self._has_passed = False
         self._now: tuple[tuple[str, str], ...] = ()
         self._frames: Counter[tuple[str, str]] = Counter()
 
@@ -51,7 +60,17 @@ class CollisionMonitor:
 
     def check(self) -> None:
         """Detect the collisions of the arm as it is now. The first one of each pair is logged."""
-        self._now = self._collisions.colliding_pairs(self._parts.positions(), self._parts.axes())
+        parts, collisions = self._parts, self._collisions
+        if parts.reach.displacement() < self._free_way:
+            parts.remember()
+            self._has_passed = True
+            return
+        if self._has_passed:
+            collisions.pass_by(*parts.before())
+            self._has_passed = False
+        self._now = collisions.colliding_pairs(parts.positions(), parts.axes())
+        self._free_way = 0.0 if self._now else CLEARANCE_SHARE * collisions.clearance()
+        parts.reach.begin()
         for pair in self._now:
             if pair not in self._frames:
                 _log.warning(

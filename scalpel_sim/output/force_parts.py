@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue import BladeContacts, FloatArray
+from tissue import BladeContacts, FloatArray, kernel
 
 EDGE_COSINE = 0.9
 """Cosine of the angle between a contact's normal and the blade's forward direction above which the
@@ -31,9 +31,30 @@ def force_parts(contacts: BladeContacts, forward: FloatArray) -> ForceParts:
         forward: Unit vector in which the blade cuts at the end of the step, in the frame of the
             contacts; shape (3,).
     """
-    pressing = contacts.normal_force[:, None] * contacts.normal
-    is_edge = contacts.normal @ forward > EDGE_COSINE
-    is_face = ~is_edge
-    edge = (pressing + contacts.friction)[is_edge]
-    total = np.add.reduce  # half the time of `sum`
-    return ForceParts(-total(edge), -total(pressing[is_face]), -total(contacts.friction[is_face]))
+    parts = np.empty((3, 3))
+    _add_up(contacts.normal, contacts.normal_force, contacts.friction, forward, parts)
+    return ForceParts(*parts)
+
+
+@kernel
+def _add_up(
+    normal: FloatArray,
+    normal_force: FloatArray,
+    friction: FloatArray,
+    forward: FloatArray,
+    parts: FloatArray,
+) -> None:
+    """Write the rows of `ForceParts`, contact by contact."""
+    for axis in range(3):
+        parts[0, axis] = parts[1, axis] = parts[2, axis] = 0.0
+    for i in range(len(normal_force)):
+        cosine = 0.0
+        for axis in range(3):
+            cosine += normal[i, axis] * forward[axis]
+        for axis in range(3):
+            pressing = normal_force[i] * normal[i, axis]
+            if cosine > EDGE_COSINE:
+                parts[0, axis] -= pressing + friction[i, axis]
+            else:
+                parts[1, axis] -= pressing
+                parts[2, axis] -= friction[i, axis]

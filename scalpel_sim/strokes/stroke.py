@@ -66,11 +66,14 @@ class Stroke:
         lengths = np.linalg.norm(edges, axis=1)
         self.blade_length = float(lengths[0])
         """From heel to tip [m]."""
-        self._middles = (tips + heels) / 2.0
+        middles = (tips + heels) / 2.0
+        self._middles: list[list[float]] = middles.tolist()
+        self._moves: list[list[float]] = np.diff(middles, axis=0).tolist()
         self._rotations = _quaternions(edges / lengths[:, None], forwards)
         self._spins = np.array(
             [_turn(a, b) for a, b in zip(self._rotations, self._rotations[1:], strict=False)]
         )
+        self._quaternion, self._axes = np.empty(4), np.empty(9)
 
     @property
     def duration(self) -> float:
@@ -82,12 +85,20 @@ class Stroke:
         t = min(max(t, 0.0), self._instants[-1])
         i = min(bisect_right(self._instants, t) - 1, len(self._spins) - 1)
         s = (t - self._instants[i]) / (self._instants[i + 1] - self._instants[i])
-        middle = self._middles[i] + s * (self._middles[i + 1] - self._middles[i])
-        quaternion, axes = self._rotations[i].copy(), np.empty(9)
-        mujoco.mju_quatIntegrate(quaternion, self._spins[i], s)
-        mujoco.mju_quat2Mat(axes, quaternion)
-        half_edge = 0.5 * self.blade_length * axes[1::3]
-        return BladeSegment(middle + half_edge, middle - half_edge, -axes[2::3])
+        self._quaternion[:] = self._rotations[i]
+        mujoco.mju_quatIntegrate(self._quaternion, self._spins[i], s)
+        mujoco.mju_quat2Mat(self._axes, self._quaternion)
+        # Plain floats: for each frame, and a third of the time of small arrays.
+        _, ex, fx, _, ey, fy, _, ez, fz = self._axes.tolist()
+        half = 0.5 * self.blade_length
+        ex, ey, ez = half * ex, half * ey, half * ez
+        (x, y, z), (dx, dy, dz) = self._middles[i], self._moves[i]
+        x, y, z = x + s * dx, y + s * dy, z + s * dz
+        return BladeSegment(
+            np.array((x + ex, y + ey, z + ez)),
+            np.array((x - ex, y - ey, z - ez)),
+            np.array((-fx, -fy, -fz)),
+        )
 
     def poses(self, count: int) -> list[BladeSegment]:
         """Return `count` poses, evenly in time, the first and the last included."""

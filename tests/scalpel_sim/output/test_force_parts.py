@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
-from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.output.force_parts import EDGE_COSINE, force_parts
 from scalpel_sim.output.recording import COLUMNS
 from scalpel_sim.scenes import changed
 from tissue import BladeContacts
@@ -29,6 +29,24 @@ def test_the_face_of_the_steepest_bevel_does_not_count_as_edge():
     steep = np.array([[0.5, np.sin(np.radians(60.0)), 0.0]])
     contacts = BladeContacts(np.zeros((1, 3)), steep, np.ones(1), np.zeros((1, 3)), np.zeros(1))
     assert not force_parts(contacts, FORWARD).edge.any()
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("n", [0, 1, 7, 60])
+def test_the_parts_are_the_sums_of_numpy(n):
+    rng = np.random.default_rng(n)
+    normal = rng.normal(size=(n, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal[::2] = FORWARD
+    contacts = BladeContacts(
+        np.zeros((n, 3)), normal, rng.normal(size=n), normal + 1.0, np.zeros(n)
+    )
+    pressing = contacts.normal_force[:, None] * normal
+    is_edge = normal @ FORWARD > EDGE_COSINE
+    parts = force_parts(contacts, FORWARD)
+    assert parts.edge == pytest.approx(-(pressing + contacts.friction)[is_edge].sum(axis=0))
+    assert parts.pressing == pytest.approx(-pressing[~is_edge].sum(axis=0))
+    assert parts.friction == pytest.approx(-contacts.friction[~is_edge].sum(axis=0))
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,72 @@
+"""How far the parts of an arm can have moved, known from the angles of its joints alone."""
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+class JointReach:
+    """A bound on how far any point of an arm's geoms is from where it was.
+
+    A hinge that turns by an angle moves a point by at most that angle times its distance from the
+    hinge, which is at most the length of the chain of bodies between them, however it is bent.
+    Hinges that turn one after the other move it by at most the sum. The distance between two geoms
+    changes by no more than that sum either: a hinge carries one of them, or both as a rigid body.
+
+    Args:
+        model: A compiled model. With joints other than hinges nothing is known.
+        data: Its data, seen live.
+        geoms: Numbers of the geoms.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int]) -> None:
+        self._qpos = data.qpos
+        self._has_hinges_alone = set(model.jnt_type.tolist()) <= {_HINGE}
+        self._reach = [_reach(model, joint, geoms) for joint in range(model.njnt)]
+        self._start = [math.nan] * len(self._reach)
+
+    def begin(self) -> None:
+        """Measure from the present configuration on."""
+        self._start = self._qpos.tolist()
+
+    def displacement(self) -> float:
+        """Return how far any point can be from where it was at `begin` [m].
+
+        NaN before the first call of `begin`; infinite where nothing is known.
+        """
+        if not self._has_hinges_alone:
+            return math.inf
+        total = 0.0
+        for reach, angle, start in zip(self._reach, self._qpos.tolist(), self._start, strict=True):
+            total += reach * abs(angle - start)
+        return total
+
+
+def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:
+    """Return the largest distance from a hinge of a point of the geoms that it carries [m]."""
+    carrier, longest = int(model.jnt_bodyid[joint]), 0.0
+    for geom in geoms:
+        box = model.geom_aabb[geom]  # its centre and half its size, in the geom's frame
+        length = _norm(model.geom_pos[geom]) + _norm(box[:3]) + _norm(box[3:])
+        body = int(model.geom_bodyid[geom])
+        while body not in (carrier, 0):
+            length += _norm(model.body_pos[body]) + _play(model, body)
+            body = int(model.body_parentid[body])
+        if body == carrier:
+            longest = max(longest, length + _norm(model.jnt_pos[joint]) + _play(model, carrier))
+    return longest
+
+
+def _play(model: mujoco.MjModel, body: int) -> float:
+    """Return how far hinges beside a body's origin can move the origin in its parent [m]."""
+    first = int(model.body_jntadr[body])
+    joints = range(first, first + int(model.body_jntnum[body]))
+    return sum(2.0 * _norm(model.jnt_pos[joint]) for joint in joints)
+
+
+def _norm(vector: Sequence[float]) -> float:
+    return float(np.linalg.norm(vector))

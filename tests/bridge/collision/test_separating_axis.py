@@ -1,0 +1,77 @@
+"""A blade that an axis separates from the tissue is not compared by the collision library."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from bridge.collision import broad_phase
+from bridge.collision.broad_phase import BroadPhase
+from tissue import BladeSegment, BladeShape, BladeSweep
+
+DT = 1e-3
+BOX = np.array([[-0.02, -0.02, -0.02], [0.02, 0.02, 0.02]])
+
+
+def turned(vector, axis, angle):
+    """Return a vector turned about a unit axis (Rodrigues)."""
+    along = (axis @ vector) * axis
+    return along + np.cos(angle) * (vector - along) + np.sin(angle) * np.cross(axis, vector)
+
+
+def random_path(rng, n_frames):
+    """Return poses of a blade that wanders and turns around the box, fast and slow, in and out."""
+    tip, edge, forward = np.array([0.08, 0.0, 0.0]), np.array([0, 0, 0.04]), np.array([0, 1.0, 0])
+    velocity, axis, poses = np.zeros(3), np.array([1.0, 0.0, 0.0]), []
+    for i in range(n_frames):
+        if i % 40 == 0:
+            away = rng.uniform(-0.08, 0.08, 3) - tip
+            velocity = rng.choice([0.0, 0.02, 0.2, 2.0]) * away / np.linalg.norm(away)
+            axis, spin = rng.normal(size=3), rng.choice([0.0, 1.0, 30.0])
+            axis /= np.linalg.norm(axis)
+        tip = tip + DT * velocity
+        edge, forward = (turned(v, axis, DT * spin) for v in (edge, forward))
+        forward = forward / np.linalg.norm(forward)
+        poses.append(BladeSegment(tip, tip + edge, forward))
+    return poses
+
+
+@pytest.fixture
+def n_compared(monkeypatch):
+    """Count how often boxes are compared by the collision library."""
+    calls = []
+    real = broad_phase.are_colliding
+    monkeypatch.setattr(broad_phase, "are_colliding", lambda *a: (calls.append(1), real(*a))[1])
+    return lambda: len(calls)
+
+
+@pytest.mark.parametrize("shape", [None, BladeShape()], ids=["line", "body"])
+@pytest.mark.parametrize("seed", range(4))
+def test_every_answer_is_the_one_of_a_comparison_in_every_frame(shape, seed):
+    """The tissue's box moves and grows too."""
+    rng = np.random.default_rng(seed)
+    poses = random_path(rng, 2000)
+    kept, bounds, answers = BroadPhase(BOX, 3.0, blade=shape), BOX, []
+    for before, after in itertools.pairwise(poses):
+        fresh = BroadPhase(bounds, 3.0, blade=shape)
+        bounds = bounds + rng.choice([0.0, 1e-6, 1e-4]) * rng.normal(size=(2, 3))
+        for phase in (fresh, kept):
+            phase.update_bounds(bounds, DT)
+        sweep = BladeSweep(before, after)
+        answers.append(kept.overlaps(sweep, DT))
+        assert answers[-1] == fresh.overlaps(sweep, DT)
+    touches = [answer.tissue for answer in answers]
+    assert 100 < sum(touches) < 1900
+
+
+def test_a_blade_that_stays_away_is_compared_rarely(n_compared):
+    phase = BroadPhase(BOX, 3.0, blade=BladeShape())
+    there = BladeSegment(np.array([0, 0, 0.1]), np.array([0, 0.04, 0.1]), np.array([0, 0, -1.0]))
+    before = there
+    for i in range(1000):  # from 80 mm to 30 mm above the box
+        down = np.array([0.0, 0.0, -5e-5 * i])
+        after = there._replace(tip=there.tip + down, heel=there.heel + down)
+        phase.update_bounds(BOX, DT)
+        assert not phase.overlaps(BladeSweep(before, after), DT).tissue
+        before = after
+    assert 1 <= n_compared() <= 5
