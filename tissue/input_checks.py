@@ -87,15 +87,14 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     """
     points, ways = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
-        parts = [np.asarray(part, dtype=np.float64) for part in segment]
-        rows = [part.tolist() for part in parts]
-        if any(part.shape != (3,) for part in parts) or not all(map(_is_finite, rows)):
+        # Plain floats: with arrays of three these checks cost more than a step of a small body.
+        tip, heel, forward = map(_three_numbers, segment)
+        if tip is None or heel is None or forward is None:
+            rows = [np.asarray(part, dtype=np.float64).tolist() for part in segment]
             raise ValueError(
                 f"the blade at the {when} of the step is {rows}; tip, heel and forward are three "
                 "finite numbers each"
             )
-        # Plain floats: with arrays of three these checks cost more than a step of a small body.
-        tip, heel, forward = (Vec3(*row) for row in rows)
         x, y, z = heel.x - tip.x, heel.y - tip.y, heel.z - tip.z
         u, v, w = forward
         length = math.hypot(x, y, z)
@@ -119,9 +118,15 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     return edge
 
 
-def _is_finite(row: list[float]) -> bool:
-    """Whether all numbers are finite: their sum is if they are, and is faster to ask."""
-    return math.isfinite(sum(row)) or all(map(math.isfinite, row))
+def _three_numbers(part: npt.ArrayLike) -> Vec3 | None:
+    """Return three finite numbers as plain floats; None where they are not that."""
+    array = np.asarray(part, dtype=np.float64)
+    if array.shape != (3,):
+        return None
+    x, y, z = array.tolist()
+    # A sum is finite only where all are, and is faster to ask.
+    is_finite = math.isfinite(x + y + z) or all(map(math.isfinite, (x, y, z)))
+    return Vec3(x, y, z) if is_finite else None
 
 
 def expect_small_turn(along: FloatArray, forward: FloatArray) -> None:

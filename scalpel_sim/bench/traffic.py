@@ -34,19 +34,14 @@ class StageCost(NamedTuple):
 
 
 _FIRST, _LAST = (3 + 3, 34), (3 + 2, 22)
-DAMPED_STAGES = (
-    StageCost(ELASTIC_SLOT_BYTES, 32, *_FIRST),
-    StageCost(ELASTIC_SLOT_BYTES, 32, 3 + 1 + 2, 22),
-    StageCost(DAMPING_SLOT_BYTES, 25, 3 + 3 + 4, 58),
-    StageCost(ELASTIC_SLOT_BYTES, 32, *_LAST),
-)
-"""Forces and dampers at three positions, and dampers once more at the second position."""
 _UNDAMPED_STAGES = (
     StageCost(ELASTIC_SLOT_BYTES, 18, *_FIRST),
     StageCost(ELASTIC_SLOT_BYTES, 18, 3 + 3 + 4, 70),
     StageCost(ELASTIC_SLOT_BYTES, 18, *_LAST),
 )
 """Without dampers the second and the third acceleration are the same."""
+DAMPED_STAGES = (*_UNDAMPED_STAGES, StageCost(DAMPING_SLOT_BYTES, 25, 2 + 1 + 3, 20))
+"""Forces at three positions, and dampers once a step: at most, for weak ones act every other."""
 
 VECTORS_PER_NODE = 9
 """Vectors of a node that a step touches: position, velocity, and seven of scratch."""

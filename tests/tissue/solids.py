@@ -90,19 +90,23 @@ class SolidBody(NamedTuple):
 
 
 def solid_of(
-    mesh: TetrahedralMesh, law: EnergyDensity, fixed: BoolArray | None = None
+    mesh: TetrahedralMesh,
+    law: EnergyDensity,
+    fixed: BoolArray | None = None,
+    *,
+    is_single: bool = False,
 ) -> SolidBody:
     """Return the body of a mesh as a solid."""
     body = build_body(mesh, None, fixed)
     springs_of(body)
-    return built(body, law)
+    return built(body, law, is_single=is_single)
 
 
-def built(body: Body, law: EnergyDensity) -> SolidBody:
+def built(body: Body, law: EnergyDensity, *, is_single: bool = False) -> SolidBody:
     """Return the solid of a body whose masses are set."""
     n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))
-    solid = no_solid(law, *room, room_for_stars(*room))
+    solid = no_solid(law, *room, room_for_stars(*room), is_single=is_single)
     visits = no_visits(*room)
     build_tetrahedra(solid, body, solid.every, n_tetrahedra)
     around = np.zeros(LARGEST_STAR, dtype=np.int64)
@@ -170,7 +174,7 @@ def integrate(
     v, f = scratch[0], scratch[1]
     n = body.n_nodes
     for _ in range(n_steps):
-        evaluate(solid, body, x, n, f)
+        evaluate(solid, body, x, f)
         for i in range(n):
             if not body.fixed[i]:
                 for c in range(3):

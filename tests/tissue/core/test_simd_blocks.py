@@ -1,0 +1,121 @@
+"""Vectors of a block give the same bits in a kernel and in NumPy, in both precisions."""
+
+import numpy as np
+import pytest
+
+from tissue.core.jit import kernel
+from tissue.core.simd import aligned, logarithm, point, store_point
+from tissue.core.simd_blocks import (
+    alike,
+    gathered_alike,
+    load_block,
+    points_of_rows,
+    row_of_lane,
+    store_block,
+    store_row,
+    store_rows,
+    sum_of_eight_rows,
+    sum_of_lanes,
+    width_of,
+)
+from tissue.core.simd_gather import larger, largest, where_larger
+
+pytestmark = pytest.mark.kernel
+
+REALS = {"double": np.float64, "single": np.float32}
+OF = np.random.default_rng(2).integers(0, 40, 32).astype(np.int32)
+
+
+@pytest.fixture(params=REALS)
+def real(request):
+    return REALS[request.param]
+
+
+def filled(n, real, seed=0):
+    """Return aligned random numbers of that precision."""
+    array = aligned(n, real)
+    array[:] = np.random.default_rng(seed).uniform(0.5, 2.0, n)
+    return array
+
+
+def both(function, *arguments, out):
+    """Return what a function writes to `out` as a kernel, and as plain Python."""
+    compiled, plain = out.copy(), out.copy()
+    kernel(function)(*arguments, compiled)
+    function(*arguments, plain)
+    return compiled, plain
+
+
+def arithmetic(values, out):
+    width = width_of(values)
+    a, b = load_block(values, 0), load_block(values, width)
+    store_block(out, 0, (a + b) * alike(3.0, a))
+    store_block(out, width, where_larger(a, b, a / b, larger(a, alike(1.0, a)) - b))
+
+
+def test_a_block_holds_eight_doubles_or_sixteen_singles(real):
+    values = filled(48, real)
+    width = 64 // values.itemsize
+    assert width_of(values) == len(load_block(values, 0)) == width
+    compiled, plain = both(arithmetic, values, out=np.zeros(2 * width, real))
+    np.testing.assert_array_equal(compiled, plain)
+    np.testing.assert_array_equal(plain[:width], 3 * (values[:width] + values[width : 2 * width]))
+
+
+def folds(values, out):
+    a = load_block(values, 0)
+    out[0], out[1] = largest(a), sum_of_lanes(a)
+    out[2] = sum_of_lanes(logarithm(a))
+
+
+def test_a_block_is_folded_to_a_double(real):
+    values = filled(16, real)
+    compiled, plain = both(folds, values, out=np.zeros(3))
+    np.testing.assert_array_equal(compiled[:2], plain[:2])
+    assert compiled[2] == pytest.approx(plain[2], abs=8 * float(np.finfo(real).eps))
+    assert plain[0] == values[: 64 // values.itemsize].max()
+
+
+def converted(values, doubles, of, out):
+    a = load_block(values, 0)
+    store_block(out, 0, gathered_alike(a, doubles, of, 0) * a)
+
+
+def test_doubles_are_gathered_in_the_precision_of_the_block(real):
+    values, doubles = filled(16, real), filled(40, np.float64, 1)
+    width = 64 // values.itemsize
+    compiled, plain = both(converted, values, doubles, OF, out=np.zeros(width, real))
+    np.testing.assert_array_equal(compiled, plain)
+    np.testing.assert_array_equal(plain, doubles.astype(real)[OF[:width]] * values[:width])
+
+
+def transposed(rows, of, out):
+    x, y, z = points_of_rows(rows, of, 0)
+    store_rows(out, width_of(rows), x, y, z)
+
+
+def test_rows_are_gathered_as_points_and_stored_again_as_rows(real):
+    rows = filled(4 * 40, real).reshape(40, 4)
+    rows[:, 3] = 0.0
+    width = 64 // rows.itemsize
+    out = aligned(4 * 2 * width, real).reshape(-1, 4)
+    compiled, plain = both(transposed, rows, OF, out=out)
+    np.testing.assert_array_equal(compiled, plain)
+    places = [width + row_of_lane(lane, width) for lane in range(width)]
+    assert sorted(places) == list(range(width, 2 * width))
+    np.testing.assert_array_equal(plain[places], rows[OF[:width]])
+
+
+def summed(rows, of, points, out):
+    store_row(rows, 2, point(points, 1))
+    store_point(out, 0, sum_of_eight_rows(rows, of, 8))
+
+
+def test_eight_rows_are_summed_to_a_point_of_doubles(real):
+    rows, points = filled(4 * 40, real).reshape(40, 4), filled(9, np.float64, 3).reshape(3, 3)
+    rows[:, 3] = 0.0
+    compiled, plain = both(summed, rows, OF, points, out=np.zeros((1, 3)))
+    np.testing.assert_array_equal(compiled, plain)
+    np.testing.assert_array_equal(rows[2, :3], points[1].astype(real))
+    expected = rows[OF[8:16], :3].astype(np.float64).sum(axis=0)
+    np.testing.assert_allclose(plain[0], expected, rtol=8 * np.finfo(real).eps)
