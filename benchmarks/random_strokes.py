@@ -19,34 +19,14 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim import SCENES
+from scalpel_sim.bench.random_strokes import STROKE_DT, STROKE_FLOOR, random_stroke
 from scalpel_sim.scene_body import make_tissue
-from tissue import BladeSegment, BladeSweep, Tissue, TissueError
+from tissue import BladeSweep, Tissue, TissueError
 
-DT = 1e-3
-"""Time step [s]."""
 FASTEST = 5.0
 """Speed of a node above which the motion counts as unstable [m/s]; the blade moves at 0.3."""
 AT_REST = 0.02
 """Speed below which the body counts as at rest [m/s]."""
-
-
-def stroke(tissue: Tissue, random: np.random.Generator) -> list[BladeSegment]:
-    """Return a random stroke across the body, one pose for each step."""
-    low, high = tissue.bounds
-    centre, extent = (low + high) / 2.0, high - low
-    yaw, lean = random.uniform(0.0, 2.0 * np.pi), random.uniform(-0.5, 0.5)
-    direction = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-    side = np.array([-direction[1], direction[0], 0.0])
-    up = np.cos(lean) * np.array([0.0, 0.0, 1.0]) + np.sin(lean) * side
-    middle = centre + side * random.uniform(-0.35, 0.35) * extent[:2].min()
-    middle[2] = high[2] - random.uniform(0.1, 0.6) * extent[2]
-    half = 0.5 * float(np.linalg.norm(extent[:2])) + 0.01
-    speed = random.uniform(0.1, 0.3)
-    along = np.arange(-half, half, speed * DT)
-    return [
-        BladeSegment(tip, tip + (extent[2] + 0.02) * up, direction)
-        for tip in (middle + s * direction for s in along)
-    ]
 
 
 def fastest(tissue: Tissue) -> float:
@@ -68,7 +48,9 @@ def main() -> int:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
     relaxation = options.relaxation or scene.relaxation
-    tissue = make_tissue(replace(scene, material=material, relaxation=relaxation, floor=-0.02))
+    tissue = make_tissue(
+        replace(scene, material=material, relaxation=relaxation, floor=STROKE_FLOOR)
+    )
     random = np.random.default_rng(options.seed)
     table = Table(title=f"organ, law {material.law}, relaxation {relaxation}")
     names = ("stroke", "tetrahedra", "pieces", "substeps/ms", "contacts")
@@ -79,21 +61,21 @@ def main() -> int:
     try:
         for i in range(options.strokes):
             substeps, began, n = 0, thread_time(), 0
-            edges = stroke(tissue, random)
+            edges = random_stroke(tissue, random)
             for before, after in itertools.pairwise(edges):
-                result = tissue.step(BladeSweep(before, after), DT)
+                result = tissue.step(BladeSweep(before, after), STROKE_DT)
                 substeps, n = max(substeps, result.n_substeps), n + 1
                 if n % 20 == 0:
                     largest_speed = max(largest_speed, fastest(tissue))
             for _ in range(50):
-                result = tissue.step(None, DT)
+                result = tissue.step(None, STROKE_DT)
             pressed = result.body_contacts.n_contacts
             row = (i + 1, tissue.n_tetrahedra, tissue.n_pieces(), substeps, pressed)
-            spent = (thread_time() - began) / (n + 50) / DT
+            spent = (thread_time() - began) / (n + 50) / STROKE_DT
             table.add_row(*map(str, row), f"{spent:.2f}", f"{largest_speed:.2f}")
             print(*row, f"{spent:.2f} {largest_speed:.2f}", file=sys.stderr)
         for _ in range(1000):
-            tissue.step(None, DT)
+            tissue.step(None, STROKE_DT)
         is_stable = largest_speed < FASTEST and fastest(tissue) < AT_REST
     except TissueError as error:
         console.print(f"[red]{error}[/red]")

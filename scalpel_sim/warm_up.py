@@ -1,13 +1,24 @@
-"""Runs every kernel once, so that it is compiled; as a program, only those that move a body."""
+"""Compiles the kernels that a scene needs, in two processes, and loads them.
 
+    python -m scalpel_sim.warm_up motion|cut KERNELS
+
+is one of the two processes; KERNELS is a `KernelSet` as JSON.
+"""
+
+import gc
+import json
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.scenes import PARENCHYMA, PHANTOM, Scene
 from tissue import (
     BladeSegment,
     BladeShape,
@@ -18,35 +29,126 @@ from tissue import (
     block,
     cache_directory,
     fixed_nodes,
+    is_compiling,
+    n_compiled_kernels,
 )
 
 _SIDE = 0.02
 """Length of the sides of the block that is cut [m]."""
 N_STEPS = 20
 _DT = 1e-3
+_SECONDS_PER_LOOK = 0.1
+"""How often the progress of the processes is looked at [s]."""
+USUAL_NUMBER = 485
+"""How many kernels a set has, about: the end of the progress bar. A test compares."""
+
+Progress = Callable[[int, int], None]
+"""Receives how many kernels are compiled, and how many there will be, about."""
 
 
-def kernels_are_compiled() -> bool:
-    """Return whether the cache has binaries of exactly these sources."""
-    return any(cache_directory().rglob("*.nbi"))
+class KernelSet(NamedTuple):
+    """What decides which kernels a run calls."""
+
+    law: str = "neo_hookean"
+    scheme: str = "stellar"
+    relaxation: str = "global"
+    audit: bool = True
+    has_sides: bool = True
+    """Whether the blade has a thickness."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> "KernelSet":
+        """Return the set that a scene needs."""
+        has_sides = scene.blade is not None
+        return cls(scene.material.law, scene.scheme, scene.relaxation, scene.audit, has_sides)
+
+    def solver(self) -> SolverSettings:
+        """Return settings that need this set."""
+        return SolverSettings(scheme=self.scheme, relaxation=self.relaxation, audit=self.audit)
+
+    def body(self, mesh: TetrahedralMesh, fixed: str = "none") -> Tissue:
+        """Return a tissue that needs this set."""
+        return Tissue(
+            mesh,
+            PHANTOM if self.law == "springs" else PARENCHYMA,
+            fixed=fixed_nodes(mesh, fixed),
+            blade=BladeShape() if self.has_sides else None,
+            solver=self.solver(),
+        )
 
 
-def warm_up() -> None:
-    """Load the kernels, or compile them where this is the first run of these sources.
+USUAL_SETS = (KernelSet(), KernelSet(audit=False))
+"""Those of the default scene, as `run` and as `view` do it."""
 
-    A small block is settled, cut half through and measured, which calls every kernel of a run.
+
+def kernels_are_compiled(kernels: KernelSet) -> bool:
+    """Return whether the cache has all kernels of a set, compiled from exactly these sources."""
+    return _mark(kernels).exists()
+
+
+def prepare_kernels(
+    sets: Sequence[KernelSet] = USUAL_SETS, on_progress: Progress = lambda n, n_all: None
+) -> None:
+    """Load the kernels, or compile them where this is the first run of these sources."""
+    for kernels in sets:
+        compile_ahead(kernels, on_progress)
+        _cut(kernels)
+        _move_two_pieces(kernels)
+
+
+def compile_ahead(kernels: KernelSet, on_progress: Progress = lambda n, n_all: None) -> None:
+    """Compile the kernels of a set in two processes, where the cache does not have them.
+
+    The cache passes on the binaries. What they do not compile is compiled where it is used.
     """
-    mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
-    if not kernels_are_compiled():
-        with _compile_motion_in_parallel():
-            places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
-            Tissue(mesh, blade=BladeShape()).incise(places, _edge(0.0).forward)
-    tissue = Tissue(
-        mesh,
-        fixed=fixed_nodes(mesh, "left,right"),
-        blade=BladeShape(),
-        solver=SolverSettings(audit=True),
-    )
+    if kernels_are_compiled(kernels) or not is_compiling():
+        return
+    with _processes(kernels) as processes:
+        while any(process.poll() is None for process in processes):
+            found = n_compiled_kernels()
+            on_progress(found, max(found, USUAL_NUMBER))
+            time.sleep(_SECONDS_PER_LOOK)
+        if not any(process.returncode for process in processes):
+            found = n_compiled_kernels()
+            on_progress(found, found)
+            _note(kernels)
+
+
+@contextmanager
+def _processes(kernels: KernelSet) -> Iterator[list["subprocess.Popen[bytes]"]]:
+    """Start the two processes, and end them where this one is interrupted."""
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "scalpel_sim.warm_up", job, json.dumps(kernels)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for job in _JOBS
+    ]
+    try:
+        yield started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _mark(kernels: KernelSet) -> Path:
+    """Return the file that says that a set is complete."""
+    return cache_directory() / ("-".join(map(str, kernels)) + ".complete")
+
+
+def _note(kernels: KernelSet) -> None:
+    """Note that a set is complete. Where nothing can be written, nothing was."""
+    try:
+        _mark(kernels).touch()
+    except OSError:
+        return
+
+
+def _cut(kernels: KernelSet) -> None:
+    """Settle a small block, cut it half through, and measure it."""
+    tissue = kernels.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE)), "left,right")
     tissue.settle()
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 0.6, N_STEPS):
@@ -59,34 +161,21 @@ def warm_up() -> None:
     tissue.snapshot()
     tissue.n_pieces()
     tissue.cut_report()
-    move_two_pieces()
 
 
-def move_two_pieces() -> None:
+def _incise_and_cut(kernels: KernelSet) -> None:
+    """Cut a block at once, before its motion, which the other process compiles meanwhile."""
+    places = [(edge.tip, edge.heel) for edge in map(_edge, (-0.1, 0.2, 0.6))]
+    kernels.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE))).incise(places, _edge(0.0).forward)
+    _cut(kernels)
+
+
+def _move_two_pieces(kernels: KernelSet) -> None:
     """Advance two falling pieces, which may touch, by a step: forces, integration and contact."""
     mesh = block((2, 2, 2), (_SIDE, _SIDE, _SIDE))
     apart = np.vstack([mesh.positions, mesh.positions + 2.0 * _SIDE])
     both = np.vstack([mesh.tetrahedra, mesh.tetrahedra + len(mesh.positions)])
-    Tissue(TetrahedralMesh(apart, both)).step(None, _DT)
-
-
-@contextmanager
-def _compile_motion_in_parallel() -> Iterator[None]:
-    """Compile the kernels that move a body in another process: on two cores 50 s in place of 73.
-
-    The cache passes on the binaries. If that fails, they are compiled in this process.
-    """
-    other = subprocess.Popen(
-        [sys.executable, "-m", "scalpel_sim.warm_up"],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        yield
-        other.wait()
-    finally:
-        other.kill()
-        other.wait()
+    kernels.body(TetrahedralMesh(apart, both)).step(None, _DT)
 
 
 def _edge(fraction: float) -> BladeSegment:
@@ -99,5 +188,10 @@ def _edge(fraction: float) -> BladeSegment:
     )
 
 
+_JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move_two_pieces, "cut": _incise_and_cut}
+"""What the two processes do. Each takes half of the time."""
+
+
 if __name__ == "__main__":
-    move_two_pieces()
+    gc.disable()  # the compiler makes millions of objects and few cycles
+    _JOBS[sys.argv[1]](KernelSet(*json.loads(sys.argv[2])))

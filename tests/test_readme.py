@@ -15,7 +15,17 @@ ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
 PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
 LARGEST_README = 10 * 1024
-HELPS = ("run", "view", "serve", "key", "materials", "figure", "validate", "bench peers")
+HELPS = (
+    "run",
+    "view",
+    "serve",
+    "key",
+    "materials",
+    "figure",
+    "validate",
+    "bench peers",
+    "bench real-time",
+)
 """Commands whose `--help` texts together list all options."""
 
 

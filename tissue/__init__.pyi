@@ -5,7 +5,9 @@ from .boundary_conditions import fixed_nodes as fixed_nodes
 from .core.array_types import BoolArray as BoolArray
 from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray
-from .core.jit import cache_directory as cache_directory
+from .core.cache_directory import cache_directory as cache_directory
+from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
+from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
@@ -89,8 +91,10 @@ __all__ = [
     "calibrated",
     "components",
     "fixed_nodes",
+    "is_compiling",
     "kernel",
     "liver_lobe",
+    "n_compiled_kernels",
     "pieces_of",
     "read_mesh",
     "spring_error",

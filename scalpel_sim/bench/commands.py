@@ -9,7 +9,7 @@ from cyclopts import App, Parameter
 
 from scalpel_sim.bench.watch import Watch, watching
 from scalpel_sim.cli.console import log_to_stderr
-from scalpel_sim.cli.options import PrintOptions
+from scalpel_sim.cli.options import Flag, PrintOptions
 from scalpel_sim.errors import UsageError
 
 if TYPE_CHECKING:  # `--help` should not wait for it
@@ -40,6 +40,8 @@ class BenchOptions:
 
 
 Largest = Annotated[int | None, Parameter(help="Omit bodies of more tetrahedra than this.")]
+
+Names = Annotated[list[str] | None, Parameter(consume_multiple=True)]
 
 Benchmark = Callable[[Watch], "BenchmarkResult"]
 
@@ -81,6 +83,54 @@ def bench_scenes(
 
     chosen = checked_scene_names(names)
     _run([lambda watch: measure_scenes(options.runs, chosen, watch)], options, printing)
+
+
+@bench.command(name="real-time")
+def bench_real_time(
+    *,
+    scenes: Names = None,
+    materials: Names = None,
+    strokes: Annotated[list[int] | None, Parameter(consume_multiple=True)] = None,
+    quick: Flag = False,
+    options: BenchOptions = BenchOptions(),
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Run whole strokes in each material, with account and viewer, and after random strokes.
+
+    Takes many minutes: choose with the options. For example:
+
+    ```console
+    scalpel-sim bench real-time --scenes organ --materials liver fat --runs 1
+    ```
+
+    Args:
+        scenes: organ, slab, grid2, grid7 [default: all].
+        materials: Names of materials, or "as shipped" [default: that, and all].
+        strokes: After how many random strokes frames are timed [default: 0 10 26 50].
+        quick: Only the begin of each stroke, as shipped, once, without and after one stroke.
+    """
+    from scalpel_sim.bench.real_time import (
+        AS_SHIPPED,
+        STROKE_COUNTS,
+        checked_materials,
+        checked_strokes,
+        measure_real_time,
+    )
+    from scalpel_sim.bench.scenes import checked_scene_names
+
+    chosen = checked_scene_names(scenes or ())
+    of_material = checked_materials(materials or ([AS_SHIPPED] if quick else []))
+    counts = checked_strokes(strokes or ((0, 1) if quick else STROKE_COUNTS))
+    runs = 1 if quick else options.runs
+    _run(
+        [
+            lambda watch: measure_real_time(
+                runs, chosen, of_material, counts, quick=quick, watch=watch
+            )
+        ],
+        options,
+        printing,
+    )
 
 
 @bench.command(name="kernels")

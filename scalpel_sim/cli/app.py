@@ -27,6 +27,7 @@ from scalpel_sim.cli.options import (
     SceneName,
     TissueOptions,
 )
+from scalpel_sim.cli.warm_up_command import warm_up
 from scalpel_sim.errors import (
     EXIT_OK,
     EXIT_RUN_FAILED,
@@ -183,7 +184,7 @@ def _serve(
         served, springs = springs_as_asked(served, tissue.material)
         if springs and not printing.quiet:
             say(", ".join(f"{name} {value:.4g}" for name, value in springs["springs"].items()))
-        load_kernels(printing)
+        load_kernels(printing, served)
         serve_tissue(
             lambda: make_tissue(served),
             scene=served.name,
@@ -217,6 +218,7 @@ def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
             print(f"{file}: a new key, readable by you alone")
 
 
+app.command(warm_up, name="warm-up")
 app.command(bench)
 app.command(validate)
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:  # an error of use should be printed without waiting for a com
 
 SECONDS_PER_PROGRESS = 0.1
 """Interval at which the progress bar is drawn [s]."""
+SECONDS_PER_LINE = 5.0
+"""Interval at which progress is printed where standard error is no terminal [s]."""
 
 
 @contextmanager
@@ -86,6 +88,40 @@ def progress(seconds: float, options: PrintOptions) -> Iterator[Callable[["Simul
                 bar.update(task, completed=simulation.time, force=force, refresh=True)
 
         yield advance
+
+
+@contextmanager
+def compiling(options: PrintOptions) -> Iterator[Callable[[int, int], None]]:
+    """Yield a function that shows how many kernels are compiled, and how many there will be.
+
+    On a terminal it draws a progress bar, elsewhere it prints a line from time to time.
+    """
+    began = shown = time.monotonic()
+    if options.quiet:
+        yield lambda done, total: None
+    elif sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import TimeElapsedColumn as Elapsed
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Elapsed())
+        with Progress(
+            *columns, console=Console(stderr=True), transient=True, auto_refresh=False
+        ) as bar:
+            task = bar.add_task("compiling kernels, first run only", total=None, visible=False)
+            yield lambda done, total: bar.update(
+                task, completed=done, total=total, visible=True, refresh=True
+            )
+    else:
+
+        def print_line(done: int, total: int) -> None:
+            nonlocal shown
+            now = time.monotonic()
+            if now >= shown:
+                shown = now + SECONDS_PER_LINE
+                say(f"compiling kernels, first run only: {done} of {total}, {now - began:.0f} s")
+
+        yield print_line
 
 
 def print_report(

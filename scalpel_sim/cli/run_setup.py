@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.arm.scalpel import chosen_blade, expect_faces
-from scalpel_sim.cli.console import say
+from scalpel_sim.cli.console import compiling
 from scalpel_sim.cli.material_file import (
     is_material_file,
     read_blade,
@@ -43,7 +43,7 @@ from scalpel_sim.scenes import (
     scene_of,
 )
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.warm_up import kernels_are_compiled, warm_up
+from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
 from tissue import BladeShape, Material
 
 _log = logging.getLogger("scalpel_sim")
@@ -131,7 +131,7 @@ def _tissue_here(
     check_scene(scene)
     check_folder(_folder(options.output, scene))
     scene, springs = springs_as_asked(scene, tissue.material)
-    load_kernels(options.printing)
+    load_kernels(options.printing, scene)
     _log.info("settling %s", scene.about)
     return InProcessLink(make_tissue(scene), scene.name), scene, scene.settings() | springs
 
@@ -197,11 +197,15 @@ def springs_as_asked(scene: Scene, options: MaterialOptions) -> tuple[Scene, dic
     }
 
 
-def load_kernels(options: PrintOptions) -> None:
-    """Load the kernels, which ends the loading; log it where they must be compiled first."""
-    if not options.quiet and not kernels_are_compiled():
-        say("compiling kernels, first run only (about a minute)")
-    warm_up()
+def load_kernels(options: PrintOptions, scene: Scene | None = None) -> None:
+    """Load the kernels, which ends the loading; show the progress where they are compiled first.
+
+    Args:
+        options: Whether to show it.
+        scene: Whose kernels; None: those of the default scene, with and without an account.
+    """
+    with compiling(options) as on_progress:
+        prepare_kernels(USUAL_SETS if scene is None else [KernelSet.of(scene)], on_progress)
     gc.enable()
 
 

@@ -1,16 +1,46 @@
-"""The first run compiles in two processes; the first loads what the second compiled."""
+"""The first run compiles in two processes; later ones, also of a copied cache, compile nothing."""
 
+import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+import scalpel_sim
 from scalpel_sim import warm_up
+from scalpel_sim.scenes import SCENES
+from scalpel_sim.warm_up import KernelSet, compile_ahead, kernels_are_compiled
+from tissue import cache_directory
+
+SMALL = KernelSet.of(SCENES["grid2"])
+"""A set whose blade is a line."""
+
+RUN_AND_COUNT = """
+from numba.core import event
+
+class Compilations(event.Listener):
+    names = []
+    def on_start(self, event):
+        self.names.append(event.data["dispatcher"].py_func.__name__)
+    def on_end(self, event):
+        pass
+
+counted = Compilations()
+event.register("numba:compile", counted)
+from scalpel_sim import SCENES, prepare
+simulation = prepare(SCENES["grid2"])
+simulation.run(0.01)
+import scalpel_sim
+print(scalpel_sim.__file__)
+print(counted.names)
+"""
 
 
 @pytest.fixture
 def started(monkeypatch):
-    """The processes that a warm-up starts, on a machine that seems to have compiled nothing."""
+    """The processes that are started, on a machine that seems to have compiled nothing."""
     processes = []
 
     class RecordedProcess(subprocess.Popen):
@@ -19,27 +49,50 @@ def started(monkeypatch):
             processes.append(self)
 
     monkeypatch.setattr(subprocess, "Popen", RecordedProcess)
-    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda: False)
+    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: False)
     return processes
 
 
-def test_a_first_run_compiles_in_another_process_too_and_waits_for_it(started):
-    warm_up.warm_up()
-    assert [process.args for process in started] == [[sys.executable, "-m", "scalpel_sim.warm_up"]]
-    assert started[0].returncode == 0
+def test_a_first_run_compiles_in_two_processes_and_waits_for_them(started):
+    shown = []
+    compile_ahead(SMALL, lambda done, total: shown.append((done, total)))
+    assert [process.args[3] for process in started] == ["motion", "cut"]
+    assert [process.returncode for process in started] == [0, 0]
+    assert kernels_are_compiled(SMALL)
+    assert all(done <= total for done, total in shown)
+    assert shown[-1][0] == shown[-1][1] > 100
 
 
-def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started, monkeypatch):
-    def interrupted(*_):
+def test_a_first_run_that_is_interrupted_leaves_no_process_behind(started):
+    def interrupt(done, total):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(warm_up.Tissue, "incise", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        warm_up.warm_up()
-    assert started[0].returncode is not None
+        compile_ahead(SMALL, interrupt)
+    assert all(process.returncode is not None for process in started)
 
 
 def test_a_later_run_starts_none(started, monkeypatch):
-    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda: True)
-    warm_up.warm_up()
+    monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: True)
+    compile_ahead(SMALL)
     assert not started
+
+
+def test_a_copied_cache_serves_a_copied_program_without_compiling(tmp_path):
+    compile_ahead(SMALL)
+    compiled = cache_directory()
+    shutil.copytree(compiled, tmp_path / "cache" / "kernels" / compiled.name)
+    for name in ("tissue", "bridge", "scalpel_sim"):
+        shutil.copytree(Path(scalpel_sim.__file__).parents[1] / name, tmp_path / "program" / name)
+    done = subprocess.run(
+        [sys.executable, "-c", RUN_AND_COUNT],
+        cwd=tmp_path,
+        env=os.environ
+        | {"PYTHONPATH": str(tmp_path / "program"), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    place, names = done.stdout.splitlines()
+    assert Path(place).is_relative_to(tmp_path)
+    assert names == "[]"

@@ -8,6 +8,7 @@ Python does not unpack the arrays.
 In Python, and with the JIT off, an `Arrays` is a plain object with its fields as attributes.
 """
 
+import hashlib
 import inspect
 from array import array
 from typing import Annotated, Any, ClassVar, Self
@@ -55,7 +56,9 @@ class ArraysType(types.Type):
         self.fields = fields
         self.cells = frozenset(field for field, _ in fields[:n_cells])
         described = ", ".join(f"{n}: {t}{' cell' * (n in self.cells)}" for n, t in fields)
-        super().__init__(name=f"{name}({described})")
+        # The name is a part of the names of all functions that take the struct, so it is short.
+        digest = hashlib.sha256(described.encode()).hexdigest()[:8]
+        super().__init__(name=f"{name}({digest})")
 
     def place(self, attribute: str) -> int:
         """Return where the field's entry begins in the table, in words of 8 bytes."""

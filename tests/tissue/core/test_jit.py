@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 import tissue
-from tissue.core.jit import cache_directory, kernel
+from tissue.core.cache_directory import cache_directory
+from tissue.core.jit import is_compiling, kernel
 
 pytestmark = pytest.mark.kernel
 
@@ -18,7 +19,7 @@ PACKAGE = Path(tissue.__file__).parent
 
 def directory_of(package: Path, cache: str = "elsewhere") -> Path:
     """Return the cache directory that a copy of the package uses."""
-    program = "from tissue.core.jit import cache_directory; print(cache_directory())"
+    program = "from tissue.core.cache_directory import cache_directory; print(cache_directory())"
     done = subprocess.run(
         [sys.executable, "-c", program],
         cwd=package.parent,
@@ -80,3 +81,61 @@ def test_a_kernel_computes_what_its_source_says():
 
     assert halves(1.0, 2.0) == 1.5
     assert halves(3, 4) == 3.5
+
+
+CALL = """
+from tissue.core.vec3 import Vec3, norm
+print(norm(Vec3(1.0, 2.0, 2.0)))
+"""
+
+
+def output_of_call(cache: Path) -> subprocess.CompletedProcess[str]:
+    """Return what a process prints that calls one kernel, with a cache of its own."""
+    return subprocess.run(
+        [sys.executable, "-c", CALL],
+        env=os.environ | {"PYTHONPATH": str(PACKAGE.parent), "NUMBA_CACHE_DIR": str(cache)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+
+
+@pytest.mark.skipif(not is_compiling(), reason="is about what is compiled")
+def test_only_what_python_calls_becomes_a_program(tmp_path):
+    output_of_call(tmp_path)
+    assert sorted(path.name.split("-")[0] for path in tmp_path.rglob("*-part.*")) == [
+        "vec3.dot",
+        "vec3.norm",
+    ]
+    assert [path.name.split("-")[0] for path in tmp_path.rglob("*-program.*")] == ["vec3.norm"]
+
+
+@pytest.mark.skipif(not is_compiling(), reason="is about what is compiled")
+def test_a_second_process_finds_what_the_first_compiled(tmp_path):
+    first = output_of_call(tmp_path).stdout
+    files = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")}
+    assert output_of_call(tmp_path).stdout == first == "3.0\n"
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.nbc")} == files
+
+
+def test_a_cache_that_cannot_be_written_costs_time_and_nothing_else(tmp_path):
+    no_folder = tmp_path / "file"
+    no_folder.touch()
+    assert output_of_call(no_folder).stdout == "3.0\n"
+
+
+def test_two_kernels_of_one_name_and_line_stay_apart():
+    def adding(amount):
+        @kernel
+        def added(a):
+            return a + amount
+
+        return added
+
+    one, two = adding(1.0), adding(2.0)
+
+    @kernel
+    def both(a):
+        return one(a) * two(a)
+
+    assert both(1.0) == 6.0
