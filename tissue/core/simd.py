@@ -249,11 +249,12 @@ def store_point(points: FloatArray, i: int, a: Point) -> None:
 
 @_compiled(store_point, types.Array, types.Integer, POINT, result=types.void)
 def _store_point(builder: Any, points: _Array, i: Any, a: Any) -> None:
-    pointer = builder.bitcast(points.at(i, 3), _POINT.as_pointer())
-    arguments = [_POINT, _POINT.as_pointer(), _I32, _XYZ.type]
-    kind = ir.FunctionType(ir.VoidType(), arguments)
-    function = _declared(builder.module, "llvm.masked.store.v4f64.p0v4f64", kind)
-    builder.call(function, [a, pointer, ir.Constant(_I32, 8), _XYZ])
+    # As two stores: one of four lanes with a mask takes 6 ns here, seven times as long.
+    pointer = points.at(i, 3)
+    low = _shuffled(builder, a, a, [0, 1])
+    builder.store(low, builder.bitcast(pointer, low.type.as_pointer()), align=8)
+    last = builder.gep(pointer, [ir.Constant(_I64, 2)])
+    builder.store(builder.extract_element(a, _I32(2)), last)
 
 
 def point_of(x: float, y: float, z: float) -> Point:
