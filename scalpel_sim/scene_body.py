@@ -40,6 +40,8 @@ def make_tissue(scene: Scene) -> Tissue:
             relaxation=scene.relaxation,
             threads=scene.threads,
             audit=scene.audit,
+            mass_scaling=scene.mass_scaling or None,
+            precision=scene.precision,
         ),
     )
     if fixed.any():

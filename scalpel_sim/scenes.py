@@ -18,6 +18,7 @@ from tissue import (
     BladeShape,
     CutSettings,
     Material,
+    SolverSettings,
     TetrahedralMesh,
     block,
 )
@@ -27,6 +28,9 @@ SCHEMES = ("stellar", "paper")
 
 RELAXATIONS = ("global", "verlet", "hierarchical", "local")
 """Names of the relaxations that `Tissue` takes."""
+
+_PRECISIONS = ("single", "double")
+"""Precisions that `Tissue` takes."""
 
 COUPLINGS = ("rigid", "virtual")
 
@@ -49,6 +53,9 @@ liver the blade would drag it along by 35 mm first (`--material liver`)."""
 
 DEFAULT_CUT_SETTINGS = CutSettings()
 """How closely cuts follow the blade, unless a scene says otherwise."""
+
+DEFAULT_MASS_SCALING = SolverSettings().mass_scaling or 0.0
+"""Angular frequency above which nodes get mass, unless a scene says otherwise [1/s]."""
 
 STANDARD_GRAVITY = 9.81
 """Gravity along -z [m/s2]."""
@@ -81,8 +88,8 @@ def check_relaxation(name: str, threads: int) -> None:
         )
 
 
-def can_audit(relaxation: str, threads: int) -> bool:
-    """Whether an energy account can be kept: where all nodes move together, on one thread."""
+def can_audit(relaxation: str) -> bool:
+    """Whether an energy account can be kept: where all nodes move together."""
     return relaxation in ("global", "verlet")
 
 
@@ -103,7 +110,13 @@ class Scene:
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
     relaxation: str = "global"
-    """How the motion is advanced: `global`, `local` or `hierarchical`."""
+    """How the motion is advanced: `global`, `verlet`, `local` or `hierarchical`."""
+    mass_scaling: float = DEFAULT_MASS_SCALING
+    """Angular frequency above which nodes get mass where a cut has left slivers [1/s]; 0: none
+    do."""
+    precision: str = "single"
+    """Precision of the forces of tetrahedra: `single` or `double`. Positions and velocities are
+    double."""
     threads: int = 1
     """Threads that share a global relaxation."""
     stretch: float = 0.05
@@ -116,7 +129,7 @@ class Scene:
     blade: BladeShape | None = SCALPEL
     """The blade as a body; None: a line, as in the paper."""
     audit: bool = False
-    """Whether an account of the energy is kept. Frames take a fifth to a third longer."""
+    """Whether an account of the energy is kept."""
     stroke: str = "straight"
     """One of `scalpel_sim.strokes.planning.STROKES`, or a CSV file."""
     speed: float = 0.06
@@ -138,15 +151,23 @@ class Scene:
         """Refuse names and numbers that make no sense.
 
         Raises:
-            UsageError: stretch, gravity, speed or a number of the coupling is out of range; there
-                is no such scheme, relaxation or coupling; an audit of a relaxation that has none.
+            UsageError: stretch, gravity, speed, mass scaling or a number of the coupling is out of
+                range; there is no such scheme, relaxation, precision or coupling; an audit of a
+                relaxation that has none.
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
-        if self.audit and not can_audit(self.relaxation, self.threads):
+        if self.audit and not can_audit(self.relaxation):
             raise UsageError(
-                "--audit needs --relaxation global and --threads 1, not "
-                f"{self.relaxation} and {self.threads}; omit --audit, or change those"
+                f"--audit needs --relaxation global or verlet, not {self.relaxation}; omit "
+                "--audit, or choose one of those"
+            )
+        if self.precision not in _PRECISIONS:
+            raise unknown("precision", self.precision, _PRECISIONS)
+        if not (self.mass_scaling >= 0.0 and np.isfinite(self.mass_scaling)):
+            raise UsageError(
+                f"--mass-scaling is {self.mass_scaling}; it is an angular frequency [1/s], or 0 "
+                "for no added mass"
             )
         self.virtual_coupling()
         if not 1 <= self.tissue_every <= MAX_FRAMES_PER_ANSWER:

@@ -55,16 +55,23 @@ class KernelSet(NamedTuple):
     audit: bool = True
     has_sides: bool = True
     """Whether the blade has a thickness."""
+    precision: str = "single"
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
         """Return the set that a scene needs."""
         has_sides = scene.blade is not None
-        return cls(scene.material.law, scene.scheme, scene.relaxation, scene.audit, has_sides)
+        law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
+        return cls(law, scheme, relaxation, scene.audit, has_sides, scene.precision)
 
     def solver(self) -> SolverSettings:
         """Return settings that need this set."""
-        return SolverSettings(scheme=self.scheme, relaxation=self.relaxation, audit=self.audit)
+        return SolverSettings(
+            scheme=self.scheme,
+            relaxation=self.relaxation,
+            precision=self.precision,
+            audit=self.audit,
+        )
 
     def body(self, mesh: TetrahedralMesh, fixed: str = "none") -> Tissue:
         """Return a tissue that needs this set."""
@@ -77,7 +84,7 @@ class KernelSet(NamedTuple):
         )
 
 
-USUAL_SETS = (KernelSet(), KernelSet(audit=False))
+USUAL_SETS = (KernelSet(), KernelSet(relaxation="verlet", audit=False))
 """Those of the default scene, as `run` and as `view` do it."""
 
 

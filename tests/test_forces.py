@@ -13,6 +13,7 @@ from tissue import (
     BladeSegment,
     BladeShape,
     BladeSweep,
+    Global,
     Material,
     SolverSettings,
     TetrahedralMesh,
@@ -56,7 +57,17 @@ def mirrored(cells):
 class Run:
     """A stroke through a block, with its energy balance."""
 
-    def __init__(self, poses, blade=None, cells=(8, 8, 4), dt=DT, mesh=None, **material):
+    def __init__(
+        self,
+        poses,
+        blade=None,
+        cells=(8, 8, 4),
+        dt=DT,
+        mesh=None,
+        relaxation="global",
+        threads=1,
+        **material,
+    ):
         mesh = mesh or block(cells, SIZE)
         boundary = {"fixed": sides(mesh), "gravity": NO_GRAVITY}
         self.tissue = Tissue(
@@ -64,7 +75,7 @@ class Run:
             Material(**SOFT | material),
             blade=blade,
             **boundary,
-            solver=SolverSettings(audit=True),
+            solver=SolverSettings(relaxation=relaxation, threads=threads, audit=True),
         )
         self.poses = poses
         self.results = [
@@ -193,6 +204,20 @@ def test_the_energy_balance_closes_within_half_a_percent(stroke, blade):
     assert abs(run.energies.residual) < 5e-3 * run.energies.work_of_blade
 
 
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("stroke", ["press", "puncture", "straight"])
+def test_the_energy_balance_of_verlet_closes_within_half_a_percent(stroke):
+    poses, material = STROKES[stroke]
+    run = Run(poses, blade=SCALPEL, relaxation="verlet", blade_friction=0.3, **material)
+    assert abs(run.energies.residual) < 5e-3 * run.energies.work_of_blade
+
+
+def test_an_audit_on_two_threads_is_that_on_one():
+    poses = upright()[:200]
+    one, two = (Run(poses, blade=SCALPEL, threads=threads) for threads in (1, 2))
+    assert two.energies == one.energies
+
+
 def test_cutting_takes_toughness_times_the_area_swept():
     run = Run(upright(end=0.055))
     area = 0.04 * 0.02
@@ -232,10 +257,12 @@ def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
     """The lips are a blade thickness apart at the blade, and close together behind it."""
     thick = BladeShape(thickness=1e-3, bevel_angle=0.2, height=8e-3)
     run = Run(upright(end=0.035), blade=thick)
-    contacts = run.results[-1].contacts
-    touching = contacts.point[np.abs(contacts.normal[:, 0]) > 0.5]
-    gap = touching[:, 0].max() - touching[:, 0].min()
-    assert 0.5e-3 < gap < 1.2e-3
+    gaps = []
+    for result in run.results[-50:]:  # lips come and go where the faces meet them
+        contacts = result.contacts
+        touching = contacts.point[np.abs(contacts.normal[:, 0]) > 0.5]
+        gaps.append(np.ptp(touching[:, 0]))
+    assert 0.5e-3 < max(gaps) < 1.2e-3
     tip = run.poses[-1].tip[1]
     assert (touching[:, 1] < tip).all()
     assert (touching[:, 1] > tip - 8e-3).all()
@@ -259,16 +286,25 @@ def test_the_side_faces_of_the_blade_do_not_press_the_skin_that_the_edge_cuts():
     assert late == pytest.approx(early, rel=0.02)
 
 
-def test_an_audit_with_local_relaxation_is_refused():
+@pytest.mark.parametrize("relaxation", ["local", Global(damping="stage")], ids=["local", "stage"])
+def test_an_audit_of_a_motion_that_cannot_be_accounted_for_is_refused(relaxation):
     with pytest.raises(ValueError, match="audit"):
-        Tissue(block((2, 2, 2), SIZE), solver=SolverSettings(audit=True, relaxation="local"))
+        Tissue(block((2, 2, 2), SIZE), solver=SolverSettings(audit=True, relaxation=relaxation))
 
 
-def test_an_audit_changes_nothing():
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
+def test_an_audit_changes_nothing(relaxation):
     poses = upright()[:300]
-    with_audit = Run(poses, blade=SCALPEL).tissue.snapshot()
+    with_audit = Run(poses, blade=SCALPEL, relaxation=relaxation).tissue.snapshot()
     mesh = block((8, 8, 4), SIZE)
-    without = Tissue(mesh, Material(**SOFT), fixed=sides(mesh), gravity=NO_GRAVITY, blade=SCALPEL)
+    without = Tissue(
+        mesh,
+        Material(**SOFT),
+        fixed=sides(mesh),
+        gravity=NO_GRAVITY,
+        blade=SCALPEL,
+        solver=SolverSettings(relaxation=relaxation),
+    )
     for a, b in itertools.pairwise(poses):
         without.step(BladeSweep(a, b), DT)
     np.testing.assert_array_equal(with_audit.positions, without.snapshot().positions)

@@ -32,7 +32,10 @@ def sagged_body(mesh, material, relaxation, seconds=1.0):
 
 @pytest.mark.parametrize(
     ("relaxation", "law"),
-    [*((NEVER_ASLEEP, law) for law in LAWS), (HIERARCHICAL, "springs")],
+    [
+        *((choice, law) for choice in ("verlet", NEVER_ASLEEP) for law in LAWS),
+        (HIERARCHICAL, "springs"),
+    ],
     ids=str,
 )
 def test_the_equilibrium_is_that_of_global_relaxation(relaxation, law):
@@ -99,7 +102,10 @@ def test_a_large_body_stays_asleep_far_from_a_small_poke():
     assert 0 < tissue._integrator.n_awake < 0.5 * tissue.n_nodes
 
 
-@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+CHOICES = {"local": LOCAL, "hierarchical": HIERARCHICAL, "verlet": "verlet"}
+
+
+@pytest.mark.parametrize("relaxation", CHOICES.values(), ids=CHOICES)
 def test_the_cutting_force_is_toughness_times_length(relaxation):
     mesh = block((6, 12, 3), SLAB)
     tissue = Tissue(
@@ -119,16 +125,21 @@ def test_the_cutting_force_is_toughness_times_length(relaxation):
     assert np.abs(apart).max() < 1e-12
 
 
-@pytest.mark.parametrize("rings", [0, 2])
+@pytest.mark.parametrize(
+    "relaxation",
+    [LocalTimeStepping(rings=0), LocalTimeStepping(rings=2), "verlet", "global"],
+    ids=["no rings", "two rings", "verlet", "global"],
+)
 @pytest.mark.parametrize("law", ["springs", "neo_hookean"])
-def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law, rings):
-    """In every frame, through splits and substeps, without drag."""
+def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law, relaxation):
+    """In every frame, through splits and substeps, without drag.
+
+    Without mass scaling: a node that gets mass, or that a cut takes it from, keeps its velocity.
+    """
     mesh = bodies.jittered(4, 0)
     material = Material(law=law, poisson_ratio=0.3, viscous_damping=0.0, toughness=5.0)
-    relaxation = LocalTimeStepping(rings=rings)
-    tissue = Tissue(
-        mesh, material, gravity=NO_GRAVITY, solver=SolverSettings(relaxation=relaxation)
-    )
+    solver = SolverSettings(relaxation=relaxation, mass_scaling=None)
+    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, solver=solver)
     scale = float(tissue.snapshot().masses.sum())
     n_cut = 0
     for sweep in strokes.sweeps(strokes.slanted(mesh)):
@@ -140,7 +151,7 @@ def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(l
     assert n_cut > len(mesh.tetrahedra)
 
 
-@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+@pytest.mark.parametrize("relaxation", CHOICES.values(), ids=CHOICES)
 def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
     mesh = bodies.jittered(4, 0)
     fingerprints = []
@@ -154,7 +165,7 @@ def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
     assert fingerprints[0] == fingerprints[1]
 
 
-@pytest.mark.parametrize("relaxation", [LOCAL, HIERARCHICAL], ids=["local", "hierarchical"])
+@pytest.mark.parametrize("relaxation", CHOICES.values(), ids=CHOICES)
 def test_arrays_that_grow_change_nothing(relaxation):
     """Arrays with enough capacity from the start, and arrays that grow during the cut."""
     mesh = bodies.jittered(4, 0)
@@ -171,6 +182,28 @@ def test_arrays_that_grow_change_nothing(relaxation):
             tissue._body.n_nodes, tissue._body.n_tetrahedra = n_nodes, n_tetrahedra
         fingerprints.append(fingerprint(tissue, strokes.make(tissue, strokes.slanted(mesh))))
     assert fingerprints[0] == fingerprints[1]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_force_of_a_cut_by_verlet_is_that_by_runge_kutta_within_a_hundredth(law):
+    """The mean over the middle of a straight cut, and the sum over all of it."""
+    mesh = block((6, 12, 3), SLAB)
+    stroke = strokes.upright(0.0213, -0.004, 0.06, -0.005, 0.025, 0.1)
+    forces = []
+    for relaxation in ("global", "verlet"):
+        tissue = Tissue(
+            mesh,
+            LAWS[law],
+            fixed=bodies.sides(mesh),
+            gravity=NO_GRAVITY,
+            solver=SolverSettings(relaxation=relaxation),
+        )
+        forces.append(np.array([r.wrench.force[1] for r in strokes.make(tissue, stroke)]))
+    expected, found = forces
+    at = np.array([pose.tip[1] for pose in stroke[1:]])
+    middle = (at > 0.035) & (at < 0.055)
+    assert found[middle].mean() == pytest.approx(expected[middle].mean(), rel=0.01)
+    assert found.sum() == pytest.approx(expected.sum(), rel=0.01)
 
 
 def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():

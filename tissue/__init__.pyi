@@ -16,8 +16,10 @@ from .elasticity.spring_calibration import SpringError as SpringError
 from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.connected_components import components as components
+from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import LocalTimeStepping as LocalTimeStepping
+from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .material import Law as Law
@@ -62,6 +64,7 @@ __all__ = [
     "DAMPING_BAND",
     "Energies",
     "FloatArray",
+    "Global",
     "Hierarchical",
     "IntArray",
     "Law",

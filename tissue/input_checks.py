@@ -15,7 +15,7 @@ from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
 from tissue.integrators.options import Global, IntegratorOptions, Verlet, checked_relaxation
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
-from tissue.solver_settings import SolverSettings
+from tissue.solver_settings import PRECISIONS, SolverSettings
 from tissue.types import BladeSweep
 
 ALONG_EDGE = 1e-6
@@ -249,6 +249,10 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
         raise ValueError(
             f"threads is {solver.threads}; relaxation='verlet' runs on one. Use threads=1, or "
             "relaxation='global'"
+        )
+    if solver.precision not in PRECISIONS:
+        raise ValueError(
+            f"precision is {solver.precision!r}; it must be one of {', '.join(PRECISIONS)}"
         )
     if solver.mass_scaling is not None and not solver.mass_scaling > 0.0:
         raise ValueError(

@@ -1,7 +1,6 @@
 """How a tissue is cut and moved, whatever it is made of."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from tissue.cut_settings import CutSettings
 from tissue.integrators.options import IntegratorOptions
@@ -11,8 +10,8 @@ MASS_SCALING_FREQUENCY = 6000.0
 is 0.05 % of its mass, at 5,000 it is 0.2 % and shows in the force (1.2 % of its peak), at 7,000 a
 step more is taken each millisecond."""
 
-Precision = Literal["double", "single"]
-"""Of the forces of tetrahedra."""
+PRECISIONS = ("double", "single")
+"""Precisions in which forces of tetrahedra can be computed."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class SolverSettings:
     these do not set the time step; None: no mass is added. The added mass has no weight, and
     `CutReport.now.added_mass` tells how much it is. For the law `neo_hookean`; where the elements
     of the uncut body are faster, their frequency is the limit."""
-    precision: Precision = "double"
+    precision: str = "double"
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes
     two thirds of the time. Positions and velocities are double either way."""
     threads: int = 1

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class Frames(NamedTuple):
     seconds: FloatArray
     """Wall time of each [s]."""
     substeps: FloatArray
-    added_mass: float | None
+    added_mass: float
     """Mass added to nodes of small elements, as a share of the body's; None: not reported."""
 
 
@@ -158,7 +158,7 @@ def _scene(name: str, material: str) -> Scene:
 def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
     """Do the stroke of a scene once."""
     scene = _scene(case.scene, case.material)
-    audit = case.what == "account" and can_audit(scene.relaxation, scene.threads)
+    audit = case.what == "account" and can_audit(scene.relaxation)
     simulation = prepare(replace(scene, audit=audit))
     n_tetrahedra = simulation.link.describe().n_tetrahedra
     substeps: list[int] = []
@@ -180,14 +180,8 @@ def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
         simulation.dt,
         simulation.recording.column("frame_s").copy(),
         np.array(substeps, dtype=np.float64),
-        added_mass_share(simulation.link.cut_report()),
+        simulation.link.cut_report().now.added_mass,
     )
-
-
-def added_mass_share(report: Any) -> float | None:
-    """Return the share of the mass that the engine added, where its report says it."""
-    share = getattr(report, "added_mass", None)
-    return None if share is None else float(share)
 
 
 def _random_stroke_frames(
@@ -233,7 +227,7 @@ def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:
         STROKE_DT,
         np.array(taken),
         np.array(substeps, dtype=np.float64),
-        added_mass_share(tissue.cut_report()),
+        tissue.cut_report().now.added_mass,
     )
 
 
@@ -250,7 +244,7 @@ def _measurements(case: TimedRun, turns: Sequence[Frames]) -> list[Measurement]:
             quantity("substeps", "steps", COUNTED), [turn.substeps for turn in turns], float
         ),
     ]
-    added = [turn.added_mass for turn in turns if turn.added_mass is not None]
+    added = [turn.added_mass for turn in turns]
     for name, unit, clock, better, values in (
         ("p99.9 of a frame", "ms", WALL.name, "lower", [_p999(turn) for turn in turns]),
         ("real-time factor", "s/s", WALL.name, HIGHER, [_factor(turn) for turn in turns]),

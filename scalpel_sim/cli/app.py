@@ -107,7 +107,8 @@ def _view(
     """Run at real-time speed, and show the cut live in a browser.
 
     On a terminal it waits for Enter, so that you can open the page first. Afterwards the page stays
-    until Ctrl-C.
+    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another or
+    several --threads.
 
     For example:
 
@@ -126,7 +127,7 @@ def _view(
         from scalpel_sim.viewer.viewer import Viewer
 
         options = RunOptions(tissue, arm, client, output, printing)
-        with prepared_run(scene, options) as prepared:
+        with prepared_run(scene, options, relaxation="verlet") as prepared:
             simulation = prepared.simulation
             with Viewer(
                 simulation.arm.model,

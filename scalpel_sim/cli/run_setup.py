@@ -60,6 +60,8 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "cut",
         "scheme",
         "relaxation",
+        "mass_scaling",
+        "precision",
         "threads",
         "blade",
         "audit",
@@ -89,7 +91,7 @@ class PreparedRun(NamedTuple):
 
 @contextmanager
 def prepared_run(
-    name: str | None, options: RunOptions, *, audits: bool = False
+    name: str | None, options: RunOptions, *, audits: bool = False, relaxation: str | None = None
 ) -> Iterator[PreparedRun]:
     """Yield the run that the command line asks for, and close the link to the tissue afterwards.
 
@@ -97,6 +99,8 @@ def prepared_run(
         name: The scene; None for the default one.
         options: What the command line asks for.
         audits: Whether an account of the energy is kept where nothing is said of it.
+        relaxation: How the motion is advanced where nothing is said of it, on one thread; None: as
+            the scene has it.
 
     Raises:
         UsageError: options that make no sense, or not together.
@@ -109,7 +113,7 @@ def prepared_run(
         raise UsageError("--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it")
     check_exports(options.output.export)
     if client.connect is None:
-        link, scene, settings = _tissue_here(name, options, audits)
+        link, scene, settings = _tissue_here(name, options, audits, relaxation)
     else:
         link, scene, settings = _tissue_elsewhere(name, options, client.connect)
     try:
@@ -121,12 +125,14 @@ def prepared_run(
 
 
 def _tissue_here(
-    name: str | None, options: RunOptions, audits: bool
+    name: str | None, options: RunOptions, audits: bool, relaxation: str | None
 ) -> tuple[TissueLink, Scene, dict[str, Any]]:
     """Make the tissue in this process, after all checks that need none."""
     tissue = options.tissue
     scene = changed(chosen_scene(name, tissue), **_changes_of_scene(options.arm))
-    if audits and tissue.solver.audit is None and can_audit(scene.relaxation, scene.threads):
+    if relaxation is not None and tissue.solver.relaxation is None and scene.threads == 1:
+        scene = replace(scene, relaxation=relaxation)
+    if audits and tissue.solver.audit is None and can_audit(scene.relaxation):
         scene = replace(scene, audit=True)
     check_scene(scene)
     check_folder(_folder(options.output, scene))
@@ -251,6 +257,8 @@ def chosen_scene(name: str | None, options: TissueOptions) -> Scene:
             material=_material_as_asked(scene.material, options.material),
             scheme=solver.scheme,
             relaxation=solver.relaxation,
+            mass_scaling=solver.mass_scaling,
+            precision=solver.precision,
             threads=solver.threads,
             snap=solver.snap,
             guard=solver.guard,

@@ -66,7 +66,7 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
     found: dict[KernelSet, None] = {}
     for name in names:
         scene = chosen_scene(name, tissue)
-        audits = (True, False) if can_audit(scene.relaxation, scene.threads) else (False,)
+        audits = (True, False) if can_audit(scene.relaxation) else (False,)
         if tissue.solver.audit is not None:
             audits = (tissue.solver.audit,)
         for audit in audits:

@@ -158,6 +158,7 @@ def quality_figures(report: CutReport) -> dict[str, float]:
         "tetrahedra_growth": report.growth,
         "frequency_growth": report.frequency_growth,
         "substep_growth": report.substep_growth,
+        "added_mass": report.now.added_mass,
     }
 
 

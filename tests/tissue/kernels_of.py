@@ -1,5 +1,6 @@
 """The arrays that kernels work on, made from a mesh as `Tissue` makes them."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,7 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
-from tissue.integrators.damping import Damping
+from tissue.integrators.damping import Damping, damp
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
 from tissue.integrators.stages import Stages, new_stages
@@ -143,8 +144,35 @@ class Network(NamedTuple):
         accelerations(self.context, out)
         return out * self.body.masses[:, None]
 
+    def damped_each_step(
+        self, take_steps: Callable[..., int], h: float, n: int = 1, *, is_running: bool = False
+    ) -> Damping:
+        """Take `n` steps of `h` [s] with damping once a step; return the damping.
+
+        Args:
+            take_steps: A loop of `tissue.integrators.substeps`.
+            h: Length of a step [s].
+            n: Number of steps.
+            is_running: Whether there are steps before and after: then half of the damping of the
+                one before is owed at the begin, and half of that of the last at the end. If not,
+                no damping is owed at the end.
+        """
+        around, context = self.surroundings, self.context
+        damping = Damping(
+            owed=0.5 * h if is_running else 0.0,
+            dissipated=0.0,
+            retardation_time=around.retardation_time,
+            drag=around.drag,
+        )
+        undamped = around.replaced(drag=0.0, retardation_time=0.0)
+        context = context.replaced(surroundings=undamped, damping=damping)
+        assert take_steps(context, NOWHERE, n * h, 0.0, 1.0, 0, n) == n
+        if not is_running:
+            damp(damping, self.body, context.elastic, self.stages, 0.0)
+        return damping
+
     def advance(self, h: float, n: int = 1) -> None:
-        """Take `n` Runge-Kutta steps of `h` [s]."""
+        """Take `n` Runge-Kutta steps of `h` [s], with damping in every stage."""
         context = self.context
         for _ in range(n):
             runge_kutta_nystroem(context, NOWHERE, h, 0.0, 1.0)

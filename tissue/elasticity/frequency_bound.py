@@ -172,10 +172,10 @@ def dilatation_term(
     for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
         t = tetrahedron_of_slot(solid, slot)
         n1, n2, n3, _ = normals(body, points, t)
-        n = add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
-        n = add_to_ring(solid, visits, n, t, 1, n1)
-        n = add_to_ring(solid, visits, n, t, 2, n2)
-        n = add_to_ring(solid, visits, n, t, 3, n3)
+        n = _add_to_ring(solid, visits, n, t, 0, scale(-1.0, add(n1, add(n2, n3))))
+        n = _add_to_ring(solid, visits, n, t, 1, n1)
+        n = _add_to_ring(solid, visits, n, t, 2, n2)
+        n = _add_to_ring(solid, visits, n, t, 3, n3)
     total = 0.0
     for i in range(n):
         total += solid.weight[solid.ring_nodes[i]] * norm(vec3(solid.ring, i))
@@ -184,7 +184,7 @@ def dilatation_term(
 
 
 @inlined
-def add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
+def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: Vec3) -> int:
     """Add a share of V grad N / 4 to node `k` of a tetrahedron; return the nodes listed so far."""
     node = solid.nodes[node_place(solid, t, k)]
     if visits.nodes[node] != visits.epoch:
@@ -258,7 +258,7 @@ def bound_of_node(
         stiffness = add_square(stiffness, c, normal)
         if averaged:
             for other in range(4):
-                n = add_to_ring(solid, visits, n, t, other, normal)
+                n = _add_to_ring(solid, visits, n, t, other, normal)
     for i in range(n):
         normal = vec3(solid.ring, i)
         length = norm(normal)

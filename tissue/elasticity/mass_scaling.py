@@ -7,7 +7,9 @@ added mass is moved and has no weight: equilibrium is the same.
 """
 
 from tissue.core.array_types import IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import Point, point_of, times
+from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.springs import Springs
 from tissue.mesh.body import Body
@@ -43,6 +45,14 @@ def scale_masses(
         body.added_masses[node] = after - own
         solid.frequency_squared[node] = stiffness / after
         springs.stiffness_per_mass[node] *= before / after
+
+
+@inlined
+def free_fall(body: Body, node: int, gravity: Vec3) -> Point:
+    """Acceleration of a node in gravity [m/s2]: the mass that was added has no weight."""
+    own = 1.0 - body.added_masses[node] / body.masses[node]
+    fall: Point = times(own, point_of(*gravity))
+    return fall
 
 
 def added_mass_share(body: Body) -> float:

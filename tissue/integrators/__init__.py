@@ -2,9 +2,10 @@
 
 - `integrator`: what an integrator does, and which one a user's `options` stand for.
 - `system`, `step_context`: what takes part in a step, for Python and for kernels.
-- `global_stepper`: the default, all nodes together; `runge_kutta`, `stages` and `stability` are its
-  method, `threaded` and `audited` take its steps on several threads and with an account of energy.
-- `step_end`: contact and slip of the blade after a step.
+- `global_stepper`: all nodes together, by `runge_kutta` (the default) or `verlet`; `damping` acts
+  between their steps, `substeps` takes them, `threaded` on several threads; `stability` has the
+  largest steps, `losses` what contact takes for the account of energy.
+- `step_end`: contact and slip of the blade after a step of the others.
 - `local`, `hierarchical`: local time stepping, and the paper's section 5.2; both search
   `node_rings` around a `focus`.
 - `equilibrium`: the state of rest of a body, by dynamic relaxation.

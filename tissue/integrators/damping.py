@@ -1,10 +1,13 @@
 """Damping once a step: dampers and drag change the velocities between two elastic steps.
 
 With D the damping and E the elastic motion the steps are D(h/2) E(h) D(h) E(h) D(h) ..., Strang's
-splitting: of second order in the damping, whatever the order of E. Where the damping is weak, it
-acts once every few steps, for as long. Each D is one explicit step at the positions as they are:
+splitting. Where the damping is weak, it acts once every few steps, for as long. Each D is one
+explicit step at the positions as they are,
 
     v <- v + s (viscous force / m - drag v)
+
+of first order: a motion that dies away at the rate r does so at r (1 + r h / 2). A second
+evaluation of the dampers in each step would be needed for the second order.
 
 It is stable up to s times the highest rate = 2 (`tissue.integrators.stability`). What it takes from
 the kinetic energy is what the dampers dissipate, so that no integral of a power is needed.

@@ -22,6 +22,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.elasticity.internal_forces import deform, internal_force, viscous_force
+from tissue.elasticity.mass_scaling import free_fall
 from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body
@@ -71,11 +72,9 @@ def acceleration(
     time = surroundings.retardation_time
     force = internal_force(context.elastic, node, positions, velocities, time)
     force = force + point(context.stages.external, node)
-    per_mass = 1.0 / body.masses[node]
-    heavy = 1.0 - body.added_masses[node] * per_mass  # what mass scaling added has no weight
-    gravity = times(heavy, point_of(*surroundings.gravity))
-    free = gravity - times(surroundings.drag, point(velocities, node))
-    total: Point = free + times(per_mass, force)
+    fall = free_fall(body, node, surroundings.gravity)
+    free = fall - times(surroundings.drag, point(velocities, node))
+    total: Point = free + times(1.0 / body.masses[node], force)
     return total
 
 

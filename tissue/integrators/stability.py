@@ -120,6 +120,7 @@ def _step(
     limit: float, elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
 ) -> float:
     """Return a stable step [s]; the elastic motion and the damping limit it each by itself."""
+    if frequency_squared == 0.0:
+        return math.inf  # every node is fixed
     rate = surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag
-    most = max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)
-    return SAFETY / most if most > 0.0 else math.inf
+    return SAFETY / max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)

@@ -35,6 +35,7 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
     apply_blade_forces(context.blade, body, edge, x, at + 0.5 * share, share, dt, external)
     deform(context.elastic, body, x)
     for i in range(body.n_nodes):
-        now = point(v, i) + times(h, acceleration(context, i, x, v))
-        store_point(v, i, now)
-        store_point(x, i, point(x, i) + times(0.5 * h, now))
+        store_point(v, i, point(v, i) + times(h, acceleration(context, i, x, v)))
+    # Only now: until here springs saw all nodes at the middle of the step.
+    for i in range(body.n_nodes):
+        store_point(x, i, point(x, i) + times(0.5 * h, point(v, i)))

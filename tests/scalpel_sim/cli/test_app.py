@@ -120,15 +120,19 @@ WRONG_USE = {
     ),
     "an audit of a local relaxation": (
         ["run", "slab", "--audit", "--relaxation", "local"],
-        "--audit needs --relaxation global",
+        "--audit needs --relaxation global or verlet",
     ),
     "fewer threads than one": (
         ["run", "slab", "--threads", "0"],
         "--threads is 0; it must be from 1",
     ),
-    "an audit on two threads": (
-        ["run", "slab", "--audit", "--threads", "2"],
-        "--audit needs --relaxation global and --threads 1",
+    "verlet on two threads": (
+        ["run", "slab", "--relaxation", "verlet", "--threads", "2"],
+        "--threads 2 is for --relaxation global; verlet runs on one",
+    ),
+    "a negative mass scaling": (
+        ["run", "slab", "--mass-scaling", "-1"],
+        "--mass-scaling is -1.0; it is an angular frequency",
     ),
     "a blade for a tissue elsewhere": (
         ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],

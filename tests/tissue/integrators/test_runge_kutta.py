@@ -94,11 +94,16 @@ def growth(step, ratio, by_drag):
     """
     damping = {"viscous_damping": 2.0 * ratio} if by_drag else {"retardation_time": 2.0 * ratio}
     network = oscillator(1.0, **damping)
+    return growth_of(network, lambda: network.advance(step))
+
+
+def growth_of(network, take_step):
+    """Return the largest growth factor of an oscillator in a step."""
     columns = []
     for x, v in ((1.0, 0.0), (0.0, 1.0)):
         # The amplitude is small: the spring is not linear for a node that passes its neighbour.
         network.body.positions[1, 0], network.body.velocities[1, 0] = 1.0 + 1e-3 * x, 1e-3 * v
-        network.advance(step)
+        take_step()
         state = network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]
         columns.append(np.array(state) / 1e-3)
     return np.abs(np.linalg.eigvals(np.transpose(columns))).max()
@@ -106,12 +111,17 @@ def growth(step, ratio, by_drag):
 
 def measured_limit(ratio, by_drag=True):
     """Return the first step, in units of 1 / w, beyond which the oscillator grows."""
+    return first_unstable_step(lambda step: growth(step, ratio, by_drag))
+
+
+def first_unstable_step(growth_in):
+    """Return the first step beyond which `growth_in(step)` is above 1."""
     scan = np.linspace(0.05, 4.0, 400)
-    first = next(i for i, step in enumerate(scan) if growth(step, ratio, by_drag) > 1.0 + 1e-6)
+    first = next(i for i, step in enumerate(scan) if growth_in(step) > 1.0 + 1e-6)
     low, high = scan[first - 1], scan[first]
     for _ in range(20):
         middle = 0.5 * (low + high)
-        if growth(middle, ratio, by_drag) > 1.0 + 1e-6:
+        if growth_in(middle) > 1.0 + 1e-6:
             high = middle
         else:
             low = middle

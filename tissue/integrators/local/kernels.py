@@ -35,6 +35,7 @@ from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
 from tissue.elasticity.internal_forces import Surroundings, internal_force
+from tissue.elasticity.mass_scaling import free_fall
 from tissue.elasticity.spring_forces import damping_force
 from tissue.elasticity.springs import Springs
 from tissue.integrators.local.chebyshev import Chebyshev
@@ -212,7 +213,6 @@ def _accelerate_coarse(context: StepContext, activity: Activity, zone: Zone) -> 
     """Find the accelerations that no fine node changes: they are the same in all substeps."""
     body, elastic, external = context.body, context.elastic, context.stages.external
     surroundings = context.surroundings
-    gravity = point_of(*surroundings.gravity)
     time = surroundings.retardation_time
     for k in range(activity.n_listed):
         node = activity.listed[k]
@@ -220,7 +220,8 @@ def _accelerate_coarse(context: StepContext, activity: Activity, zone: Zone) -> 
             continue
         force = internal_force(elastic, node, body.positions, body.velocities, time)
         force = force + point(external, node)
-        store_point(zone.accelerations, node, gravity + times(1.0 / body.masses[node], force))
+        fall = free_fall(body, node, surroundings.gravity)
+        store_point(zone.accelerations, node, fall + times(1.0 / body.masses[node], force))
 
 
 @kernel
@@ -230,7 +231,7 @@ def _begin_fine(body: Body, springs: Springs, zone: Zone, surroundings: Surround
     time = surroundings.retardation_time
     for k in range(rings.n_found):
         node = rings.order[k]
-        steady = point_of(*surroundings.gravity)
+        steady = free_fall(body, node, surroundings.gravity)
         if rings.ring[node] == 0:
             store_point(zone.start, node, point(body.positions, node))
         elif time > 0.0:

@@ -1,0 +1,144 @@
+"""Mass that slivers get: it bounds the frequencies, has no weight, and is in no report of mass."""
+
+import numpy as np
+import pytest
+
+from tests import bodies, incisions
+from tests.tissue.solids import SolidBody, highest_frequency, moved
+from tissue import LocalTimeStepping, Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue.integrators.runge_kutta import accelerations
+
+MESH = block((6, 6, 3), (0.06, 0.06, 0.03))
+FREE = {"viscous_damping": 0.0, "retardation_time": 0.0}
+STRETCH = np.array([1.1, 1.0, 1.0])
+"""Of bodies that are held, so that a slit across it stays open."""
+
+LOW = 4000.0
+"""Angular frequency that many nodes of the cut body exceed [1/s]: the uncut one has less."""
+
+
+def body_of(mass_scaling, relaxation="global", is_held=True, **damping):
+    """Return a block held at two sides, and stretched, or free."""
+    return Tissue(
+        MESH,
+        Material(law="neo_hookean", poisson_ratio=0.45, young_modulus=10e3, **damping),
+        fixed=bodies.sides(MESH) if is_held else None,
+        positions=MESH.positions * STRETCH if is_held else None,
+        solver=SolverSettings(mass_scaling=mass_scaling, relaxation=relaxation),
+    )
+
+
+def cut_body(mass_scaling, seed=0, **settings):
+    """Return a block after two incisions."""
+    tissue, kinds = body_of(mass_scaling, **settings), list(incisions.KINDS)
+    for i in range(2):
+        kind = kinds[(seed + 3 * i) % len(kinds)]
+        tissue.incise(*incisions.incision(MESH, kind, seed + i))
+    return tissue
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_after_cuts_no_bound_is_above_the_limit(seed):
+    """The limit is that asked for, or the bound of the uncut body if that is higher."""
+    tissue = cut_body(LOW, seed)
+    solid = tissue._system.elasticity.arrays.solid
+    limit = max(LOW, tissue.cut_report().initial.frequency)
+    bounds = np.sqrt(solid.frequency_squared[: tissue.n_nodes])
+    assert bounds.max() <= limit * (1.0 + 1e-9)
+    assert highest_frequency(SolidBody(tissue._body, solid)) <= limit
+    assert tissue.cut_report().now.frequency <= limit * (1.0 + 1e-9)
+    assert cut_body(None, seed).cut_report().now.frequency > 1.1 * limit
+
+
+def test_the_report_tells_the_share_of_the_mass_that_was_added():
+    tissue = cut_body(LOW)
+    body, n = tissue._body, tissue.n_nodes
+    own = tissue.snapshot().masses
+    np.testing.assert_allclose(body.masses[:n], own + body.added_masses[:n], rtol=1e-12)
+    share = body.added_masses[:n].sum() / own.sum()
+    assert tissue.cut_report().now.added_mass == pytest.approx(share, rel=1e-12)
+    assert 1e-4 < share < 0.1
+    assert tissue.cut_report().initial.added_mass == 0.0
+    assert (body.added_masses[:n] >= 0.0).all()
+
+
+def test_without_mass_scaling_no_mass_is_added():
+    tissue = cut_body(None)
+    assert not tissue._body.added_masses.any()
+    assert tissue.cut_report().now.added_mass == 0.0
+
+
+def test_an_uncut_body_gets_no_mass_however_low_the_limit():
+    tissue = Tissue(MESH, Material(law="neo_hookean"), solver=SolverSettings(mass_scaling=1.0))
+    assert not tissue._body.added_masses.any()
+
+
+def test_springs_get_no_mass():
+    tissue = Tissue(MESH, solver=SolverSettings(mass_scaling=LOW))
+    tissue.incise(*incisions.incision(MESH, next(iter(incisions.KINDS)), 0))
+    assert not tissue._body.added_masses.any()
+
+
+def test_masses_and_volumes_of_snapshot_and_pieces_are_those_without_mass_scaling():
+    scaled, exact = cut_body(LOW), cut_body(None)
+    """To rounding: a snapshot has the mass of each node less what was added."""
+    np.testing.assert_allclose(scaled.snapshot().masses, exact.snapshot().masses, rtol=1e-14)
+    for found, expected in zip(scaled.pieces(), exact.pieces(), strict=True):
+        assert found.mass == pytest.approx(expected.mass, rel=1e-14)
+        assert (found.volume, found.rest_volume) == (expected.volume, expected.rest_volume)
+        size = np.abs(expected.inertia).max()
+        np.testing.assert_allclose(found.inertia, expected.inertia, atol=1e-13 * size)
+
+
+def forces(tissue, positions):
+    """Return the forces on the nodes at positions, gravity included [N]."""
+    body, n = tissue._body, tissue.n_nodes
+    body.positions[:n] = positions
+    out = np.zeros_like(body.positions)
+    accelerations(tissue._system.context, out)
+    return out[:n] * body.masses[:n, None]
+
+
+def test_added_mass_changes_no_force_so_that_equilibrium_is_the_same():
+    scaled, exact = cut_body(LOW), cut_body(None)
+    rest = exact.snapshot().rest_positions
+    x = moved(TetrahedralMesh(rest, exact.snapshot().tetrahedra), 1e-3)
+    expected = forces(exact, x)
+    np.testing.assert_allclose(forces(scaled, x), expected, atol=1e-12 * np.abs(expected).max())
+
+
+def test_the_sag_is_the_same_to_a_millionth():
+    """Under strong drag, until nothing moves any more; the slit stays open."""
+    sags = []
+    for mass_scaling in (0.5 * LOW, None):
+        tissue = body_of(mass_scaling, viscous_damping=60.0)
+        slit = [[(0.0287, y, 0.0123), (0.0287, y, 0.04)] for y in (-0.01, 0.07)]
+        tissue.incise(slit, (0.0, 1.0, 0.0))
+        for _ in range(1000):
+            result = tissue.step(None, 1e-3)
+        assert result.body_contacts.force == 0.0
+        assert (tissue.cut_report().now.added_mass > 0.0) == (mass_scaling is not None)
+        sags.append(tissue.snapshot().positions - tissue.snapshot().rest_positions)
+    assert np.abs(sags[0] - sags[1]).max() < 1e-6 * np.abs(sags[1]).max()
+
+
+@pytest.mark.parametrize(
+    "relaxation", ["global", "verlet", LocalTimeStepping()], ids=["global", "verlet", "local"]
+)
+def test_a_free_body_gains_the_momentum_of_its_own_weight(relaxation):
+    tissue = cut_body(LOW, relaxation=relaxation, is_held=False, **FREE)
+    body, n = tissue._body, tissue.n_nodes
+    assert body.added_masses[:n].sum() > 1e-4 * body.masses[:n].sum()
+    momentum = []
+    for _ in range(20):
+        tissue.step(None, 1e-3)
+        momentum.append((body.masses[:n, None] * body.velocities[:n]).sum(axis=0))
+    weight = tissue.snapshot().masses.sum() * np.array([0.0, 0.0, -9.81])
+    gained = momentum[-1] - momentum[0]
+    np.testing.assert_allclose(gained, 0.019 * weight, atol=1e-12 * abs(weight[2]))
+
+
+@pytest.mark.parametrize("frequency", [0.0, -1.0])
+def test_a_frequency_that_is_none_is_refused(frequency):
+    with pytest.raises(ValueError, match="mass_scaling is"):
+        Tissue(MESH, solver=SolverSettings(mass_scaling=frequency))

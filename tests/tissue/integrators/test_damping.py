@@ -1,0 +1,121 @@
+"""Damping once a step: its order, its stability, and the energy that it takes."""
+
+import numpy as np
+import pytest
+
+from tests import bodies
+from tests.tissue.integrators.test_runge_kutta import (
+    DAMPINGS,
+    FREQUENCY,
+    exact_state,
+    first_unstable_step,
+    growth_of,
+    order,
+)
+from tests.tissue.kernels_of import elastic_of, network_of, oscillator
+from tissue import block
+from tissue.elasticity.internal_forces import elastic_energy
+from tissue.integrators.stability import DAMPING_LIMIT, RUNGE_KUTTA_LIMIT, VERLET_LIMIT
+from tissue.integrators.substeps import runge_kutta_steps, verlet_steps
+
+pytestmark = pytest.mark.kernel
+
+METHODS = {"Runge-Kutta": runge_kutta_steps, "Verlet": verlet_steps}
+LIMITS = {"Runge-Kutta": RUNGE_KUTTA_LIMIT, "Verlet": VERLET_LIMIT}
+STEPS = [40, 80, 160, 320]
+
+
+def state_after_a_second(method, n, damping):
+    """Return x and x' of the oscillator of `exact_state`."""
+    network = oscillator(FREQUENCY, **damping)
+    network.body.positions[1, 0] = 1.3
+    network.damped_each_step(METHODS[method], 1.0 / n, n)
+    return np.array([network.body.positions[1, 0] - 1.0, network.body.velocities[1, 0]])
+
+
+@pytest.mark.parametrize(("method", "expected"), [("Runge-Kutta", 4.0), ("Verlet", 2.0)])
+def test_without_damping_the_order_is_that_of_the_method(method, expected):
+    errors = [
+        np.abs(state_after_a_second(method, n, {}) - exact_state(1.0, {})).max() for n in STEPS
+    ]
+    assert order(STEPS, errors) == pytest.approx(expected, abs=0.05)
+
+
+def error_with_rate(method, n, damping, rate):
+    """Return the error against the exact motion with a damping rate [1/s]."""
+    exact = exact_state(1.0, {"viscous_damping": rate})
+    return np.abs(state_after_a_second(method, n, damping) - exact).max()
+
+
+def rate_of(damping):
+    """Return the rate of damping of the oscillator [1/s]."""
+    by_dampers = damping.get("retardation_time", 0.0) * FREQUENCY**2
+    return damping.get("viscous_damping", 0.0) + by_dampers
+
+
+DAMPED = ["drag", "retardation", "both"]
+
+
+@pytest.mark.parametrize("damping", DAMPED)
+@pytest.mark.parametrize("method", METHODS)
+def test_with_damping_once_a_step_the_order_is_one(method, damping):
+    given = DAMPINGS[damping]
+    errors = [error_with_rate(method, n, given, rate_of(given)) for n in STEPS]
+    assert order(STEPS, errors) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("damping", DAMPED)
+@pytest.mark.parametrize("method", METHODS)
+def test_the_error_of_first_order_is_a_rate_too_high_by_half_of_rate_times_step(method, damping):
+    """A step multiplies by 1 - r h, as the rate -ln(1 - r h) / h = r (1 + r h / 2 + ...) does.
+
+    Against the motion with that rate the order is two: that of the splitting.
+    """
+    given = DAMPINGS[damping]
+    rate = rate_of(given)
+    errors = [error_with_rate(method, n, given, rate * (1.0 + 0.5 * rate / n)) for n in STEPS]
+    assert order(STEPS, errors) > 1.9
+
+
+def limit_of(method, ratio, by_drag):
+    """Return the first step, in units of 1 / w, beyond which the oscillator grows."""
+    damping = {"viscous_damping": 2.0 * ratio} if by_drag else {"retardation_time": 2.0 * ratio}
+    network = oscillator(1.0, **damping)
+
+    def growth(step):
+        def take_step():
+            network.damped_each_step(METHODS[method], step, is_running=True)
+
+        return growth_of(network, take_step)
+
+    return first_unstable_step(growth)
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 0.3, 0.6, 1.0, 2.0])
+@pytest.mark.parametrize("by_drag", [True, False], ids=["drag", "retardation"])
+@pytest.mark.parametrize("method", METHODS)
+def test_elastic_motion_and_damping_limit_the_step_each_by_itself(method, by_drag, ratio):
+    """The rate of damping is 2 ratio w. Some damping makes longer Runge-Kutta steps stable."""
+    of_damping = DAMPING_LIMIT / (2.0 * ratio) if ratio > 0.0 else np.inf
+    expected, found = min(LIMITS[method], of_damping), limit_of(method, ratio, by_drag)
+    assert expected <= found + 0.001
+    if method == "Verlet" or ratio in (0.0, 1.0, 2.0):
+        assert found == pytest.approx(expected, abs=0.005)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_damping_takes_is_what_the_body_loses(method):
+    """A shaken block: kinetic and elastic energy and what was dissipated are constant."""
+    mesh = block((2, 2, 1), (0.04, 0.04, 0.02))
+    network = network_of(mesh, bodies.sides(mesh), retardation_time=2e-4, viscous_damping=5.0)
+    body, elastic = network.body, elastic_of(network.springs)
+    noise = np.random.default_rng(0).normal(size=body.positions.shape) * ~body.fixed[:, None]
+    body.velocities[:] = 0.02 * noise
+
+    def energy():
+        return 0.5 * body.masses @ (body.velocities**2).sum(axis=1) + elastic_energy(elastic, body)
+
+    before = energy()
+    damping = network.damped_each_step(METHODS[method], 2e-5, 200)
+    assert damping.dissipated > 0.05 * before
+    assert before - energy() == pytest.approx(damping.dissipated, rel=1e-3)
