@@ -40,6 +40,7 @@ def main() -> int:
     parser.add_argument("--strokes", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--relaxation", choices=("global", "hierarchical", "local"), default=None)
+    parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     parser.add_argument("--law", choices=("springs", "neo_hookean"), default=None)
     options = parser.parse_args()
     scene = SCENES["organ"]
@@ -48,11 +49,11 @@ def main() -> int:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
     relaxation = options.relaxation or scene.relaxation
-    tissue = make_tissue(
-        replace(scene, material=material, relaxation=relaxation, floor=STROKE_FLOOR)
-    )
+    contact = options.contact or scene.contact
+    scene = replace(scene, material=material, relaxation=relaxation, contact=contact)
+    tissue = make_tissue(replace(scene, floor=STROKE_FLOOR))
     random = np.random.default_rng(options.seed)
-    table = Table(title=f"organ, law {material.law}, relaxation {relaxation}")
+    table = Table(title=f"organ, law {material.law}, relaxation {relaxation}, contact {contact}")
     names = ("stroke", "tetrahedra", "pieces", "substeps/ms", "contacts")
     for name in (*names, "CPU ms/ms", "fastest [m/s]"):
         table.add_column(name, justify="right")

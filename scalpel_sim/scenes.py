@@ -31,6 +31,8 @@ RELAXATIONS = ("global", "verlet", "hierarchical", "local")
 
 _PRECISIONS = ("single", "double")
 """Precisions that `Tissue` takes."""
+CONTACTS = ("impulses", "penalty")
+"""Names of the contacts that `Tissue` takes."""
 
 COUPLINGS = ("rigid", "virtual")
 
@@ -88,6 +90,18 @@ def check_relaxation(name: str, threads: int) -> None:
         )
 
 
+def check_contact(name: str, relaxation: str) -> None:
+    """Check that a contact exists, and that it goes with the relaxation.
+
+    Raises:
+        UsageError: it does not; the message says why.
+    """
+    if name not in CONTACTS:
+        raise unknown("contact", name, CONTACTS)
+    if name == "penalty" and relaxation not in ("global", "verlet"):
+        raise UsageError(f"--contact penalty needs --relaxation global or verlet, not {relaxation}")
+
+
 def can_audit(relaxation: str) -> bool:
     """Whether an energy account can be kept: where all nodes move together."""
     return relaxation in ("global", "verlet")
@@ -117,6 +131,8 @@ class Scene:
     precision: str = "single"
     """Precision of the forces of tetrahedra: `single` or `double`. Positions and velocities are
     double."""
+    contact: str = "impulses"
+    """How the body is kept from passing through itself: `impulses`, or `penalty`."""
     threads: int = 1
     """Threads that share a global relaxation."""
     stretch: float = 0.05
@@ -152,11 +168,12 @@ class Scene:
 
         Raises:
             UsageError: stretch, gravity, speed, mass scaling or a number of the coupling is out of
-                range; there is no such scheme, relaxation, precision or coupling; an audit of a
-                relaxation that has none.
+                range; there is no such scheme, relaxation, precision, contact or coupling; an audit
+                of a relaxation that has none.
         """
         check_scheme(self.scheme)
         check_relaxation(self.relaxation, self.threads)
+        check_contact(self.contact, self.relaxation)
         if self.audit and not can_audit(self.relaxation):
             raise UsageError(
                 f"--audit needs --relaxation global or verlet, not {self.relaxation}; omit "

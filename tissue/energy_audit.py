@@ -4,6 +4,7 @@ from tissue.blade.edge import Edge
 from tissue.blade.forces import edge_energy
 from tissue.blade.impulse_totals import clear_works
 from tissue.blade.side_contact import sides_energy
+from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.energy import body_energy, kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
@@ -22,6 +23,7 @@ class Audit:
         self._gravity = gravity
         self._topology = 0.0
         self._at_first = (0.0, 0.0, 0.0)
+        self._contacts_at_first = (0.0, 0.0)
 
     def begin(self, system: System) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
@@ -29,6 +31,8 @@ class Audit:
         system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
         clear_works(system.interaction.state.totals)
         self._at_first = self._stored(system)
+        contacts = system.contact.forces
+        self._contacts_at_first = (contacts.work, contacts.stored)
 
     def before_cut(self, system: System, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
@@ -45,20 +49,26 @@ class Audit:
         elastic, kinetic, potential = self._stored(system)
         elastic_first, kinetic_first, potential_first = self._at_first
         held = edge_energy(blade, system.body, edge, 1.0)
+        contacts = system.contact.forces
         return Energies(
             work_of_blade=totals.work_of_blade,
             elastic=elastic - elastic_first,
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,
-            held=held + sides_energy(blade.sides),
+            held=held + sides_energy(blade.sides) + contacts.stored - self._contacts_at_first[1],
             damping=system.damping.dissipated,
             cutting=totals.work_of_cutting,
             breaking=totals.work_of_breaking,
             friction=totals.work_of_friction,
-            contact=system.contact_loss.dissipated,
+            contact=system.contact_loss.dissipated + self._lost_in(contacts),
             topology=self._topology,
             released=totals.released,
         )
+
+    def _lost_in(self, contacts: PenaltyForces) -> float:
+        """Return what the body gave to contacts and their springs do not hold [J]."""
+        work, stored = self._contacts_at_first
+        return (work - contacts.work) - (contacts.stored - stored)
 
     def _stored(self, system: System) -> tuple[float, float, float]:
         """Return the elastic, kinetic and potential energy [J]."""

@@ -30,6 +30,9 @@ tetrahedra 3 % at 1.27, 5 % at 2.0 and 16 % at 2.5."""
 HOW_LOW = {"springs": 20, "neo_hookean": 15}
 """Percent by which it was below it at most, beyond that."""
 
+_CONTACTS = ("impulses", "penalty")
+"""Names that `SolverSettings.contact` may have."""
+
 _log = logging.getLogger("tissue")
 
 
@@ -228,12 +231,19 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
     """Return the settings of the integrator that was chosen, for a body of that material.
 
     Raises:
-        ValueError: there is no such scheme, integrator or number of threads, or the integrator does
-            not go with the material or with an account of the energy.
+        ValueError: there is no such scheme, integrator, contact or number of threads, or the
+            integrator does not go with the material, the contact or an account of the energy.
     """
     checked_scheme(solver.scheme)
     checked_threads(solver.threads)
     options = checked_relaxation(solver.relaxation, material)
+    if solver.contact not in _CONTACTS:
+        raise ValueError(f"no contact is called {solver.contact!r}. Known: {', '.join(_CONTACTS)}")
+    if solver.contact == "penalty" and not isinstance(options, Global | Verlet):
+        raise ValueError(
+            "contact='penalty' needs relaxation='global' or 'verlet': the others correct the "
+            "motion after each substep. Omit one of the two"
+        )
     if solver.audit and not isinstance(options, Global | Verlet):
         raise ValueError(
             "an audit needs relaxation='global' or 'verlet': in the others nodes are at different "

@@ -121,7 +121,7 @@ class Tissue(BodyQueries):
             body = with_room_to_hang(body)
         method = method_of(options)
         self._system = assembled(
-            *(body, self.material, surroundings, blade, floor),
+            *(body, self.material, surroundings, blade, floor, solver.contact),
             mass_scaling=solver.mass_scaling,
             damps_each_step=method.damps_each_step,
             is_single=solver.precision == "single",

@@ -87,8 +87,8 @@ class Energies(NamedTuple):
     potential: float
     """Change of the energy of the tissue in gravity."""
     held: float
-    """Change of the elastic energy of the contact of edge and faces of the blade with the
-    tissue."""
+    """Change of the elastic energy of the contact of edge and faces of the blade with the tissue,
+    and of contacts of the tissue that act as springs."""
     damping: float
     """Energy dissipated by viscosity and drag."""
     cutting: float

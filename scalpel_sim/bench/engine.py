@@ -145,7 +145,7 @@ class TouchingBlocks:
     @property
     def n_contacts(self) -> int:
         """Number of contacts that press."""
-        return self._tissue._system.contact.arrays.n_pressing
+        return int(self._tissue._system.hard_contact.arrays.n_pressing)
 
     def searches(self, n: int) -> None:
         """Search all candidate pairs again, as after faces have moved by the margin, and resolve.
@@ -153,12 +153,12 @@ class TouchingBlocks:
         The steps of `checks` are part of it.
         """
         for _ in range(n):
-            self._tissue._system.contact.arrays.stale = REBUILD
+            self._tissue._system.hard_contact.arrays.stale = REBUILD
             self.checks(1)
 
     def checks(self, n: int) -> None:
         """Test the candidate pairs and resolve contacts, as in every Runge-Kutta step."""
-        contact, body = self._tissue._system.contact.arrays, self._tissue._body
+        contact, body = self._tissue._system.hard_contact.arrays, self._tissue._body
         for _ in range(n):
             note_all_positions(contact, body)
             resolve(contact, body, FRAME_DT)

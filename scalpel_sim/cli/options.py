@@ -123,6 +123,9 @@ class SolverOptions:
     precision: str | None = None
     """Precision of the forces of tetrahedra: single [default], or double, which takes a third
     longer. Positions and velocities are double."""
+    contact: str | None = None
+    """How the body is kept from passing through itself: impulses, which correct its motion in each
+    substep [default]; or penalty, springs found once a frame: for bodies of many cuts."""
     threads: int | None = None
     "Threads that share a global relaxation; pays from about 30,000 tetrahedra on [default: 1]."
     snap: float | None = None

@@ -8,7 +8,7 @@ import numpy as np
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
-from tissue.contact.self_contact import SelfContact
+from tissue.contact.penalty.contact_forces import new_penalty_forces
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
@@ -130,7 +130,7 @@ class Network(NamedTuple):
             body=self.body,
             elastic=elastic_of(self.springs),
             blade=self.blade,
-            contact=SelfContact(self.body, 1.0, 0.0, None).arrays,
+            contacts=new_penalty_forces(0, 0.0, 0.0),
             surroundings=self.surroundings,
             damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),

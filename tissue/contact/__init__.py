@@ -2,6 +2,7 @@
 
 In the order in which they are best read:
 
+    contact            what contact does for a system, whichever way it acts
     self_contact       owns the arrays, and knows when there is anything to search
     state              all that contact reads and writes, beside the body
     resolve            the stages of contact after a Runge-Kutta step
@@ -24,4 +25,5 @@ In the order in which they are best read:
     constraints        one contact: manifold, slop, warm start
     contact_table      contacts by their nodes
     solver             Gauss-Seidel on positions and velocities
+    penalty            the other way: springs, found once in a time step
 """

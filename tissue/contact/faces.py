@@ -10,6 +10,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import CUT, OUTER, Body, grown
 from tissue.mesh.changes import Change
+from tissue.mesh.pieces import label_pieces
 
 ROOM_FOR_FACES = 1 << 14
 """Faces that there is room for at first: those of several cuts, so that few steps must grow it."""
@@ -80,6 +81,20 @@ def with_pieces(faces: Faces, piece: IntArray, n_pieces: int) -> Faces:
     """Return the faces of a body in `n_pieces`; `piece` is that of each tetrahedron, (n_tets,)."""
     faces.piece[: len(piece)] = piece
     return faces.replaced(piece_low=np.zeros((n_pieces, 3)), piece_high=np.zeros((n_pieces, 3)))
+
+
+def with_found_pieces(faces: Faces, body: Body) -> Faces | None:
+    """Return the faces of a body in several pieces, skin among them; None where it is one piece."""
+    piece, queue = np.empty((2, body.n_tetrahedra), np.int64)
+    n_pieces = label_pieces(body, piece, queue)
+    if n_pieces == 1:
+        return None
+    faces = with_pieces(faces, piece, n_pieces)
+    if not faces.has_skin:
+        faces = with_room(faces, count_faces(body, True))
+        faces.has_skin = 1
+        collect_faces(faces, body)
+    return faces
 
 
 @kernel

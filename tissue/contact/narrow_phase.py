@@ -254,7 +254,7 @@ def _point_triangle(contact: ContactState, now: Corners, nodes: Nodes) -> PointT
     """Test whether the node went through the triangle and neither is inverted."""
     before = _corners(contact.start, nodes)
     test = point_triangle(before, now, _residual(contact, nodes), contact.tolerance)
-    is_through = test.is_through and not has_inverted(contact, nodes)
+    is_through = test.is_through and not has_inverted(contact.inverted_step, contact.step, nodes)
     return PointTriangle(is_through, test.normal, test.b, test.c)
 
 
@@ -267,7 +267,7 @@ def _edge_edge(contact: ContactState, now: Edges, nodes: Nodes) -> EdgeEdge:
     if (
         not lines_overlap(now, outward, other_outward)
         or face_the_same_side(outward, other_outward)
-        or has_inverted(contact, nodes)
+        or has_inverted(contact.inverted_step, contact.step, nodes)
     ):
         return EdgeEdge(False, outward, 0.0, 0.0)
     before, residual = _edges(contact.start, nodes), _residual(contact, nodes)

@@ -1,8 +1,8 @@
 """Normals at the nodes of faces, and which nodes belong to inverted tetrahedra."""
 
-from tissue.contact.faces import NO_FACE
+from tissue.contact.faces import NO_FACE, Faces
 from tissue.contact.pairs import Nodes
-from tissue.contact.state import ContactState
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
 from tissue.mesh.body import Body
@@ -10,9 +10,19 @@ from tissue.mesh.faces import OUTWARD
 
 
 @kernel
-def update_normals(contact: ContactState, body: Body) -> None:
-    """Write the normals of nodes, and note the nodes of tetrahedra that are inverted."""
-    faces, normal, x = contact.faces, contact.normal, body.positions
+def update_normals(
+    faces: Faces, body: Body, normal: FloatArray, inverted_step: IntArray, step: int
+) -> None:
+    """Write the normals of nodes, and note the nodes of tetrahedra that are inverted.
+
+    Args:
+        faces: The faces that may touch.
+        body: Where the nodes are.
+        normal: Outward normal of the nodes of faces, weighted by area [m2]; written.
+        inverted_step: When each node was last seen to be of an inverted tetrahedron; written.
+        step: Now, as it is written there.
+    """
+    x = body.positions
     nothing = Vec3(0.0, 0.0, 0.0)
     for at in range(faces.n_places):
         if faces.face[at] != NO_FACE:
@@ -34,14 +44,16 @@ def update_normals(contact: ContactState, body: Body) -> None:
         store(normal, k, add(vec3(normal, k), area))
         if not dot(area, sub(a, vec3(x, behind))) > 0.0:
             for node in (i, j, k, behind):
-                contact.inverted_step[node] = contact.step
+                inverted_step[node] = step
 
 
 @kernel
-def has_inverted(contact: ContactState, nodes: Nodes) -> bool:
-    """Whether one of the nodes belongs to a tetrahedron that is inverted in this step."""
-    inverted, step = contact.inverted_step, contact.step
+def has_inverted(inverted_step: IntArray, step: int, nodes: Nodes) -> bool:
+    """Whether one of the nodes was seen at `step` to be of an inverted tetrahedron."""
     a, b, c, d = nodes
     return bool(
-        inverted[a] == step or inverted[b] == step or inverted[c] == step or inverted[d] == step
+        inverted_step[a] == step
+        or inverted_step[b] == step
+        or inverted_step[c] == step
+        or inverted_step[d] == step
     )

@@ -66,7 +66,7 @@ def resolve(contact: ContactState, body: Body, seconds: float) -> bool:
     if contact.has_begun == 0:
         contact.step += 1
         contact.motion.step += 1
-        update_normals(contact, body)
+        update_normals(contact.faces, body, contact.normal, contact.inverted_step, contact.step)
         _carry_contacts_over(contact, body, seconds)
         contact.has_begun = 1
     if not _update_candidates(contact, body):
@@ -143,7 +143,7 @@ def _is_gone(contact: ContactState, k: int) -> bool:
     first, second = contacts.face[k, 0], contacts.face[k, 1]
     if first >= 0 and contacts.generation[k] != generation[first] + generation[second]:
         return True
-    return has_inverted(contact, nodes_of(contacts.node, k))
+    return has_inverted(contact.inverted_step, contact.step, nodes_of(contacts.node, k))
 
 
 @kernel

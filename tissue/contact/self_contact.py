@@ -16,21 +16,21 @@ import numpy as np
 from tissue.contact.candidates import Candidates, grown_candidates, new_candidates
 from tissue.contact.constraints import Contacts, grown_contacts, new_contacts
 from tissue.contact.faces import (
-    collect_faces,
-    count_faces,
     grown_faces,
     new_faces,
     update_changed_faces,
-    with_pieces,
+    with_found_pieces,
     with_room,
 )
 from tissue.contact.hits import new_hits
 from tissue.contact.motion_bounds import grown_motion_bounds, new_motion_bounds
+from tissue.contact.penalty.contact_forces import new_penalty_forces
+from tissue.contact.resolve import note_all_positions, resolve
 from tissue.contact.state import FACES_CHANGED, REBUILD, UP_TO_DATE, ContactState
+from tissue.core.array_types import FloatArray
 from tissue.core.simd import aligned, room_for_points
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import Change
-from tissue.mesh.pieces import label_pieces
 from tissue.types import BodyContacts
 
 PAIR_MARGIN = 0.25
@@ -118,6 +118,7 @@ class SelfContact:
             largest_residual=float(_LARGEST_RESIDUAL * node_size),
             tolerance=float(_TOLERANCE * node_size),
         )
+        self.forces = new_penalty_forces(0, friction, 0.0)
         self._find_pieces(body)
 
     @property
@@ -163,18 +164,37 @@ class SelfContact:
 
     def _find_pieces(self, body: Body) -> None:
         """Find out whether the body is in pieces; their skin may touch then, too."""
-        faces = self.arrays.faces
-        n_tetrahedra = body.n_tetrahedra
-        piece, queue = np.empty((2, n_tetrahedra), np.int64)
-        n_pieces = label_pieces(body, piece, queue)
-        if n_pieces == 1:
-            return
-        faces = with_pieces(faces, piece, n_pieces)
-        if not faces.has_skin:
-            faces = with_room(faces, count_faces(body, True))
-            faces.has_skin = 1
-            collect_faces(faces, body)
-        self.arrays = self.arrays.replaced(faces=faces, is_awake=1, stale=REBUILD)
+        faces = with_found_pieces(self.arrays.faces, body)
+        if faces is not None:
+            self.arrays = self.arrays.replaced(faces=faces, is_awake=1, stale=REBUILD)
+
+    @property
+    def added_frequency_squared(self) -> float:
+        """What contact adds to w^2 of the body [1/s2]: it corrects motion, and is no spring."""
+        return 0.0
+
+    def prepare(
+        self, body: Body, frequency_squared: FloatArray, highest: float, seconds: float
+    ) -> None:
+        """Do nothing: contacts are found after each substep.
+
+        Args:
+            body: Where the nodes are.
+            frequency_squared: Bound on w^2 of each node without contact [1/s2].
+            highest: Bound on w^2 of the body without contact [1/s2].
+            seconds: Length of the time step [s].
+        """
+
+    def start_substep(self, body: Body) -> None:
+        """Note where all nodes are, before a substep."""
+        if self.is_awake:
+            note_all_positions(self.arrays, body)
+
+    def end_substep(self, body: Body, external: FloatArray, seconds: float) -> None:
+        """Correct positions and velocities after a substep of that length [s]."""
+        if self.is_awake:
+            while not resolve(self.arrays, body, seconds):
+                self.make_room()
 
     def make_room(self) -> None:
         """Double the room for what may touch."""

@@ -35,9 +35,11 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         at_rest = elasticity.frequency_squared
         strained = elasticity.strained_frequency_squared(body, system.visits, at_rest)
-        highest = max(at_rest, strained)
+        highest = max(at_rest, strained) + system.contact.added_frequency_squared
         step = stepper.method.stable_step(elasticity, highest, system.surroundings)
         dt = STEPS_BETWEEN_PEAKS * step
+        system.contact.begin()
+        system.find_contacts(dt)
         velocities_t0 = velocities.copy()
         stepper.take_steps(system, Increment(edge, dt, 0.0, 1.0), STEPS_BETWEEN_PEAKS)
         if system.contact.is_awake:  # what holds a body on the floor is not in its forces

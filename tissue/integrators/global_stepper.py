@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tissue.blade.forces import frequency_with_blade
+from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
@@ -16,7 +17,12 @@ from tissue.integrators.stability import (
     verlet_step,
 )
 from tissue.integrators.step_context import Increment
-from tissue.integrators.substeps import runge_kutta_steps, verlet_steps
+from tissue.integrators.substeps import (
+    runge_kutta_steps,
+    runge_kutta_steps_with_forces,
+    verlet_steps,
+    verlet_steps_with_forces,
+)
 from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
 from tissue.mesh.body import Body
@@ -34,6 +40,8 @@ class Method(NamedTuple):
 
     take_steps: Callable[..., int]
     """Takes a number of steps, as `tissue.integrators.substeps.runge_kutta_steps`."""
+    take_steps_with_forces: Callable[..., None]
+    """The same where contact acts as forces: `runge_kutta_steps_with_forces`."""
     stable_step: StableStep
     """The largest step."""
     damps_each_step: bool
@@ -46,10 +54,11 @@ def method_of(options: IntegratorOptions) -> Method:
     These move all nodes where a body settles.
     """
     if isinstance(options, Verlet):
-        return Method(verlet_steps, verlet_step, True)
+        return Method(verlet_steps, verlet_steps_with_forces, verlet_step, True)
+    steps = (runge_kutta_steps, runge_kutta_steps_with_forces)
     if isinstance(options, Global) and options.damping == "step":
-        return Method(runge_kutta_steps, runge_kutta_step, True)
-    return Method(runge_kutta_steps, stage_damped_step, False)
+        return Method(*steps, runge_kutta_step, True)
+    return Method(*steps, stage_damped_step, False)
 
 
 class GlobalStepper:
@@ -69,16 +78,19 @@ class GlobalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""
+        system.find_contacts(increment.span)
         elasticity, blade = system.elasticity, system.interaction.state
         by_node = elasticity.arrays.frequency_squared
         near = frequency_with_blade(blade, system.body, by_node, system.stages.external)
-        least = max(elasticity.frequency_squared, near)
+        of_contact = system.contact.added_frequency_squared
+        least = max(elasticity.frequency_squared, near) + of_contact
         longest = self.method.stable_step(elasticity, least, system.surroundings)
         done = 0
         while True:
-            allowed = _without_another_step(least, longest, increment.span)
+            allowed = _without_another_step(least, longest, increment.span) - of_contact
             strained = elasticity.strained_frequency_squared(system.body, system.visits, allowed)
-            step = self.method.stable_step(elasticity, max(least, strained), system.surroundings)
+            highest = max(least, strained + of_contact)
+            step = self.method.stable_step(elasticity, highest, system.surroundings)
             n = max(1, math.ceil(increment.span / step))
             if not elasticity.follows_strain or n <= STEPS_BETWEEN_STRAIN_BOUNDS:
                 self.take_steps(system, increment, n)
@@ -96,12 +108,15 @@ class GlobalStepper:
         if self._threads is not None:
             self._threads.take_steps(system, increment, n)
             return
-        done = 0
+        contact, done = system.contact, 0
+        if not isinstance(contact, SelfContact):
+            self.method.take_steps_with_forces(system.context, *increment, n)
+            return
         while True:
-            done = self.method.take_steps(system.context, *increment, done, n)
+            done = self.method.take_steps(system.context, contact.arrays, *increment, done, n)
             if done == n:
                 return
-            system.contact.make_room()
+            contact.make_room()
 
     def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
         """Do nothing: no step depends on the one before."""

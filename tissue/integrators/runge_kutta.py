@@ -18,6 +18,7 @@ every stage, for the full order; by default it acts between the steps
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_blade_forces
+from tissue.contact.penalty.contact_forces import add_contact_forces, clear_contact_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
@@ -41,24 +42,50 @@ def runge_kutta_nystroem(
         at: Fraction of the time step at which the step begins.
         share: Length of the step as a fraction of the time step.
     """
-    body, elastic, blade, stages = context.body, context.elastic, context.blade, context.stages
+    body, elastic, stages = context.body, context.elastic, context.stages
     h = share * dt
     n = body.n_nodes
-    external = stages.external
     half, end = at + 0.5 * share, at + share
-    apply_blade_forces(blade, body, edge, body.positions, at, share / 6.0, dt, external)
+    apply_outer_forces(context, edge, body.positions, body.velocities, at, share / 6.0, dt)
     deform(elastic, body, body.positions)
     first_stage(context, h, 0, n)
     x2 = stages.positions
-    apply_blade_forces(blade, body, edge, x2, half, share * 2.0 / 3.0, dt, external)
+    apply_outer_forces(context, edge, x2, stages.velocities, half, share * 2.0 / 3.0, dt)
     deform(elastic, body, x2)
     second_stage(context, h, 0, n)
     if context.surroundings.retardation_time > 0.0:
         third_stage(context, h, 0, n)
     x4 = stages.positions_4
-    apply_blade_forces(blade, body, edge, x4, end, share / 6.0, dt, external)
+    apply_outer_forces(context, edge, x4, stages.velocities, end, share / 6.0, dt)
     deform(elastic, body, x4)
     fourth_stage(context, h, 0, n)
+
+
+@kernel
+def apply_outer_forces(
+    context: StepContext,
+    edge: Edge,
+    positions: FloatArray,
+    velocities: FloatArray,
+    when: float,
+    share: float,
+    dt: float,
+) -> None:
+    """Write the forces of the blade and of contact on the nodes; count impulses and work.
+
+    Args:
+        context: Forces on the nodes are written to its stages.
+        edge: The cutting edge over the time step.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        when: Instant, as a fraction of the time step.
+        share: Weight of this evaluation in the integral over the time step.
+        dt: Length of the time step [s].
+    """
+    external = context.stages.external
+    clear_contact_forces(context.contacts, external)
+    apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
+    add_contact_forces(context.contacts, positions, velocities, share * dt, external)
 
 
 @inlined

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import Edge
-from tissue.contact.state import ContactState
+from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.structs import Arrays
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.damping import Damping
@@ -23,8 +23,8 @@ class StepContext(Arrays, two_precisions=True):
     """What the forces inside the body follow from."""
     blade: BladeState
     """The blade: it acts in every stage, and slips after every step."""
-    contact: ContactState
-    """What may touch; positions and velocities are corrected after every step."""
+    contacts: PenaltyForces
+    """Contacts that act as forces; none where contact corrects the motion after every step."""
     surroundings: Surroundings
     """Gravity, and the damping that acts in every stage."""
     damping: Damping

@@ -1,7 +1,6 @@
 """What follows each step of every integrator: contact is resolved, and the blade slips."""
 
 from tissue.blade.forces import apply_slip
-from tissue.contact.resolve import resolve
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
 
@@ -15,15 +14,13 @@ def end_step(system: System, increment: Increment, seconds: float, when: float) 
         seconds: Length of the step [s].
         when: End of the step, as a fraction of the time step.
     """
-    if system.contact.is_awake:
-        resolve_contact(system, seconds)
+    resolve_contact(system, seconds)
     slip_blade(system, increment, seconds, when)
 
 
 def resolve_contact(system: System, seconds: float) -> None:
-    """Correct positions and velocities after a step of that length [s], with room as needed."""
-    while not resolve(system.contact.arrays, system.body, seconds):
-        system.contact.make_room()
+    """Do what contact does after a step of that length [s]."""
+    system.contact.end_substep(system.body, system.stages.external, seconds)
 
 
 def slip_blade(system: System, increment: Increment, seconds: float, when: float) -> None:

@@ -1,8 +1,10 @@
-"""What every step of an integrator of all nodes begins and ends with: damping, contact, slip."""
+"""Steps of the integrators of all nodes, each with its damping, its contact and its slip."""
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_slip, edge_energy
+from tissue.contact.penalty.contact_forces import end_contact_substep
 from tissue.contact.resolve import note_all_positions, resolve
+from tissue.contact.state import ContactState
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
@@ -16,7 +18,14 @@ from tissue.mesh.body import Body
 
 @kernel
 def runge_kutta_steps(
-    context: StepContext, edge: Edge, dt: float, begin: float, end: float, first: int, n: int
+    context: StepContext,
+    contact: ContactState,
+    edge: Edge,
+    dt: float,
+    begin: float,
+    end: float,
+    first: int,
+    n: int,
 ) -> int:
     """Take Runge-Kutta steps, each with its contact and its slip of the blade; return how many.
 
@@ -24,6 +33,7 @@ def runge_kutta_steps(
 
     Args:
         context: What takes part.
+        contact: What may touch; positions and velocities are corrected after every step.
         edge: The cutting edge over the time step.
         dt: Length of the time step [s].
         begin: Fraction of the time step at which to begin.
@@ -34,19 +44,57 @@ def runge_kutta_steps(
     share = (end - begin) / n
     for i in range(first, n):
         at = begin + i * share
-        if context.contact.is_pending == 0:
+        if contact.is_pending == 0:
+            if contact.is_awake == 1:
+                note_all_positions(contact, context.body)
             begin_substep(context, share * dt, i, n)
             runge_kutta_nystroem(context, edge, dt, at, share)
-        if not end_substep(context, edge, share * dt, at + share):
+        if not end_substep(context, contact, edge, share * dt, at + share):
             return i
     return n
 
 
 @kernel
 def verlet_steps(
-    context: StepContext, edge: Edge, dt: float, begin: float, end: float, first: int, n: int
+    context: StepContext,
+    contact: ContactState,
+    edge: Edge,
+    dt: float,
+    begin: float,
+    end: float,
+    first: int,
+    n: int,
 ) -> int:
     """Take steps of position Verlet; see `runge_kutta_steps`.
+
+    Args:
+        context: What takes part.
+        contact: What may touch; positions and velocities are corrected after every step.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        first: Step to begin with: 0, or where it stopped for want of room.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(first, n):
+        at = begin + i * share
+        if contact.is_pending == 0:
+            if contact.is_awake == 1:
+                note_all_positions(contact, context.body)
+            begin_substep(context, share * dt, i, n)
+            position_verlet(context, edge, dt, at, share)
+        if not end_substep(context, contact, edge, share * dt, at + share):
+            return i
+    return n
+
+
+@kernel
+def runge_kutta_steps_with_forces(
+    context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
+) -> None:
+    """Take `n` Runge-Kutta steps in which contact acts as forces, each with its slip of the blade.
 
     Args:
         context: What takes part.
@@ -54,23 +102,41 @@ def verlet_steps(
         dt: Length of the time step [s].
         begin: Fraction of the time step at which to begin.
         end: Fraction of the time step at which to end.
-        first: Step to begin with: 0, or where it stopped for want of room.
         n: Number of steps from `begin` to `end`.
     """
     share = (end - begin) / n
-    for i in range(first, n):
+    for i in range(n):
         at = begin + i * share
-        if context.contact.is_pending == 0:
-            begin_substep(context, share * dt, i, n)
-            position_verlet(context, edge, dt, at, share)
-        if not end_substep(context, edge, share * dt, at + share):
-            return i
-    return n
+        begin_substep(context, share * dt, i, n)
+        runge_kutta_nystroem(context, edge, dt, at, share)
+        _end_with_forces(context, edge, share * dt, at + share)
+
+
+@kernel
+def verlet_steps_with_forces(
+    context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
+) -> None:
+    """Take `n` steps of position Verlet; see `runge_kutta_steps_with_forces`.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(n):
+        at = begin + i * share
+        begin_substep(context, share * dt, i, n)
+        position_verlet(context, edge, dt, at, share)
+        _end_with_forces(context, edge, share * dt, at + share)
 
 
 @kernel
 def begin_substep(context: StepContext, h: float, i: int, n: int) -> None:
-    """Note where the nodes are, where contact needs it, and let the damping act where it is due.
+    """Let the damping act where it is due.
 
     Args:
         context: What takes part.
@@ -78,8 +144,6 @@ def begin_substep(context: StepContext, h: float, i: int, n: int) -> None:
         i: Number of the step.
         n: How many steps of that length follow one another.
     """
-    if context.contact.is_awake == 1:
-        note_all_positions(context.contact, context.body)
     every = context.damping.interval
     if i % every == 0:
         seconds = min(every, n - i) * h
@@ -87,11 +151,22 @@ def begin_substep(context: StepContext, h: float, i: int, n: int) -> None:
 
 
 @kernel
-def end_substep(context: StepContext, edge: Edge, seconds: float, when: float) -> bool:
+def _end_with_forces(context: StepContext, edge: Edge, seconds: float, when: float) -> None:
+    """End a step in which contact acted as forces; see `end_substep`."""
+    body, external = context.body, context.stages.external
+    end_contact_substep(context.contacts, body.positions, body.velocities, external)
+    apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
+
+
+@kernel
+def end_substep(
+    context: StepContext, contact: ContactState, edge: Edge, seconds: float, when: float
+) -> bool:
     """Resolve contact, then let the blade slip.
 
     Args:
         context: What takes part.
+        contact: What may touch.
         edge: The cutting edge over the time step.
         seconds: Length of the step [s].
         when: End of the step, as a fraction of the time step.
@@ -99,7 +174,7 @@ def end_substep(context: StepContext, edge: Edge, seconds: float, when: float) -
     Returns:
         Whether contact had room. If not, make room and call again.
     """
-    body, contact, stages = context.body, context.contact, context.stages
+    body, stages = context.body, context.stages
     if contact.is_awake == 1:
         if contact.is_pending == 0 and context.contact_loss.is_counted == 1:
             _note_state(body, stages)

@@ -6,6 +6,7 @@ import numpy as np
 
 from tissue.blade.interaction import BladeInteraction
 from tissue.blade_shape import BladeShape
+from tissue.contact.contact import Contact
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.cut_settings import MeshMeasures
@@ -42,7 +43,7 @@ class System:
         self,
         body: Body,
         elasticity: Elasticity,
-        contact: SelfContact,
+        contact: Contact,
         interaction: BladeInteraction,
         surroundings: Surroundings,
         visits: Visits,
@@ -82,14 +83,14 @@ class System:
             or context.body is not self.body
             or context.elastic is not self.elasticity.arrays
             or context.blade is not self.interaction.state
-            or context.contact is not self.contact.arrays
+            or context.contacts is not self.contact.forces
             or context.stages is not self.stages
         ):
             self._context = context = StepContext(
                 body=self.body,
                 elastic=self.elasticity.arrays,
                 blade=self.interaction.state,
-                contact=self.contact.arrays,
+                contacts=self.contact.forces,
                 surroundings=self._in_stages,
                 damping=self.damping,
                 contact_loss=self.contact_loss,
@@ -97,6 +98,18 @@ class System:
                 visits=self.visits,
             )
         return context
+
+    @property
+    def hard_contact(self) -> SelfContact:
+        """Contact that corrects the motion, for integrators that take no other."""
+        assert isinstance(self.contact, SelfContact)
+        return self.contact
+
+    def find_contacts(self, seconds: float) -> None:
+        """Find the contacts that act as forces in a time step of that length [s]."""
+        elasticity = self.elasticity
+        by_node, highest = elasticity.arrays.frequency_squared, elasticity.frequency_squared
+        self.contact.prepare(self.body, by_node, highest, seconds)
 
     def mesh_changed(self, change: Change, nodes: IntArray) -> None:
         """Update what depends on the tetrahedra that a pass of a cut changed, and their nodes."""
@@ -131,6 +144,7 @@ def assembled(
     surroundings: Surroundings,
     blade: BladeShape | None,
     floor: float | None,
+    contact: str,
     *,
     mass_scaling: float | None,
     damps_each_step: bool,
@@ -144,6 +158,7 @@ def assembled(
         surroundings: Gravity and damping.
         blade: The body of the blade; None for a line that cuts.
         floor: Height of a floor below the body [m]; None for no floor.
+        contact: `impulses` or `penalty`; see `SolverSettings`.
         mass_scaling: Frequency above which nodes get mass [1/s]; see `Elasticity`.
         damps_each_step: Whether damping acts once a step; if not, in every stage of it.
         is_single: Whether forces of tetrahedra are computed in single precision.
@@ -152,6 +167,14 @@ def assembled(
     elasticity = Elasticity(material, body, visits, mass_scaling=mass_scaling, is_single=is_single)
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
-    contact = SelfContact(body, node_size, material.friction, floor)
-    owners = (body, elasticity, contact, interaction, surroundings, visits, node_size)
+    touching: Contact
+    if contact == "penalty":
+        # Imported late: kernels that are not used cost no start.
+        from tissue.contact.penalty.penalty_contact import PenaltyContact
+
+        highest = elasticity.frequency_squared
+        touching = PenaltyContact(body, node_size, material.friction, floor, highest)
+    else:
+        touching = SelfContact(body, node_size, material.friction, floor)
+    owners = (body, elasticity, touching, interaction, surroundings, visits, node_size)
     return System(*owners, damps_each_step=damps_each_step)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from tissue.blade.forces import apply_blade_forces
+from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import FloatArray
 from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
@@ -21,8 +21,15 @@ from tissue.elasticity.neo_hookean import (
     has_averaged_volumes,
     pressures,
 )
-from tissue.integrators.runge_kutta import first_stage, fourth_stage, second_stage, third_stage
+from tissue.integrators.runge_kutta import (
+    apply_outer_forces,
+    first_stage,
+    fourth_stage,
+    second_stage,
+    third_stage,
+)
 from tissue.integrators.step_context import Increment, StepContext
+from tissue.integrators.step_end import end_step
 from tissue.integrators.substeps import begin_substep, end_substep
 from tissue.integrators.system import System
 from tissue.mesh.body import Body
@@ -45,10 +52,19 @@ class Threads:
         for i in range(n):
             at = increment.begin + i * share
             seconds, when = share * increment.dt, at + share
+            system.contact.start_substep(system.body)
             begin_substep(system.context, seconds, i, n)
             self._step(system.context, increment, at, share)
-            while not end_substep(system.context, increment.edge, seconds, when):
-                system.contact.make_room()
+            self._end(system, increment, seconds, when)
+
+    def _end(self, system: System, increment: Increment, seconds: float, when: float) -> None:
+        """Resolve contact, and let the blade slip."""
+        contact, edge = system.contact, increment.edge
+        if not isinstance(contact, SelfContact):
+            end_step(system, increment, seconds, when)
+            return
+        while not end_substep(system.context, contact.arrays, edge, seconds, when):
+            contact.make_room()
 
     def _step(self, context: StepContext, increment: Increment, at: float, share: float) -> None:
         """Take one step of Nystroem's form, as `runge_kutta_nystroem`."""
@@ -56,15 +72,16 @@ class Threads:
         x2, x4 = stages.positions, stages.positions_4
         n, h = body.n_nodes, share * increment.dt
         half, end = at + 0.5 * share, at + share
-        _apply_blade(context, increment, body.positions, at, share / 6.0)
+        edge, dt, v = increment.edge, increment.dt, stages.velocities
+        apply_outer_forces(context, edge, body.positions, body.velocities, at, share / 6.0, dt)
         self._deform(body, elastic, body.positions)
         self._share(n, first_stage, context, h)
-        _apply_blade(context, increment, x2, half, share * 2.0 / 3.0)
+        apply_outer_forces(context, edge, x2, v, half, share * 2.0 / 3.0, dt)
         self._deform(body, elastic, x2)
         self._share(n, second_stage, context, h)
         if context.surroundings.retardation_time > 0.0:
             self._share(n, third_stage, context, h)
-        _apply_blade(context, increment, x4, end, share / 6.0)
+        apply_outer_forces(context, edge, x4, v, end, share / 6.0, dt)
         self._deform(body, elastic, x4)
         self._share(n, fourth_stage, context, h)
 
@@ -89,12 +106,3 @@ class Threads:
         loop(*arguments, bounds[0], bounds[1])
         for other in others:
             other.result()
-
-
-def _apply_blade(
-    context: StepContext, increment: Increment, positions: FloatArray, when: float, share: float
-) -> None:
-    """Write the blade's forces on the nodes at `positions` [m]; see `apply_blade_forces`."""
-    blade, body, external = context.blade, context.body, context.stages.external
-    edge, dt = increment.edge, increment.dt
-    apply_blade_forces(blade, body, edge, positions, when, share, dt, external)

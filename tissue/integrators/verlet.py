@@ -9,11 +9,10 @@ between the steps (`tissue.integrators.damping`).
 """
 
 from tissue.blade.edge import Edge
-from tissue.blade.forces import apply_blade_forces
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.elasticity.internal_forces import deform
-from tissue.integrators.runge_kutta import acceleration
+from tissue.integrators.runge_kutta import acceleration, apply_outer_forces
 from tissue.integrators.step_context import StepContext
 
 
@@ -29,10 +28,10 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
         share: Length of the step as a fraction of the time step.
     """
     body, h = context.body, share * dt
-    x, v, external = body.positions, body.velocities, context.stages.external
+    x, v = body.positions, body.velocities
     for i in range(body.n_nodes):
         store_point(x, i, point(x, i) + times(0.5 * h, point(v, i)))
-    apply_blade_forces(context.blade, body, edge, x, at + 0.5 * share, share, dt, external)
+    apply_outer_forces(context, edge, x, v, at + 0.5 * share, share, dt)
     deform(context.elastic, body, x)
     for i in range(body.n_nodes):
         store_point(v, i, point(v, i) + times(h, acceleration(context, i, x, v)))

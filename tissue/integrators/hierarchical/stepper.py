@@ -65,7 +65,7 @@ class HierarchicalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""
-        options, body, contact = self._options, system.body, system.contact
+        options, body, contact = self._options, system.body, system.hard_contact
         self._find_rings(system)
         n, every = self._divide(system, increment.span)
         if contact.is_awake:

@@ -86,7 +86,7 @@ class LocalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return how many steps the finest nodes took."""
-        activity, zone, contact = self._activity, self._zone, system.contact
+        activity, zone, contact = self._activity, self._zone, system.hard_contact
         n, p = self._divide(system, increment.span)
         share = (increment.end - increment.begin) / n
         coefficients = chebyshev(p, self._options.stabilisation)
@@ -115,7 +115,7 @@ class LocalStepper:
 
     def _doze(self, system: System, span: float) -> None:
         """Put nodes to sleep that are at rest, `span` [s] after the last call."""
-        body, activity, contact = system.body, self._activity, system.contact
+        body, activity, contact = system.body, self._activity, system.hard_contact
         if contact.is_awake:
             note_positions(contact.arrays, body, activity.listed, self.n_awake)
         springs = system.elasticity.arrays.springs
@@ -165,7 +165,7 @@ class LocalStepper:
 
     def _note_positions(self, system: System) -> None:
         """Let contact note where the nodes are before the step."""
-        contact, body, activity = system.contact, system.body, self._activity
+        contact, body, activity = system.hard_contact, system.body, self._activity
         if not contact.is_awake:
             self._is_prepared = False
         elif self._is_prepared:  # those that sleep are where they were

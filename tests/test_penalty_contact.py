@@ -1,0 +1,266 @@
+"""Contact as forces: what is pressed holds, what rests stays, and nothing is made of nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scalpel_sim import SCENES
+from scalpel_sim.errors import UsageError
+from tests import bodies, strokes
+from tests.test_contact import NO_GRAVITY, SLAB, frame_speed, joined, overlap_depth, speed
+from tissue import Material, SolverSettings, Tissue, block
+
+ELEMENT = 0.01
+ALLOWED = 0.02 * ELEMENT
+"""Largest allowed penetration of one body into another [m]; springs must be pressed to push."""
+
+AT_REST = 0.01
+PENALTY = SolverSettings(contact="penalty")
+
+
+def pressed_blocks(solver: SolverSettings = PENALTY, beside=(0.0, 0.0)) -> Tissue:
+    """Return a block on another; gravity is chosen so that it weighs 1 N."""
+    lower = block((6, 6, 2), SLAB)
+    mesh = joined(lower, block((5, 4, 2), SLAB), (*beside, SLAB[2] + 1e-3))
+    weight = 1.0 / (1000.0 * np.prod(SLAB))
+    held = mesh.positions[:, 2] == 0.0
+    material = Material(viscous_damping=20.0)
+    return Tissue(mesh, material, fixed=held, gravity=(0.0, 0.0, -weight), solver=solver)
+
+
+@pytest.mark.parametrize("beside", [(0.0, 0.0), (0.013, 0.007)])
+def test_two_blocks_pressed_together_with_1_n_hold_and_come_to_rest(beside):
+    tissue = pressed_blocks(beside=beside)
+    for i in range(1500):
+        result = tissue.step(None, strokes.DT)
+        if i % 100 == 0:
+            assert overlap_depth(tissue.snapshot()) < ALLOWED
+    assert result.body_contacts.force == pytest.approx(1.0, rel=0.1)
+    assert result.body_contacts.penetration < ALLOWED
+    assert frame_speed(tissue) < AT_REST
+    assert tissue.pieces()[1 if tissue.pieces()[0].is_held else 0].centre[2] > 1.39 * SLAB[2]
+
+
+def test_free_blocks_that_collide_keep_their_momentum():
+    mesh = joined(
+        block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.007, 0.004, 0.03)
+    )
+    material = Material(100e3, viscous_damping=0.0, retardation_time=0.0)
+    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, solver=PENALTY)
+    tissue._body.velocities[64 : len(mesh.positions)] = [0.1, 0.0, -0.5]
+    body = tissue.snapshot()
+    before = body.masses @ body.velocities
+    pressed = [tissue.step(None, strokes.DT).body_contacts.force for _ in range(60)]
+    assert max(pressed) > 0.0
+    after = body.masses @ tissue.snapshot().velocities
+    np.testing.assert_allclose(after, before, atol=1e-12 * np.linalg.norm(before))
+
+
+def on_floor(gravity=(0.0, 0.0, -9.81), solver=PENALTY, **material) -> Tissue:
+    """Return a loose block on a floor at z = 0."""
+    mesh = block((3, 3, 2), (0.03, 0.03, 0.02))
+    return Tissue(mesh, Material(**material), gravity=gravity, floor=0.0, solver=solver)
+
+
+def test_the_floor_bears_the_weight_of_a_block():
+    tissue = on_floor(viscous_damping=10.0)
+    for _ in range(1000):
+        result = tissue.step(None, strokes.DT)
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(0.018 * 9.81, rel=1e-3)
+    assert np.abs(result.body_contacts.force_of_floor[:2]).max() < 1e-3 * 0.018 * 9.81
+    assert result.body_contacts.force == 0.0
+    assert result.bounds[0, 2] > -ALLOWED
+    assert speed(tissue) < 1e-3
+
+
+@pytest.mark.parametrize(("degrees", "slides"), [(10.0, False), (15.0, False), (19.0, True)])
+def test_friction_of_0_3_holds_a_block_on_a_slope_of_less_than_16_7_degrees(degrees, slides):
+    """The floor is level; gravity is tilted instead."""
+    slope = np.radians(degrees)
+    tilted = 9.81 * np.array([np.sin(slope), 0.0, -np.cos(slope)])
+    tissue = on_floor(tilted, viscous_damping=2.0, friction=0.3)
+    for _ in range(500):
+        tissue.step(None, strokes.DT)
+    before = tissue.pieces()[0].centre[0]
+    for _ in range(300):
+        tissue.step(None, strokes.DT)
+    moved = tissue.pieces()[0].centre[0] - before
+    assert moved > 0.01 if slides else abs(moved) < 1e-4
+
+
+def test_where_nothing_touches_contact_changes_no_bit():
+    """Of the floor far below: with impulses contact would be awake as well."""
+
+    def run(solver: SolverSettings, floor: float | None) -> Tissue:
+        mesh = block((3, 3, 3), (0.03,) * 3)
+        tissue = Tissue(mesh, fixed=bodies.sides(mesh), floor=floor, solver=solver)
+        for _ in range(50):
+            tissue.step(None, strokes.DT)
+        return tissue
+
+    for solver in (PENALTY, SolverSettings()):
+        touched = run(solver, -0.05)
+        for one, other in zip(touched.snapshot(), run(PENALTY, None).snapshot(), strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def split_block(solver: SolverSettings = PENALTY) -> Tissue:
+    """Return a block cut in two, whose held sides are pushed together by 1 mm."""
+    mesh = bodies.jittered(3, 0)
+    tissue = Tissue(
+        mesh,
+        Material(viscous_damping=20.0),
+        fixed=bodies.sides(mesh),
+        gravity=NO_GRAVITY,
+        solver=solver,
+    )
+    edges = [[(0.0207, y, -0.01), (0.0207, y, 0.05)] for y in (-0.01, 0.06)]
+    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
+    return tissue
+
+
+def squeeze(tissue: Tissue, by: float) -> None:
+    """Move both held sides towards each other along x, each by `by` [m]."""
+    body, n = tissue._body, tissue.n_nodes
+    held = body.fixed[:n]
+    inwards = np.where(body.rest[:n][held, 0] < 0.02, by, -by)
+    body.positions[:n][held, 0] += inwards
+
+
+def test_freshly_cut_lips_under_no_load_have_no_contact_force():
+    tissue = split_block()
+    for _ in range(50):
+        contacts = tissue.step(None, strokes.DT).body_contacts
+        assert contacts.force < 1e-9 and contacts.penetration < 1e-9
+    assert speed(tissue) < 1e-9
+
+
+def test_lips_that_are_pressed_shut_do_not_overlap_and_come_to_rest():
+    tissue = split_block()
+    for _ in range(100):
+        squeeze(tissue, 1e-5)
+        tissue.step(None, strokes.DT)
+    for _ in range(1000):
+        pressed = tissue.step(None, strokes.DT).body_contacts
+    assert pressed.force > 0.1
+    assert overlap_depth(tissue.snapshot()) < ALLOWED
+    assert speed(tissue) < AT_REST
+
+
+def test_lips_that_lie_node_on_node_press_as_much_as_those_that_are_shifted():
+    """Each node meets all faces around its twin; they count once."""
+    pushed = []
+    for shift in (0.0, 0.0042):
+        lower = block((6, 6, 2), SLAB)
+        mesh = joined(lower, block((6, 6, 2), SLAB), (shift, shift, SLAB[2]))
+        weight = 1.0 / (1000.0 * np.prod(SLAB))
+        tissue = Tissue(
+            mesh,
+            Material(viscous_damping=50.0),
+            fixed=mesh.positions[:, 2] == 0.0,
+            gravity=(0.0, 0.0, -weight),
+            solver=PENALTY,
+        )
+        for _ in range(600):
+            result = tissue.step(None, strokes.DT)
+        pushed.append(result.body_contacts)
+    assert pushed[0].n_contacts <= 2 * 49
+    assert pushed[0].force == pytest.approx(1.0, rel=0.05)
+    assert pushed[1].force == pytest.approx(pushed[0].force, rel=0.05)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_run_is_reproducible_to_the_bit(threads):
+    def run(n: int) -> Tissue:
+        tissue = pressed_blocks(SolverSettings(contact="penalty", threads=n))
+        for _ in range(60):
+            result = tissue.step(None, strokes.DT)
+        assert result.body_contacts.n_contacts > 0
+        return tissue
+
+    for one, other in zip(run(1).snapshot(), run(threads).snapshot(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_the_account_of_energy_closes_within_1_percent_where_contact_presses():
+    tissue = pressed_blocks(SolverSettings(contact="penalty", audit=True))
+    for _ in range(400):
+        energies = tissue.step(None, strokes.DT).energies
+    spent = -energies.potential
+    assert spent > 0.0 and energies.contact > 0.0
+    assert abs(energies.residual) < 0.01 * spent
+
+
+def test_the_account_of_energy_closes_within_1_percent_over_a_cut():
+    mesh = block((4, 4, 4), (0.04,) * 3)
+    solver = SolverSettings(contact="penalty", audit=True)
+    tissue = Tissue(mesh, Material(toughness=5.0), fixed=bodies.sides(mesh), solver=solver)
+    stroke = strokes.slanted(mesh)
+    for sweep in [*strokes.sweeps(stroke), *[None] * 100]:
+        result = tissue.step(sweep, strokes.DT)
+    assert result.energies.contact != 0.0
+    assert abs(result.energies.residual) < 0.01 * result.energies.work_of_blade
+
+
+def test_a_piece_that_is_cut_off_lands_on_the_floor():
+    mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
+    fixed = mesh.positions[:, 0] <= 0.02
+    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.03, solver=PENALTY)
+    strokes.make(tissue, strokes.straight(mesh, 0.75))
+    for _ in range(1000):
+        result = tissue.step(None, strokes.DT)
+    loose = next(piece for piece in tissue.pieces() if not piece.is_held)
+    assert -0.03 < loose.centre[2] < -0.015
+    assert result.body_contacts.force_of_floor[2] == pytest.approx(loose.mass * 9.81, rel=0.1)
+    assert np.linalg.norm(loose.velocity) < AT_REST
+
+
+def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
+    def run() -> Tissue:
+        tissue = split_block()
+        for _ in range(30):
+            squeeze(tissue, 1e-5)
+            tissue.step(None, strokes.DT)
+        return tissue
+
+    ample = run()
+    monkeypatch.setattr("tissue.contact.penalty.penalty_contact.CAPACITY_OF_PAIRS", 4)
+    for one, other in zip(ample.snapshot(), run().snapshot(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_what_is_found_inside_another_part_comes_out():
+    """At rest the blocks are apart; where they begin, the upper one is sunk in by 4 mm."""
+    cells, size = (2, 2, 1), (0.02, 0.02, 0.01)
+    mesh = joined(block(cells, size), block(cells, size), (0.003, 0.002, 0.05))
+    sunk = mesh.positions - np.where(mesh.positions[:, 2:] > 0.04, [0.0, 0.0, 0.044], 0.0)
+    held = mesh.positions[:, 2] == 0.0
+    material = Material(viscous_damping=20.0)
+    tissue = Tissue(mesh, material, fixed=held, positions=sunk, gravity=NO_GRAVITY, solver=PENALTY)
+    assert overlap_depth(tissue.snapshot()) > 0.3 * ELEMENT
+    fastest = 0.0
+    for _ in range(1000):
+        tissue.step(None, strokes.DT)
+        fastest = max(fastest, speed(tissue))
+    assert overlap_depth(tissue.snapshot()) < ALLOWED
+    assert fastest < 0.1
+
+
+@pytest.mark.parametrize("relaxation", ["local", "hierarchical"])
+def test_other_integrators_refuse_contact_as_forces(relaxation):
+    mesh = block((1, 1, 1), (0.01,) * 3)
+    solver = SolverSettings(contact="penalty", relaxation=relaxation)
+    with pytest.raises(ValueError, match="penalty"):
+        Tissue(mesh, solver=solver)
+
+
+@pytest.mark.parametrize("options", [{"contact": "soft"}, {"relaxation": "local"}])
+def test_a_scene_refuses_a_contact_that_it_cannot_have(options):
+    with pytest.raises(UsageError, match="contact"):
+        replace(SCENES["slab"], **{"contact": "penalty", **options})
+
+
+def test_an_unknown_contact_is_refused_by_name():
+    with pytest.raises(ValueError, match="'soft'"):
+        Tissue(block((1, 1, 1), (0.01,) * 3), solver=SolverSettings(contact="soft"))

@@ -1,0 +1,57 @@
+"""Mass splitting bounds the stiffness of all contacts together."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.tissue.contact.penalty.lists import ADDED, NODE_SIZE, random_contacts, stiffened
+from tissue.contact.penalty.contact_forces import end_contact_substep
+from tissue.contact.penalty.stiffness import new_limits, recover, split_masses
+
+pytestmark = pytest.mark.kernel
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 60))
+def test_contacts_together_are_never_stiffer_than_what_their_nodes_may_bear(seed, n):
+    body, forces, bearable = stiffened(seed, n)
+    weights = np.zeros((n, body.n_nodes))
+    for c in range(n):
+        np.add.at(weights[c], forces.node[c], forces.weight[c])
+    stiffness = weights.T @ (forces.stiffness[:n, None] * weights)
+    scaled = stiffness / np.sqrt(bearable[:, None] * bearable[None, :])
+    assert np.linalg.eigvalsh(scaled).max() <= 1.0 + 1e-12
+
+
+def test_a_single_contact_of_one_node_bears_all_that_its_mass_allows():
+    body, forces = random_contacts(0, 1)
+    forces.node[0], forces.weight[0] = 3, [1.0, 0.0, 0.0, 0.0]
+    limits = new_limits(NODE_SIZE, ADDED)
+    split_masses(forces, limits, body, np.zeros(body.n_nodes), np.zeros(body.n_nodes))
+    assert forces.stiffness[0] == pytest.approx(body.masses[3] * ADDED)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_contact_keeps_its_force_where_the_stiffness_changes_and_a_new_one_has_none(seed):
+    body, forces, _ = stiffened(seed)
+    scratch = np.zeros_like(body.positions)
+    forces.offset[:20] = 0.02e-3
+    end_contact_substep(forces, body.positions, body.velocities, scratch)
+    before = forces.push[:20].copy()
+    assert (before > 0.0).any()
+    body.masses[:] *= 2.0
+    limits = new_limits(NODE_SIZE, ADDED)
+    split_masses(forces, limits, body, np.zeros(body.n_nodes), np.zeros(body.n_nodes))
+    end_contact_substep(forces, body.positions, body.velocities, scratch)
+    free = forces.largest_depth[:20] * forces.stiffness[:20] > before
+    np.testing.assert_allclose(forces.push[:20][free], before[free], rtol=1e-9, atol=1e-12)
+
+
+def test_an_overlap_without_force_comes_out_at_the_speed_of_recovery():
+    body, forces, _ = stiffened(1)
+    forces.push[:20] = 0.0
+    forces.offset[:20] = -1e-3
+    forces.height[:20] = 1.0
+    recover(forces, new_limits(NODE_SIZE, ADDED), body, 1e-3)
+    np.testing.assert_allclose(forces.offset[:20], -1e-3 + NODE_SIZE * 1e-3)

@@ -1,0 +1,16 @@
+"""Contact as forces, found once in a time step: the choice `penalty`.
+
+In the order in which they are best read:
+
+    penalty_contact    owns the arrays, and lists the stages of a search
+    contact_forces     contacts as springs with friction, evaluated with all other forces
+    stiffness          stiffness by mass splitting, and offsets that keep forces continuous
+    contact_list       one contact for each direction in which a node is pushed
+    touch              whether a node touches a face, and in which direction it is pushed
+    lost_nodes         nodes inside another part of the body, which no contact pushes out
+    search_state       all that the search reads and writes
+    pair_update        faces ask for nodes near them, where something moved or changed
+    near_pairs         the pairs of node and face
+    node_grid          nodes by the cells of a grid
+    node_ways          how far nodes have moved
+"""

@@ -1,0 +1,280 @@
+"""The list of contacts: a node gets one for each direction in which it is pushed, at most three.
+
+A node that lies on the other lip meets all faces around the nodes there, and they all say the same:
+only the nearest foot in each direction counts. What a node has is sought again once it or what is
+near it has moved by as much as can matter; the others keep their contacts as they are.
+"""
+
+import math
+
+from tissue.contact.penalty.contact_forces import HANDED_ON, PenaltyForces, weighted_sum
+from tissue.contact.penalty.near_pairs import triangle_displacement, triangle_way
+from tissue.contact.penalty.node_ways import is_stirred
+from tissue.contact.penalty.pair_update import CONTACT_REACH
+from tissue.contact.penalty.search_state import SearchState
+from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, axpy, dot, store, sub, vec3
+from tissue.mesh.body import Body
+
+DIRECTIONS = 3
+"""Contacts of a node with faces at most: more than three directions do not hold it any firmer."""
+
+_SAME_DIRECTION = 0.7
+"""Cosine between normals above which contacts are one: 45 degrees. Larger: a node on a curved lip
+has several that share its stiffness; smaller: it is not held in a corner."""
+
+_STILL = 0.02
+"""Motion of a node against a face after which their contact is sought again, per node size. Larger:
+cheaper, and normals are out of date; smaller: all is sought in every time step."""
+
+_WAY_NEAR = 0.2
+"""Sum of the ways of its nodes after which a near pair is looked at even if they moved alike, per
+node size: as they turn."""
+
+
+@kernel
+def find_due(search: SearchState, is_anew: bool) -> int:
+    """Find the nodes whose contacts are to be sought; return how many.
+
+    Args:
+        search: `is_due` is written.
+        is_anew: Whether pairs have just been updated.
+    """
+    pairs, ways, n = search.pairs, search.ways, 0
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        search.is_due[node] = 0
+        is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
+        if is_calm and not is_stirred(ways, node):
+            continue
+        slack = _least_slack(search, node)
+        has_lost = is_anew and pairs.lost_at[node] == pairs.n_updates
+        if slack < 0.0 or has_lost:
+            search.is_due[node] = 1
+            n += 1
+        search.calm_until[node] = ways.quiet_way + slack
+    return n
+
+
+@kernel
+def _least_slack(search: SearchState, node: int) -> float:
+    """Return how much way is left before a pair of a node is to be looked at [m]; negative: now."""
+    pairs, ways = search.pairs, search.ways
+    still, least = _STILL * ways.node_size, math.inf
+    own = vec3(ways.displacement, node)
+    for k in range(pairs.first + pairs.begin[node], pairs.first + pairs.end[node]):
+        face = pairs.face[k]
+        left = pairs.wake[k] - ways.way[node] - triangle_way(pairs, ways.way, face)
+        if pairs.is_near[k] == 1:
+            relative = sub(own, triangle_displacement(pairs, ways.displacement, face))
+            moved = sub(relative, vec3(pairs.relative, k))
+            left = min(left, still - math.sqrt(dot(moved, moved)))
+        if left < 0.0:
+            return float(left)
+        least = min(least, left)
+    return least
+
+
+@kernel
+def floor_changes(search: SearchState, body: Body) -> bool:
+    """Whether a node came near the floor or left it."""
+    if search.floor == -math.inf:
+        return False
+    for node in range(body.n_nodes):
+        is_listed = search.floor_listed_at[node] == search.n_listings
+        if _is_near_floor(search, body, node, is_listed) != is_listed:
+            return True
+    return False
+
+
+@kernel
+def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> None:
+    """Seek the contacts of nodes that are due, and list all.
+
+    Room: DIRECTIONS for each node of a face, and one for each node that may be on the floor.
+    """
+    pairs, now = search.pairs, search.n_listings + 1
+    to, n = len(forces.push) // 2 - forces.first, 0
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        was_listed = search.listed_at[node] == search.n_listings
+        n_before = search.n_contacts[node] if was_listed else 0
+        first, n_own = search.contact[node], n_before
+        if search.is_due[node] == 1:
+            n_own = _seek(search, forces, body, node, to + n)
+            _take_over(forces, body, (first, n_before), (to + n, n_own))
+        else:
+            for q in range(n_before):
+                _copy_contact(forces, first + q, to + n + q)
+        search.listed_at[node] = now
+        search.contact[node] = to + n
+        search.n_contacts[node] = n_own
+        n += n_own
+    forces.n_contacts = _list_floor_contacts(search, forces, body, to, n)
+    forces.first = to
+    search.n_listings = now
+
+
+@kernel
+def _seek(search: SearchState, forces: PenaltyForces, body: Body, node: int, to: int) -> int:
+    """Write the contacts of a node with faces from row `to` on; return how many."""
+    pairs, ways, n = search.pairs, search.ways, 0
+    near = _WAY_NEAR * ways.node_size
+    least = math.inf
+    for k in range(pairs.first + pairs.begin[node], pairs.first + pairs.end[node]):
+        face = pairs.face[k]
+        way = ways.way[node] + triangle_way(pairs, ways.way, face)
+        if pairs.is_near[k] == 1 or way > pairs.wake[k]:
+            touch = touch_of(search, forces, body, node, face)
+            if touch.slack > 0.0:
+                pairs.is_near[k] = 0
+                pairs.wake[k] = way + max(touch.slack, _STILL * ways.node_size)
+            else:
+                pairs.is_near[k] = 1
+                pairs.wake[k] = way + near
+                relative = sub(
+                    vec3(ways.displacement, node),
+                    triangle_displacement(pairs, ways.displacement, face),
+                )
+                store(pairs.relative, k, relative)
+                least = min(least, _STILL * ways.node_size)
+            if touch.is_touching:
+                n = _place(search, forces, (node, face), touch, to, n)
+        least = min(least, pairs.wake[k] - way)
+    search.calm_until[node] = ways.quiet_way + least
+    return n
+
+
+@kernel
+def _place(
+    search: SearchState,
+    forces: PenaltyForces,
+    pair: tuple[int, int],
+    touch: Touch,
+    to: int,
+    n: int,
+) -> int:
+    """Write a touch as a contact, unless one in its direction is nearer; return how many there are.
+
+    Args:
+        search: The nodes of faces.
+        forces: Written.
+        pair: Node and face.
+        touch: Where they touch.
+        to: Row of the first contact of this node.
+        n: How many it has so far.
+    """
+    q = 0
+    while q < n and dot(vec3(forces.normal, to + q), touch.normal) <= _SAME_DIRECTION:
+        q += 1
+    if q == DIRECTIONS or (q < n and search.distance[q] <= touch.distance_squared):
+        return n
+    node, face = pair
+    c, b = to + q, touch.b
+    search.distance[q] = touch.distance_squared
+    forces.node[c, 0] = node
+    for corner in range(3):
+        forces.node[c, 1 + corner] = search.pairs.triangle[face, corner]
+    forces.weight[c, 0] = 1.0
+    forces.weight[c, 1] = -b.x
+    forces.weight[c, 2] = -b.y
+    forces.weight[c, 3] = -b.z
+    store(forces.normal, c, touch.normal)
+    _begin_contact(forces, c, 0.0)
+    return max(n, q + 1)
+
+
+@kernel
+def _begin_contact(forces: PenaltyForces, c: int, height: float) -> None:
+    """Let contact `c` begin without a force; `height`: that of the floor [m], else 0."""
+    forces.height[c] = height
+    forces.stiffness[c] = 0.0
+    forces.offset[c] = 0.0
+    forces.push[c] = 0.0
+    store(forces.anchor, c, Vec3(0.0, 0.0, 0.0))
+    store(forces.impulse, c, Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def _take_over(
+    forces: PenaltyForces, body: Body, before: tuple[int, int], now: tuple[int, int]
+) -> None:
+    """Let the contacts of a node go on with the forces of those before, each by one heir at most.
+
+    `before` and `now`: first contact, and how many.
+    """
+    for c in range(now[0], now[0] + now[1]):
+        normal, heir, most = vec3(forces.normal, c), -1, _SAME_DIRECTION
+        for old in range(before[0], before[0] + before[1]):
+            cosine = dot(vec3(forces.normal, old), normal)
+            if cosine > most and forces.push[old] != HANDED_ON:
+                heir, most = old, cosine
+        if heir < 0:
+            continue
+        forces.push[c] = forces.push[heir]
+        forces.stiffness[c] = forces.stiffness[heir]
+        forces.offset[c] = forces.offset[heir]
+        forces.push[heir] = HANDED_ON
+        stretch = sub(_across(forces, body, heir), vec3(forces.anchor, heir))
+        stretch = axpy(-dot(stretch, normal), normal, stretch)
+        store(forces.anchor, c, sub(_across(forces, body, c), stretch))
+
+
+@kernel
+def _across(forces: PenaltyForces, body: Body, c: int) -> Vec3:
+    """Return what separates the sides of contact `c` across its normal [m]."""
+    d, normal = weighted_sum(forces, c, body.positions), vec3(forces.normal, c)
+    return axpy(-dot(d, normal), normal, d)
+
+
+@kernel
+def _copy_contact(forces: PenaltyForces, c: int, to: int) -> None:
+    """Copy a contact to another row."""
+    for q in range(4):
+        forces.node[to, q] = forces.node[c, q]
+        forces.weight[to, q] = forces.weight[c, q]
+    store(forces.normal, to, vec3(forces.normal, c))
+    store(forces.anchor, to, vec3(forces.anchor, c))
+    store(forces.impulse, to, Vec3(0.0, 0.0, 0.0))
+    forces.height[to] = forces.height[c]
+    forces.stiffness[to] = forces.stiffness[c]
+    forces.offset[to] = forces.offset[c]
+    forces.push[to] = forces.push[c]
+
+
+@kernel
+def _list_floor_contacts(
+    search: SearchState, forces: PenaltyForces, body: Body, to: int, n: int
+) -> int:
+    """List the contacts with the floor behind the `n` others; return how many there are."""
+    if search.floor == -math.inf:
+        return n
+    now = search.n_listings + 1
+    for node in range(body.n_nodes):
+        is_listed = search.floor_listed_at[node] == search.n_listings
+        if not _is_near_floor(search, body, node, is_listed):
+            continue
+        c = to + n
+        if is_listed:
+            _copy_contact(forces, search.floor_contact[node], c)
+        else:
+            for q in range(4):
+                forces.node[c, q] = node
+                forces.weight[c, q] = 1.0 if q == 0 else 0.0
+            store(forces.normal, c, Vec3(0.0, 0.0, 1.0))
+            _begin_contact(forces, c, search.floor)
+        search.floor_contact[node] = c
+        search.floor_listed_at[node] = now
+        n += 1
+    return n
+
+
+@kernel
+def _is_near_floor(search: SearchState, body: Body, node: int, is_listed: bool) -> bool:
+    """Whether a node is so near the floor that it needs a contact; a little longer, if it has."""
+    if body.fixed[node]:
+        return False
+    falling = max(-body.velocities[node, 2], 0.0)
+    reach = CONTACT_REACH * search.ways.node_size + TIME_AHEAD * falling
+    return bool(body.positions[node, 2] - search.floor < (2.0 * reach if is_listed else reach))

@@ -1,0 +1,156 @@
+"""`NearPairs`: which node may come to touch which face, by nodes, kept true to motion and cuts.
+
+A pair is listed if node and face would touch wherever in their balls their four nodes are. It holds
+until one of them leaves its ball or the face changes; only then are that node and that face paired
+anew (`pair_update`). Faces go by their places in `Faces`.
+"""
+
+import numpy as np
+
+from tissue.contact.penalty.node_grid import NodeGrid, new_node_grid
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, IntCell
+from tissue.core.vec3 import Vec3
+from tissue.mesh.body import grown
+
+_OF_NODES = (
+    "nodes",
+    "seen_at",
+    "cut_at",
+    "moved_at",
+    "lost_at",
+    "is_lost",
+    "moved",
+    "asked_at",
+    "begin",
+    "end",
+)
+"""Fields with an entry for each node."""
+
+
+class NearPairs(Arrays):
+    """Two lists of pairs, that in use and room for the next, and what they were made from.
+
+    The pairs of one list are one after the other, so their arrays have 2 * capacity rows.
+    """
+
+    first: IntCell
+    """First row of the list in use: 0, or the capacity."""
+    n_pairs: IntCell
+    """Number of pairs in the list in use."""
+    n_nodes: IntCell
+    """Number of nodes of faces."""
+    n_moved: IntCell
+    """Number of nodes that were paired anew in the last update."""
+    n_updates: IntCell
+    """Number of the last update, from 1."""
+    n_found: IntCell
+    """Number of pairs that hold or were found in this update; there may be no room for all."""
+    n_asked: IntCell
+    """Number of boxes that have asked a grid so far."""
+    nodes: IntArray
+    """Nodes of faces, shape (node capacity,)."""
+    seen_at: IntArray
+    """Update in which each node was last one of a face, shape (node capacity,)."""
+    cut_at: IntArray
+    """Update in which each node was last one of a face of a cut, shape (node capacity,)."""
+    moved_at: IntArray
+    """Update in which each node was last paired anew, shape (node capacity,)."""
+    lost_at: IntArray
+    """Update in which each node last lost a near pair, shape (node capacity,)."""
+    is_lost: IntArray
+    """1 if a node is known to be inside another part of the body, else 0 (`lost_nodes`); shape
+    (node capacity,)."""
+    moved: IntArray
+    """Nodes that were paired anew in the last update, shape (node capacity,)."""
+    asked_at: IntArray
+    """Scratch: last box that found each node, by `n_asked`; shape (node capacity,)."""
+    begin: IntArray
+    """First pair of each node, counted from `first`; shape (node capacity,)."""
+    end: IntArray
+    """Behind its last pair, shape (node capacity,)."""
+    triangle: IntArray
+    """Nodes of each face, counter-clockwise seen from outside; shape (face capacity, 3)."""
+    tetrahedron: IntArray
+    """Tetrahedron of each face, shape (face capacity,)."""
+    is_of_cut: IntArray
+    """1 if a face was made by a cut, else 0; shape (face capacity,)."""
+    is_active: IntArray
+    """1 if a face is paired, else 0; shape (face capacity,)."""
+    seen_generation: IntArray
+    """Generation in `Faces` of each face when it was last looked at; shape (face capacity,)."""
+    dirty_at: IntArray
+    """Update in which each face was last paired anew, shape (face capacity,)."""
+    node: IntArray
+    """Node of each pair, shape (2 * capacity,)."""
+    face: IntArray
+    """Place of the face of each pair, shape (2 * capacity,)."""
+    is_near: IntArray
+    """1 if node and face touch, or may by what they move against each other; else 0. Shape
+    (2 * capacity,)."""
+    wake: FloatArray
+    """Sum of the ways of its four nodes up to which a pair needs no look [m], shape
+    (2 * capacity,)."""
+    relative: FloatArray
+    """Displacement of the node against the face as a near pair was last looked at [m], shape
+    (2 * capacity, 3)."""
+    grid: NodeGrid
+    """All nodes of faces."""
+    moved_grid: NodeGrid
+    """Nodes that are paired anew."""
+
+
+def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
+    """Return no pairs.
+
+    Args:
+        n_nodes: Nodes of the body that there is room for.
+        n_faces: Faces that there is room for.
+        capacity: Pairs that there is room for.
+    """
+    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at")
+    return NearPairs(
+        first=0,
+        n_pairs=0,
+        n_nodes=0,
+        n_moved=0,
+        n_updates=1,
+        n_found=0,
+        n_asked=0,
+        **{name: np.zeros(n_nodes, np.int64) for name in _OF_NODES},
+        triangle=np.zeros((n_faces, 3), np.int64),
+        **{name: np.zeros(n_faces, np.int64) for name in of_faces},
+        seen_generation=np.full(n_faces, -1, np.int64),
+        **{name: np.zeros(2 * capacity, np.int64) for name in ("node", "face", "is_near")},
+        wake=np.zeros(2 * capacity),
+        relative=np.zeros((2 * capacity, 3)),
+        grid=new_node_grid(4 * n_nodes),
+        moved_grid=new_node_grid(4 * n_nodes),
+    )
+
+
+def grown_near_pairs(pairs: NearPairs, n_nodes: int) -> NearPairs:
+    """Return the pairs with room for `n_nodes` of the body."""
+    larger = {name: grown(getattr(pairs, name), n_nodes) for name in _OF_NODES}
+    room = max(4 * n_nodes, len(pairs.grid.entry))
+    return pairs.replaced(**larger, grid=new_node_grid(room), moved_grid=new_node_grid(room))
+
+
+@kernel
+def triangle_displacement(pairs: NearPairs, displacement: FloatArray, face: int) -> Vec3:
+    """Return how far the middle of a face is from where it was when it was paired [m]."""
+    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
+    third = 1.0 / 3.0
+    return Vec3(
+        third * (displacement[a, 0] + displacement[b, 0] + displacement[c, 0]),
+        third * (displacement[a, 1] + displacement[b, 1] + displacement[c, 1]),
+        third * (displacement[a, 2] + displacement[b, 2] + displacement[c, 2]),
+    )
+
+
+@kernel
+def triangle_way(pairs: NearPairs, way: FloatArray, face: int) -> float:
+    """Return the sum of the ways of the nodes of a face [m]."""
+    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
+    return float(way[a] + way[b] + way[c])

@@ -1,0 +1,333 @@
+"""Update of the pairs: faces ask for nodes near them where a node left its ball or a face changed.
+
+A cut, or a lip that the blade drags along, costs its neighbourhood and not the body.
+"""
+
+import math
+from typing import NamedTuple
+
+from tissue.contact.faces import NO_FACE, Faces, is_face_of_cut
+from tissue.contact.penalty.near_pairs import NearPairs
+from tissue.contact.penalty.node_grid import (
+    LONGEST,
+    NodeGrid,
+    bucket_of,
+    cells_of_box,
+    fill_node_grid,
+)
+from tissue.contact.penalty.node_ways import (
+    BALL,
+    LARGEST_BALL,
+    NodeWays,
+    begin_ball,
+    has_left_middle,
+)
+from tissue.contact.piece_boxes import may_touch, update_piece_boxes
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
+from tissue.geometry.aabb import Aabb, empty_box, overlap, widened, with_point
+from tissue.mesh.body import Body
+from tissue.mesh.faces import OUTWARD
+
+CONTACT_REACH = 0.05
+"""Gap up to which a contact is kept ready, per node size: fast nodes touch within a time step.
+Larger: contacts that do not press take stiffness from those that do."""
+
+DEEPEST = 0.25
+"""Depth below a face up to which a node is paired with it, per node size. Larger: nodes on the far
+side of thin lips are looked at; smaller: what was pressed in deep is lost."""
+
+_SAME_SHEET = 0.17
+"""Cosine between the normals of node and face above which they are of one sheet, which bends and
+does not touch itself. Larger: more pairs; smaller: lips that lie across each other are missed."""
+
+SKIN_WAY = 0.5
+"""Way of any node after which it is asked again which skin is near another piece, per node size.
+Larger: more skin is paired; smaller: all skin is tested more often."""
+
+
+class _Asking(NamedTuple):
+    """A face as it asks for nodes near it."""
+
+    at: int
+    """Its place."""
+    nodes: tuple[int, int, int]
+    """Its corners."""
+    corner: Vec3
+    """Reference of the first corner [m]."""
+    area: Vec3
+    """Its normal, twice as long as its area [m2]."""
+    length: float
+    """Length of that [m2]."""
+    reach: float
+    """How far a node may be from it, without the ball of the node [m]."""
+    box: Aabb
+    """Box of what touches it, with the ball of a slow node around it."""
+
+
+@kernel
+def update_pairs(
+    pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body, normal: FloatArray
+) -> bool:
+    """Pair anew what left its ball or changed; return False if there is no room, to call again.
+
+    Args:
+        pairs: Written.
+        ways: Balls of nodes that are paired anew are laid anew.
+        faces: The faces that may touch.
+        body: Where the nodes are.
+        normal: Normal of each node, weighted by area [m2], shape (capacity, 3).
+    """
+    if faces.n_places > len(pairs.triangle):
+        return False
+    pairs.n_updates += 1
+    _take_faces(pairs, ways, faces, body)
+    _list_nodes(pairs, ways, faces, body)
+    for at in range(faces.n_places):
+        if pairs.is_active[at] == 1 and _has_moved_corner(pairs, at):
+            pairs.dirty_at[at] = pairs.n_updates
+    first = len(pairs.wake) // 2 - pairs.first
+    _keep_pairs(pairs, first)
+    if not fill_node_grid(pairs.grid, ways, pairs.nodes, pairs.n_nodes):
+        return False
+    if not fill_node_grid(pairs.moved_grid, ways, pairs.moved, pairs.n_moved):
+        return False
+    box = _box_of_moved(pairs, ways)
+    for at in range(faces.n_places):
+        if pairs.is_active[at] == 0:
+            continue
+        asking = _asking(pairs, ways, at)
+        if pairs.dirty_at[at] == pairs.n_updates:
+            _ask(pairs, pairs.grid, ways, faces, body, normal, asking)
+        elif overlap(asking.box, box):
+            _ask(pairs, pairs.moved_grid, ways, faces, body, normal, asking)
+    if pairs.n_found > len(pairs.wake) // 2:
+        return False
+    _sort(pairs, first)
+    return True
+
+
+@kernel
+def _take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> None:
+    """Note faces that changed, and skin that came near another piece or left it."""
+    has_skin_moved = faces.has_skin == 1 and not ways.largest_way <= SKIN_WAY * ways.node_size
+    if has_skin_moved:
+        update_piece_boxes(faces, body)
+        ways.largest_way = 0.0
+    reach = (2.0 * SKIN_WAY + CONTACT_REACH + 2.0 * BALL) * ways.node_size
+    for at in range(faces.n_places):
+        has_changed = pairs.seen_generation[at] != faces.generation[at]
+        if not (has_changed or has_skin_moved):
+            continue
+        face = faces.face[at]
+        is_wanted = face != NO_FACE and may_touch(faces, body, face, reach)
+        if not has_changed and is_wanted == (pairs.is_active[at] == 1):
+            continue
+        pairs.seen_generation[at] = faces.generation[at]
+        pairs.is_active[at] = is_wanted
+        pairs.dirty_at[at] = pairs.n_updates
+        if is_wanted:
+            pairs.is_of_cut[at] = is_face_of_cut(faces, body, at)
+            pairs.tetrahedron[at] = face // 4
+            for q in range(3):
+                pairs.triangle[at, q] = body.tetrahedra[face // 4, OUTWARD[face % 4, q]]
+
+
+@kernel
+def _list_nodes(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> None:
+    """List the nodes of active faces, and which of them are to be paired anew."""
+    now = pairs.n_updates
+    pairs.n_nodes = 0
+    pairs.n_moved = 0
+    for at in range(faces.n_places):
+        if pairs.is_active[at] == 0:
+            continue
+        for q in range(3):
+            node = pairs.triangle[at, q]
+            if pairs.seen_at[node] != now:
+                if pairs.seen_at[node] != now - 1 or has_left_middle(ways, body, node):
+                    _begin_anew(pairs, ways, body, node)
+                pairs.seen_at[node] = now
+                pairs.nodes[pairs.n_nodes] = node
+                pairs.n_nodes += 1
+            if pairs.is_of_cut[at] == 1 and pairs.cut_at[node] != now:
+                if pairs.cut_at[node] != now - 1 and pairs.moved_at[node] != now:
+                    _begin_anew(pairs, ways, body, node)
+                pairs.cut_at[node] = now
+
+
+@kernel
+def _begin_anew(pairs: NearPairs, ways: NodeWays, body: Body, node: int) -> None:
+    """Lay the ball of a node anew, and list it as one to be paired."""
+    pairs.moved_at[node] = pairs.n_updates
+    pairs.moved[pairs.n_moved] = node
+    pairs.n_moved += 1
+    begin_ball(ways, body, node)
+    if pairs.is_lost[node] == 1:
+        ways.radius[node] = LARGEST_BALL * ways.node_size
+
+
+@kernel
+def _has_moved_corner(pairs: NearPairs, at: int) -> bool:
+    """Whether a node of a face is paired anew."""
+    now, node, moved = pairs.n_updates, pairs.triangle, pairs.moved_at
+    return bool(moved[node[at, 0]] == now or moved[node[at, 1]] == now or moved[node[at, 2]] == now)
+
+
+@kernel
+def _keep_pairs(pairs: NearPairs, first: int) -> None:
+    """Copy the pairs that hold to the other list, whose first row is `first`."""
+    now, n = pairs.n_updates, 0
+    for k in range(pairs.first, pairs.first + pairs.n_pairs):
+        node, at = pairs.node[k], pairs.face[k]
+        has_moved = pairs.seen_at[node] != now or pairs.moved_at[node] == now
+        if has_moved or pairs.is_active[at] == 0 or pairs.dirty_at[at] == now:
+            if pairs.is_near[k] == 1:
+                pairs.lost_at[node] = now
+            continue
+        _copy_pair(pairs, k, first + n)
+        n += 1
+    pairs.n_found = n
+
+
+@kernel
+def _copy_pair(pairs: NearPairs, k: int, to: int) -> None:
+    """Copy a pair to another row."""
+    pairs.node[to] = pairs.node[k]
+    pairs.face[to] = pairs.face[k]
+    pairs.is_near[to] = pairs.is_near[k]
+    pairs.wake[to] = pairs.wake[k]
+    for x in range(3):
+        pairs.relative[to, x] = pairs.relative[k, x]
+
+
+@kernel
+def _box_of_moved(pairs: NearPairs, ways: NodeWays) -> Aabb:
+    """Return the box around the balls of the nodes that are paired anew."""
+    box = empty_box()
+    for i in range(pairs.n_moved):
+        node = pairs.moved[i]
+        p, r = vec3(ways.reference, node), ways.radius[node]
+        box = with_point(with_point(box, Vec3(p.x - r, p.y - r, p.z - r)), p)
+        box = with_point(box, Vec3(p.x + r, p.y + r, p.z + r))
+    return box
+
+
+@kernel
+def _asking(pairs: NearPairs, ways: NodeWays, at: int) -> _Asking:
+    """Return a face as it asks for nodes."""
+    x, r = ways.reference, ways.radius
+    a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
+    i, j, k = vec3(x, a), vec3(x, b), vec3(x, c)
+    area = cross(sub(j, i), sub(k, i))
+    reach = max(r[a], max(r[b], r[c])) + CONTACT_REACH * ways.node_size
+    corners = with_point(with_point(Aabb(i, i), j), k)
+    box = widened(corners, reach + BALL * ways.node_size)
+    return _Asking(at, (a, b, c), i, area, math.sqrt(dot(area, area)), reach, box)
+
+
+@kernel
+def _ask(
+    pairs: NearPairs,
+    grid: NodeGrid,
+    ways: NodeWays,
+    faces: Faces,
+    body: Body,
+    normal: FloatArray,
+    face: _Asking,
+) -> None:
+    """Pair a face with the nodes of a grid that may touch it; see `update_pairs`."""
+    pairs.n_asked += 1
+    cells = cells_of_box(ways, face.box)
+    if (
+        cells.i_last - cells.i >= LONGEST
+        or cells.j_last - cells.j >= LONGEST
+        or cells.k_last - cells.k >= LONGEST
+    ):
+        for e in range(grid.n_entries):
+            _try_pair(pairs, ways, faces, body, normal, face, grid.entry[e])
+        return
+    for i in range(cells.i, cells.i_last + 1):
+        for j in range(cells.j, cells.j_last + 1):
+            for k in range(cells.k, cells.k_last + 1):
+                bucket = bucket_of(grid, i, j, k)
+                for e in range(grid.begin[bucket], grid.begin[bucket + 1]):
+                    _try_pair(pairs, ways, faces, body, normal, face, grid.entry[e])
+
+
+@inlined
+def _try_pair(
+    pairs: NearPairs,
+    ways: NodeWays,
+    faces: Faces,
+    body: Body,
+    normal: FloatArray,
+    face: _Asking,
+    node: int,
+) -> None:
+    """Pair a face with a node that may touch it, unless it has met that node before."""
+    p = vec3(ways.reference, node)
+    more = ways.radius[node] - BALL * ways.node_size
+    if not overlap(Aabb(p, p), widened(face.box, more)) or pairs.asked_at[node] == pairs.n_asked:
+        return
+    pairs.asked_at[node] = pairs.n_asked
+    if not _may_meet(pairs, ways, faces, body, normal, face, node):
+        return
+    room = len(pairs.wake) // 2
+    if pairs.n_found < room:
+        k = room - pairs.first + pairs.n_found
+        pairs.node[k] = node
+        pairs.face[k] = face.at
+        pairs.is_near[k] = 0
+        pairs.wake[k] = -1.0
+    pairs.n_found += 1
+
+
+@kernel
+def _may_meet(
+    pairs: NearPairs,
+    ways: NodeWays,
+    faces: Faces,
+    body: Body,
+    normal: FloatArray,
+    face: _Asking,
+    node: int,
+) -> bool:
+    """Whether a node may touch a face while both stay in their balls."""
+    if node in face.nodes:
+        return False
+    if pairs.is_of_cut[face.at] == 0 or pairs.cut_at[node] != pairs.n_updates:
+        piece = faces.piece[body.node_tetrahedron[node]]
+        if piece >= 0 and piece == faces.piece[pairs.tetrahedron[face.at]]:
+            return False
+    own = vec3(normal, node)
+    along = dot(own, face.area)
+    if along > 0.0 and along * along > (_SAME_SHEET * face.length) ** 2 * dot(own, own):
+        return False
+    height = dot(face.area, sub(vec3(ways.reference, node), face.corner))
+    reach = face.reach + ways.radius[node]
+    if height < 0.0:
+        reach += DEEPEST * ways.node_size
+    return bool(abs(height) <= reach * face.length)
+
+
+@kernel
+def _sort(pairs: NearPairs, first: int) -> None:
+    """Sort the pairs from row `first` on by their nodes, into the list in use."""
+    n, to = pairs.n_found, pairs.first
+    for i in range(pairs.n_nodes):
+        pairs.end[pairs.nodes[i]] = 0
+    for k in range(first, first + n):
+        pairs.end[pairs.node[k]] += 1
+    total = 0
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        pairs.begin[node] = total
+        total += pairs.end[node]
+        pairs.end[node] = pairs.begin[node]
+    for k in range(first, first + n):
+        node = pairs.node[k]
+        _copy_pair(pairs, k, to + pairs.end[node])
+        pairs.end[node] += 1
+    pairs.n_pairs = n

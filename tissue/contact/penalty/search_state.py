@@ -1,0 +1,50 @@
+"""`SearchState`: all that the search for contacts reads and writes, beside the body."""
+
+from tissue.contact.faces import Faces
+from tissue.contact.penalty.near_pairs import NearPairs
+from tissue.contact.penalty.node_ways import NodeWays
+from tissue.contact.penalty.stiffness import Limits
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.structs import Arrays, IntCell
+
+
+class SearchState(Arrays):
+    """All that the search for contacts reads and writes, beside the body and the contacts."""
+
+    step: IntCell
+    """Number of times that normals were computed."""
+    turn: IntCell
+    """Place in `NearPairs.nodes` of the node that was last looked at by `lost_nodes`."""
+    n_listings: IntCell
+    """Number of times that contacts were listed."""
+    faces: Faces
+    pairs: NearPairs
+    ways: NodeWays
+    limits: Limits
+    normal: FloatArray
+    """Outward normal of each node of a face, weighted by area [m2]; shape (node capacity, 3)."""
+    inverted_step: IntArray
+    """Value of `step` when a tetrahedron with this node was last seen inverted; shape (node
+    capacity,)."""
+    is_due: IntArray
+    """1 if the contacts of a node are sought in this search, else 0; shape (node capacity,)."""
+    calm_until: FloatArray
+    """Value of `NodeWays.quiet_way` up to which a node need not be asked while nothing near it is
+    stirred [m], shape (node capacity,)."""
+    contact: IntArray
+    """First contact of each node with faces, in the list in use; shape (node capacity,)."""
+    n_contacts: IntArray
+    """Number of contacts of each node with faces, shape (node capacity,)."""
+    listed_at: IntArray
+    """Listing in which the contacts of each node with faces were last listed; shape (node
+    capacity,)."""
+    floor_contact: IntArray
+    """Contact of each node with the floor in the list in use, shape (node capacity,)."""
+    floor_listed_at: IntArray
+    """Listing in which each node was last in contact with the floor, shape (node capacity,)."""
+    distance: FloatArray
+    """Scratch: squared distance of the contacts that a node was found to have [m2], shape (3,)."""
+    share: FloatArray
+    """Scratch of `split_masses`, shape (node capacity,)."""
+    floor: float
+    """Height of the floor [m], or -inf."""

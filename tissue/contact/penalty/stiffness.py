@@ -1,0 +1,170 @@
+"""Stiffness of the contacts by mass splitting, and offsets that keep forces continuous.
+
+A node of mass m_i whose share in all contacts is S_i = sum_c |w_ci| may bear the stiffness
+m_i W_i^2. With
+
+    1 / k_c = sum_i |w_ci| S_i / (m_i W_i^2)
+
+the contacts together stay below it, K_contact <= diag(m_i W_i^2), however many a node has: the
+inequality of Cauchy and Schwarz with shares |w_ci| / S_i. So the stable step is known before any
+contact is. W_i^2 is what contact adds for every node, and half of what the node itself leaves of
+the frequency that the step is chosen for.
+
+Source: Tonge et al. (2012), Mass splitting for jitter-free parallel rigid body simulation, for the
+shares.
+"""
+
+from tissue.contact.penalty.contact_forces import PenaltyForces, weighted_sum
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, FloatCell
+from tissue.core.vec3 import axpy, dot, scale, store, sub, vec3
+from tissue.mesh.body import Body
+
+_ROOM_SHARE = 0.5
+"""Share of the room between a node's own bound on w^2 and the highest that its contacts may use.
+Larger: stiffer contact; at 1 nothing is left for what strain adds."""
+
+_LARGEST_DEPTH = 0.2
+"""Depth above which a force grows no more, per node size. Larger: what was pinched and is let go is
+thrown; smaller: it sinks in deeper."""
+
+_LARGEST_ACCELERATION = 0.03
+"""Acceleration that one contact may give its sides at once, in node sizes times W^2: 2,000 m/s2 in
+an organ of liver, 40 mN on a node of it. Larger: slivers of a thousandth of the usual mass are
+thrown at several metres a second; smaller: what is pressed hard sinks in."""
+
+_GROWTH = 1.05
+"""Factor by which that grows in each time step in which a contact gives all of it. Larger: as if
+there were no such limit; 1: a sliver that was pinched once stays where it is."""
+
+_SLACK = 0.01
+"""Gap up to which a contact keeps its force as its normal turns, per node size. Larger: sides are
+held apart, and nodes flutter to and fro; 0: forces jump whenever a normal turns outwards."""
+
+_ROUNDING = 1e-9
+"""Relative difference of forces that counts as none."""
+
+_RECOVERY = 1.0
+"""Speed at which an overlap comes out that had no force as it was found, in node sizes a second.
+Larger: more work on the springs behind; 0: what overlaps does so for good."""
+
+_RECOVERY_FROM_SLACK = 4.0
+"""How many times as fast slack is taken back."""
+
+
+class Limits(Arrays):
+    """What bounds the stiffness of contacts, and how they recover."""
+
+    highest: FloatCell
+    """Bound on w^2 of the whole body that the step is chosen for [1/s2]."""
+    added: float
+    """What contact may add to w^2 of every node [1/s2]."""
+    largest_depth: float
+    """Depth above which a force grows no more [m]."""
+    largest_acceleration: float
+    """Acceleration that one contact may give its sides [m/s2]."""
+    slack: float
+    """Gap up to which a contact keeps its force [m]."""
+    recovery: float
+    """Speed at which an overlap comes out that had no force as it was found [m/s]."""
+
+
+def new_limits(node_size: float, added: float) -> Limits:
+    """Return the limits for a body of that mean node size [m].
+
+    Args:
+        node_size: Mean node size of the body [m].
+        added: What contact may add to w^2 of every node [1/s2].
+    """
+    return Limits(
+        highest=0.0,
+        added=float(added),
+        largest_depth=float(_LARGEST_DEPTH * node_size),
+        largest_acceleration=float(_LARGEST_ACCELERATION * node_size * added),
+        slack=float(_SLACK * node_size),
+        recovery=float(_RECOVERY * node_size),
+    )
+
+
+@kernel
+def split_masses(
+    forces: PenaltyForces,
+    limits: Limits,
+    body: Body,
+    frequency_squared: FloatArray,
+    share: FloatArray,
+) -> None:
+    """Write the stiffness of every contact; what has a force keeps it by its offset.
+
+    Args:
+        forces: Stiffness, offset, greatest depth and anchors are written. `stiffness` is as it was
+            in the last list, or 0.
+        limits: How stiff contact may be.
+        body: Masses and positions.
+        frequency_squared: Bound on w^2 of each node without contact [1/s2], shape (capacity,).
+        share: Scratch, shape (capacity,): the share of each node in all contacts.
+    """
+    rows = range(forces.first, forces.first + forces.n_contacts)
+    for c in rows:
+        for q in range(4):
+            share[forces.node[c, q]] = 0.0
+    for c in rows:
+        for q in range(4):
+            share[forces.node[c, q]] += abs(forces.weight[c, q])
+    for c in rows:
+        softness, mobility = 0.0, 0.0
+        for q in range(4):
+            node, weight = forces.node[c, q], abs(forces.weight[c, q])
+            room = max(limits.highest - frequency_squared[node], 0.0)
+            bearable = body.masses[node] * (limits.added + _ROOM_SHARE * room)
+            softness += weight * share[node] / bearable
+            mobility += weight * weight / body.masses[node]
+        before = forces.stiffness[c]
+        k = 1.0 / softness
+        forces.stiffness[c] = k
+        most = max(limits.largest_acceleration / mobility, forces.push[c])
+        forces.largest_depth[c] = min(limits.largest_depth, most / k)
+        _keep_force(forces, limits, body, c, before)
+
+
+@kernel
+def _keep_force(
+    forces: PenaltyForces, limits: Limits, body: Body, c: int, stiffness_before: float
+) -> None:
+    """Set offset and anchor so that contact `c` pushes and rubs as before; a new one not at all."""
+    across = weighted_sum(forces, c, body.positions)
+    normal = vec3(forces.normal, c)
+    along = dot(normal, across)
+    gap = along - forces.height[c]
+    tangential = axpy(-along, normal, across)
+    if forces.push[c] > 0.0:
+        k = forces.stiffness[c]
+        forces.offset[c] = min(gap + forces.push[c] / k, limits.slack)
+        stretch = sub(tangential, vec3(forces.anchor, c))
+        stretch = scale(stiffness_before / k, stretch)
+        store(forces.anchor, c, sub(tangential, stretch))
+    else:
+        forces.offset[c] = min(gap, 0.0)
+        store(forces.anchor, c, tangential)
+
+
+@kernel
+def recover(forces: PenaltyForces, limits: Limits, body: Body, seconds: float) -> None:
+    """Let offsets return towards zero by what they may in a time step [s], and forces grow."""
+    back = limits.recovery * seconds
+    for c in range(forces.first, forces.first + forces.n_contacts):
+        most = forces.largest_depth[c]
+        if forces.push[c] >= (1.0 - _ROUNDING) * forces.stiffness[c] * most:
+            forces.largest_depth[c] = min(_GROWTH * most, limits.largest_depth)
+        offset = forces.offset[c]
+        if offset == 0.0:
+            continue
+        if forces.push[c] == 0.0:
+            # What has come out on its own does not go in again.
+            along = dot(vec3(forces.normal, c), weighted_sum(forces, c, body.positions))
+            offset = min(max(offset, along - forces.height[c]), 0.0)
+        if offset > 0.0:
+            forces.offset[c] = max(offset - _RECOVERY_FROM_SLACK * back, 0.0)
+        else:
+            forces.offset[c] = min(offset + back, 0.0)
