@@ -56,13 +56,15 @@ class KernelSet(NamedTuple):
     has_sides: bool = True
     """Whether the blade has a thickness."""
     precision: str = "single"
+    contact: str = "impulses"
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
         """Return the set that a scene needs."""
         has_sides = scene.blade is not None
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
-        return cls(law, scheme, relaxation, scene.audit, has_sides, scene.precision)
+        how = (scene.audit, has_sides, scene.precision, scene.contact)
+        return cls(law, scheme, relaxation, *how)
 
     def solver(self) -> SolverSettings:
         """Return settings that need this set."""
@@ -70,6 +72,7 @@ class KernelSet(NamedTuple):
             scheme=self.scheme,
             relaxation=self.relaxation,
             precision=self.precision,
+            contact=self.contact,
             audit=self.audit,
         )
 

@@ -6,27 +6,35 @@ from tissue.blade.impulse_totals import clear_works
 from tissue.blade.side_contact import sides_energy
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.vec3 import Vec3
-from tissue.elasticity.energy import body_energy, kinetic_energy, potential_energy
+from tissue.elasticity.energy import kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
 from tissue.integrators.system import System
 from tissue.types import Energies
 
 
 class Audit:
-    """The account of one body.
+    """The account of one body, or none.
 
-    It costs a sum over the body in each step, two in each cut, and two in each substep in which
-    parts of the body touch.
+    It costs a sum over the body in each step, two more in each cut that changes the mesh, and two
+    in each substep in which parts of the body touch.
+
+    Args:
+        gravity: Acceleration of free fall [m/s2].
+        is_kept: Whether an account is kept; if not, the methods do nothing.
     """
 
-    def __init__(self, gravity: Vec3) -> None:
+    def __init__(self, gravity: Vec3, *, is_kept: bool) -> None:
+        self._is_kept = is_kept
         self._gravity = gravity
-        self._topology = 0.0
+        self._topology = self._before_cut = 0.0
+        self._now: tuple[float, float, float] | None = None
         self._at_first = (0.0, 0.0, 0.0)
         self._contacts_at_first = (0.0, 0.0)
 
     def begin(self, system: System) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
+        if not self._is_kept:
+            return
         system.contact_loss.is_counted = 1
         system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
         clear_works(system.interaction.state.totals)
@@ -34,19 +42,27 @@ class Audit:
         contacts = system.contact.forces
         self._contacts_at_first = (contacts.work, contacts.stored)
 
+    def forget(self) -> None:
+        """Forget the energy: the body moved, or its mesh changed."""
+        self._now = None
+
     def before_cut(self, system: System, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
-        self._topology += self._all(system, edge, when)
+        if self._is_kept:
+            self._before_cut = self._all(system, edge, when)
 
     def after_cut(self, system: System, edge: Edge, when: float) -> None:
-        """Count the energy that the change of the mesh took."""
-        self._topology -= self._all(system, edge, when)
+        """Count the energy that the change of the mesh took; where it has not changed, none."""
+        if self._is_kept and self._now is None:
+            self._topology += self._before_cut - self._all(system, edge, when)
 
-    def energies(self, system: System, edge: Edge) -> Energies:
-        """Return the account at the end of a step."""
+    def energies(self, system: System, edge: Edge) -> Energies | None:
+        """Return the account at the end of a step; None where none is kept."""
+        if not self._is_kept:
+            return None
         blade = system.interaction.state
         totals = blade.totals
-        elastic, kinetic, potential = self._stored(system)
+        elastic, kinetic, potential = self._now or self._stored(system)
         elastic_first, kinetic_first, potential_first = self._at_first
         held = edge_energy(blade, system.body, edge, 1.0)
         contacts = system.contact.forces
@@ -71,12 +87,13 @@ class Audit:
         return (work - contacts.work) - (contacts.stored - stored)
 
     def _stored(self, system: System) -> tuple[float, float, float]:
-        """Return the elastic, kinetic and potential energy [J]."""
+        """Return the elastic, kinetic and potential energy [J], and remember them."""
         body, potential = system.body, potential_energy(system.body, self._gravity)
-        return elastic_energy(system.elasticity.arrays, body), kinetic_energy(body), potential
+        elastic = elastic_energy(system.elasticity.arrays, body)
+        self._now = (elastic, kinetic_energy(body), potential)
+        return self._now
 
     def _all(self, system: System, edge: Edge, when: float) -> float:
         """Return the energy of the body and of the anchors [J]."""
-        body, blade = system.body, system.interaction.state
-        stored = body_energy(body, system.elasticity.arrays, self._gravity)
-        return stored + edge_energy(blade, body, edge, when)
+        stored = sum(self._now or self._stored(system))
+        return stored + edge_energy(system.interaction.state, system.body, edge, when)

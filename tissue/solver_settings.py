@@ -7,8 +7,8 @@ from tissue.integrators.options import IntegratorOptions
 
 MASS_SCALING_FREQUENCY = 6000.0
 """Angular frequency above which nodes get mass [1/s]. In an organ of 5,000 elements cut in two that
-is 0.05 % of its mass, at 5,000 it is 0.2 % and shows in the force (1.2 % of its peak), at 7,000 a
-step more is taken each millisecond."""
+is 0.15 % of its mass; a limit of 5,000 adds several times as much and shows in the force (1.2 % of
+its peak), at 7,000 a step more is taken each millisecond."""
 
 PRECISIONS = ("double", "single")
 """Precisions in which forces of tetrahedra can be computed."""

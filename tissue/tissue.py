@@ -48,7 +48,6 @@ from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
 from tissue.types import (
     BladeSweep,
-    Energies,
     SchemeStatistics,
     StageTimes,
     StepResult,
@@ -132,7 +131,7 @@ class Tissue(BodyQueries):
         checked_floor(floor, float(self.bounds[0, 2]))
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
         self._incision = Incision(scheme, self.node_size)
-        self._audit = Audit(surroundings.gravity) if solver.audit else None
+        self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.stable_step)
         elasticity = self._system.elasticity
@@ -141,7 +140,7 @@ class Tissue(BodyQueries):
         self._edge_now = (NOWHERE, 1.0)
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
-        self._begin_audit()
+        self._audit.begin(self._system)
 
     @property
     def _body(self) -> Body:
@@ -224,7 +223,7 @@ class Tissue(BodyQueries):
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body, system.elasticity)
         self._box = body_bounds(system.body)
-        self._begin_audit()
+        self._audit.begin(self._system)
         return n_steps
 
     def cut_report(self) -> CutReport:
@@ -268,6 +267,7 @@ class Tissue(BodyQueries):
     def _advance(self, increment: Increment) -> int:
         """Advance the motion by an increment; return the substeps that it took."""
         n = self._integrator.advance(self._system, increment) if increment.span > 0.0 else 0
+        self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
         if n == 0:
             return 0
@@ -336,7 +336,7 @@ class Tissue(BodyQueries):
             n_substeps=n_substeps,
             body_contacts=self._system.contact.report(dt),
             stage_times=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
-            energies=self._energies(edge),
+            energies=self._audit.energies(self._system, edge),
         )
 
     # changes of the mesh
@@ -349,8 +349,7 @@ class Tissue(BodyQueries):
         return self._system.body, self._system.visits
 
     def _before_cut(self) -> None:
-        if self._audit:
-            self._audit.before_cut(self._system, *self._edge_now)
+        self._audit.before_cut(self._system, *self._edge_now)
 
     def _after_pass(self) -> None:
         """Update what depends on the tetrahedra that changed, and make room for another pass."""
@@ -358,14 +357,14 @@ class Tissue(BodyQueries):
         n = touched_nodes(system.body, change, system.visits, self._touched)
         if n:
             self._chunks = None
+            self._audit.forget()
             nodes = self._touched[:n]
             system.mesh_changed(change, nodes)
             self._integrator.mesh_changed(system.body, system.elasticity, nodes)
         self._make_room()
 
     def _after_cut(self) -> None:
-        if self._audit:
-            self._audit.after_cut(self._system, *self._edge_now)
+        self._audit.after_cut(self._system, *self._edge_now)
 
     def _make_room(self) -> None:
         """Make room for the next pass of a cut: arrays double when they are nearly full."""
@@ -384,16 +383,6 @@ class Tissue(BodyQueries):
             self._end_incision()
             interaction.replace_edge(length, self._system.body, *self._edge_now)
             self._incision.take_edge(interaction.n_samples)
-
-    # figures
-
-    def _begin_audit(self) -> None:
-        """Begin the account of energy with the body as it is."""
-        if self._audit:
-            self._audit.begin(self._system)
-
-    def _energies(self, edge: Edge) -> Energies | None:
-        return self._audit.energies(self._system, edge) if self._audit else None
 
 
 def _travel(edge: Edge) -> float:

@@ -18,7 +18,7 @@ from tissue.elasticity.finite_elements import (
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.frequency_refinement import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
-from tissue.elasticity.mass_scaling import scale_masses
+from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP, scale_masses
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
 from tissue.material import Material
@@ -69,6 +69,7 @@ class Elasticity:
         self._has_solid = law is not None
         self._solid_frequency_squared = 0.0
         self._allowed = math.inf
+        self._added_mass = self._mass = 0.0
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
         self.damper_frequency_squared = 0.0
@@ -78,6 +79,7 @@ class Elasticity:
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law == "neo_hookean":
             self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
+            self._mass = float(body.masses[:n_nodes].sum())
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
@@ -128,6 +130,7 @@ class Elasticity:
         )
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
+        self._added_mass -= float(body.added_masses[nodes].sum())
         self._write_springs(body, visits, nodes)
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
@@ -137,7 +140,10 @@ class Elasticity:
             n = tighten(solid, body, visits, n, self._solid_frequency_squared)
             nodes = solid.listed[:n]
             if self._allowed < math.inf:
-                scale_masses(body, springs, solid, nodes, n, self._allowed)
+                added = scale_masses(body, springs, solid, nodes, n, self._allowed)
+                self._added_mass += added
+                nodes = self._limit_added_mass(body, nodes)
+                n = len(nodes)
             forget_tests(solid, nodes, n)
             highest = largest_frequency(body, solid.frequency_squared, nodes, n)
             self._solid_frequency_squared = max(self._solid_frequency_squared, highest)
@@ -148,6 +154,17 @@ class Elasticity:
         bound_both_frequencies(self.arrays, nodes, len(nodes))
         largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
         self.frequency_squared = max(self.frequency_squared, largest)
+
+    def _limit_added_mass(self, body: Body, nodes: IntArray) -> IntArray:
+        """Raise the limit of frequencies until the added mass is small; return the nodes scaled."""
+        if self._added_mass <= LARGEST_ADDED_MASS * self._mass:
+            return nodes
+        springs, solid, n = self.arrays.springs, self.arrays.solid, body.n_nodes
+        while self._added_mass > LARGEST_ADDED_MASS * self._mass:
+            self._allowed *= LIMIT_STEP**2
+            added = scale_masses(body, springs, solid, solid.every, n, self._allowed)
+            self._added_mass += added
+        return solid.every[:n]
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
         density, modulus = self._material.density, self._material.spring_modulus

@@ -48,6 +48,11 @@ SAFETY = 0.8
 """Share of the stable step that is used. Springs in strong compression are stiffer than at rest;
 0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
 
+RUNGE_KUTTA_SAFETY = 0.75
+"""The same for the Runge-Kutta method with damping once a step, which takes energy from the fastest
+modes near its limit. No account of the energy sees that: where a blade presses and withdraws it was
+0.9 % of the work at 0.8, and 0.2 % at 0.75, with three steps in a millisecond instead of two."""
+
 
 def largest_stable_step(frequency: float, retardation_time: float, viscous_damping: float) -> float:
     """Return the largest stable step [s] for angular frequencies up to `frequency` [1/s].
@@ -106,7 +111,8 @@ def runge_kutta_step(
     elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
 ) -> float:
     """Return a stable Runge-Kutta step [s] where damping acts once a step."""
-    return _step(RUNGE_KUTTA_LIMIT, elasticity, frequency_squared, surroundings)
+    share = RUNGE_KUTTA_SAFETY / SAFETY
+    return share * _step(RUNGE_KUTTA_LIMIT, elasticity, frequency_squared, surroundings)
 
 
 def verlet_step(

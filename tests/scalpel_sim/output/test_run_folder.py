@@ -299,6 +299,14 @@ def test_the_summary_has_the_trade_between_path_error_and_time_step():
     assert found["substep_growth"] == pytest.approx(4.0)
 
 
+def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
+    console = Console(record=True, width=100)
+    summary = summary_of(recorded(10))
+    print_summary(summary, console)
+    assert summary.quality["added_mass"] == 1e-3
+    assert re.search("mass added to slivers.* 0.1 %", console.export_text())
+
+
 def test_the_summary_reports_where_the_work_went_and_the_residual():
     recording = zero_recording()
     for name, energy in (("work_of_blade_j", 4e-3), ("cutting_j", 3e-3), ("residual_j", 1e-5)):

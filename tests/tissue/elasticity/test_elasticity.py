@@ -8,6 +8,7 @@ from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 from tissue.integrators.stability import (
+    RUNGE_KUTTA_SAFETY,
     SAFETY,
     runge_kutta_step,
     stage_damped_step,
@@ -53,9 +54,9 @@ def verlet_matrix(k, c, h):
 
 
 METHODS = {
-    "Runge-Kutta, damping in stages": (runge_kutta_matrix, stage_damped_step),
-    "Runge-Kutta": (damped_once, runge_kutta_step),
-    "Verlet": (verlet_matrix, verlet_step),
+    "Runge-Kutta, damping in stages": (runge_kutta_matrix, stage_damped_step, SAFETY),
+    "Runge-Kutta": (damped_once, runge_kutta_step, RUNGE_KUTTA_SAFETY),
+    "Verlet": (verlet_matrix, verlet_step, SAFETY),
 }
 
 
@@ -68,7 +69,7 @@ def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poiss
     Neither method comes with a proof where K and C have other modes, so two steps are tried: the
     longest by the limits, and the one that is taken.
     """
-    step_matrix, stable_step = METHODS[method]
+    step_matrix, stable_step, safety = METHODS[method]
     material = Material(law="neo_hookean", poisson_ratio=poisson_ratio)
     springs = Material(material.spring_modulus)
     root = 1.0 / np.sqrt(np.repeat(masses(MESH, material.density), 3))
@@ -78,6 +79,6 @@ def test_no_mode_grows_in_a_stable_step_with_any_damping(retardation_time, poiss
     elasticity = Elasticity(material, body, no_visits(len(body.rest), len(body.tetrahedra)))
     around = Surroundings(gravity=Vec3(0.0, 0.0, 0.0), drag=0.0, retardation_time=retardation_time)
     h = stable_step(elasticity, elasticity.frequency_squared, around)
-    for step in (h, h / SAFETY):
+    for step in (h, h / safety):
         # The six rigid motions have double eigenvalues of 1, which rounding separates.
         assert np.abs(np.linalg.eigvals(step_matrix(k, c, step))).max() < 1.0 + 1e-4
