@@ -250,11 +250,6 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
             "instants, so that the energy of the whole is not known. Omit the audit, or use one of "
             "these"
         )
-    if solver.audit and options == Global(damping="stage"):
-        raise ValueError(
-            "an audit needs damping once a step: what is lost in the stages of a step is not "
-            "counted. Omit the audit, or use Global(damping='step')"
-        )
     if solver.threads > 1 and isinstance(options, Verlet):
         raise ValueError(
             f"threads is {solver.threads}; relaxation='verlet' runs on one. Use threads=1, or "

@@ -35,7 +35,7 @@ from tissue.integrators.equilibrium import settle
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
-from tissue.integrators.system import assembled
+from tissue.integrators.system import Numerics, assembled
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.body_queries import BodyQueries
@@ -118,13 +118,10 @@ class Tissue(BodyQueries):
             from tissue.cutting.bielser_1998.mesh_records import with_room_to_hang
 
             body = with_room_to_hang(body)
-        method = method_of(options)
-        self._system = assembled(
-            *(body, self.material, surroundings, blade, floor, solver.contact),
-            mass_scaling=solver.mass_scaling,
-            damps_each_step=method.damps_each_step,
-            is_single=solver.precision == "single",
-        )
+        method = method_of(options, self.material.law)
+        single = solver.precision == "single"
+        how = Numerics(solver.contact, solver.mass_scaling, method.damps_each_step, single)
+        self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)

@@ -62,6 +62,7 @@ class EngineLoops:
         is_damped: Whether there are dampers along the edges.
         is_averaged: Whether dilatation is averaged over nodes, as the engine does, or taken in
             each tetrahedron, as other engines do.
+        precision: Of the forces of tetrahedra, `double` or `single`.
     """
 
     def __init__(
@@ -71,12 +72,12 @@ class EngineLoops:
         *,
         is_damped: bool = True,
         is_averaged: bool = True,
+        precision: str = "double",
     ) -> None:
         material = block_material(law, is_damped=is_damped)
-        self._stepper = GlobalStepper(method_of(Global()))
-        self._tissue = Tissue(
-            mesh, material, fixed=held_nodes(mesh), solver=SolverSettings(relaxation="global")
-        )
+        self._stepper = GlobalStepper(method_of(Global(damping="step"), law))
+        solver = SolverSettings(relaxation=Global(damping="step"), precision=precision)
+        self._tissue = Tissue(mesh, material, fixed=held_nodes(mesh), solver=solver)
         if not is_averaged:
             elasticity = self._tissue._system.elasticity
             plain = neo_hookean(material.mu, material.lam, averaged=False)
@@ -86,8 +87,10 @@ class EngineLoops:
     def forces(self, n: int) -> None:
         """Evaluate the forces on all nodes, and the accelerations that follow."""
         system = self._tissue._system
+        # With the dampers among the forces; the engine's own steps let them act in between.
+        damped = system.context.replaced(surroundings=system.surroundings)
         for _ in range(n):
-            accelerations(system.context, system.stages.a1)
+            accelerations(damped, system.stages.a1)
 
     def euler_steps(self, n: int) -> None:
         """Take steps of the symplectic Euler method: one evaluation of the forces each.

@@ -29,6 +29,8 @@ OURS_SPRINGS, OURS_SOLID = "springs, Runge-Kutta", "plain neo-Hookean, 1 evaluat
 """Names of the cases that others are compared with: damped with damped, undamped with undamped."""
 UNDAMPED = ", undamped"
 """End of the name of a case without dampers."""
+SINGLE = ", single"
+"""End of the name of a case whose forces are computed in single precision."""
 
 _RKN, _EULER = "Runge-Kutta-Nystroem", "symplectic Euler"
 _AVERAGED = "f64; averaged dilatation"
@@ -36,7 +38,7 @@ _AVERAGED = "f64; averaged dilatation"
 OURS: dict[str, EngineCase] = {
     OURS_SPRINGS: EngineCase(
         "ours", "ours", "springs:runge_kutta:damped", f"springs, damped; {_RKN}", "3",
-        "f64; dampers four times a step",
+        "f64; dampers once a step",
     ),
     OURS_SPRINGS + UNDAMPED: EngineCase(
         "ours", "ours", "springs:runge_kutta:undamped", f"springs, no damping; {_RKN}", "3",
@@ -60,7 +62,20 @@ OURS: dict[str, EngineCase] = {
     ),
     "neo-Hookean, Runge-Kutta": EngineCase(
         "ours", "ours", "neo_hookean:runge_kutta:damped", f"neo-Hookean, damped; {_RKN}", "3",
-        f"{_AVERAGED}; dampers four times a step",
+        f"{_AVERAGED}; dampers once a step",
+    ),
+    OURS_SOLID + SINGLE: EngineCase(
+        "ours", "ours", "neo_hookean:euler:damped:plain:single",
+        f"neo-Hookean, damped; {_EULER}", "1", "f32, state in f64; for comparison only",
+    ),
+    OURS_SOLID + SINGLE + UNDAMPED: EngineCase(
+        "ours", "ours", "neo_hookean:euler:undamped:plain:single",
+        f"neo-Hookean, no damping; {_EULER}", "1", "f32, state in f64; for comparison only",
+    ),
+    "neo-Hookean, Runge-Kutta" + SINGLE: EngineCase(
+        "ours", "ours", "neo_hookean:runge_kutta:damped:single",
+        f"neo-Hookean, damped; {_RKN}", "3",
+        "f32, state in f64; averaged dilatation; dampers once a step",
     ),
 }  # fmt: skip
 

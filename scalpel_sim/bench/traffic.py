@@ -41,7 +41,7 @@ _UNDAMPED_STAGES = (
 )
 """Without dampers the second and the third acceleration are the same."""
 DAMPED_STAGES = (*_UNDAMPED_STAGES, StageCost(DAMPING_SLOT_BYTES, 25, 2 + 1 + 3, 20))
-"""Forces at three positions, and dampers once a step: at most, for weak ones act every other."""
+"""Forces at three positions, and dampers once a step."""
 
 VECTORS_PER_NODE = 9
 """Vectors of a node that a step touches: position, velocity, and seven of scratch."""

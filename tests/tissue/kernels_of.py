@@ -9,6 +9,7 @@ from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.contact.penalty.contact_forces import new_penalty_forces
+from tissue.contact.self_contact import SelfContact
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
@@ -132,7 +133,7 @@ class Network(NamedTuple):
             blade=self.blade,
             contacts=new_penalty_forces(0, 0.0, 0.0),
             surroundings=self.surroundings,
-            damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
+            damping=Damping(owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
@@ -166,7 +167,8 @@ class Network(NamedTuple):
         )
         undamped = around.replaced(drag=0.0, retardation_time=0.0)
         context = context.replaced(surroundings=undamped, damping=damping)
-        assert take_steps(context, NOWHERE, n * h, 0.0, 1.0, 0, n) == n
+        contact = SelfContact(self.body, 1.0, 0.0, None).arrays
+        assert take_steps(context, contact, NOWHERE, n * h, 0.0, 1.0, 0, n) == n
         if not is_running:
             damp(damping, self.body, context.elastic, self.stages, 0.0)
         return damping

@@ -214,7 +214,15 @@ def row_of_lane(lane: int, width: int) -> int:
 
 
 def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
-    """Write the points of a vector into as many rows from `i` on, lane k into `row_of_lane`."""
+    """Write the points of a vector into as many rows, lane k into row `i + row_of_lane(k)`.
+
+    Args:
+        rows: Rows of four, shape (n, 4); the last column becomes 0.
+        i: First row.
+        x: First coordinates.
+        y: Second coordinates.
+        z: Third coordinates.
+    """
     n = len(x)
     for lane in range(n):
         rows[i + row_of_lane(lane, n)] = (x[lane], y[lane], z[lane], 0.0)

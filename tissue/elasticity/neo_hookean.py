@@ -68,7 +68,7 @@ def solid_forces(
         n_nodes: How many of them.
     """
     displacements(solid, body, positions, nodes, 0, n_nodes)
-    gradients(solid, blocks, 0, n_blocks)
+    displacement_gradients(solid, blocks, 0, n_blocks)
     if has_averaged_volumes(solid):
         pressures(solid, nodes, 0, n_nodes)
     corner_forces(solid, blocks, 0, n_blocks)
@@ -118,7 +118,15 @@ def displacements(
 def displacements_of_blocks(
     solid: Solid, body: Body, positions: FloatArray, blocks: IntArray, n: int
 ) -> None:
-    """Write the displacements of the nodes of the first `n` of `blocks` to `positions` [m]."""
+    """Write the displacements of the nodes of some blocks from rest to `positions` [m].
+
+    Args:
+        solid: Written.
+        body: Rest positions.
+        positions: Positions of the nodes [m].
+        blocks: Blocks of tetrahedra.
+        n: How many of them.
+    """
     width = width_of(solid.shape)
     for i in range(n):
         first = 4 * width * blocks[i]
@@ -126,7 +134,7 @@ def displacements_of_blocks(
 
 
 @kernel
-def gradients(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
+def displacement_gradients(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
     """Write H and V (J - 1) of the tetrahedra of `blocks[begin:end]`, after `displacements`."""
     width = width_of(solid.shape)
     for i in range(begin, end):
@@ -233,7 +241,7 @@ def keeps_gradients(solid: Solid) -> bool:
 
 @inlined
 def _known_gradient(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
-    """Return the rows of H of the tetrahedra of a block, after `gradients`."""
+    """Return the rows of H of the tetrahedra of a block, after `displacement_gradients`."""
     if keeps_gradients(solid):
         width = width_of(solid.shape)
         at = 9 * width * block
@@ -342,7 +350,7 @@ def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
     """Return the elastic energy of the body at `positions` [m], less that at rest [J]."""
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
     displacements(solid, body, positions, solid.every, 0, body.n_nodes)
-    gradients(solid, solid.every, 0, blocks)
+    displacement_gradients(solid, solid.every, 0, blocks)
     energy = 0.0
     for block in range(blocks):
         energy += sum_of_lanes(_energies(solid, block))
@@ -354,7 +362,10 @@ def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
 
 @inlined
 def _energies(solid: Solid, block: int) -> Lanes:
-    """Return the energies of the tetrahedra of a block by themselves [J], after `gradients`."""
+    """Return the energies of the tetrahedra of a block by themselves [J].
+
+    After `displacement_gradients`.
+    """
     law, width = solid.law, width_of(solid.shape)
     x, y, z = _known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)

@@ -1,8 +1,7 @@
 """Damping once a step: dampers and drag change the velocities between two elastic steps.
 
 With D the damping and E the elastic motion the steps are D(h/2) E(h) D(h) E(h) D(h) ..., Strang's
-splitting. Where the damping is weak, it acts once every few steps, for as long. Each D is one
-explicit step at the positions as they are,
+splitting. Each D is one explicit step at the positions as they are,
 
     v <- v + s (viscous force / m - drag v)
 
@@ -15,7 +14,7 @@ the kinetic energy is what the dampers dissipate, so that no integral of a power
 
 from tissue.core.jit import kernel
 from tissue.core.simd import point, point_of, store_point, times
-from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import Elastic, viscous_force
 from tissue.integrators.stages import Stages
@@ -23,14 +22,13 @@ from tissue.mesh.body import Body
 
 
 class Damping(Arrays):
-    """Damping that acts once a step, or once every few steps."""
+    """Damping that acts once a step, and the loss in damping either way."""
 
-    interval: IntCell
-    """Number of steps for which it acts at once."""
     owed: FloatCell
-    """Time for which it has yet to act [s]: the second half of what it acted for last."""
+    """Time for which it has yet to act [s]: the second half of the last step."""
     dissipated: FloatCell
-    """Energy lost in viscosity and drag so far [J]."""
+    """Energy lost in viscosity and drag so far [J]; where damping acts in every stage it is counted
+    for an account of energy alone."""
     retardation_time: float
     """Damping along each edge, per stiffness of the edge [s]; 0 where it acts in every stage."""
     drag: float
@@ -39,14 +37,14 @@ class Damping(Arrays):
 
 @kernel
 def damp(damping: Damping, body: Body, elastic: Elastic, stages: Stages, h: float) -> None:
-    """Let half of the damping of the steps before act, and half of that of the steps to come.
+    """Let half of the damping of the last step act, and half of that of the step to come.
 
     Args:
         damping: What is owed and what is dissipated are written.
         body: Velocities are written.
         elastic: The dampers.
         stages: Scratch.
-        h: Length of the steps to come, until it acts again [s].
+        h: Length of the step to come [s].
     """
     seconds = damping.owed + 0.5 * h
     damping.owed = 0.5 * h

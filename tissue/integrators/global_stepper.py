@@ -11,7 +11,6 @@ from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
     StableStep,
-    damping_interval,
     runge_kutta_step,
     stage_damped_step,
     verlet_step,
@@ -25,6 +24,7 @@ from tissue.integrators.substeps import (
 )
 from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
+from tissue.material import Law
 from tissue.mesh.body import Body
 
 STEPS_BETWEEN_STRAIN_BOUNDS = 2
@@ -48,7 +48,7 @@ class Method(NamedTuple):
     """Whether damping acts once a step; if not, in every stage of it."""
 
 
-def method_of(options: IntegratorOptions) -> Method:
+def method_of(options: IntegratorOptions, law: Law) -> Method:
     """Return the method of a choice; for integrators that do not move all nodes, Runge-Kutta.
 
     These move all nodes where a body settles.
@@ -56,7 +56,8 @@ def method_of(options: IntegratorOptions) -> Method:
     if isinstance(options, Verlet):
         return Method(verlet_steps, verlet_steps_with_forces, verlet_step, True)
     steps = (runge_kutta_steps, runge_kutta_steps_with_forces)
-    if isinstance(options, Global) and options.damping == "step":
+    usual = "stage" if law == "springs" else "step"
+    if isinstance(options, Global) and (options.damping or usual) == "step":
         return Method(*steps, runge_kutta_step, True)
     return Method(*steps, stage_damped_step, False)
 
@@ -103,8 +104,6 @@ class GlobalStepper:
 
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
-        step = increment.span / n
-        system.damping.interval = damping_interval(system.elasticity, system.surroundings, step)
         if self._threads is not None:
             self._threads.take_steps(system, increment, n)
             return

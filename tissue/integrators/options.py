@@ -21,14 +21,15 @@ class Global:
         ValueError: a setting is none that it can have.
     """
 
-    damping: WhenDamped = "step"
+    damping: WhenDamped | None = None
     """When the damping acts: once a `step`, of first order with a small error, or in every `stage`,
-    of fourth order as the elastic motion, for a third more time. Without damping both are the
+    of fourth order as the elastic motion, for a third more time. By default in every stage under
+    law springs, the paper's, and once a step under the others. Without damping both are the
     same."""
 
     def __post_init__(self) -> None:
         known = get_args(WhenDamped)
-        if self.damping not in known:
+        if self.damping is not None and self.damping not in known:
             raise ValueError(f"damping is {self.damping!r}; it must be one of {', '.join(known)}")
 
 

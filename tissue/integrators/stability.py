@@ -41,9 +41,6 @@ _RATIOS = STABILITY_LIMIT[:, 0].tolist()
 _INVERSES = (1.0 / STABILITY_LIMIT[:, 1]).tolist()
 """The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
 
-MOST_STEPS_AT_ONCE = 2
-"""Steps at most for which damping acts at once; each more makes the force less exact."""
-
 SAFETY = 0.8
 """Share of the stable step that is used. Springs in strong compression are stiffer than at rest;
 0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
@@ -72,18 +69,6 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
         share = (ratio - _RATIOS[i]) / (_RATIOS[i + 1] - _RATIOS[i])
         limit = 1.0 / (_INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i]))
     return limit / frequency
-
-
-MONOTONE_DAMPING = 0.8
-"""Largest rate of damping times the time for which it acts at once where it acts once every few
-steps: below 1 no velocity is turned round."""
-
-
-def damping_interval(elasticity: Elasticity, surroundings: Surroundings, step: float) -> int:
-    """Return for how many steps of that length [s] damping may act at once."""
-    rate = surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag
-    longest = MONOTONE_DAMPING / rate if rate > 0.0 else math.inf
-    return int(min(max(longest / step, 1.0), MOST_STEPS_AT_ONCE))
 
 
 StableStep = Callable[[Elasticity, float, Surroundings], float]

@@ -22,6 +22,10 @@ class Stages(Arrays):
     """Accelerations of the first stage [m/s2]."""
     a2: FloatArray
     """Accelerations of the second stage [m/s2]."""
+    start_positions: FloatArray
+    """Positions before the step [m], where the loss in damped stages is counted."""
+    start_velocities: FloatArray
+    """Velocities before the step [m/s], where the loss in damped stages is counted."""
 
 
 def new_stages(n_nodes: int) -> Stages:

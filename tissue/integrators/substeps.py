@@ -10,6 +10,11 @@ from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
 from tissue.integrators.damping import damp
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
+from tissue.integrators.stage_damping import (
+    begin_damped_step,
+    counts_stage_damping,
+    end_damped_step,
+)
 from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.verlet import position_verlet
@@ -47,8 +52,7 @@ def runge_kutta_steps(
         if contact.is_pending == 0:
             if contact.is_awake == 1:
                 note_all_positions(contact, context.body)
-            begin_substep(context, share * dt, i, n)
-            runge_kutta_nystroem(context, edge, dt, at, share)
+            _runge_kutta_step(context, edge, dt, at, share)
         if not end_substep(context, contact, edge, share * dt, at + share):
             return i
     return n
@@ -83,7 +87,7 @@ def verlet_steps(
         if contact.is_pending == 0:
             if contact.is_awake == 1:
                 note_all_positions(contact, context.body)
-            begin_substep(context, share * dt, i, n)
+            damp(context.damping, context.body, context.elastic, context.stages, share * dt)
             position_verlet(context, edge, dt, at, share)
         if not end_substep(context, contact, edge, share * dt, at + share):
             return i
@@ -107,8 +111,7 @@ def runge_kutta_steps_with_forces(
     share = (end - begin) / n
     for i in range(n):
         at = begin + i * share
-        begin_substep(context, share * dt, i, n)
-        runge_kutta_nystroem(context, edge, dt, at, share)
+        _runge_kutta_step(context, edge, dt, at, share)
         _end_with_forces(context, edge, share * dt, at + share)
 
 
@@ -129,25 +132,20 @@ def verlet_steps_with_forces(
     share = (end - begin) / n
     for i in range(n):
         at = begin + i * share
-        begin_substep(context, share * dt, i, n)
+        damp(context.damping, context.body, context.elastic, context.stages, share * dt)
         position_verlet(context, edge, dt, at, share)
         _end_with_forces(context, edge, share * dt, at + share)
 
 
 @kernel
-def begin_substep(context: StepContext, h: float, i: int, n: int) -> None:
-    """Let the damping act where it is due.
-
-    Args:
-        context: What takes part.
-        h: Length of the step [s].
-        i: Number of the step.
-        n: How many steps of that length follow one another.
-    """
-    every = context.damping.interval
-    if i % every == 0:
-        seconds = min(every, n - i) * h
-        damp(context.damping, context.body, context.elastic, context.stages, seconds)
+def _runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, share: float) -> None:
+    """Take one Runge-Kutta step with its damping; see `runge_kutta_nystroem`."""
+    is_counted = counts_stage_damping(context)
+    before = begin_damped_step(context) if is_counted else 0.0
+    damp(context.damping, context.body, context.elastic, context.stages, share * dt)
+    runge_kutta_nystroem(context, edge, dt, at, share)
+    if is_counted:
+        end_damped_step(context, before, share * dt)
 
 
 @kernel

@@ -1,6 +1,7 @@
 """`System`: a body with everything that acts on it, as integrators advance it."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -63,7 +64,6 @@ class System:
         damped = surroundings if damps_each_step else undamped
         self._in_stages = undamped if damps_each_step else surroundings
         self.damping = Damping(
-            interval=1,
             owed=0.0,
             dissipated=0.0,
             retardation_time=damped.retardation_time,
@@ -138,17 +138,26 @@ class System:
         )
 
 
+class Numerics(NamedTuple):
+    """How the motion of a body is computed, as far as its arrays depend on it."""
+
+    contact: str
+    """`impulses` or `penalty`; see `SolverSettings`."""
+    mass_scaling: float | None
+    """Frequency above which nodes get mass [1/s]; see `Elasticity`."""
+    damps_each_step: bool
+    """Whether damping acts once a step; if not, in every stage of it."""
+    is_single: bool
+    """Whether forces of tetrahedra are computed in single precision."""
+
+
 def assembled(
     body: Body,
     material: Material,
     surroundings: Surroundings,
     blade: BladeShape | None,
     floor: float | None,
-    contact: str,
-    *,
-    mass_scaling: float | None,
-    damps_each_step: bool,
-    is_single: bool,
+    numerics: Numerics,
 ) -> System:
     """Return a body with its elasticity, its contact and the blade.
 
@@ -158,17 +167,16 @@ def assembled(
         surroundings: Gravity and damping.
         blade: The body of the blade; None for a line that cuts.
         floor: Height of a floor below the body [m]; None for no floor.
-        contact: `impulses` or `penalty`; see `SolverSettings`.
-        mass_scaling: Frequency above which nodes get mass [1/s]; see `Elasticity`.
-        damps_each_step: Whether damping acts once a step; if not, in every stage of it.
-        is_single: Whether forces of tetrahedra are computed in single precision.
+        numerics: How it is computed.
     """
     visits = no_visits(body.n_nodes, body.n_tetrahedra)
-    elasticity = Elasticity(material, body, visits, mass_scaling=mass_scaling, is_single=is_single)
+    elasticity = Elasticity(
+        material, body, visits, mass_scaling=numerics.mass_scaling, is_single=numerics.is_single
+    )
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)
     touching: Contact
-    if contact == "penalty":
+    if numerics.contact == "penalty":
         # Imported late: kernels that are not used cost no start.
         from tissue.contact.penalty.penalty_contact import PenaltyContact
 
@@ -177,4 +185,4 @@ def assembled(
     else:
         touching = SelfContact(body, node_size, material.friction, floor)
     owners = (body, elasticity, touching, interaction, surroundings, visits, node_size)
-    return System(*owners, damps_each_step=damps_each_step)
+    return System(*owners, damps_each_step=numerics.damps_each_step)

@@ -16,11 +16,12 @@ from tissue.elasticity.finite_elements import n_blocks
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import (
     corner_forces,
+    displacement_gradients,
     displacements,
-    gradients,
     has_averaged_volumes,
     pressures,
 )
+from tissue.integrators.damping import damp
 from tissue.integrators.runge_kutta import (
     apply_outer_forces,
     first_stage,
@@ -28,9 +29,14 @@ from tissue.integrators.runge_kutta import (
     second_stage,
     third_stage,
 )
+from tissue.integrators.stage_damping import (
+    begin_damped_step,
+    counts_stage_damping,
+    end_damped_step,
+)
 from tissue.integrators.step_context import Increment, StepContext
 from tissue.integrators.step_end import end_step
-from tissue.integrators.substeps import begin_substep, end_substep
+from tissue.integrators.substeps import end_substep
 from tissue.integrators.system import System
 from tissue.mesh.body import Body
 
@@ -53,8 +59,13 @@ class Threads:
             at = increment.begin + i * share
             seconds, when = share * increment.dt, at + share
             system.contact.start_substep(system.body)
-            begin_substep(system.context, seconds, i, n)
-            self._step(system.context, increment, at, share)
+            context = system.context
+            damp(context.damping, context.body, context.elastic, context.stages, seconds)
+            is_counted = counts_stage_damping(context)
+            before = begin_damped_step(context) if is_counted else 0.0
+            self._step(context, increment, at, share)
+            if is_counted:
+                end_damped_step(context, before, seconds)
             self._end(system, increment, seconds, when)
 
     def _end(self, system: System, increment: Increment, seconds: float, when: float) -> None:
@@ -92,7 +103,7 @@ class Threads:
         solid = elastic.solid
         blocks = n_blocks(solid, body.n_tetrahedra)
         self._share(body.n_nodes, displacements, solid, body, positions, solid.every)
-        self._share(blocks, gradients, solid, solid.every)
+        self._share(blocks, displacement_gradients, solid, solid.every)
         if has_averaged_volumes(solid):
             self._share(body.n_nodes, pressures, solid, solid.every)
         self._share(blocks, corner_forces, solid, solid.every)

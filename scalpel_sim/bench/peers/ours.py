@@ -1,4 +1,4 @@
-"""Our own engine: springs or neo-Hookean tetrahedra, double precision."""
+"""Our own engine: springs or neo-Hookean tetrahedra."""
 
 from typing import cast
 
@@ -14,10 +14,16 @@ def ours(body: PeerBody, case: str) -> PeerStepper:
 
     Args:
         body: What to simulate.
-        case: LAW:METHOD:DAMPING, and :plain where dilatation is not averaged over nodes.
+        case: LAW:METHOD:DAMPING, then :plain where dilatation is not averaged over nodes, and
+            :single for forces in single precision.
     """
-    law, method, damping, *plain = case.split(":")
-    mesh = TetrahedralMesh(body.positions, body.tetrahedra)
-    loops = EngineLoops(mesh, cast(Law, law), is_damped=damping == "damped", is_averaged=not plain)
+    law, method, damping, *more = case.split(":")
+    loops = EngineLoops(
+        TetrahedralMesh(body.positions, body.tetrahedra),
+        cast(Law, law),
+        is_damped=damping == "damped",
+        is_averaged="plain" not in more,
+        precision="single" if "single" in more else "double",
+    )
     steps = {"runge_kutta": loops.runge_kutta_steps, "euler": loops.euler_steps}[method]
     return PeerStepper(steps, lambda: loops.positions, version("scalpel-sim"))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import FloatArray, IntArray
+from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3
 from tissue.cutting.stellar_subdivision import split_edge, split_face
 from tissue.cutting.workspace import Cut
@@ -19,7 +19,7 @@ N_SPLITS = 500
 """Splits of each body; with more, its tetrahedra become so small that rounding matters."""
 
 
-@njit
+@kernel
 def volume_around(cut: Cut, a: int, b: int, out: IntArray) -> tuple[float, float]:
     """Return the sum and the smallest of the volumes around edge ab."""
     n = edge_star(cut.body, cut.visits, a, b, out)
@@ -31,7 +31,7 @@ def volume_around(cut: Cut, a: int, b: int, out: IntArray) -> tuple[float, float
     return total, least
 
 
-@njit
+@kernel
 def split_at_random(cut: Cut, which: FloatArray, before: FloatArray, after: FloatArray) -> float:
     """Split an edge or a face for each row of random numbers; return the smallest volume.
 

@@ -15,8 +15,8 @@ from tissue.elasticity.finite_elements import Solid, tetrahedron_of_slot
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import (
     corner_forces,
+    displacement_gradients,
     displacements_of_blocks,
-    gradients,
     has_averaged_volumes,
     pressures,
 )
@@ -123,7 +123,7 @@ def deform_patch(patch: Patch, elastic: Elastic, body: Body, positions: FloatArr
     if elastic.has_tetrahedra:
         solid = elastic.solid
         displacements_of_blocks(solid, body, positions, patch.volumes, patch.n_volumes)
-        gradients(solid, patch.volumes, 0, patch.n_volumes)
+        displacement_gradients(solid, patch.volumes, 0, patch.n_volumes)
         if has_averaged_volumes(solid):
             pressures(solid, patch.pressures, 0, patch.n_pressures)
         corner_forces(solid, patch.forces, 0, patch.n_forces)

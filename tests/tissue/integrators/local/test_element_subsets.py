@@ -67,10 +67,10 @@ def test_the_force_on_a_node_needs_only_its_patch(shaken, node):
     """All values outside the patch are zero."""
     elastic, body = shaken
     expected = all_forces(elastic, body)[node]
-    for name in ("volume", "pressure", "forces"):
+    for name in ("dilated", "pressure", "forces"):
         getattr(elastic.solid, name)[:] = 0.0
     patch = patch_of(elastic, rings_around(elastic, node, 1), 1, 0)
-    deform_patch(patch, elastic, body.positions)
+    deform_patch(patch, elastic, body, body.positions)
     out = np.zeros((N_NODES, 3))
     elastic_forces(elastic, body, np.array([node]), 1, out)
     np.testing.assert_array_equal(out[node], expected)
@@ -84,7 +84,7 @@ def test_the_patch_of_a_moved_node_has_all_nodes_whose_force_changes(shaken, nod
     reach = reach_of(elastic)
     rings = rings_around(elastic, node, reach)
     body.positions[node] += 1e-4
-    deform_patch(patch_of(elastic, rings, 0, reach - 1), elastic, body.positions)
+    deform_patch(patch_of(elastic, rings, 0, reach - 1), elastic, body, body.positions)
     out = before.copy()
     n = rings.n_found
     elastic_forces(elastic, body, rings.order, n, out)
