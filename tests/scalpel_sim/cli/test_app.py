@@ -15,7 +15,7 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import read_forces
-from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES
+from scalpel_sim.output.run_folder import ENERGY_PLOT, FRAMES_PER_FLUSH, RUN_FILES
 from tissue import MATERIALS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
@@ -419,7 +419,7 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     )
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == f"interrupted by {number.name}"
-    assert summary["frames"] == len(read_forces(forces)) >= 100
+    assert summary["frames"] == len(read_forces(forces)) >= FRAMES_PER_FLUSH
     assert sorted(path.name for path in folder.iterdir()) == sorted(RUN_FILES)
 
 
