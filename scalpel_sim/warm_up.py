@@ -40,7 +40,7 @@ _DT = 1e-3
 _SECONDS_PER_LOOK = 0.1
 """How often the progress of the processes is looked at [s]."""
 USUAL_NUMBER = 485
-"""How many kernels a set has, about: the end of the progress bar. A test compares."""
+"""How many kernels a set has, about: the end of the progress bar, unless there are more."""
 
 Progress = Callable[[int, int], None]
 """Receives how many kernels are compiled, and how many there will be, about."""

@@ -1,4 +1,4 @@
-"""Gathers between nodes and blocks of eight tetrahedra, and their largest entry.
+"""Sums over the row of a node, and the larger and the largest of the numbers of vectors.
 
 As in `tissue.core.simd` each function is also a plain Python function, which runs when the JIT is
 off.
@@ -14,30 +14,12 @@ from numba.core import types
 from tissue.core.array_types import FloatArray, SlotArray
 from tissue.core.simd import (
     _I32,
-    _POINT,
-    _VECTOR,
     LANES,
-    POINT,
     WIDTH,
     Lanes,
-    Point,
     _Array,
     _compiled,
 )
-
-
-def gathered(values: FloatArray, of: SlotArray, i: int) -> Lanes:
-    """Return `values` at `of[i]` to `of[i + 7]`."""
-    return values[of[i : i + WIDTH]]
-
-
-@_compiled(gathered, types.Array, types.Array, types.Integer)
-def _gathered(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
-    made = ir.Constant(_VECTOR, ir.Undefined)
-    for lane in range(WIDTH):
-        place = builder.load(of.at(builder.add(i, i.type(lane))))
-        made = builder.insert_element(made, builder.load(values.at(place)), _I32(lane))
-    return made
 
 
 def sum_of_eight(values: FloatArray, of: SlotArray, i: int) -> float:
@@ -50,24 +32,6 @@ def _sum_of_eight(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
     places = (builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH))
     total = _tree([builder.load(values.at(place)) for place in places], builder.fadd)
     return total if total.type == ir.DoubleType() else builder.fpext(total, ir.DoubleType())
-
-
-def sum_of_eight_points(values: FloatArray, of: SlotArray, i: int) -> Point:
-    """Return the sum of eight points, x at `of[i]` to `of[i + 7]`, y and z 8 and 16 behind it."""
-    x, y, z = (_tree(list(values[of[i : i + WIDTH] + c * WIDTH])) for c in range(3))
-    return np.array([x, y, z, 0.0])
-
-
-@_compiled(sum_of_eight_points, types.Array, types.Array, types.Integer, result=POINT)
-def _sum_of_eight_points(builder: Any, values: _Array, of: _Array, i: Any) -> Any:
-    places = [builder.load(of.at(builder.add(i, i.type(k)))) for k in range(WIDTH)]
-    made = ir.Constant(_POINT, [0.0] * 4)
-    for c in range(3):
-        terms = [
-            builder.load(values.at(builder.add(place, place.type(c * WIDTH)))) for place in places
-        ]
-        made = builder.insert_element(made, _tree(terms, builder.fadd), _I32(c))
-    return made
 
 
 def larger(a: Lanes, b: Lanes) -> Lanes:
