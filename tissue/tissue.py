@@ -120,7 +120,7 @@ class Tissue(BodyQueries):
             body = with_room_to_hang(body)
         method = method_of(options, self.material.law)
         single = solver.precision == "single"
-        how = Numerics(solver.contact, solver.mass_scaling, method.damps_each_step, single)
+        how = Numerics(solver.contact, solver.mass_scaling, method.damps_between_steps, single)
         self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)

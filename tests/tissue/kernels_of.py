@@ -133,7 +133,7 @@ class Network(NamedTuple):
             blade=self.blade,
             contacts=new_penalty_forces(0, 0.0, 0.0),
             surroundings=self.surroundings,
-            damping=Damping(owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
+            damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
@@ -145,22 +145,30 @@ class Network(NamedTuple):
         accelerations(self.context, out)
         return out * self.body.masses[:, None]
 
-    def damped_each_step(
-        self, take_steps: Callable[..., int], h: float, n: int = 1, *, is_running: bool = False
+    def damped_between_steps(
+        self,
+        take_steps: Callable[..., int],
+        h: float,
+        n: int = 1,
+        *,
+        interval: int = 1,
+        is_running: bool = False,
     ) -> Damping:
-        """Take `n` steps of `h` [s] with damping once a step; return the damping.
+        """Take `n` steps of `h` [s] with damping between steps; return the damping.
 
         Args:
             take_steps: A loop of `tissue.integrators.substeps`.
             h: Length of a step [s].
             n: Number of steps.
+            interval: Steps from one time that damping acts to the next.
             is_running: Whether there are steps before and after: then half of the damping of the
                 one before is owed at the begin, and half of that of the last at the end. If not,
                 no damping is owed at the end.
         """
         around, context = self.surroundings, self.context
         damping = Damping(
-            owed=0.5 * h if is_running else 0.0,
+            interval=interval,
+            owed=0.5 * interval * h if is_running else 0.0,
             dissipated=0.0,
             retardation_time=around.retardation_time,
             drag=around.drag,

@@ -171,7 +171,7 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
     law, width = solid.law, width_of(solid.shape)
     for i in range(begin, end):
         block = blocks[i]
-        x, y, z = _known_gradient(solid, block)
+        x, y, z = known_gradient(solid, block)
         v = shape_of(solid, block, VOLUME)
         p = alike(0.0, v)
         if law.lam_of_nodes != 0.0:
@@ -240,7 +240,7 @@ def keeps_gradients(solid: Solid) -> bool:
 
 
 @inlined
-def _known_gradient(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
+def known_gradient(solid: Solid, block: int) -> tuple[Vec3, Vec3, Vec3]:
     """Return the rows of H of the tetrahedra of a block, after `displacement_gradients`."""
     if keeps_gradients(solid):
         width = width_of(solid.shape)
@@ -367,7 +367,7 @@ def _energies(solid: Solid, block: int) -> Lanes:
     After `displacement_gradients`.
     """
     law, width = solid.law, width_of(solid.shape)
-    x, y, z = _known_gradient(solid, block)
+    x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
     trace = x.x + y.y + z.z
     grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))

@@ -8,9 +8,11 @@ from tissue.blade.forces import frequency_with_blade
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.elasticity.elasticity import Elasticity
+from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
     StableStep,
+    damping_rate,
     runge_kutta_step,
     stage_damped_step,
     verlet_step,
@@ -44,8 +46,8 @@ class Method(NamedTuple):
     """The same where contact acts as forces: `runge_kutta_steps_with_forces`."""
     stable_step: StableStep
     """The largest step."""
-    damps_each_step: bool
-    """Whether damping acts once a step; if not, in every stage of it."""
+    damps_between_steps: bool
+    """Whether damping acts between steps; if not, in every stage of them."""
 
 
 def method_of(options: IntegratorOptions, law: Law) -> Method:
@@ -93,6 +95,9 @@ class GlobalStepper:
             highest = max(least, strained + of_contact)
             step = self.method.stable_step(elasticity, highest, system.surroundings)
             n = max(1, math.ceil(increment.span / step))
+            rate = damping_rate(elasticity, system.surroundings)
+            is_slow = rate * LONGEST_INTERVAL * increment.span / n <= SLOW_DAMPING
+            system.damping.interval = LONGEST_INTERVAL if is_slow else 1
             if not elasticity.follows_strain or n <= STEPS_BETWEEN_STRAIN_BOUNDS:
                 self.take_steps(system, increment, n)
                 return done + n

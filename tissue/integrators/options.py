@@ -7,7 +7,7 @@ from typing import Literal, get_args
 from tissue.material import Material
 
 WhenDamped = Literal["step", "stage"]
-"""How often the damping acts: once a step, or in every stage of it."""
+"""When the damping acts: between steps, or in every stage of them."""
 
 Far = Literal["moved", "frozen"]
 """What becomes of nodes beyond the last ring: `moved` once a frame, or `frozen` (the paper)."""
@@ -22,10 +22,10 @@ class Global:
     """
 
     damping: WhenDamped | None = None
-    """When the damping acts: once a `step`, of first order with a small error, or in every `stage`,
-    of fourth order as the elastic motion, for a third more time. By default in every stage under
-    law springs, the paper's, and once a step under the others. Without damping both are the
-    same."""
+    """When the damping acts: between steps (`step`), of first order with a small error, or in every
+    `stage`, of fourth order as the elastic motion, for a third more time. By default in every stage
+    under law springs, the paper's, and between steps under the others. Without damping both are
+    the same."""
 
     def __post_init__(self) -> None:
         known = get_args(WhenDamped)

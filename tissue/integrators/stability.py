@@ -28,14 +28,14 @@ stage (the tests measure it). Between 0.05 and 0.5 the limit is higher; the tabl
 lowest."""
 
 RUNGE_KUTTA_LIMIT = 2.585
-"""Largest angular frequency times step of the Runge-Kutta method where damping acts once a step."""
+"""Largest angular frequency times step of the Runge-Kutta method, with damping between steps."""
 
 VERLET_LIMIT = 2.0
 """Largest angular frequency times step of position Verlet."""
 
 DAMPING_LIMIT = 2.0
-"""Largest rate of damping times step where damping acts once a step, with either method: beyond it
-the damping turns a velocity round and makes it larger."""
+"""Largest rate of damping times its interval where damping acts between steps, with either method:
+beyond it the damping turns a velocity round and makes it larger."""
 
 _RATIOS = STABILITY_LIMIT[:, 0].tolist()
 _INVERSES = (1.0 / STABILITY_LIMIT[:, 1]).tolist()
@@ -46,9 +46,10 @@ SAFETY = 0.8
 0.8 covers a compression to about 0.7 of the rest length. Above 1 the body can explode."""
 
 RUNGE_KUTTA_SAFETY = 0.75
-"""The same for the Runge-Kutta method with damping once a step, which takes energy from the fastest
-modes near its limit. No account of the energy sees that: where a blade presses and withdraws it was
-0.9 % of the work at 0.8, and 0.2 % at 0.75, with three steps in a millisecond instead of two."""
+"""The same for the Runge-Kutta method with damping between steps, which takes energy from the
+fastest modes near its limit. No account of the energy sees that: where a blade presses and
+withdraws it was 0.9 % of the work at 0.8, and 0.2 % at 0.75, with three steps in a millisecond
+instead of two."""
 
 
 def largest_stable_step(frequency: float, retardation_time: float, viscous_damping: float) -> float:
@@ -95,7 +96,7 @@ def stage_damped_step(
 def runge_kutta_step(
     elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
 ) -> float:
-    """Return a stable Runge-Kutta step [s] where damping acts once a step."""
+    """Return a stable Runge-Kutta step [s] where damping acts between steps."""
     share = RUNGE_KUTTA_SAFETY / SAFETY
     return share * _step(RUNGE_KUTTA_LIMIT, elasticity, frequency_squared, surroundings)
 
@@ -113,5 +114,10 @@ def _step(
     """Return a stable step [s]; the elastic motion and the damping limit it each by itself."""
     if frequency_squared == 0.0:
         return math.inf  # every node is fixed
-    rate = surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag
+    rate = damping_rate(elasticity, surroundings)
     return SAFETY / max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)
+
+
+def damping_rate(elasticity: Elasticity, surroundings: Surroundings) -> float:
+    """Return the highest rate [1/s] at which damping stops a motion."""
+    return surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag

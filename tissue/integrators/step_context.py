@@ -28,7 +28,7 @@ class StepContext(Arrays, two_precisions=True):
     surroundings: Surroundings
     """Gravity, and the damping that acts in every stage."""
     damping: Damping
-    """The damping that acts once a step."""
+    """The damping that acts between steps."""
     contact_loss: ContactLoss
     """What contact takes from the energy, where that is counted."""
     stages: Stages

@@ -52,6 +52,7 @@ def runge_kutta_steps(
         if contact.is_pending == 0:
             if contact.is_awake == 1:
                 note_all_positions(contact, context.body)
+            damp_if_due(context, i, n, share * dt)
             _runge_kutta_step(context, edge, dt, at, share)
         if not end_substep(context, contact, edge, share * dt, at + share):
             return i
@@ -87,7 +88,7 @@ def verlet_steps(
         if contact.is_pending == 0:
             if contact.is_awake == 1:
                 note_all_positions(contact, context.body)
-            damp(context.damping, context.body, context.elastic, context.stages, share * dt)
+            damp_if_due(context, i, n, share * dt)
             position_verlet(context, edge, dt, at, share)
         if not end_substep(context, contact, edge, share * dt, at + share):
             return i
@@ -111,6 +112,7 @@ def runge_kutta_steps_with_forces(
     share = (end - begin) / n
     for i in range(n):
         at = begin + i * share
+        damp_if_due(context, i, n, share * dt)
         _runge_kutta_step(context, edge, dt, at, share)
         _end_with_forces(context, edge, share * dt, at + share)
 
@@ -132,17 +134,32 @@ def verlet_steps_with_forces(
     share = (end - begin) / n
     for i in range(n):
         at = begin + i * share
-        damp(context.damping, context.body, context.elastic, context.stages, share * dt)
+        damp_if_due(context, i, n, share * dt)
         position_verlet(context, edge, dt, at, share)
         _end_with_forces(context, edge, share * dt, at + share)
 
 
 @kernel
+def damp_if_due(context: StepContext, i: int, n: int, h: float) -> None:
+    """Before a step, let damping act between steps if it is due.
+
+    Args:
+        context: What takes part.
+        i: The step, from 0 on.
+        n: Number of steps in this part of the time step.
+        h: Length of a step [s].
+    """
+    interval = context.damping.interval
+    if i % interval == 0:
+        seconds = min(interval, n - i) * h
+        damp(context.damping, context.body, context.elastic, context.stages, seconds)
+
+
+@kernel
 def _runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, share: float) -> None:
-    """Take one Runge-Kutta step with its damping; see `runge_kutta_nystroem`."""
+    """Take one Runge-Kutta step; count the damping in its stages. See `runge_kutta_nystroem`."""
     is_counted = counts_stage_damping(context)
     before = begin_damped_step(context) if is_counted else 0.0
-    damp(context.damping, context.body, context.elastic, context.stages, share * dt)
     runge_kutta_nystroem(context, edge, dt, at, share)
     if is_counted:
         end_damped_step(context, before, share * dt)

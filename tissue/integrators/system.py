@@ -37,7 +37,7 @@ class System:
         surroundings: Gravity and damping.
         visits: Scratch for searches, with room for the body.
         node_size: Mean node size of the body [m].
-        damps_each_step: Whether damping acts once a step; if not, in every stage of it.
+        damps_between_steps: Whether damping acts between steps; if not, in every stage of them.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class System:
         visits: Visits,
         node_size: float,
         *,
-        damps_each_step: bool,
+        damps_between_steps: bool,
     ) -> None:
         self.body = body
         self.elasticity = elasticity
@@ -61,15 +61,16 @@ class System:
         self.node_size = node_size
         self.stages = new_stages(len(body.rest))
         undamped = surroundings.replaced(drag=0.0, retardation_time=0.0)
-        damped = surroundings if damps_each_step else undamped
-        self._in_stages = undamped if damps_each_step else surroundings
+        damped = surroundings if damps_between_steps else undamped
+        self._in_stages = undamped if damps_between_steps else surroundings
         self.damping = Damping(
+            interval=1,
             owed=0.0,
             dissipated=0.0,
             retardation_time=damped.retardation_time,
             drag=damped.drag,
         )
-        """The damping that acts once a step, and what it has dissipated."""
+        """The damping that acts between steps, and what it has dissipated."""
         self.contact_loss = ContactLoss(is_counted=0, dissipated=0.0)
         """What contact takes from the energy, where that is counted."""
         self._context: StepContext | None = None
@@ -145,8 +146,8 @@ class Numerics(NamedTuple):
     """`impulses` or `penalty`; see `SolverSettings`."""
     mass_scaling: float | None
     """Frequency above which nodes get mass [1/s]; see `Elasticity`."""
-    damps_each_step: bool
-    """Whether damping acts once a step; if not, in every stage of it."""
+    damps_between_steps: bool
+    """Whether damping acts between steps; if not, in every stage of them."""
     is_single: bool
     """Whether forces of tetrahedra are computed in single precision."""
 
@@ -185,4 +186,4 @@ def assembled(
     else:
         touching = SelfContact(body, node_size, material.friction, floor)
     owners = (body, elasticity, touching, interaction, surroundings, visits, node_size)
-    return System(*owners, damps_each_step=numerics.damps_each_step)
+    return System(*owners, damps_between_steps=numerics.damps_between_steps)

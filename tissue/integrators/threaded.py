@@ -19,9 +19,9 @@ from tissue.elasticity.neo_hookean import (
     displacement_gradients,
     displacements,
     has_averaged_volumes,
+    keeps_gradients,
     pressures,
 )
-from tissue.integrators.damping import damp
 from tissue.integrators.runge_kutta import (
     apply_outer_forces,
     first_stage,
@@ -36,7 +36,7 @@ from tissue.integrators.stage_damping import (
 )
 from tissue.integrators.step_context import Increment, StepContext
 from tissue.integrators.step_end import end_step
-from tissue.integrators.substeps import end_substep
+from tissue.integrators.substeps import damp_if_due, end_substep
 from tissue.integrators.system import System
 from tissue.mesh.body import Body
 
@@ -60,7 +60,7 @@ class Threads:
             seconds, when = share * increment.dt, at + share
             system.contact.start_substep(system.body)
             context = system.context
-            damp(context.damping, context.body, context.elastic, context.stages, seconds)
+            damp_if_due(context, i, n, seconds)
             is_counted = counts_stage_damping(context)
             before = begin_damped_step(context) if is_counted else 0.0
             self._step(context, increment, at, share)
@@ -107,6 +107,7 @@ class Threads:
         if has_averaged_volumes(solid):
             self._share(body.n_nodes, pressures, solid, solid.every)
         self._share(blocks, corner_forces, solid, solid.every)
+        solid.has_gradients = int(keeps_gradients(solid))
 
     def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:
         """Run `loop(*arguments, begin, end)` over 0 to `n`, a part of it on each thread."""

@@ -8,7 +8,7 @@ from tests.tissue.solids import SolidBody, highest_frequency, law_of, solid_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.finite_elements import n_blocks
-from tissue.elasticity.internal_forces import Elastic
+from tissue.elasticity.internal_forces import Elastic, deform
 from tissue.elasticity.springs import no_springs
 from tissue.elasticity.strained_frequency import (
     forget_tests,
@@ -66,6 +66,16 @@ def test_the_bound_holds_however_the_body_is_stretched(stretch, poisson_ratio, a
         noise = np.random.default_rng(3).normal(size=MESH.positions.shape)
         x = MESH.positions @ stretch.T + shake * np.ptp(MESH.positions) * noise
         assert bound(solid, x) > 1.1 * highest_frequency(solid, x)
+
+
+@pytest.mark.parametrize("allowed", [0.0, np.inf])
+def test_gradients_that_the_forces_keep_give_the_same_bound(allowed):
+    solid = solid_of(MESH, law_of(0.45, averaged=True), is_single=True)
+    x = MESH.positions @ STRETCHES["sheared"].T
+    computed = bound(solid, x, allowed)
+    deform(elastic_of(solid), solid.body, solid.body.positions)
+    assert solid.solid.has_gradients
+    assert bound(solid, x, allowed) == computed
 
 
 CUT = block((6, 6, 3), (0.06, 0.06, 0.03))

@@ -34,7 +34,7 @@ def energy(network):
 
 def positions_after(n, seconds=0.04):
     network = bent()
-    network.damped_each_step(verlet_steps, seconds / n, n)
+    network.damped_between_steps(verlet_steps, seconds / n, n)
     return network.body.positions.copy()
 
 
@@ -50,7 +50,7 @@ def test_a_motion_whose_velocities_are_reversed_returns():
     network = bent()
     begin = network.body.positions.copy()
     for _ in range(2):
-        network.damped_each_step(verlet_steps, 2e-4, 20)
+        network.damped_between_steps(verlet_steps, 2e-4, 20)
         network.body.velocities *= -1.0
     assert np.abs(network.body.positions - begin).max() < 1e-12
 
@@ -66,7 +66,7 @@ def test_the_energy_does_not_drift_in_ten_thousand_steps(share):
     for _ in range(100):
         means = []
         for _ in range(10):
-            network.damped_each_step(verlet_steps, h, 10)
+            network.damped_between_steps(verlet_steps, h, 10)
             means.append(energy(network))
         energies.append(np.mean(means))
     drift = np.polyfit(np.arange(len(energies)), energies, 1)[0] * len(energies)
