@@ -39,9 +39,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--strokes", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument(
-        "--relaxation", choices=("global", "verlet", "hierarchical", "local"), default=None
-    )
+    parser.add_argument("--relaxation", choices=("global", "verlet", "hierarchical"), default=None)
     parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     parser.add_argument("--law", choices=("springs", "neo_hookean"), default=None)
     options = parser.parse_args()

@@ -26,7 +26,7 @@ from tissue import (
 SCHEMES = ("stellar", "paper")
 """Names of the schemes that `Tissue` takes."""
 
-RELAXATIONS = ("global", "verlet", "hierarchical", "local")
+RELAXATIONS = ("global", "verlet", "hierarchical")
 """Names of the relaxations that `Tissue` takes."""
 
 _PRECISIONS = ("single", "double")
@@ -124,7 +124,7 @@ class Scene:
     scheme: str = "stellar"
     """How the mesh is cut: `stellar`, or `paper` as in Bielser, Maiwald and Gross (1998)."""
     relaxation: str = "global"
-    """How the motion is advanced: `global`, `verlet`, `local` or `hierarchical`."""
+    """How the motion is advanced: `global`, `verlet` or `hierarchical`."""
     mass_scaling: float = DEFAULT_MASS_SCALING
     """Angular frequency above which nodes get mass where a cut has left slivers [1/s]; 0: none
     do."""

@@ -6,11 +6,9 @@ import pytest
 from tests import bodies, strokes
 from tests.test_conservation import NO_GRAVITY, SLAB, momentum
 from tests.test_determinism import fingerprint
-from tissue import Hierarchical, LocalTimeStepping, Material, SolverSettings, Tissue, block
-from tissue.integrators.local.sleeping import WAKE_ACCELERATION
+from tissue import Hierarchical, Material, SolverSettings, Tissue, block
 
-LOCAL, HIERARCHICAL = LocalTimeStepping(), Hierarchical(updates=16, rings=3)
-NEVER_ASLEEP = LocalTimeStepping(sleep=False)
+HIERARCHICAL = Hierarchical(updates=16, rings=3)
 
 LAWS = {
     "springs": Material(viscous_damping=60.0),
@@ -32,10 +30,7 @@ def sagged_body(mesh, material, relaxation, seconds=1.0):
 
 @pytest.mark.parametrize(
     ("relaxation", "law"),
-    [
-        *((choice, law) for choice in ("verlet", NEVER_ASLEEP) for law in LAWS),
-        (HIERARCHICAL, "springs"),
-    ],
+    [*(("verlet", law) for law in LAWS), (HIERARCHICAL, "springs")],
     ids=str,
 )
 def test_the_equilibrium_is_that_of_global_relaxation(relaxation, law):
@@ -47,62 +42,7 @@ def test_the_equilibrium_is_that_of_global_relaxation(relaxation, law):
     assert apart < 1e-6 * 0.04
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_a_sleeping_body_rests_where_it_would_awake(law):
-    """The error, as a share of the sag, is at most the share of gravity that wakes a node."""
-    mesh = bodies.jittered(3, 0)
-    awake, asleep = (sagged_body(mesh, LAWS[law], choice) for choice in (NEVER_ASLEEP, LOCAL))
-    assert asleep._integrator.n_awake == 0
-    apart = np.abs(asleep.snapshot().positions - awake.snapshot().positions).max()
-    sag = np.abs(awake.snapshot().positions - mesh.positions).max()
-    assert apart <= WAKE_ACCELERATION / 9.81 * sag
-
-
-def test_a_sleeping_body_does_not_change_at_all():
-    tissue = sagged_body(bodies.jittered(3, 0), LAWS["springs"], LOCAL)
-    before = tissue.snapshot()
-    result = tissue.step(None, strokes.DT)
-    for now, then in zip(tissue.snapshot(), before, strict=True):
-        np.testing.assert_array_equal(now, then)
-    np.testing.assert_array_less(result.bounds[0] - 1e-12, before.positions.min(axis=0))
-    np.testing.assert_array_less(before.positions.max(axis=0), result.bounds[1] + 1e-12)
-
-
-POKE = {"low": -0.01, "high": 0.05, "speed": 0.05}
-
-
-def test_a_body_woken_by_a_poke_responds_as_if_it_had_never_slept():
-    mesh = block((6, 6, 6), (0.04, 0.04, 0.04))
-    runs = []
-    for choice in (LOCAL, NEVER_ASLEEP):
-        tissue = sagged_body(mesh, LAWS["springs"], choice)
-        results = strokes.make(tissue, strokes.upright(0.02, -0.002, 0.003, **POKE))
-        runs.append((tissue, np.array([r.wrench.force for r in results])))
-    (slept, force), (awake, expected) = runs
-    assert np.abs(expected).max() > 0.05
-    np.testing.assert_allclose(force, expected, atol=0.02 * np.abs(expected).max())
-    moved = np.abs(awake.snapshot().positions - mesh.positions).max()
-    apart = np.abs(slept.snapshot().positions - awake.snapshot().positions).max()
-    assert apart < 0.02 * moved
-
-
-def test_a_large_body_stays_asleep_far_from_a_small_poke():
-    mesh = block((20, 6, 6), (0.4, 0.12, 0.12))
-    tissue = Tissue(
-        mesh,
-        Material(viscous_damping=100.0),
-        gravity=NO_GRAVITY,
-        solver=SolverSettings(relaxation=LOCAL),
-    )
-    for _ in range(100):
-        tissue.step(None, strokes.DT)
-    assert tissue._integrator.n_awake == 0
-    press = strokes.upright(0.2, -0.001, 0.0002, low=0.05, high=0.15, speed=0.02)
-    strokes.make(tissue, press)
-    assert 0 < tissue._integrator.n_awake < 0.5 * tissue.n_nodes
-
-
-CHOICES = {"local": LOCAL, "hierarchical": HIERARCHICAL, "verlet": "verlet"}
+CHOICES = {"hierarchical": HIERARCHICAL, "verlet": "verlet"}
 
 
 @pytest.mark.parametrize("relaxation", CHOICES.values(), ids=CHOICES)
@@ -125,11 +65,7 @@ def test_the_cutting_force_is_toughness_times_length(relaxation):
     assert np.abs(apart).max() < 1e-12
 
 
-@pytest.mark.parametrize(
-    "relaxation",
-    [LocalTimeStepping(rings=0), LocalTimeStepping(rings=2), "verlet", "global"],
-    ids=["no rings", "two rings", "verlet", "global"],
-)
+@pytest.mark.parametrize("relaxation", ["verlet", "global"])
 @pytest.mark.parametrize("law", ["springs", "neo_hookean"])
 def test_the_momentum_of_a_free_body_changes_by_the_impulse_of_the_blade_alone(law, relaxation):
     """In every frame, through splits and substeps, without drag.
@@ -206,14 +142,13 @@ def test_the_force_of_a_cut_by_verlet_is_that_by_runge_kutta_within_a_hundredth(
     assert found.sum() == pytest.approx(expected.sum(), rel=0.01)
 
 
-def test_pieces_that_touch_and_lie_on_a_floor_wake_and_sleep():
-    """Cut through, held at one side: the loose piece falls on the floor and comes to rest."""
+def test_a_loose_piece_falls_on_a_floor_and_comes_to_rest():
+    """Cut through, held at one side."""
     mesh = block((4, 4, 4), (0.04, 0.04, 0.04))
     held = mesh.positions[:, 0] < 1e-6
     material = Material(viscous_damping=20.0, toughness=2.0)
-    tissue = Tissue(
-        mesh, material, fixed=held, floor=-0.004, solver=SolverSettings(relaxation=LOCAL)
-    )
+    solver = SolverSettings(relaxation="verlet")
+    tissue = Tissue(mesh, material, fixed=held, floor=-0.004, solver=solver)
     strokes.make(tissue, strokes.straight(mesh, 0.6))
     assert tissue.n_pieces() == 2
     for _ in range(800):
@@ -234,9 +169,8 @@ def test_a_cut_between_fixed_nodes_creates_no_false_contacts():
     mesh = mesh._replace(positions=mesh.positions + 0.1)
     held = mesh.positions[:, 2] < 0.115
     material = Material(viscous_damping=20.0, toughness=2.0)
-    tissue = Tissue(
-        mesh, material, fixed=held, gravity=NO_GRAVITY, solver=SolverSettings(relaxation=LOCAL)
-    )
+    solver = SolverSettings(relaxation="verlet")
+    tissue = Tissue(mesh, material, fixed=held, gravity=NO_GRAVITY, solver=solver)
     strokes.make(tissue, strokes.straight(mesh, 0.3))  # from here on lips may touch
     results = strokes.make(tissue, strokes.straight(mesh, 0.7))
     new_fixed = tissue.snapshot().fixed[len(mesh.positions) :]

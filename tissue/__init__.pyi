@@ -18,7 +18,6 @@ from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.connected_components import components as components
 from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
-from .integrators.options import LocalTimeStepping as LocalTimeStepping
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
@@ -68,7 +67,6 @@ __all__ = [
     "Hierarchical",
     "IntArray",
     "Law",
-    "LocalTimeStepping",
     "MATERIALS",
     "Material",
     "MeshError",

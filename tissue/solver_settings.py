@@ -28,8 +28,8 @@ class SolverSettings:
     """How closely cuts follow the blade, where the scheme lets one choose."""
     relaxation: str | IntegratorOptions = "global"
     """How the motion is advanced: `global`, all nodes together by the Runge-Kutta method; `verlet`,
-    the same by position Verlet, two to three times as fast; `local`, small elements in substeps and
-    what rests asleep; `hierarchical`, the paper's; or one of their classes with settings."""
+    the same by position Verlet, two to three times as fast; `hierarchical`, the paper's; or one of
+    their classes with settings."""
     mass_scaling: float | None = MASS_SCALING_FREQUENCY
     """Angular frequency [1/s] above which nodes get mass where a cut has left slivers, so that
     these do not set the time step; None: no mass is added. The added mass has no weight, and

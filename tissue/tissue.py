@@ -131,8 +131,7 @@ class Tissue(BodyQueries):
         self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.stable_step)
-        elasticity = self._system.elasticity
-        self._integrator = integrator_of(options, self._global_stepper, body, elasticity)
+        self._integrator = integrator_of(options, self._global_stepper, len(body.rest))
         self._box = body_bounds(body)
         self._edge_now = (NOWHERE, 1.0)
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
@@ -218,7 +217,7 @@ class Tissue(BodyQueries):
         self._take_edge(None)
         system = self._system
         n_steps = settle(self._global_stepper, system, NOWHERE)
-        self._integrator.body_moved(system.body, system.elasticity)
+        self._integrator.body_moved(system.body)
         self._box = body_bounds(system.body)
         self._audit.begin(self._system)
         return n_steps
@@ -357,7 +356,7 @@ class Tissue(BodyQueries):
             self._audit.forget()
             nodes = self._touched[:n]
             system.mesh_changed(change, nodes)
-            self._integrator.mesh_changed(system.body, system.elasticity, nodes)
+            self._integrator.mesh_changed(nodes)
         self._make_room()
 
     def _after_cut(self) -> None:
@@ -369,7 +368,7 @@ class Tissue(BodyQueries):
         if room is not None:
             self._system.grow(*room)
             self._incision.scheme.grow(*room)
-            self._integrator.grow(*room)
+            self._integrator.grow(room[0])
             self._touched = np.zeros(room[0], dtype=np.int64)
 
     def _take_edge(self, edge: Edge | None) -> None:

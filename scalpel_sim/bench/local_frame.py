@@ -1,9 +1,8 @@
 """The cost of a frame that is local: it depends on the zone around the blade, not on the body.
 
 The same shallow slit is cut into the upper side of bodies of 6,000 to 1,000,188 tetrahedra. In a
-frame that splits any, about a dozen tetrahedra are split. Only what is near the blade, or moves, is
-relaxed: by the paper's hierarchy with its far nodes frozen, as printed, or by local time stepping,
-where what is at rest sleeps. The times are those of whole frames.
+frame that splits any, about a dozen tetrahedra are split. Only what is near the blade is relaxed:
+by the paper's hierarchy with its far nodes frozen, as printed. The times are those of whole frames.
 """
 
 from collections.abc import Sequence
@@ -33,8 +32,6 @@ from tissue import (
     BladeSweep,
     FloatArray,
     Hierarchical,
-    Law,
-    LocalTimeStepping,
     SolverSettings,
     Tissue,
 )
@@ -54,31 +51,23 @@ _STEP = 7e-4
 tetrahedra."""
 N_FRAMES = 40
 """Frames with the blade."""
-N_AT_REST = 80
-"""Frames before the blade arrives: the far nodes of a body at rest fall asleep."""
 _TOUGHNESS = 1.0
 """Toughness [J/m2], so low that the blade hardly drags the tissue along and cuts where it
 passes."""
 N_ENTRY = 3
 """First frames, which are not counted: the edge enters the body."""
 
-BENCHED_RELAXATIONS: dict[str, tuple[Law, Hierarchical | LocalTimeStepping]] = {
-    "hierarchical (I 64, s_max 6)": (
-        "springs",
-        Hierarchical(updates=64, rings=6, far="frozen"),
-    ),
-    "local, springs": ("springs", LocalTimeStepping()),
-    "local, neo-Hookean": ("neo_hookean", LocalTimeStepping()),
-}
-"""Law of elasticity and relaxation, by the name in the tables."""
+RELAXATION = Hierarchical(updates=64, rings=6, far="frozen")
+"""The paper's rings; nodes beyond them do not move."""
+RELAXATION_NAME = "hierarchical (I 64, s_max 6)"
+"""Its name in the tables."""
 _US_PER_S = 1e6
 
 _ABOUT = (
     "Whole frames of 1 ms: detection, cut, relaxation, the force on the blade, and the work of "
     "Python. Cut: frames that split tetrahedra, `splits` of them on average. Else: frames in which "
     "the blade moves on and splits nothing. Share: of the time in the smallest body. CPU time of "
-    "the thread. Hierarchical: the paper's relaxation by rings, whose far nodes stay fixed. Local: "
-    "its successor, whose far nodes sleep until they are pulled."
+    "the thread. Hierarchical: the paper's relaxation by rings, whose far nodes stay fixed."
 )
 
 
@@ -94,9 +83,8 @@ class SlitFrames(NamedTuple):
 
 
 class LocalFrameCost(NamedTuple):
-    """The cost of a frame with one relaxation in one body, medians over rounds."""
+    """The cost of a frame in one body, medians over rounds."""
 
-    relaxation: str
     tetrahedra: int
     splits: float
     """Mean number of tetrahedra split in a frame that splits any."""
@@ -110,42 +98,35 @@ def measure_local_frames(
     watch: Watch = SILENT,
     sizes: Sequence[int] = _SIZES,
 ) -> BenchmarkResult:
-    """Cut a slit into each body up to the largest, with each relaxation, in turns."""
+    """Cut a slit into each body up to the largest, in turns."""
     fitting, skipped = sizes_that_fit(
         sizes_up_to(tuple(sizes), largest), memory_bytes(), "local frame"
     )
-    cases = [(size, name) for name in BENCHED_RELAXATIONS for size in fitting]
-    for law, relaxation in BENCHED_RELAXATIONS.values():
-        _cut_slit(fitting[0], law, relaxation)  # loads the kernels
-    watch.begin(n_rounds * len(cases))
+    _cut_slit(fitting[0])  # loads the kernels
+    watch.begin(n_rounds * len(fitting))
     rounds: list[list[SlitFrames]] = []
     for _ in range(n_rounds):
         rounds.append([])
-        for size, name in cases:
-            rounds[-1].append(_cut_slit(size, *BENCHED_RELAXATIONS[name]))
-            watch.tick(f"{name}, {size:,}")
+        for size in fitting:
+            rounds[-1].append(_cut_slit(size))
+            watch.tick(f"{RELAXATION_NAME}, {size:,}")
     costs = [
-        _cost(name, size, frames)
-        for (size, name), frames in zip(cases, zip(*rounds, strict=True), strict=True)
+        _cost(size, frames) for size, frames in zip(fitting, zip(*rounds, strict=True), strict=True)
     ]
     measured = [measurement for each in costs for measurement in (each.cut, each.other)]
     return BenchmarkResult(measured, skipped, partial(_print, costs, skipped))
 
 
-def _cut_slit(
-    n_tetrahedra: int, law: Law, relaxation: Hierarchical | LocalTimeStepping
-) -> SlitFrames:
+def _cut_slit(n_tetrahedra: int) -> SlitFrames:
     """Cut the slit into a new body at rest."""
     mesh = jittered_block(n_tetrahedra)
     tissue = Tissue(
         mesh,
-        replace(block_material(law), toughness=_TOUGHNESS),
+        replace(block_material("springs"), toughness=_TOUGHNESS),
         fixed=held_nodes(mesh),
         gravity=(0.0, 0.0, 0.0),
-        solver=SolverSettings(relaxation=relaxation),
+        solver=SolverSettings(relaxation=RELAXATION),
     )
-    for _ in range(N_AT_REST):
-        tissue.step(None, FRAME_DT)
     seconds, sizes = np.zeros(N_FRAMES), np.full(N_FRAMES + 1, n_tetrahedra)
     before = _edge(n_tetrahedra, 0)
     with no_garbage_collection():
@@ -174,18 +155,17 @@ def _edge(n_tetrahedra: int, frame: int) -> BladeSegment:
     )
 
 
-def _cost(name: str, size: int, rounds: Sequence[SlitFrames]) -> LocalFrameCost:
-    """Return the cost with one relaxation in one body."""
+def _cost(size: int, rounds: Sequence[SlitFrames]) -> LocalFrameCost:
+    """Return the cost in one body."""
     splits = float(np.mean([each.splits.mean() for each in rounds]))
 
     def measurement(case: str, samples: Sequence[FloatArray], note: str) -> Measurement:
         quantity = Quantity(
-            "local frame", f"{name}: {case}", size, "time", "µs", CPU.name, note=note
+            "local frame", f"{RELAXATION_NAME}: {case}", size, "time", "µs", CPU.name, note=note
         )
         return summarise_times(quantity, samples, lambda s: _US_PER_S * s)
 
     return LocalFrameCost(
-        name,
         size,
         splits,
         measurement("cut frame", [each.cut for each in rounds], f"{splits:.1f} tetrahedra split"),
@@ -194,15 +174,15 @@ def _cost(name: str, size: int, rounds: Sequence[SlitFrames]) -> LocalFrameCost:
 
 
 def _print(costs: Sequence[LocalFrameCost], skipped: Sequence[Skipped], console: "Console") -> None:
-    """Print a row for each relaxation and body."""
+    """Print a row for each body."""
     table = compact_table("local frame, CPU time in µs")
     table.add_column("relaxation")
     for heading in ("tetrahedra", "splits", "cut", "p95", "p99", "share", "else", "n"):
         table.add_column(heading, justify="right")
     for each in costs:
-        smallest = next(one for one in costs if one.relaxation == each.relaxation)
+        smallest = costs[0]
         table.add_row(
-            each.relaxation if each is smallest else "",
+            RELAXATION_NAME if each is smallest else "",
             f"{each.tetrahedra:,}",
             f"{each.splits:.1f}",
             *map(three_digits, (each.cut.median, each.cut.p95, each.cut.p99)),

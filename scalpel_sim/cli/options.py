@@ -115,8 +115,7 @@ class SolverOptions:
     relaxation: str | None = None
     """How the motion is advanced: global, all nodes together by the Runge-Kutta method [default of
     run]; verlet, the same by a method of second order, two to three times as fast [default of
-    view]; local, small elements in substeps and elements at rest not at all; or hierarchical, the
-    paper's, for springs."""
+    view]; or hierarchical, the paper's, for springs."""
     mass_scaling: float | None = None
     """Nodes of slivers get mass until none is faster than this angular frequency [1/s; 0: off;
     default: 6000]. The added mass has no weight, and the table tells how much it is."""

@@ -29,7 +29,7 @@ def warm_up(
     ```console
     scalpel-sim warm-up
     scalpel-sim warm-up all
-    NUMBA_CACHE_DIR=/opt/kernels scalpel-sim warm-up organ --relaxation local
+    NUMBA_CACHE_DIR=/opt/kernels scalpel-sim warm-up slab --relaxation hierarchical
     ```
 
     Args:

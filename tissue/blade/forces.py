@@ -116,36 +116,6 @@ def release_edge(blade: BladeState, body: Body, edge: Edge, when: float) -> None
 
 
 @kernel
-def add_blade_frequency(
-    blade: BladeState, body: Body, frequency_squared: FloatArray, scratch: FloatArray
-) -> None:
-    """Add what the blade adds to the bound on w^2 [1/s2] of each node that it acts on.
-
-    `scratch`, shape (capacity, 3), must be zero at those nodes and is so again afterwards.
-    """
-    anchors, sides = blade.anchors, blade.sides
-    add_anchor_stiffness(anchors, body, scratch)
-    add_side_stiffness(sides, scratch)
-    for k in range(len(anchors.state)):
-        for q in range(4):
-            _add_frequency(
-                body, frequency_squared, scratch, body.tetrahedra[anchors.tetrahedron[k], q]
-            )
-    for i in range(sides.n_faces):
-        for corner in range(3):
-            _add_frequency(body, frequency_squared, scratch, sides.node[i, corner])
-
-
-@kernel
-def _add_frequency(
-    body: Body, frequency_squared: FloatArray, scratch: FloatArray, node: int
-) -> None:
-    """Add the stiffness at a node to its bound, once: it is zero afterwards."""
-    frequency_squared[node] += scratch[node, 0] / body.masses[node]
-    scratch[node, 0] = 0.0
-
-
-@kernel
 def frequency_with_blade(
     blade: BladeState, body: Body, frequency_squared: FloatArray, scratch: FloatArray
 ) -> float:

@@ -24,7 +24,6 @@ from tissue.contact.pairs import nodes_of
 from tissue.contact.point_triangle import Corners, is_within, project_to_plane
 from tissue.contact.solver import solve_positions, solve_velocities
 from tissue.contact.state import REBUILD, UP_TO_DATE, ContactState
-from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, scale, store, vec3
 from tissue.geometry.tetrahedron import Weights
@@ -41,13 +40,6 @@ def note_all_positions(contact: ContactState, body: Body) -> None:
     """Note where all nodes are, before a Runge-Kutta step."""
     for i in range(body.n_nodes):
         store(contact.start, i, vec3(body.positions, i))
-
-
-@kernel
-def note_positions(contact: ContactState, body: Body, nodes: IntArray, n: int) -> None:
-    """Note where the first `n` of `nodes` are, before a Runge-Kutta step."""
-    for i in range(n):
-        store(contact.start, nodes[i], vec3(body.positions, nodes[i]))
 
 
 @kernel

@@ -18,7 +18,7 @@ Four loops: displacements of nodes, gradients of blocks, pressures of nodes, for
 the force on a node is the sum over its row. Threads may share a loop, each taking a part of it.
 """
 
-from tissue.core.array_types import FloatArray, IntArray, SlotArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, Point, logarithm, point, point_of
 from tissue.core.simd_blocks import (
@@ -95,7 +95,7 @@ def displacements(
     solid: Solid,
     body: Body,
     positions: FloatArray,
-    nodes: IntArray | SlotArray,
+    nodes: IntArray,
     begin: int,
     end: int,
 ) -> None:
@@ -112,25 +112,6 @@ def displacements(
     for i in range(begin, end):
         node = nodes[i]
         store_row(solid.displacement, node, point(positions, node) - point(body.rest, node))
-
-
-@kernel
-def displacements_of_blocks(
-    solid: Solid, body: Body, positions: FloatArray, blocks: IntArray, n: int
-) -> None:
-    """Write the displacements of the nodes of some blocks from rest to `positions` [m].
-
-    Args:
-        solid: Written.
-        body: Rest positions.
-        positions: Positions of the nodes [m].
-        blocks: Blocks of tetrahedra.
-        n: How many of them.
-    """
-    width = width_of(solid.shape)
-    for i in range(n):
-        first = 4 * width * blocks[i]
-        displacements(solid, body, positions, solid.nodes, first, first + 4 * width)
 
 
 @kernel

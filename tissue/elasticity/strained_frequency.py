@@ -24,10 +24,9 @@ from tissue.core.simd_gather import larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
 from tissue.elasticity.finite_elements import Solid, n_blocks, node_place, tetrahedron_of_slot
 from tissue.elasticity.frequency_bound import bound_of_node, dilatation_term
-from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
+from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import (
     displacements,
-    displacements_of_blocks,
     gradient_of_displacement,
     gradient_of_shape,
     known_gradient,
@@ -144,40 +143,6 @@ def forget_tests(solid: Solid, nodes: IntArray, n: int) -> None:
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             solid.tested_growth[solid.around[slot]] = 1.0
-
-
-@kernel
-def strain_frequencies(
-    elastic: Elastic,
-    body: Body,
-    blocks: IntArray,
-    n_blocks: int,
-    nodes: IntArray,
-    n: int,
-) -> None:
-    """Write the bound on w^2 at nodes as they are deformed to `elastic.frequency_squared`.
-
-    Args:
-        elastic: Written.
-        body: Positions of the nodes.
-        blocks: Blocks that hold the tetrahedra around the nodes.
-        n_blocks: How many of them.
-        nodes: The nodes.
-        n: How many of them.
-    """
-    solid = elastic.solid
-    width = width_of(solid.shape)
-    displacements_of_blocks(solid, body, body.positions, blocks, n_blocks)
-    for i in range(n_blocks):
-        growth = _growth(solid, blocks[i], *gradient_of_displacement(solid, blocks[i]))
-        store_block(solid.growth, width * (1 + blocks[i]), growth)
-    bound_both_frequencies(elastic, nodes, n)
-    for i in range(n):
-        node = nodes[i]
-        growth = 1.0
-        for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            growth = max(growth, float(solid.growth[solid.around[slot]]))
-        elastic.frequency_squared[node] += (growth - 1.0) * solid.frequency_squared[node]
 
 
 @inlined

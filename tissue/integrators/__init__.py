@@ -6,7 +6,6 @@
   between their steps, `substeps` takes them, `threaded` on several threads; `stability` has the
   largest steps, `losses` what contact takes for the account of energy.
 - `step_end`: contact and slip of the blade after a step of the others.
-- `local`, `hierarchical`: local time stepping, and the paper's section 5.2; both search
-  `node_rings` around a `focus`.
+- `hierarchical`: the paper's section 5.2, which searches `node_rings` around a `focus`.
 - `equilibrium`: the state of rest of a body, by dynamic relaxation.
 """

@@ -7,7 +7,6 @@ from typing import NamedTuple
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
-from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
@@ -122,13 +121,13 @@ class GlobalStepper:
                 return
             contact.make_room()
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+    def mesh_changed(self, nodes: IntArray) -> None:
         """Do nothing: no step depends on the one before."""
 
-    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
+    def body_moved(self, body: Body) -> None:
         """Do nothing: no step depends on the one before."""
 
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+    def grow(self, n_nodes: int) -> None:
         """Do nothing: there are no arrays."""
 
 

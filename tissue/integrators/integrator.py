@@ -3,9 +3,8 @@
 from typing import Protocol
 
 from tissue.core.array_types import IntArray
-from tissue.elasticity.elasticity import Elasticity
 from tissue.integrators.global_stepper import GlobalStepper
-from tissue.integrators.options import Hierarchical, IntegratorOptions, LocalTimeStepping
+from tissue.integrators.options import Hierarchical, IntegratorOptions
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
 from tissue.mesh.body import Body
@@ -29,30 +28,26 @@ class Integrator(Protocol):
         """Advance the motion by an increment; return how many steps the finest nodes took."""
         ...
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+    def mesh_changed(self, nodes: IntArray) -> None:
         """Take note that the mesh around these nodes changed."""
         ...
 
-    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
+    def body_moved(self, body: Body) -> None:
         """Take note that every node moved by other means, and is at rest."""
         ...
 
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
-        """Make room for that many nodes and tetrahedra."""
+    def grow(self, n_nodes: int) -> None:
+        """Make room for that many nodes."""
         ...
 
 
 def integrator_of(
-    options: IntegratorOptions, global_stepper: GlobalStepper, body: Body, elasticity: Elasticity
+    options: IntegratorOptions, global_stepper: GlobalStepper, n_nodes: int
 ) -> Integrator:
-    """Return the integrator that a user chose, for that body."""
+    """Return the integrator that a user chose, with room for that many nodes."""
     # Imported late: kernels that are not used cost no start.
     if isinstance(options, Hierarchical):
         from tissue.integrators.hierarchical.stepper import HierarchicalStepper
 
-        return HierarchicalStepper(options, len(body.rest))
-    if isinstance(options, LocalTimeStepping):
-        from tissue.integrators.local.stepper import LocalStepper
-
-        return LocalStepper(options, body, elasticity)
+        return HierarchicalStepper(options, n_nodes)
     return global_stepper

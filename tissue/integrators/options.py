@@ -1,6 +1,5 @@
 """Options of the integrators that a user can choose."""
 
-import math
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -73,40 +72,12 @@ class Hierarchical:
             )
 
 
-@dataclass(frozen=True)
-class LocalTimeStepping:
-    """Leap-frog in which small elements take substeps, and what is at rest sleeps.
-
-    Raises:
-        ValueError: a setting is none that it can have.
-    """
-
-    rings: int = 0
-    """Rings of nodes that take substeps however soft they are, the first of which are those that
-    the blade holds. At 0 only nodes do that are too stiff for the step, with what the blade adds to
-    the stiffness of those that it holds."""
-    sleep: bool = True
-    """Whether nodes at rest sleep until they are pulled, so that a step costs what moves."""
-    stabilisation: float = 1.0
-    """Coefficient nu of the scheme; see `tissue.integrators.local.chebyshev`."""
-
-    def __post_init__(self) -> None:
-        if self.rings < 0:
-            raise ValueError(f"rings is {self.rings}; it must not be negative")
-        if not (math.isfinite(self.stabilisation) and self.stabilisation > 0.0):
-            raise ValueError(
-                f"stabilisation is {self.stabilisation}; it must be positive and finite: without "
-                "it the scheme is unstable at many steps far below its limit"
-            )
-
-
-IntegratorOptions = Global | Verlet | Hierarchical | LocalTimeStepping
+IntegratorOptions = Global | Verlet | Hierarchical
 
 BY_NAME: dict[str, IntegratorOptions] = {
     "global": Global(),
     "verlet": Verlet(),
     "hierarchical": Hierarchical(),
-    "local": LocalTimeStepping(),
 }
 """Integrators by name, with their default settings."""
 
@@ -124,14 +95,14 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
     if not isinstance(choice, IntegratorOptions):
         raise ValueError(
             f"relaxation is {choice!r}; it must be a name ({', '.join(BY_NAME)}), or Global, "
-            "Verlet, Hierarchical or LocalTimeStepping with settings"
+            "Verlet or Hierarchical with settings"
         )
     has_tetrahedra = material.law != "springs" or material.volume_modulus > 0.0
     if isinstance(choice, Hierarchical) and has_tetrahedra:
         raise ValueError(
             "hierarchical relaxation moves one node at a time, on its springs alone; with law "
             f"{material.law} and poisson_ratio {material.poisson_ratio} tetrahedra resist too. "
-            "Choose law springs with poisson_ratio 0.25, or relaxation local, its heir for every "
-            "law"
+            "Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast under "
+            "every law"
         )
     return choice

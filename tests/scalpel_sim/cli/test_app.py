@@ -118,8 +118,8 @@ WRONG_USE = {
         ["run", "slab", "--toughness-speed", "0"],
         "toughness_speed is 0",
     ),
-    "an audit of a local relaxation": (
-        ["run", "slab", "--audit", "--relaxation", "local"],
+    "an audit of a hierarchical relaxation": (
+        ["run", "slab", "--audit", "--relaxation", "hierarchical"],
         "--audit needs --relaxation global or verlet",
     ),
     "fewer threads than one": (

@@ -32,7 +32,7 @@ def test_mass_scaling_of_zero_is_none_and_without_the_option_it_is_the_default(a
 
 @pytest.mark.parametrize(
     ("asked", "expected"),
-    [({}, "verlet"), ({"relaxation": "local"}, "local"), ({"threads": 2}, "global")],
+    [({}, "verlet"), ({"relaxation": "hierarchical"}, "hierarchical"), ({"threads": 2}, "global")],
     ids=str,
 )
 def test_a_command_may_have_another_relaxation_where_none_is_asked_for(tmp_path, asked, expected):
@@ -42,7 +42,7 @@ def test_a_command_may_have_another_relaxation_where_none_is_asked_for(tmp_path,
         assert prepared.settings["relaxation"] == expected
 
 
-@pytest.mark.parametrize(("relaxation", "is_audited"), [("verlet", True), ("local", False)])
+@pytest.mark.parametrize(("relaxation", "is_audited"), [("verlet", True), ("hierarchical", False)])
 def test_a_run_keeps_an_account_where_one_can_be_kept(tmp_path, relaxation, is_audited):
     asked = options(tmp_path, relaxation=relaxation)
     with prepared_run("grid2", asked, audits=True) as prepared:

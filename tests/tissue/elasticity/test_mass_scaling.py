@@ -5,7 +5,7 @@ import pytest
 
 from tests import bodies, incisions
 from tests.tissue.solids import SolidBody, highest_frequency, moved
-from tissue import LocalTimeStepping, Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP
 from tissue.integrators.runge_kutta import accelerations
 
@@ -130,9 +130,7 @@ def test_the_sag_is_the_same_to_a_millionth():
     assert np.abs(sags[0] - sags[1]).max() < 1e-6 * np.abs(sags[1]).max()
 
 
-@pytest.mark.parametrize(
-    "relaxation", ["global", "verlet", LocalTimeStepping()], ids=["global", "verlet", "local"]
-)
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
 def test_a_free_body_gains_the_momentum_of_its_own_weight(relaxation):
     tissue = cut_body(LOW, relaxation=relaxation, is_held=False, **FREE)
     body, n = tissue._body, tissue.n_nodes

@@ -1,9 +1,9 @@
-"""Networks of springs advanced by the kernels of the steppers, without `Tissue`."""
+"""Networks of springs advanced by the kernels of the hierarchical stepper, without `Tissue`."""
 
 import numpy as np
 
 from tests import bodies
-from tests.tissue.kernels_of import Network, elastic_of, network_of
+from tests.tissue.kernels_of import Network, network_of
 from tissue import BoolArray, FloatArray, Hierarchical
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.internal_forces import Surroundings
@@ -13,19 +13,14 @@ from tissue.integrators.hierarchical.kernels import (
     hierarchical_frame,
     new_trails,
 )
-from tissue.integrators.hierarchical.stepper import ring_steps
-from tissue.integrators.local.chebyshev import STABILISATION, chebyshev
-from tissue.integrators.local.element_subsets import find_patch, new_patch, reach_of
-from tissue.integrators.local.kernels import LocalState, MacroStep, macro_step, new_zone
-from tissue.integrators.local.sleeping import all_asleep, wake_all
-from tissue.integrators.local.step_selection import find_listed_patch
-from tissue.integrators.node_rings import (
+from tissue.integrators.hierarchical.node_rings import (
     Rings,
     add_focus,
     begin_search,
     new_rings,
     search,
 )
+from tissue.integrators.hierarchical.stepper import ring_steps
 from tissue.tissue import NOWHERE
 
 FREE_FALL = Vec3(0.0, 0.0, -9.81)
@@ -98,61 +93,10 @@ def hierarchical_frames(
         hierarchical_frame(context, NOWHERE, rings, trails, every, frame)
 
 
-def macro_steps(
-    network: Network,
-    fine: list[int],
-    span: float,
-    n: int,
-    n_substeps: int,
-    stabilisation: float = STABILISATION,
-) -> None:
-    """Advance by macro steps of local time stepping, all nodes awake.
-
-    The first step starts from velocities at the same instant as the positions.
-
-    Args:
-        network: The network to advance.
-        fine: Nodes that take substeps.
-        span: Length of a macro step [s].
-        n: Number of macro steps.
-        n_substeps: Substeps of the fine nodes in a macro step.
-        stabilisation: Damping of the Chebyshev polynomials.
-    """
-    body, elastic = network.body, elastic_of(network.springs)
-    n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
-    zone, activity = new_zone(n_nodes, n_tetrahedra), all_asleep(n_nodes)
-    listed = new_patch(n_nodes, n_tetrahedra)
-    wake_all(activity, body, network.springs)
-    begin_search(zone.rings)
-    for node in fine:
-        if not body.fixed[node]:
-            add_focus(zone.rings, node)
-    search(zone.rings, network.springs, reach_of(elastic))
-    find_patch(zone.patch, elastic, zone.rings, 0, reach_of(elastic) - 1)
-    find_listed_patch(listed, elastic, activity, new_rings(n_nodes))
-    context = network.context
-    state = LocalState(activity=activity, listed=listed, zone=zone)
-    for i in range(n):
-        step = MacroStep(span, 0.0, 1.0, 0.5 if i == 0 else 1.0)
-        coefficients = chebyshev(n_substeps, stabilisation)
-        macro_step(context, NOWHERE, state, coefficients, step, 0.0)
-
-
 def frequency_bound(network: Network) -> float:
     """Return the bound on the angular frequency of the free nodes [1/s]."""
     free = ~network.body.fixed
     return float(np.sqrt(network.springs.frequency_squared[free].max()))
-
-
-def stiffen(network: Network, nodes: list[int], factor: float) -> None:
-    """Multiply the stiffness of the springs between these nodes by a factor."""
-    springs, among = network.springs, set(nodes)
-    for node in nodes:
-        first = springs.first[node]
-        for slot in range(first, first + springs.count[node]):
-            if int(springs.neighbour[slot]) in among:
-                springs.stiffness[slot] *= factor
-                springs.rest_pull[slot] *= factor
 
 
 def shake(network: Network, size: float) -> None:

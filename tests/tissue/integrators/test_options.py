@@ -2,13 +2,13 @@
 
 import pytest
 
-from tissue import Hierarchical, LocalTimeStepping, Material
+from tissue import Hierarchical, Material, Verlet
 from tissue.integrators.options import Global, checked_relaxation
 
 
 @pytest.mark.parametrize(
     ("name", "settings"),
-    [("global", Global()), ("local", LocalTimeStepping()), ("hierarchical", Hierarchical())],
+    [("global", Global()), ("verlet", Verlet()), ("hierarchical", Hierarchical())],
 )
 def test_a_name_stands_for_the_default_settings(name, settings):
     assert checked_relaxation(name, Material()) == settings
@@ -34,7 +34,7 @@ def test_an_unknown_choice_is_refused(choice, message):
 def test_the_hierarchy_is_for_springs_alone(material):
     with pytest.raises(ValueError, match="on its springs alone"):
         checked_relaxation("hierarchical", material)
-    assert checked_relaxation("local", material) == LocalTimeStepping()
+    assert checked_relaxation("verlet", material) == Verlet()
 
 
 @pytest.mark.parametrize(
@@ -49,16 +49,3 @@ def test_the_hierarchy_is_for_springs_alone(material):
 def test_impossible_hierarchical_settings_are_refused(settings, message):
     with pytest.raises(ValueError, match=message):
         Hierarchical(**settings)
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"rings": -1}, "rings is -1"),
-        ({"stabilisation": 0.0}, "stabilisation is 0.0"),
-        ({"stabilisation": float("nan")}, "stabilisation is nan"),
-    ],
-)
-def test_impossible_settings_of_local_time_stepping_are_refused(settings, message):
-    with pytest.raises(ValueError, match=message):
-        LocalTimeStepping(**settings)

@@ -44,7 +44,7 @@ from tissue.core.simd import (
 from tissue.core.structs import Arrays, IntCell
 from tissue.elasticity.spring_forces import NO_LENGTH
 from tissue.elasticity.springs import Springs
-from tissue.integrators.node_rings import Rings, ring_of
+from tissue.integrators.hierarchical.node_rings import Rings, ring_of
 from tissue.integrators.step_context import StepContext
 from tissue.mesh.body import Body, grown
 from tissue.mesh.star import LARGEST_STAR

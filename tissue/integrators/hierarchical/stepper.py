@@ -8,8 +8,7 @@ import numpy as np
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import IntArray
-from tissue.elasticity.elasticity import Elasticity
-from tissue.integrators.focus import find_held, find_rings
+from tissue.integrators.hierarchical.focus import find_held, find_rings
 from tissue.integrators.hierarchical.kernels import (
     FrameTimes,
     grown_trails,
@@ -17,7 +16,7 @@ from tissue.integrators.hierarchical.kernels import (
     new_trails,
     ring_frequencies,
 )
-from tissue.integrators.node_rings import grown_rings, new_rings
+from tissue.integrators.hierarchical.node_rings import grown_rings, new_rings
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
 from tissue.integrators.step_context import Increment
@@ -98,14 +97,15 @@ class HierarchicalStepper:
             needed.append(span / (SAFETY * step))
         return ring_steps(options, needed)
 
-    def mesh_changed(self, body: Body, elasticity: Elasticity, nodes: IntArray) -> None:
+    def mesh_changed(self, nodes: IntArray) -> None:
         """Note nodes that may be new: they may have moved as others did."""
         note_moved(self._moved, nodes, len(nodes))
 
-    def body_moved(self, body: Body, elasticity: Elasticity) -> None:
-        """Do nothing: a frame depends on the one before by its rings alone."""
+    def body_moved(self, body: Body) -> None:
+        """Note every node."""
+        note_moved(self._moved, np.arange(body.n_nodes), body.n_nodes)
 
-    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+    def grow(self, n_nodes: int) -> None:
         """Make room for that many nodes."""
         self._rings = grown_rings(self._rings, n_nodes)
         self._held = grown_rings(self._held, n_nodes)

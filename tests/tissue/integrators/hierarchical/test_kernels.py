@@ -14,7 +14,7 @@ from tests.tissue.integrators.networks import (
 )
 from tests.tissue.kernels_of import row
 from tissue.integrators.hierarchical.kernels import new_trails
-from tissue.integrators.node_rings import UNREACHED, ring_of
+from tissue.integrators.hierarchical.node_rings import UNREACHED, ring_of
 
 TOP = np.array([0.02, 0.02, 0.04])
 

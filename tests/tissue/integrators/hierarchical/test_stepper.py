@@ -4,8 +4,9 @@ import itertools
 
 import pytest
 
+from tests.tissue.integrators.networks import block
 from tissue import Hierarchical
-from tissue.integrators.hierarchical.stepper import ring_steps
+from tissue.integrators.hierarchical.stepper import HierarchicalStepper, ring_steps
 
 
 def steps(options, needed):
@@ -36,3 +37,10 @@ def test_updates_need_not_be_a_power_of_two(updates):
     needed = [0.5, 0.5, 1.1 * updates, 3.5]
     found = steps(options, needed)
     assert all(taken >= least for taken, least in zip(found, needed, strict=True))
+
+
+def test_after_a_body_was_settled_all_its_nodes_have_moved_even_frozen_ones():
+    body = block(2).body
+    stepper = HierarchicalStepper(Hierarchical(updates=16, rings=3, far="frozen"), len(body.rest))
+    stepper.body_moved(body)
+    assert stepper.moved.n_nodes == body.n_nodes

@@ -5,7 +5,13 @@ from tissue.blade.blade_state import BladeState
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.elasticity.springs import Springs
-from tissue.integrators.node_rings import Rings, add_focus, append_node, begin_search, search
+from tissue.integrators.hierarchical.node_rings import (
+    Rings,
+    add_focus,
+    append_node,
+    begin_search,
+    search,
+)
 from tissue.mesh.body import Body
 
 N_CORNERS = 4
@@ -13,8 +19,8 @@ N_CORNERS = 4
 
 
 @kernel
-def find_held(held: Rings, body: Body, blade: BladeState) -> bool:
-    """Make the nodes that the blade acts on ring 0 of `held`; return whether there are any.
+def find_held(held: Rings, body: Body, blade: BladeState) -> None:
+    """Make the nodes that the blade acts on ring 0 of `held`.
 
     The nodes of the anchor nearest to the tip come first. Without any, `held` stays as it was.
     """
@@ -33,7 +39,6 @@ def find_held(held: Rings, body: Body, blade: BladeState) -> bool:
         n += 1
         for corner in range(3):
             add_focus(held, sides.node[i, corner])
-    return n > 0
 
 
 @kernel

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tissue.integrators.networks import block, found_nodes, rings_around
-from tissue.integrators.node_rings import (
+from tissue.integrators.hierarchical.node_rings import (
     UNREACHED,
     add_focus,
     begin_search,

@@ -1,1 +1,0 @@
-"""Local time stepping: small elements take substeps, and what is at rest sleeps."""
