@@ -2,7 +2,8 @@
 
 In the order in which they are best read:
 
-    penalty_contact    owns the arrays, and lists the stages of a search
+    penalty_contact    owns the arrays
+    search             the stages of a search
     contact_forces     contacts as springs with friction, evaluated with all other forces
     stiffness          stiffness by mass splitting, and offsets that keep forces continuous
     contact_list       one contact for each direction in which a node is pushed

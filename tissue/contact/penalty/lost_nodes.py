@@ -1,65 +1,101 @@
-"""Nodes that are inside another part of the body without a contact: found in turn, one a search.
+"""Nodes that are inside another part of the body without a contact, found by its tetrahedra.
 
 A blade can drag a node through a face in one time step, or press it in so deep that its contact is
-given up. Nothing would ever push it out again. A node that is found inside a tetrahedron which at
-rest is far from it is paired with faces further above it, and is taken to be behind them; it comes
-out as slowly as any overlap that had no force.
+given up. Nothing would ever push it out again. Each search looks into some tetrahedra, in turn. A
+node that is inside one which at rest is far from it is paired with faces further above it, and is
+taken to be behind them; it comes out as slowly as any overlap that had no force.
 """
 
 import math
 
+from tissue.contact.penalty.node_grid import bucket_of, cells_of_box
+from tissue.contact.penalty.node_ways import BALL
 from tissue.contact.penalty.search_state import SearchState
 from tissue.core.jit import kernel
 from tissue.core.vec3 import dot, sub, vec3
+from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body, local_index
+
+_TETRAHEDRA_A_SEARCH = 64
+"""Tetrahedra that are looked into in one search. More: lost nodes are found sooner than within the
+tenth of a second that it takes to look into some 6,000, and each time step costs more."""
 
 _FAR_AT_REST = 2.0
 """Distance at rest beyond which a tetrahedron is another part of the body, per node size. Smaller:
 nodes of elements that are folded are taken for lost."""
 
-_LARGEST_TETRAHEDRON = 4.0
-"""Distance from a corner up to which a tetrahedron is searched, per node size."""
+_LARGEST_TETRAHEDRON = 8.0
+"""Extent along an axis up to which a tetrahedron is looked into, per node size. Larger: where a
+mesh is graded, one search takes as long as many."""
 
 _INSIDE = 0.02
 """Least barycentric weight of a node that is inside."""
 
 
 @kernel
-def look_for_lost_node(search: SearchState, body: Body) -> None:
-    """Find out about the next node without a contact whether it is inside another part."""
-    pairs = search.pairs
-    node = -1
-    for _ in range(pairs.n_nodes):
-        search.turn = search.turn + 1 if search.turn + 1 < pairs.n_nodes else 0
-        node = pairs.nodes[search.turn]
-        if search.n_contacts[node] == 0 or pairs.is_lost[node] == 1:
-            break
-        node = -1
-    if node < 0:
-        return
-    is_inside = _is_inside_another_part(search, body, node)
-    if is_inside and pairs.is_lost[node] == 0:
-        # No ball is as large as that, so the node is paired anew in the next search.
-        search.ways.radius[node] = math.nan
-    pairs.is_lost[node] = 1 if is_inside else 0
+def look_for_lost_nodes(search: SearchState, body: Body) -> None:
+    """Look into the next tetrahedra for lost nodes; after the last, forget who was not found."""
+    for _ in range(min(_TETRAHEDRA_A_SEARCH, body.n_tetrahedra)):
+        if search.turn >= body.n_tetrahedra:
+            _forget_others(search)
+            search.turn = 0
+            search.n_rounds += 1
+        _look_into(search, body, search.turn)
+        search.turn += 1
 
 
 @kernel
-def _is_inside_another_part(search: SearchState, body: Body, node: int) -> bool:
-    """Whether a node is in a tetrahedron that at rest is far from it."""
+def _forget_others(search: SearchState) -> None:
+    """Forget that nodes were lost which no tetrahedron contained in this round."""
+    pairs = search.pairs
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        if pairs.is_lost[node] == 1 and pairs.found_in[node] != search.n_rounds:
+            pairs.is_lost[node] = 0
+
+
+@kernel
+def _look_into(search: SearchState, body: Body, t: int) -> None:
+    """Find the nodes of faces that are lost in tetrahedron `t`."""
+    x, ways, grid = body.positions, search.ways, search.pairs.grid
+    a, b = vec3(x, body.tetrahedra[t, 0]), vec3(x, body.tetrahedra[t, 1])
+    c, d = vec3(x, body.tetrahedra[t, 2]), vec3(x, body.tetrahedra[t, 3])
+    box = with_point(with_point(with_point(Aabb(a, a), b), c), d)
+    extent = sub(box.high, box.low)
+    largest = _LARGEST_TETRAHEDRON * ways.node_size
+    # Of numbers that are not finite this is not true, either.
+    if not (extent.x < largest and extent.y < largest and extent.z < largest):
+        return
+    cells = cells_of_box(ways, widened(box, BALL * ways.node_size))
+    for i in range(cells.i, cells.i_last + 1):
+        for j in range(cells.j, cells.j_last + 1):
+            for k in range(cells.k, cells.k_last + 1):
+                bucket = bucket_of(grid, i, j, k)
+                for e in range(grid.begin[bucket], grid.begin[bucket + 1]):
+                    node = grid.entry[e]
+                    if _is_lost_in(search, body, node, t):
+                        _note_lost(search, node)
+
+
+@kernel
+def _is_lost_in(search: SearchState, body: Body, node: int, t: int) -> bool:
+    """Whether a node without a contact is in a tetrahedron that at rest is far from it."""
+    if search.n_contacts[node] > 0 and search.pairs.is_lost[node] == 0:
+        return False
     x, rest, size = body.positions, body.rest, search.ways.node_size
-    p, p_rest = vec3(x, node), vec3(rest, node)
-    near = (_LARGEST_TETRAHEDRON * size) ** 2
-    far = (_FAR_AT_REST * size) ** 2
-    for t in range(body.n_tetrahedra):
-        corner = body.tetrahedra[t, 0]
-        d = sub(vec3(x, corner), p)
-        if not dot(d, d) < near:
-            continue
-        d = sub(vec3(rest, corner), p_rest)
-        if dot(d, d) < far or local_index(body, t, node) >= 0:
-            continue
-        if smallest_weight(barycentric_in(p, x, body.tetrahedra, t)) > _INSIDE:
-            return True
-    return False
+    apart = sub(vec3(rest, body.tetrahedra[t, 0]), vec3(rest, node))
+    if dot(apart, apart) < (_FAR_AT_REST * size) ** 2 or local_index(body, t, node) >= 0:
+        return False
+    return smallest_weight(barycentric_in(vec3(x, node), x, body.tetrahedra, t)) > _INSIDE
+
+
+@kernel
+def _note_lost(search: SearchState, node: int) -> None:
+    """Note that a node is lost, so that it is paired with faces further off."""
+    pairs = search.pairs
+    pairs.found_in[node] = search.n_rounds
+    if pairs.is_lost[node] == 0:
+        pairs.is_lost[node] = 1
+        # No ball is as large as that, so the node is paired anew in the next search.
+        search.ways.radius[node] = math.nan

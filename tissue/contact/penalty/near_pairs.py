@@ -21,6 +21,7 @@ _OF_NODES = (
     "moved_at",
     "lost_at",
     "is_lost",
+    "found_in",
     "moved",
     "asked_at",
     "begin",
@@ -62,6 +63,9 @@ class NearPairs(Arrays):
     is_lost: IntArray
     """1 if a node is known to be inside another part of the body, else 0 (`lost_nodes`); shape
     (node capacity,)."""
+    found_in: IntArray
+    """Round of `lost_nodes` in which each node was last found to be lost, shape (node
+    capacity,)."""
     moved: IntArray
     """Nodes that were paired anew in the last update, shape (node capacity,)."""
     asked_at: IntArray

@@ -15,32 +15,24 @@ from tissue.contact.faces import (
     with_found_pieces,
     with_room,
 )
-from tissue.contact.node_normals import update_normals
 from tissue.contact.penalty.contact_forces import (
     clear_contact_totals,
     end_contact_substep,
     grown_penalty_forces,
     new_penalty_forces,
 )
-from tissue.contact.penalty.contact_list import (
-    DIRECTIONS,
-    find_due,
-    floor_changes,
-    list_contacts,
-)
-from tissue.contact.penalty.lost_nodes import look_for_lost_node
+from tissue.contact.penalty.contact_list import DIRECTIONS
 from tissue.contact.penalty.near_pairs import grown_near_pairs, new_near_pairs
-from tissue.contact.penalty.node_ways import (
-    IN_BALL,
-    LOST,
-    grown_node_ways,
-    measure_ways,
-    new_node_ways,
-    note_places,
+from tissue.contact.penalty.node_ways import grown_node_ways, new_node_ways
+from tissue.contact.penalty.search import (
+    BEGIN,
+    DONE,
+    NO_ROOM_FOR_PAIRS,
+    SEARCHES_TO_NORMALS,
+    search_contacts,
 )
-from tissue.contact.penalty.pair_update import SKIN_WAY, update_pairs
 from tissue.contact.penalty.search_state import SearchState
-from tissue.contact.penalty.stiffness import new_limits, recover, split_masses
+from tissue.contact.penalty.stiffness import new_limits
 from tissue.core.array_types import FloatArray
 from tissue.core.simd import room_for_points
 from tissue.mesh.body import Body, grown
@@ -58,13 +50,6 @@ in a millisecond with contact. Smaller: what lies on such a body sinks into it b
 RETARDATION_TIME = 0.45
 """Damping per stiffness of contacts, over the square root of what they may add to w^2: 1e-4 s in an
 organ of liver. Larger: shorter steps; smaller: what meets bounces and trembles for longer."""
-
-_SEARCHES_TO_NORMALS = 8
-"""Searches after which normals are computed anew where no pair is updated."""
-
-_SEARCHES_TO_NEW_FACES = 4
-"""Searches after which faces that a cut made are paired. Those that are gone still have their
-nodes, so that what they hold meanwhile keeps its momentum."""
 
 CAPACITY_OF_PAIRS = 1 << 12
 """Pairs that there is room for at first."""
@@ -96,7 +81,15 @@ class PenaltyContact:
         self._search = SearchState(
             step=0,
             turn=0,
+            n_rounds=1,
             n_listings=1,
+            stage=BEGIN,
+            is_anew=0,
+            is_pairing_due=1,
+            has_new_faces=0,
+            is_listing_due=1,
+            since_pairing=0,
+            since_normals=SEARCHES_TO_NORMALS,
             faces=faces,
             pairs=new_near_pairs(n_nodes, len(faces.face), CAPACITY_OF_PAIRS),
             ways=new_node_ways(n_nodes, node_size),
@@ -114,11 +107,8 @@ class PenaltyContact:
         self.forces = new_penalty_forces(n_nodes, friction, time)
         self._is_awake = floor is not None
         self._is_searched = False
-        self._is_pairing_due = True
-        self._has_new_faces = False
-        self._is_listing_due = True
-        self._since_pairing = 0
-        self._since_normals = _SEARCHES_TO_NORMALS
+        self._n_contacts = 0
+        self._has_touched = False
         self._find_pieces(body)
 
     @property
@@ -129,15 +119,19 @@ class PenaltyContact:
     @property
     def added_frequency_squared(self) -> float:
         """What contact adds at most to w^2 of the body [1/s2]."""
-        return self._search.limits.added if self.forces.n_contacts else 0.0
+        return self._search.limits.added if self._n_contacts else 0.0
 
     def begin(self) -> None:
         """Clear the totals, and search before the next substep."""
-        clear_contact_totals(self.forces)
+        if self._has_touched:
+            clear_contact_totals(self.forces)
+        self._has_touched = self._n_contacts > 0
         self._is_searched = False
 
     def report(self, dt: float) -> BodyContacts:
         """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
+        if not self._has_touched:
+            return BodyContacts(0, 0.0, 0.0, np.zeros(3))
         forces = self.forces
         per_second = 1.0 / dt if dt > 0.0 else 0.0
         return BodyContacts(
@@ -161,23 +155,18 @@ class PenaltyContact:
         if self._is_searched or not self._is_awake:
             return
         self._is_searched = True
-        search, pairs = self._search, self._search.pairs
-        where = measure_ways(search.ways, body, pairs.nodes, pairs.n_nodes)
-        if where == LOST:
-            self.forces.n_contacts = 0
-            search.n_listings += 1
-            self._is_pairing_due = True
-            return
-        is_anew = self._needs_pairing(where != IN_BALL)
-        self._update_normals(body, is_anew)
-        if is_anew:
-            self._update_pairs(body)
-        n_due = find_due(self._search, is_anew)
-        if n_due or self._is_listing_due or floor_changes(self._search, body):
-            self._list(body, frequency_squared, highest)
-        look_for_lost_node(self._search, body)
-        recover(self.forces, self._search.limits, body, seconds)
-        note_places(self._search.ways, body)
+        while True:
+            found = search_contacts(
+                self._search, self.forces, body, frequency_squared, highest, seconds
+            )
+            if found == DONE:
+                break
+            if found == NO_ROOM_FOR_PAIRS:
+                self._double_room_for_pairs()
+            else:
+                self._make_room_for_contacts(body)
+        self._n_contacts = self.forces.n_contacts
+        self._has_touched = self._has_touched or self._n_contacts > 0
 
     def end_substep(self, body: Body, external: FloatArray, seconds: float) -> None:
         """Let what slides slide on after a substep, and clear the forces [N] on the nodes."""
@@ -194,7 +183,7 @@ class PenaltyContact:
         faces = with_room(self._search.faces, 4 * change.n_dirty)
         update_changed_faces(faces, body, change)
         self._take_faces(faces)
-        self._has_new_faces = self._is_listing_due = True
+        self._search.has_new_faces = self._search.is_listing_due = 1
         self._is_searched = False
 
     def incision_ended(self, body: Body) -> None:
@@ -219,7 +208,8 @@ class PenaltyContact:
         faces = with_found_pieces(self._search.faces, body)
         if faces is not None:
             self._take_faces(faces)
-            self._is_awake = self._is_pairing_due = True
+            self._is_awake = True
+            self._search.is_pairing_due = 1
             self._search.ways.largest_way = np.inf
 
     def _take_faces(self, faces: Faces) -> None:
@@ -227,53 +217,18 @@ class PenaltyContact:
         if faces is not self._search.faces:
             self._search = self._search.replaced(faces=faces)
 
-    def _needs_pairing(self, has_left: bool) -> bool:
-        """Whether pairs are out of date; `has_left`: a node has left its ball."""
-        self._since_pairing += 1
-        is_old = self._has_new_faces and self._since_pairing >= _SEARCHES_TO_NEW_FACES
-        ways = self._search.ways
-        has_skin_moved = (
-            self._search.faces.has_skin and ways.largest_way > SKIN_WAY * ways.node_size
-        )
-        return bool(has_left or is_old or has_skin_moved or self._is_pairing_due)
-
-    def _update_normals(self, body: Body, is_anew: bool) -> None:
-        """Compute the normals of nodes, now and then."""
-        self._since_normals += 1
-        if is_anew or self._since_normals >= _SEARCHES_TO_NORMALS:
-            search = self._search
-            search.step += 1
-            update_normals(search.faces, body, search.normal, search.inverted_step, search.step)
-            self._since_normals = 0
-
-    def _update_pairs(self, body: Body) -> None:
-        """Pair what left its ball or changed, with room as needed."""
-        while True:
-            search = self._search
-            if update_pairs(search.pairs, search.ways, search.faces, body, search.normal):
-                break
-            room = len(search.pairs.wake)
-            n_faces = max(len(search.faces.face), len(search.pairs.triangle))
-            self._search = search.replaced(pairs=new_near_pairs(len(search.share), n_faces, room))
-        self._since_pairing = 0
-        self._is_pairing_due = self._has_new_faces = False
-        self._is_listing_due = True
-
-    def _list(self, body: Body, frequency_squared: FloatArray, highest: float) -> None:
-        """List the contacts, with room as needed, and find how stiff they may be."""
+    def _double_room_for_pairs(self) -> None:
+        """Make room for twice as many pairs, and for all faces; all is paired anew."""
         search = self._search
-        has_floor = np.isfinite(search.floor)
-        needed = DIRECTIONS * search.pairs.n_nodes + (body.n_nodes if has_floor else 0)
-        if needed > len(self.forces.push) // 2:
-            self._move_contacts(2 * needed)
-        list_contacts(search, self.forces, body)
-        search.limits.highest = highest
-        split_masses(self.forces, search.limits, body, frequency_squared, search.share)
-        self._is_listing_due = False
+        room = len(search.pairs.wake)
+        n_faces = max(len(search.faces.face), len(search.pairs.triangle))
+        self._search = search.replaced(pairs=new_near_pairs(len(search.share), n_faces, room))
 
-    def _move_contacts(self, capacity: int) -> None:
-        """Move the contacts to arrays with room for that many."""
+    def _make_room_for_contacts(self, body: Body) -> None:
+        """Make room for twice as many contacts as there may be."""
         search, first = self._search, self.forces.first
+        on_floor = body.n_nodes if np.isfinite(search.floor) else 0
+        capacity = 2 * (DIRECTIONS * search.pairs.n_nodes + on_floor)
         self.forces = grown_penalty_forces(self.forces, capacity)
         search.contact[:] -= first
         search.floor_contact[:] -= first

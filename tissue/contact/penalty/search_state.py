@@ -14,9 +14,26 @@ class SearchState(Arrays):
     step: IntCell
     """Number of times that normals were computed."""
     turn: IntCell
-    """Place in `NearPairs.nodes` of the node that was last looked at by `lost_nodes`."""
+    """Tetrahedron that `lost_nodes` looks into next."""
+    n_rounds: IntCell
+    """Number of the round in which `lost_nodes` looks into all tetrahedra, from 1."""
     n_listings: IntCell
     """Number of times that contacts were listed."""
+    stage: IntCell
+    """Stage at which a search begins or, where it stopped for want of room, goes on: a value of
+    `search`."""
+    is_anew: IntCell
+    """1 if pairs are updated in this search, else 0."""
+    is_pairing_due: IntCell
+    """1 if pairs are to be updated whatever has moved, else 0."""
+    has_new_faces: IntCell
+    """1 if a cut has changed faces since pairs were updated, else 0."""
+    is_listing_due: IntCell
+    """1 if contacts are to be listed whatever has moved, else 0."""
+    since_pairing: IntCell
+    """Number of searches since pairs were updated."""
+    since_normals: IntCell
+    """Number of searches since normals were computed."""
     faces: Faces
     pairs: NearPairs
     ways: NodeWays

@@ -1,0 +1,113 @@
+"""The search for contacts in a time step: one kernel, which costs little where nothing touches."""
+
+import math
+
+from tissue.contact.node_normals import update_normals
+from tissue.contact.penalty.contact_forces import PenaltyForces
+from tissue.contact.penalty.contact_list import (
+    DIRECTIONS,
+    find_due,
+    floor_changes,
+    list_contacts,
+)
+from tissue.contact.penalty.lost_nodes import look_for_lost_nodes
+from tissue.contact.penalty.node_ways import IN_BALL, LOST, measure_ways, note_places
+from tissue.contact.penalty.pair_update import SKIN_WAY, update_pairs
+from tissue.contact.penalty.search_state import SearchState
+from tissue.contact.penalty.stiffness import recover, split_masses
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.mesh.body import Body
+
+BEGIN, PAIRS, LIST = 0, 1, 2
+"""Stages of a search: it begins; pairs are updated; contacts are listed."""
+
+DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS = 0, 1, 2
+"""Results of a search."""
+
+SEARCHES_TO_NORMALS = 8
+"""Searches after which normals are computed anew where no pair is updated."""
+
+_SEARCHES_TO_NEW_FACES = 4
+"""Searches after which faces that a cut made are paired. Those that are gone still have their
+nodes, so that what they hold meanwhile keeps its momentum."""
+
+
+@kernel
+def search_contacts(
+    search: SearchState,
+    forces: PenaltyForces,
+    body: Body,
+    frequency_squared: FloatArray,
+    highest: float,
+    seconds: float,
+) -> int:
+    """Find the contacts of a time step; return DONE, or what needs room, to call again.
+
+    Args:
+        search: Written.
+        forces: The contacts; written.
+        body: Where the nodes are.
+        frequency_squared: Bound on w^2 of each node without contact [1/s2].
+        highest: Bound on w^2 of the body without contact [1/s2].
+        seconds: Length of the time step [s].
+    """
+    pairs, ways = search.pairs, search.ways
+    if search.stage == BEGIN:
+        where = measure_ways(ways, body, pairs.nodes, pairs.n_nodes)
+        if where == LOST:
+            forces.n_contacts = 0
+            search.n_listings += 1
+            search.is_pairing_due = 1
+            return DONE
+        search.is_anew = _needs_pairing(search, where != IN_BALL)
+        _renew_normals(search, body)
+        search.stage = PAIRS
+    if search.stage == PAIRS:
+        if search.is_anew == 1:
+            if not update_pairs(pairs, ways, search.faces, body, search.normal):
+                return NO_ROOM_FOR_PAIRS
+            search.since_pairing = 0
+            search.is_pairing_due = search.has_new_faces = 0
+            search.is_listing_due = 1
+        search.stage = LIST
+    n_due = find_due(search, search.is_anew == 1)
+    if n_due > 0 or search.is_listing_due == 1 or floor_changes(search, body):
+        if _most_contacts(search, body) > len(forces.push) // 2:
+            return NO_ROOM_FOR_CONTACTS
+        list_contacts(search, forces, body)
+        search.limits.highest = highest
+        split_masses(forces, search.limits, body, frequency_squared, search.share)
+        search.is_listing_due = 0
+    look_for_lost_nodes(search, body)
+    recover(forces, search.limits, body, seconds)
+    note_places(ways, body)
+    search.stage = BEGIN
+    return DONE
+
+
+@kernel
+def _needs_pairing(search: SearchState, has_left: bool) -> bool:
+    """Whether pairs are out of date; `has_left`: a node has left its ball."""
+    search.since_pairing += 1
+    is_old = search.has_new_faces == 1 and search.since_pairing >= _SEARCHES_TO_NEW_FACES
+    ways = search.ways
+    has_skin_moved = search.faces.has_skin == 1 and ways.largest_way > SKIN_WAY * ways.node_size
+    return bool(has_left or is_old or has_skin_moved or search.is_pairing_due == 1)
+
+
+@kernel
+def _renew_normals(search: SearchState, body: Body) -> None:
+    """Compute the normals of nodes, now and then."""
+    search.since_normals += 1
+    if search.is_anew == 1 or search.since_normals >= SEARCHES_TO_NORMALS:
+        search.step += 1
+        update_normals(search.faces, body, search.normal, search.inverted_step, search.step)
+        search.since_normals = 0
+
+
+@kernel
+def _most_contacts(search: SearchState, body: Body) -> int:
+    """Return how many contacts there may be at most."""
+    on_floor = 0 if search.floor == -math.inf else body.n_nodes
+    return int(DIRECTIONS * search.pairs.n_nodes + on_floor)
