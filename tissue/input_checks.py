@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.edge import Edge
+from tissue.blade.edge import LEAST_SINE, Edge, is_sound
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
@@ -17,9 +17,6 @@ from tissue.integrators.options import Global, IntegratorOptions, Verlet, checke
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.solver_settings import PRECISIONS, SolverSettings
 from tissue.types import BladeSweep
-
-ALONG_EDGE = 1e-6
-"""Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
 
 TOUGHEST = {"springs": 0.3, "neo_hookean": 2.0}
 """Toughness over Young's modulus, in mean node sizes, up to which the cutting force is within 6 %
@@ -88,9 +85,18 @@ def checked_edge(sweep: BladeSweep) -> Edge:
     Raises:
         ValueError: a number is not finite, the blade has no length, or it would cut along itself.
     """
+    parts = (*sweep.t0, *sweep.t1)
+    if all(type(part) is np.ndarray and part.shape == (3,) for part in parts):
+        edge = Edge.of_numbers(np.concatenate(parts, dtype=np.float64).tobytes())
+        if is_sound(edge):
+            return edge
+    return _edge_or_error(sweep)
+
+
+def _edge_or_error(sweep: BladeSweep) -> Edge:
+    """Return what `checked_edge` does, of lists too, or say what is wrong."""
     points, ways = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
-        # Plain floats: with arrays of three these checks cost more than a step of a small body.
         tip, heel, forward = map(_three_numbers, segment)
         if tip is None or heel is None or forward is None:
             rows = [np.asarray(part, dtype=np.float64).tolist() for part in segment]
@@ -106,7 +112,7 @@ def checked_edge(sweep: BladeSweep) -> Edge:
                 f"the blade at the {when} of the step has no length: {[[*tip], [*heel]]}"
             )
         across = math.hypot(y * w - z * v, z * u - x * w, x * v - y * u)
-        if not across > ALONG_EDGE * length * math.hypot(u, v, w):
+        if not across > LEAST_SINE * length * math.hypot(u, v, w):
             raise ValueError(
                 f"the blade at the {when} of the step cuts along its own edge: forward is "
                 f"{[*forward]}, from tip to heel is {[x, y, z]}"
@@ -174,7 +180,7 @@ def checked_edges(edges: npt.ArrayLike, forward: npt.ArrayLike) -> tuple[FloatAr
     ways = np.broadcast_to(ways, (len(rows), 3)).copy()
     along = rows[:, -1] - rows[:, 0]
     across = np.linalg.norm(np.cross(along, ways), axis=1)
-    limit = ALONG_EDGE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
+    limit = LEAST_SINE * np.linalg.norm(along, axis=1) * np.linalg.norm(ways, axis=1)
     wrong = np.flatnonzero(~(across > limit))
     if len(wrong):
         i = int(wrong[0])

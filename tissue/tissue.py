@@ -1,13 +1,13 @@
 """A tetrahedral body that a blade can cut: `Tissue.step` lists the stages of a step."""
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
+from tissue.blade.blade_context import NOT_ENGAGED, BladeContext
 from tissue.blade.edge import Edge
-from tissue.blade.path_tracing import forget_path, trace_path
+from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import BoolArray, FloatArray
@@ -39,7 +39,7 @@ from tissue.integrators.system import Numerics, assembled
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.body_queries import BodyQueries
-from tissue.mesh.bounding_boxes import body_bounds, bounds_after_motion
+from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
 from tissue.mesh.changes import touched_nodes
 from tissue.mesh.cut_error import path_error
 from tissue.mesh.star import Visits
@@ -53,9 +53,6 @@ from tissue.types import (
     StepResult,
     TetrahedralMesh,
 )
-
-SHEET_MARGIN = 0.5
-"""How far outside the skin the sheet begins and ends, per mean node size."""
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
@@ -132,7 +129,8 @@ class Tissue(BodyQueries):
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.stable_step)
         self._integrator = integrator_of(options, self._global_stepper, len(body.rest))
-        self._box = body_bounds(body)
+        self._bounds = self.bounds
+        self._slit_reach = EXPLAINED * solver.cut.floor * self.node_size
         self._edge_now = (NOWHERE, 1.0)
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
@@ -159,7 +157,7 @@ class Tissue(BodyQueries):
         interaction, incision, clock = self._system.interaction, self._incision, StageClock()
         self._take_edge(edge if has_blade else None)
         self._begin_step(edge, dt)
-        travel = _travel(edge) if has_blade else 0.0
+        travel = edge.travel if has_blade else 0.0
         n_substeps = 0
         for increment in self._increments(edge, travel, dt):
             with clock.RX:  # relaxation: forces, contact, motion, slip of the blade
@@ -168,7 +166,7 @@ class Tissue(BodyQueries):
                 if has_blade:
                     self._update_anchors(increment)
             with clock.CD:  # collision detection: path, active tetrahedra, crossed edges
-                is_crossed = has_blade and self._trace(increment) and incision.detect(*self._mesh())
+                is_crossed = has_blade and self._detect(increment)
             with clock.GC:  # geometric changes: subdivision, separation
                 if is_crossed:
                     incision.cut(self._hooks)
@@ -218,7 +216,7 @@ class Tissue(BodyQueries):
         system = self._system
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
-        self._box = body_bounds(system.body)
+        write_bounds(system.body, self._bounds)
         self._audit.begin(self._system)
         return n_steps
 
@@ -255,10 +253,8 @@ class Tissue(BodyQueries):
 
     def _update_faces(self, increment: Increment, has_blade: bool) -> None:
         """Find the faces of the tissue that the faces of the blade may touch."""
-        system, moved = self._system, self._integrator.moved
-        edge = increment.edge if has_blade else None
-        where = (edge, increment.begin, self._box)
-        system.interaction.update_faces(system.body, system.visits, moved, *where)
+        edge, moved = increment.edge if has_blade else None, self._integrator.moved
+        self._system.interaction.update_faces(self._blade_context, moved, edge, increment.begin)
 
     def _advance(self, increment: Increment) -> int:
         """Advance the motion by an increment; return the substeps that it took."""
@@ -269,10 +265,10 @@ class Tissue(BodyQueries):
             return 0
         moving, body = self._integrator.moving, self._system.body
         if moving is None or 2 * moving[1] > self.n_nodes:
-            self._box = body_bounds(body)
+            is_finite = write_bounds(body, self._bounds)
         else:
-            self._box = bounds_after_motion(body, *moving, self._box)
-        if not self._box.is_finite:
+            is_finite = widen_bounds(body, *moving, self._bounds)
+        if not is_finite:
             raise TissueError(
                 "the motion of the tissue became unstable: the position of a node is not a finite "
                 "number. Use a shorter time step, or a material that is softer or heavier"
@@ -282,21 +278,18 @@ class Tissue(BodyQueries):
     def _update_anchors(self, increment: Increment) -> None:
         """Anchor the edge to tissue that it has entered; release what it has left."""
         system, moved = self._system, self._integrator.moved
-        system.interaction.clear_forces(system.body, system.stages.external)
-        reach = EXPLAINED * self.solver.cut.floor * self.node_size
-        where = (increment.edge, increment.end, self._box, reach)
-        path = self._incision.path
-        system.interaction.update_anchors(system.body, system.visits, path, moved, *where)
+        system.interaction.update_anchors(
+            self._blade_context, system.stages.external, moved, increment.edge, increment.end
+        )
 
-    def _trace(self, increment: Increment) -> bool:
-        """Trace the path of the edge through the material; return whether it is in the tissue."""
+    def _detect(self, increment: Increment) -> bool:
+        """Trace the path of the edge through the material; return whether it crossed anything."""
         interaction, incision = self._system.interaction, self._incision
-        if not interaction.is_engaged:
+        travel = interaction.trace(self._blade_context, increment.edge, increment.end)
+        if travel == NOT_ENGAGED:
             return False
         incision.has_begun = True
-        edge, when, margin = increment.edge, increment.end, SHEET_MARGIN * self.node_size
-        trace_path(interaction.state.anchors, self._system.body, edge, when, margin, incision.path)
-        return True
+        return incision.detect(*self._mesh(), travel)
 
     def _end_incision(self) -> None:
         """Resolve what the blade left uncut; the next contact begins another incision."""
@@ -309,23 +302,21 @@ class Tissue(BodyQueries):
         self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, clock: StageClock
     ) -> StepResult:
         """Return what the step did."""
-        low, high, _ = self._box
         interaction = self._system.interaction
         totals = interaction.state.totals
-        interaction.write_report(self._system.body, edge)
-        point = np.array(edge.tip_t1) if has_blade else np.zeros(3)
+        report = interaction.report(self._blade_context, edge, dt)
         return StepResult(
-            wrench=interaction.mean_wrench(point, dt),
-            wrench_t1=interaction.wrench_t1(point),
-            stiffness=interaction.stiffness,
-            contacts=interaction.contacts,
-            force_on_tissue=interaction.mean_force_on_tissue(dt),
-            bounds=np.array([low, high]),
+            wrench=report.mean_wrench,
+            wrench_t1=report.wrench,
+            stiffness=report.stiffness,
+            contacts=report.contacts,
+            force_on_tissue=report.mean_force_on_tissue,
+            bounds=report.bounds,
             n_tetrahedra=self.n_tetrahedra,
             n_nodes=self.n_nodes,
             n_active=self._incision.scheme.n_active,
             active_point_tetrahedron=int(self._incision.path.seed[0]) if has_blade else -1,
-            anchored_length=interaction.anchored_length,
+            anchored_length=report.anchored_length,
             cut_area=self._incision.cut_area,
             work_of_blade=totals.work_of_blade,
             work_of_cutting=totals.work_of_cutting,
@@ -334,6 +325,12 @@ class Tissue(BodyQueries):
             stage_times=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
             energies=self._audit.energies(self._system, edge),
         )
+
+    @property
+    def _blade_context(self) -> BladeContext:
+        system, path = self._system, self._incision.path
+        where = (path, self._bounds, self._slit_reach)
+        return system.interaction.context(system.body, system.visits, *where)
 
     # changes of the mesh
 
@@ -373,14 +370,9 @@ class Tissue(BodyQueries):
 
     def _take_edge(self, edge: Edge | None) -> None:
         """Take the edge of this blade; another blade, or none, releases the tissue."""
-        length = 0.0 if edge is None else math.dist(edge.tip_t1, edge.heel_t1)
+        length = 0.0 if edge is None else edge.length
         interaction = self._system.interaction
         if interaction.is_other_edge(length):
             self._end_incision()
             interaction.replace_edge(length, self._system.body, *self._edge_now)
             self._incision.take_edge(interaction.n_samples)
-
-
-def _travel(edge: Edge) -> float:
-    """Return how far the edge moves [m]: the further of its two ends."""
-    return max(math.dist(edge.tip_t1, edge.tip_t0), math.dist(edge.heel_t1, edge.heel_t0))

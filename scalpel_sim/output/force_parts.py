@@ -31,9 +31,14 @@ def force_parts(contacts: BladeContacts, forward: FloatArray) -> ForceParts:
         forward: Unit vector in which the blade cuts at the end of the step, in the frame of the
             contacts; shape (3,).
     """
+    return ForceParts(*force_rows(contacts, forward))
+
+
+def force_rows(contacts: BladeContacts, forward: FloatArray) -> FloatArray:
+    """Return what `force_parts` does as rows of one array [N], shape (3, 3)."""
     parts = np.empty((3, 3))
     _add_up(contacts.normal, contacts.normal_force, contacts.friction, forward, parts)
-    return ForceParts(*parts)
+    return parts
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.output.force_parts import force_rows
 from scalpel_sim.output.recording import N_OF_ACCOUNT
 from tissue import BladeSegment, Energies, StepResult, Wrench
 
@@ -52,7 +52,7 @@ def row_of(
         frame: Where the tissue lies in the world.
         wall_times: Wall times of the frame and of its stages.
     """
-    parts = force_parts(result.contacts, frame.vectors_to_tissue(blade.forward))
+    parts = force_rows(result.contacts, frame.vectors_to_tissue(blade.forward))
     stiffness = frame.matrix_to_world(result.stiffness[:3, :3])
     return (
         time,
@@ -61,7 +61,7 @@ def row_of(
         *felt.torque.tolist(),
         *raw.force.tolist(),
         *raw.torque.tolist(),
-        *(frame.vectors_to_world(np.array(parts)).ravel().tolist()),
+        *frame.vectors_to_world(parts).ravel().tolist(),
         *UPPER(stiffness.ravel().tolist()),
         result.cut_area,
         result.n_tetrahedra,

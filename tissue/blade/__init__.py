@@ -18,5 +18,6 @@ In reading order:
 - `path_tracing`: the path of the edge through the material, from the anchors.
 - `prescribed_path`: the path of an edge that is given.
 - `wrench`: the wrench on the blade.
+- `blade_context`: what `BladeInteraction` calls, on one struct.
 - `interaction`: `BladeInteraction`, which `Tissue` calls.
 """

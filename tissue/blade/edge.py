@@ -4,6 +4,7 @@ An instant is a fraction of the time step: 0 at its start, 1 at its end. A kerne
 takes the `Edge` and an instant, computes the pose once, and passes it to the kernels that it calls.
 """
 
+import math
 from typing import NamedTuple
 
 from tissue.core.jit import kernel
@@ -26,6 +27,19 @@ class Edge(Vectors):
     """Heel at the end of the step [m]."""
     forward_t1: Vec3
     """Direction in which the edge cuts at the end of the step, of any length."""
+
+    @property
+    def length(self) -> float:
+        """Length of the edge at the end of the step [m]."""
+        numbers = self._numbers
+        return math.dist(numbers[9:12], numbers[12:15])
+
+    @property
+    def travel(self) -> float:
+        """How far the edge moves [m]: the further of its two ends."""
+        numbers = self._numbers
+        tip = math.dist(numbers[9:12], numbers[0:3])
+        return max(tip, math.dist(numbers[12:15], numbers[3:6]))
 
 
 class BladePose(NamedTuple):
@@ -69,6 +83,31 @@ class BladeCoordinates(NamedTuple):
     """Distance behind the edge [m]."""
     across: float
     """Distance from the blade's plane, positive along its normal [m]."""
+
+
+LEAST_SINE = 1e-6
+"""Sine of the angle between edge and `forward` below which the blade would cut along its edge."""
+
+
+@kernel
+def is_sound(edge: Edge) -> bool:
+    """Return whether a blade can move so: it has a length, faces across it, and turns little.
+
+    False too where a number is not finite, or so large or small that its square is not.
+    """
+    along_t0, along_t1 = sub(edge.heel_t0, edge.tip_t0), sub(edge.heel_t1, edge.tip_t1)
+    return (
+        _has_plane(along_t0, edge.forward_t0)
+        and _has_plane(along_t1, edge.forward_t1)
+        and dot(along_t0, along_t1) > 0.0
+        and dot(edge.forward_t0, edge.forward_t1) > 0.0
+    )
+
+
+@kernel
+def _has_plane(along: Vec3, forward: Vec3) -> bool:
+    across = norm(cross(along, forward))
+    return math.isfinite(across) and across > LEAST_SINE * norm(along) * norm(forward)
 
 
 @kernel

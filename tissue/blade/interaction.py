@@ -4,40 +4,33 @@ import math
 
 import numpy as np
 
-from tissue.blade.anchors import anchored_length, is_engaged, new_anchors
+from tissue.blade.anchors import is_engaged, new_anchors
+from tissue.blade.blade_context import (
+    GRID_IS_FULL,
+    NO_ROOM_FOR_FACES,
+    NOT_SEARCHED,
+    BladeContext,
+    report_step,
+    trace,
+    update_anchors,
+    update_faces,
+)
 from tissue.blade.blade_state import new_blade_state
 from tissue.blade.edge import Edge
-from tissue.blade.engagement import anchor_entering, update_engagement
-from tissue.blade.forces import begin_blade_step, clear_blade_forces, release_edge
+from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
-from tissue.blade.side_search import (
-    blade_box,
-    find_faces,
-    forget_cells,
-    forget_changed_faces,
-    release_faces,
-)
-from tissue.blade.wrench import (
-    contacts_of,
-    mean_force_on_tissue,
-    mean_wrench,
-    new_report,
-    wrench_of,
-    write_report,
-)
+from tissue.blade.side_search import forget_cells, forget_changed_faces, release_faces
+from tissue.blade.wrench import BladeReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.cutting.blade_path import Path
-from tissue.geometry.aabb import Aabb, overlap
 from tissue.material import Material
 from tissue.mesh.body import Body
-from tissue.mesh.bounding_boxes import BodyBounds
 from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
-from tissue.mesh.point_location import build_grid, list_appended, list_moved, no_grid
+from tissue.mesh.point_location import build_grid, no_grid
 from tissue.mesh.star import Visits
-from tissue.types import BladeContacts, Wrench
 
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
@@ -48,6 +41,9 @@ MOST_SAMPLES = 512
 GRID_MARGIN = 0.5
 """Distance that a node moves before its tetrahedra are listed in the grid again, per mean node
 size."""
+
+SHEET_MARGIN = 0.5
+"""How far outside the skin the sheet begins and ends, per mean node size."""
 
 _SAME_LENGTH = 1e-3
 """Relative change in length below which an edge counts as the same. Poses in single precision, or
@@ -77,6 +73,7 @@ class BladeInteraction:
         self._edge_length = 0.0
         self._grid = no_grid()
         self._all_nodes = np.zeros(0, np.int64)
+        self._context: BladeContext | None = None
 
     @property
     def n_samples(self) -> int:
@@ -87,11 +84,6 @@ class BladeInteraction:
     def is_engaged(self) -> bool:
         """Whether the edge is in the tissue."""
         return is_engaged(self.state.anchors)
-
-    @property
-    def anchored_length(self) -> float:
-        """Length of edge that pulls on the tissue [m]."""
-        return anchored_length(self.state.anchors)
 
     def is_other_edge(self, length: float) -> bool:
         """Return whether an edge of that length [m] differs from the current one; 0 is no edge."""
@@ -127,110 +119,127 @@ class BladeInteraction:
         """Begin a time step of `dt` [s]: impulses are counted from zero."""
         begin_blade_step(self.state, body, edge, dt)
 
-    def clear_forces(self, body: Body, external: FloatArray) -> None:
-        """Set the forces on the nodes that the blade acts on to zero."""
-        clear_blade_forces(self.state, body, external)
-
-    def update_faces(
-        self,
-        body: Body,
-        visits: Visits,
-        moved: Moved | None,
-        edge: Edge | None,
-        when: float,
-        box: BodyBounds,
-    ) -> None:
-        """Find the faces of the tissue that the side faces of the blade may touch.
-
-        Args:
-            body: The tissue.
-            visits: For searches.
-            moved: Nodes that moved since the last search; None where all may have.
-            edge: The cutting edge over the time step; None for no blade.
-            when: Instant, as a fraction of the time step.
-            box: Box around the body.
-        """
-        if not self._has_sides:
-            return
-        if edge is None or not overlap(
-            blade_box(self.state.sides, edge, when), Aabb(box.low, box.high)
-        ):
-            release_faces(self.state)
-            return
-        self._list_tetrahedra(body, visits, moved)
-        while not find_faces(self.state, body, visits, self._grid, edge, when):
-            self.state = self.state.replaced(sides=with_more_faces(self.state.sides))
-            self._report = new_report(self.state)
-
-    def update_anchors(
-        self,
-        body: Body,
-        visits: Visits,
-        path: Path,
-        moved: Moved | None,
-        edge: Edge,
-        when: float,
-        box: BodyBounds,
-        slit_reach: float,
-    ) -> None:
-        """Anchor the samples of the edge that entered the tissue, and free those that left it.
+    def context(
+        self, body: Body, visits: Visits, path: Path, bounds: FloatArray, slit_reach: float
+    ) -> BladeContext:
+        """Return the arrays as one struct; another one where an owner has replaced its own.
 
         Args:
             body: The tissue.
             visits: For searches.
             path: Path of the edge through the material.
-            moved: Nodes that moved since the last search; None where all may have.
-            edge: The cutting edge over the time step.
-            when: Instant, as a fraction of the time step.
-            box: Box around the body, within which free samples are looked for.
+            bounds: Lowest and highest corner of a box around the tissue [m], shape (2, 3). They,
+                and the distance below, are the same for all steps.
             slit_reach: Distance from a cut face up to which a point is in the slit [m]
                 (`tissue.blade.engagement.is_in_slit`).
         """
-        state, corners = self.state, (box.low, box.high)
-        if update_engagement(state, body, visits, path, edge, when, *corners):
-            self._list_tetrahedra(body, visits, moved)
-            anchor_entering(state.anchors, body, self._grid, edge, when, slit_reach, *corners)
+        context = self._context
+        if (
+            context is None
+            or context.blade is not self.state
+            or context.body is not body
+            or context.visits is not visits
+            or context.path is not path
+            or context.grid is not self._grid
+            or context.report is not self._report
+        ):
+            self._context = context = BladeContext(
+                blade=self.state,
+                body=body,
+                visits=visits,
+                path=path,
+                grid=self._grid,
+                report=self._report,
+                bounds=bounds,
+                slit_reach=slit_reach,
+                sheet_margin=SHEET_MARGIN * self._node_size,
+            )
+        return context
 
-    def write_report(self, body: Body, edge: Edge) -> None:
-        """Write wrench, stiffness and contacts at the end of a step, for the properties below."""
-        write_report(self._report, self.state, body, edge)
+    def _renewed(self, context: BladeContext) -> BladeContext:
+        """Return the struct with the arrays that were replaced since."""
+        return self.context(
+            context.body, context.visits, context.path, context.bounds, context.slit_reach
+        )
 
-    def wrench_t1(self, point: FloatArray) -> Wrench:
-        """Return the wrench on the blade at the end of the step, about the tip, `point` [m]."""
-        return wrench_of(self._report, point)
+    def update_faces(
+        self, context: BladeContext, moved: Moved | None, edge: Edge | None, when: float
+    ) -> None:
+        """Find the faces of the tissue that the side faces of the blade may touch.
 
-    @property
-    def stiffness(self) -> FloatArray:
-        """Change of that wrench with the pose of the blade, shape (6, 6); a copy."""
-        return self._report.stiffness.copy()
+        Args:
+            context: Body and blade.
+            moved: Nodes that moved since the last search; None where all may have.
+            edge: The cutting edge over the time step; None for no blade.
+            when: Instant, as a fraction of the time step.
+        """
+        if not self._has_sides:
+            return
+        if edge is None:
+            release_faces(self.state)
+            return
+        while True:
+            outcome = update_faces(context, edge, when, *self._to_list(context.body, moved))
+            self._note_search(outcome, moved)
+            if outcome == NO_ROOM_FOR_FACES:
+                self.state = self.state.replaced(sides=with_more_faces(self.state.sides))
+                self._report = new_report(self.state)
+            elif outcome != GRID_IS_FULL:
+                return
+            else:
+                self._build_grid(context.body)
+            context = self._renewed(context)
 
-    @property
-    def contacts(self) -> BladeContacts:
-        """The contacts at the end of the step; views."""
-        return contacts_of(self._report)
+    def update_anchors(
+        self,
+        context: BladeContext,
+        external: FloatArray,
+        moved: Moved | None,
+        edge: Edge,
+        when: float,
+    ) -> None:
+        """Anchor the samples of the edge that entered the tissue, and free those that left it.
 
-    def mean_wrench(self, point: FloatArray, dt: float) -> Wrench:
-        """Return the mean wrench on the blade in a step of `dt` [s], about `point` [m]."""
-        return mean_wrench(self.state.totals, point, dt)
+        Args:
+            context: Body and blade.
+            external: Forces on the nodes [N], shape (capacity, 3); those of the blade are cleared.
+            moved: Nodes that moved since the last search; None where all may have.
+            edge: The cutting edge over the time step.
+            when: Instant, as a fraction of the time step.
+        """
+        body, is_again = context.body, False
+        while True:
+            nodes = self._to_list(body, moved)
+            outcome = update_anchors(context, external, edge, when, *nodes, is_again)
+            self._note_search(outcome, moved)
+            if outcome != GRID_IS_FULL:
+                return
+            self._build_grid(body)
+            context, is_again = self._renewed(context), True
 
-    def mean_force_on_tissue(self, dt: float) -> FloatArray:
-        """Return the mean force of the blade on the nodes in a step of `dt` [s], summed [N]."""
-        return mean_force_on_tissue(self.state.totals, dt)
+    def trace(self, context: BladeContext, edge: Edge, when: float) -> float:
+        """Trace the path of the edge; see `tissue.blade.blade_context.trace`."""
+        return trace(context, edge, when)
 
-    def _list_tetrahedra(self, body: Body, visits: Visits, moved: Moved | None) -> None:
-        """List in the grid where the tetrahedra are now."""
+    def report(self, context: BladeContext, edge: Edge, dt: float) -> BladeReport:
+        """Return what a time step of `dt` [s] came to."""
+        report_step(context, edge, dt)
+        return blade_report(self._report)
+
+    def _to_list(self, body: Body, moved: Moved | None) -> tuple[IntArray, int]:
+        """Return the nodes whose tetrahedra may have to be listed again, and how many they are."""
+        if moved is not None:
+            return moved.nodes, moved.n_nodes
         if len(self._all_nodes) != len(body.positions):
             self._all_nodes = np.arange(len(body.positions))
-        nodes, n = self._all_nodes, body.n_nodes
-        if moved is not None:
-            nodes, n = moved.nodes, moved.n_nodes
-        has_room = (
-            len(self._grid.listed_at) == len(body.positions)
-            and list_moved(body, visits, self._grid, nodes, n, self.state.queue)
-            and list_appended(body, body.positions, self._grid)
-        )
-        if moved is not None:
+        return self._all_nodes, body.n_nodes
+
+    def _note_search(self, outcome: int, moved: Moved | None) -> None:
+        """Forget the nodes that moved where a search has listed their tetrahedra."""
+        if moved is not None and outcome != NOT_SEARCHED:
             forget_moved(moved)
-        if not has_room:
-            self._grid = build_grid(body, body.positions, GRID_MARGIN * self._node_size)
-            forget_cells(self.state.sides)
+
+    def _build_grid(self, body: Body) -> None:
+        """List all tetrahedra in a new grid."""
+        self._grid = build_grid(body, body.positions, GRID_MARGIN * self._node_size)
+        forget_cells(self.state.sides)

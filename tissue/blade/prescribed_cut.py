@@ -6,7 +6,7 @@ from tissue.blade.interaction import MOST_SAMPLES, SAMPLES_PER_NODE_SIZE
 from tissue.blade.prescribed_path import begin_path, prescribe_path
 from tissue.core.array_types import FloatArray
 from tissue.core.vec3 import Vec3
-from tissue.cutting.blade_path import resampled
+from tissue.cutting.blade_path import path_travel, resampled
 from tissue.cutting.incision import CutHooks, Incision
 from tissue.mesh.point_location import build_grid
 
@@ -44,5 +44,5 @@ def cut_along(
             direction = Vec3(*((1.0 - at) * forward[i - 1] + at * forward[i]).tolist())
             body, visits = hooks.mesh()  # after a cut perhaps another body, with more room
             prescribe_path(path, body, grid, points, direction)
-            if incision.detect(body, visits):
+            if incision.detect(body, visits, path_travel(incision.path)):
                 incision.cut(hooks)

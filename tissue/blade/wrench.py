@@ -5,6 +5,8 @@ The wrench at the end, its stiffness and the contacts follow from the same point
 torques cancel but for rounding.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tissue.blade.anchors import ANCHORED, anchor_position, surplus_stretch
@@ -14,7 +16,7 @@ from tissue.blade.impulse_totals import ImpulseTotals
 from tissue.blade.side_contact import POINTS, contact_forces, contact_point, penetration
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays, IntCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
 from tissue.types import BladeContacts, Wrench
@@ -25,6 +27,8 @@ class WrenchReport(Arrays):
 
     n_contacts: IntCell
     """Number of contacts."""
+    anchored_length: FloatCell
+    """Length of edge that pulls on the tissue [m]."""
     point: FloatArray
     """Where each contact acts [m], shape (capacity, 3)."""
     normal: FloatArray
@@ -37,52 +41,121 @@ class WrenchReport(Arrays):
     """Area that each anchor cut in the step [m2], shape (capacity,); 0 for side contacts."""
     wrench: FloatArray
     """Force on the blade [N], then torque on it about the tip [N m]; shape (6,)."""
+    mean_wrench: FloatArray
+    """Their means over the time step, shape (2, 3)."""
+    mean_force_on_tissue: FloatArray
+    """Mean force on the nodes in the time step, summed [N], shape (3,)."""
+    tip: FloatArray
+    """The tip [m], shape (3,)."""
+    bounds: FloatArray
+    """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
     stiffness: FloatArray
     """Change of the wrench with a displacement and rotation of the blade, shape (6, 6)."""
+    numbers: FloatArray
+    """The arrays from `wrench` to `stiffness` one after the other, which are views of it."""
 
 
 def new_report(blade: BladeState) -> WrenchReport:
     """Return a report without contacts, with room for as many as the blade may have."""
     capacity = len(blade.anchors.state) + POINTS * len(blade.sides.face)
+    numbers = np.zeros(_N_NUMBERS)
     return WrenchReport(
         n_contacts=0,
+        anchored_length=0.0,
         point=np.zeros((capacity, 3)),
         normal=np.zeros((capacity, 3)),
         normal_force=np.zeros(capacity),
         friction=np.zeros((capacity, 3)),
         cut_area=np.zeros(capacity),
-        wrench=np.zeros(6),
-        stiffness=np.zeros((6, 6)),
+        **_parts_of(numbers)._asdict(),
+        numbers=numbers,
+    )
+
+
+class _Parts(NamedTuple):
+    """The arrays of a report whose length does not change; see `WrenchReport`."""
+
+    wrench: FloatArray
+    mean_wrench: FloatArray
+    mean_force_on_tissue: FloatArray
+    tip: FloatArray
+    bounds: FloatArray
+    stiffness: FloatArray
+
+
+_N_NUMBERS = 60
+"""Numbers in them."""
+
+
+def _parts_of(numbers: FloatArray) -> _Parts:
+    """Return views of `WrenchReport.numbers`."""
+    return _Parts(
+        numbers[0:6],
+        numbers[6:12].reshape(2, 3),
+        numbers[12:15],
+        numbers[15:18],
+        numbers[18:24].reshape(2, 3),
+        numbers[24:60].reshape(6, 6),
+    )
+
+
+class BladeReport(NamedTuple):
+    """What a report came to."""
+
+    mean_wrench: Wrench
+    """Mean wrench of the tissue on the blade in the time step, about the tip."""
+    wrench: Wrench
+    """That wrench at the end of the step."""
+    stiffness: FloatArray
+    """Change of that wrench with the pose of the blade, shape (6, 6)."""
+    contacts: BladeContacts
+    """The contacts at the end of the step; views."""
+    mean_force_on_tissue: FloatArray
+    """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
+    bounds: FloatArray
+    """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
+    anchored_length: float
+    """Length of edge that pulls on the tissue [m]."""
+
+
+def blade_report(report: WrenchReport) -> BladeReport:
+    """Return a copy of what was reported last; the contacts are views."""
+    now, mean, on_tissue, tip, bounds, stiffness = _parts_of(report.numbers.copy())
+    return BladeReport(
+        Wrench(mean[0], mean[1], tip),
+        Wrench(now[:3], now[3:], tip),
+        stiffness,
+        contacts_of(report),
+        on_tissue,
+        bounds,
+        report.anchored_length,
     )
 
 
 def contacts_of(report: WrenchReport) -> BladeContacts:
     """Return views of the contacts that were reported last."""
     n = report.n_contacts
-    return BladeContacts(*(getattr(report, name)[:n] for name in BladeContacts._fields))
+    return BladeContacts(
+        report.point[:n],
+        report.normal[:n],
+        report.normal_force[:n],
+        report.friction[:n],
+        report.cut_area[:n],
+    )
 
 
-def wrench_of(report: WrenchReport, point: FloatArray) -> Wrench:
-    """Return a copy of the wrench that was reported last, at the tip [m]."""
-    return Wrench(report.wrench[:3].copy(), report.wrench[3:].copy(), point)
-
-
-def mean_wrench(totals: ImpulseTotals, point: FloatArray, dt: float) -> Wrench:
-    """Return the mean wrench on the blade in a step of `dt` [s], about a point [m]."""
-    per_second = _per_second(dt)
-    force, torque = totals.impulse * per_second, totals.angular_impulse * per_second
-    (x, y, z), (fx, fy, fz) = point.tolist(), force.tolist()  # np.cross would cost 20 us
-    torque -= np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
-    return Wrench(force, torque, point)
-
-
-def mean_force_on_tissue(totals: ImpulseTotals, dt: float) -> FloatArray:
-    """Return the mean force of the blade on the nodes in a step of `dt` [s], summed [N]."""
-    return totals.impulse_on_tissue * _per_second(dt)
-
-
-def _per_second(dt: float) -> float:
-    return 1.0 / dt if dt > 0.0 else 0.0
+@kernel
+def write_means(report: WrenchReport, totals: ImpulseTotals, tip: Vec3, dt: float) -> None:
+    """Write the tip [m], and the mean wrench and force in a time step of `dt` [s]."""
+    per_second = 1.0 / dt if dt > 0.0 else 0.0
+    impulse, angular_impulse = totals.impulse, totals.angular_impulse
+    force = scale(per_second, Vec3(impulse[0], impulse[1], impulse[2]))
+    torque = scale(per_second, Vec3(angular_impulse[0], angular_impulse[1], angular_impulse[2]))
+    store(report.mean_wrench, 0, force)
+    store(report.mean_wrench, 1, sub(torque, cross(tip, force)))
+    for axis in range(3):
+        report.mean_force_on_tissue[axis] = totals.impulse_on_tissue[axis] * per_second
+        report.tip[axis] = tip[axis]
 
 
 @kernel

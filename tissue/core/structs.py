@@ -186,10 +186,29 @@ class Vectors(Arrays):
         cls._numba_type_ = ArraysType(cls.__name__, fields)
 
     def __init__(self, *vectors: Vec3) -> None:
-        self.__dict__.update(zip(self._names, vectors, strict=True))
+        self._keep(array("d", sum(vectors, ())))
+
+    @classmethod
+    def of_numbers(cls, numbers: bytes) -> Self:
+        """Return a struct of vectors whose doubles stand one after the other in memory."""
+        vectors = cls.__new__(cls)
+        vectors._keep(array("d", numbers))
+        return vectors
+
+    def _keep(self, numbers: "array[float]") -> None:
+        if len(numbers) != 3 * len(self._names):
+            raise TypeError(f"{type(self).__name__} takes {list(self._names)}")
         # An array of Python's own is made in half the time of one of NumPy.
-        self._numbers = array("d", sum(vectors, ()))
-        self.address = self._numbers.buffer_info()[0]
+        self._numbers = numbers
+        self.address = numbers.buffer_info()[0]
+
+    def __getattr__(self, name: str) -> Vec3:
+        """Return a vector, which is made when it is asked for first."""
+        if name not in self._names:
+            raise AttributeError(f"{type(self).__name__} has no {name}")
+        first = 3 * self._names.index(name)
+        vector = self.__dict__[name] = Vec3(*self._numbers[first : first + 3])
+        return vector
 
 
 @typeof_impl.register(Arrays)

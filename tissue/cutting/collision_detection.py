@@ -15,12 +15,20 @@ from tissue.core.hash_table import (
 )
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
-from tissue.cutting.blade_path import Path
+from tissue.cutting.blade_path import Path, put_on_lattice
 from tissue.cutting.cut_surface import on_sheet
 from tissue.cutting.workspace import Cut
 from tissue.geometry.aabb import Aabb, overlap, segment_box, tetrahedron_box
 from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
 from tissue.mesh.body import CUT, behind, n_behind
+
+
+@kernel
+def detect_collisions(cut: Cut) -> None:
+    """Find the active tetrahedra, and the edges of them that the swept edge crosses."""
+    put_on_lattice(cut.path, cut.body.lattice)
+    find_active_tetrahedra(cut)
+    find_crossings(cut)
 
 
 @kernel

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from tissue.cutting.blade_path import Path, new_path, path_travel, put_on_lattice
+from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.scheme import Scheme
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -69,12 +69,15 @@ class Incision:
         """Prepare for an edge of that many samples."""
         self.path = new_path(n_samples)
 
-    def detect(self, body: Body, visits: Visits) -> bool:
-        """Find the active tetrahedra and the edges that were crossed; return whether to cut."""
-        if not self.has_begun or path_travel(self.path) == 0.0:
+    def detect(self, body: Body, visits: Visits, travel: float) -> bool:
+        """Find the active tetrahedra and the edges that were crossed; return whether to cut.
+
+        `travel`: that of the path (`tissue.cutting.blade_path.path_travel`).
+        """
+        if not self.has_begun or travel == 0.0:
             return False
         self._is_open = False
-        self._detect(body, visits)
+        self.scheme.detect(body, visits, self.path)
         return True
 
     def cut(self, hooks: CutHooks) -> None:
@@ -83,7 +86,7 @@ class Incision:
 
     def open_to_edge(self, hooks: CutHooks) -> None:
         """Cut up to the edge itself, which rests or leaves the way that it came."""
-        self._detect(*hooks.mesh())
+        self.scheme.detect(*hooks.mesh(), self.path)
         self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True
 
@@ -96,8 +99,8 @@ class Incision:
         """
         if not self.has_begun or self._is_open:
             return False
-        travel = max(travel, path_travel(self.path))
-        if travel > RESTING_SPEED * self._node_size * dt:
+        most = RESTING_SPEED * self._node_size * dt
+        if travel > most or path_travel(self.path) > most:
             self._resting_time = 0.0
         else:
             self._resting_time += dt
@@ -111,10 +114,6 @@ class Incision:
         self._cut_in_passes(self.scheme.end, hooks)
         self.scheme.forget()
         self.has_begun = False
-
-    def _detect(self, body: Body, visits: Visits) -> None:
-        put_on_lattice(self.path, body.lattice)
-        self.scheme.detect(body, visits, self.path)
 
     def _cut_in_passes(
         self, one_pass: Callable[[Body, Visits, Path], None], hooks: CutHooks

@@ -9,7 +9,7 @@ import numpy as np
 
 from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active, resolve_bridges
-from tissue.cutting.collision_detection import find_active_tetrahedra, find_crossings
+from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
 from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
 from tissue.cutting.separation import close_sheet, open_sheet
@@ -46,9 +46,7 @@ class StellarScheme:
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        cut = self._arrays(body, visits, path)
-        find_active_tetrahedra(cut)
-        find_crossings(cut)
+        detect_collisions(self._arrays(body, visits, path))
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut what was detected, in one pass."""

@@ -69,6 +69,12 @@ def box_at(low: FloatArray, high: FloatArray, i: int) -> Aabb:
 
 
 @kernel
+def box_between(corners: FloatArray) -> Aabb:
+    """Return the box between two corners, shape (2, 3)."""
+    return Aabb(vec3(corners, 0), vec3(corners, 1))
+
+
+@kernel
 def store_box(low: FloatArray, high: FloatArray, i: int, box: Aabb) -> None:
     """Write the corners of a box to rows `i` of two arrays, shape (n, 3)."""
     store(low, i, box.low)

@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.mesh.body import Body
-from tissue.mesh.bounding_boxes import ChunkNodes, body_bounds, chunk_nodes, chunks_of
+from tissue.mesh.bounding_boxes import ChunkNodes, chunk_nodes, chunks_of, write_bounds
 from tissue.mesh.pieces import label_pieces, piece_of_tetrahedra, pieces_of
 from tissue.mesh.surface import boundary_surface
 from tissue.types import Chunks, Piece, Snapshot, Surface
@@ -36,8 +36,9 @@ class BodyQueries(ABC):
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of the body [m], shape (2, 3)."""
-        low, high, _ = body_bounds(self._body)
-        return np.array([low, high])
+        corners = np.empty((2, 3))
+        write_bounds(self._body, corners)
+        return corners
 
     def snapshot(self) -> Snapshot:
         """Return a copy of the whole state."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.vec3 import Vec3, vec3
-from tissue.geometry.aabb import Aabb, with_point
+from tissue.core.vec3 import Vec3, store, vec3
+from tissue.geometry.aabb import Aabb, box_between, empty_box, with_point
 from tissue.mesh.body import Body
 from tissue.types import Chunks
 
@@ -20,45 +20,47 @@ MOST_CHUNKS = 512
 body has larger chunks."""
 
 
-class BodyBounds(NamedTuple):
-    """The box around the body, and whether all positions are finite."""
+class _Bounds(NamedTuple):
+    """A box around nodes, and whether all their positions are finite."""
 
-    low: Vec3
-    """Lowest corner of the body [m]."""
-    high: Vec3
-    """Highest corner [m]."""
+    box: Aabb
     is_finite: bool
-    """Whether all positions are finite; if not, the motion became unstable."""
 
 
 @kernel
-def body_bounds(body: Body) -> BodyBounds:
-    """Return the box around all nodes."""
-    box = BodyBounds(Vec3(np.inf, np.inf, np.inf), Vec3(-np.inf, -np.inf, -np.inf), True)
+def write_bounds(body: Body, corners: FloatArray) -> bool:
+    """Write the corners of the box around all nodes [m], shape (2, 3).
+
+    Returns whether all positions are finite; if not, the motion became unstable.
+    """
+    bounds = _Bounds(empty_box(), True)
     x = body.positions
     for node in range(body.n_nodes):
-        box = _with(box, vec3(x, node))
-    return box
+        bounds = _with(bounds, vec3(x, node))
+    store(corners, 0, bounds.box.low)
+    store(corners, 1, bounds.box.high)
+    return bounds.is_finite
 
 
 @kernel
-def bounds_after_motion(body: Body, nodes: IntArray, n: int, before: BodyBounds) -> BodyBounds:
-    """Return a box around the body, of which the first `n` of `nodes` moved since `before`.
+def widen_bounds(body: Body, nodes: IntArray, n: int, corners: FloatArray) -> bool:
+    """Widen the box around the body, of which the first `n` of `nodes` moved; see `write_bounds`.
 
     The box may be larger than the body: nodes that moved inwards do not shrink it.
     """
-    now = before
+    bounds = _Bounds(box_between(corners), True)
     for i in range(n):
-        now = _with(now, vec3(body.positions, nodes[i]))
-    return now
+        bounds = _with(bounds, vec3(body.positions, nodes[i]))
+    store(corners, 0, bounds.box.low)
+    store(corners, 1, bounds.box.high)
+    return bounds.is_finite
 
 
 @inlined
-def _with(box: BodyBounds, p: Vec3) -> BodyBounds:
-    low, high = with_point(Aabb(box.low, box.high), p)
+def _with(bounds: _Bounds, p: Vec3) -> _Bounds:
     # A comparison with nan is false: min and max would overlook it.
-    is_finite = box.is_finite and math.isfinite(p.x + p.y + p.z)
-    return BodyBounds(low, high, is_finite)
+    is_finite = bounds.is_finite and math.isfinite(p.x + p.y + p.z)
+    return _Bounds(with_point(bounds.box, p), is_finite)
 
 
 class ChunkNodes(NamedTuple):

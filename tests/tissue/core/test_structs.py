@@ -149,8 +149,18 @@ def test_a_kernel_reads_a_struct_of_vectors():
 
 
 def test_a_struct_of_vectors_needs_them_all():
-    with pytest.raises(ValueError, match="argument"):
+    with pytest.raises(TypeError, match="origin"):
         Frame(Vec3(1.0, 0.0, 0.0))
+
+
+def test_a_struct_of_vectors_is_made_of_vectors_or_of_their_numbers():
+    made = Frame(Vec3(1.0, 2.0, 3.0), Vec3(4.0, 5.0, 6.0))
+    read = Frame.of_numbers(np.arange(1.0, 7.0).tobytes())
+    for frame in (made, read):
+        assert (frame.origin, frame.axis) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
+        assert along(frame, 2.0) == 13.0
+    with pytest.raises(AttributeError, match="no end"):
+        _ = made.end
 
 
 @kernel

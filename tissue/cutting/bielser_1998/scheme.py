@@ -23,7 +23,7 @@ from tissue.cutting.bielser_1998.template_1_to_17 import N_LOCAL_NODES
 from tissue.cutting.bielser_1998.workspace import Split, no_counts
 from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
-from tissue.cutting.collision_detection import find_active_tetrahedra, find_crossings
+from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.cut_surface import grown_sheet, new_sheet
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.mesh.body import Body
@@ -79,9 +79,7 @@ class PaperScheme:
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        cut = self._arrays(body, visits, path)
-        find_active_tetrahedra(cut)
-        find_crossings(cut)
+        detect_collisions(self._arrays(body, visits, path))
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Record what was detected, and split the tetrahedra that the blade has left: one pass."""
