@@ -16,7 +16,24 @@ from typing import Any, ClassVar, NamedTuple, Self, cast
 import llvmlite.binding as llvm
 import numba
 from numba.core import codegen, compiler, environment
-from numba.core.types import unliteral
+from numba.core.compiler_machinery import PassManager
+from numba.core.typed_passes import (
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.types import Function, unliteral
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
 
 from tissue.core.kernel_cache import KernelCache
 
@@ -154,11 +171,60 @@ class _Program(codegen.JITCodeLibrary):
         return program
 
 
-class _PartCompiler(compiler.Compiler):
+_PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    ReconstructSSA,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+)
+"""Numba's passes that a kernel needs. Left out are those for what no kernel has: closures, `with`,
+loops over tuples of several types, expressions of whole arrays."""
+
+
+class _Typing:
+    """Numba's typing, which remembers the types of operators and of Numba's own functions.
+
+    For each `a + b` Numba tries some eighty implementations one after the other, a quarter of the
+    time that it takes to compile the engine.
+
+    Args:
+        context: Numba's typing context.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what is not remembered."""
+        return getattr(self._context, name)
+
+    def resolve_function_type(self, function: Any, args: Any, keywords: Any) -> Any:
+        """Return the signature of a call with arguments of these types."""
+        if keywords or type(function) is not Function:
+            return self._context.resolve_function_type(function, args, keywords)
+        call = function, tuple(args)
+        if call not in _SIGNATURES:
+            _SIGNATURES[call] = self._context.resolve_function_type(function, args, keywords)
+        return _SIGNATURES[call]
+
+
+_SIGNATURES: dict[tuple[Any, tuple[Any, ...]], Any] = {}
+"""Signatures that `_Typing` remembers, by function and types of the arguments."""
+
+
+class _PartCompiler(compiler.CompilerBase):
     """Numba's compiler, ending in a `_Part`."""
 
     def define_pipelines(self) -> Any:
-        """Return Numba's own passes.
+        """Return the passes.
 
         Numba numbers functions in the order in which a process meets them, and the number is a part
         of a name in the code. Here it is the line, so that parts from several processes fit.
@@ -169,7 +235,12 @@ class _PartCompiler(compiler.Compiler):
             function.unique_id = function.firstlineno
             function.unique_name = f"{function.func_qualname}${function.firstlineno}"
         state.library = _Part(state.targetctx.codegen(), function.func_qualname, origin)
-        return super().define_pipelines()
+        state.typingctx = _Typing(state.typingctx)
+        passes = PassManager("part")
+        for each in _PASSES:
+            passes.add_pass(each, each.__name__)
+        passes.finalize()
+        return [passes]
 
 
 class _ProgramCompiler(compiler.CompilerBase):

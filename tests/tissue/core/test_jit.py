@@ -139,3 +139,21 @@ def test_two_kernels_of_one_name_and_line_stay_apart():
         return one(a) * two(a)
 
     assert both(1.0) == 6.0
+
+
+@kernel
+def sums(a, b, c):
+    return a + b, a + c, c + c, a < c
+
+
+def test_an_operator_is_typed_by_the_types_of_each_of_its_uses():
+    """Types of operators are remembered from kernel to kernel."""
+    for _ in range(2):
+        values = sums(1, 2, 0.5), sums(1.5, 2, 3), sums(True, 2, 1)
+        assert values == ((3, 1.5, 1.0, False), (3.5, 4.5, 6, True), (3, 2, 2, False))
+        kinds = [[type(value) for value in row] for row in values]
+        assert kinds == [
+            [int, float, float, bool],
+            [float, float, int, bool],
+            [int, int, int, bool],
+        ]
