@@ -278,6 +278,27 @@ def test_the_table_has_a_row_for_each_piece():
     assert "piece 1, loose" in text and "piece 2, held" in text
 
 
+@pytest.mark.parametrize(
+    ("wall_seconds", "settings", "words"),
+    [
+        (0.005, {"relaxation": "global", "audit": True}, "2.00"),
+        (0.02, {"relaxation": "verlet", "audit": False}, "0.50: slower than real time"),
+        (
+            0.02,
+            {"relaxation": "global", "audit": True},
+            "0.50: slower than real time; try --relaxation verlet, --no-audit",
+        ),
+    ],
+)
+def test_the_table_says_when_a_run_was_slower_than_real_time(wall_seconds, settings, words):
+    console = Console(record=True, width=120)
+    summary = summary_of(recorded(10), wall_seconds)
+    summary.settings.update(settings)
+    print_summary(summary, console)
+    (row,) = (x for x in console.export_text().splitlines() if "real-time factor" in x)
+    assert row.strip(" │|").endswith(words)
+
+
 def test_the_table_reports_frames_that_were_limited_or_damped():
     console = Console(record=True, width=100)
     passivity = {"energy": 0.0, "least_energy": -5e-7, "injected_away": 2e-3, "frames": 12}
