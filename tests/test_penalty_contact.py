@@ -230,6 +230,21 @@ def test_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
         np.testing.assert_array_equal(one, other)
 
 
+def test_lips_that_lie_inside_each_other_come_out():
+    """At rest they touch; both were moved 1 mm into each other before any contact was known."""
+    tissue = split_block()
+    body, n = tissue._body, tissue.n_nodes
+    tetrahedra = body.tetrahedra[: tissue.n_tetrahedra]
+    is_left = np.zeros(n, dtype=bool)
+    is_left[tetrahedra[body.rest[tetrahedra].mean(axis=1)[:, 0] < 0.0207]] = True
+    body.positions[:n, 0] += np.where(is_left, 1e-3, -1e-3)
+    before = overlap_depth(tissue.snapshot())
+    assert before > 0.15 * ELEMENT
+    for _ in range(500):
+        tissue.step(None, strokes.DT)
+    assert overlap_depth(tissue.snapshot()) < 0.2 * before
+
+
 def test_what_is_found_inside_another_part_comes_out():
     """At rest the blocks are apart; where they begin, the upper one is sunk in by 4 mm."""
     cells, size = (2, 2, 1), (0.02, 0.02, 0.01)

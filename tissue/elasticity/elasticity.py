@@ -18,7 +18,12 @@ from tissue.elasticity.finite_elements import (
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.frequency_refinement import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
-from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP, scale_masses
+from tissue.elasticity.mass_scaling import (
+    LARGEST_ADDED_MASS,
+    LEAST_MASS,
+    LIMIT_STEP,
+    scale_masses,
+)
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
 from tissue.material import Material
@@ -69,6 +74,7 @@ class Elasticity:
         self._has_solid = law is not None
         self._solid_frequency_squared = 0.0
         self._allowed = math.inf
+        self._least_mass = 0.0
         self._added_mass = self._mass = 0.0
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
@@ -79,7 +85,9 @@ class Elasticity:
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law == "neo_hookean":
             self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
-            self._mass = float(body.masses[:n_nodes].sum())
+            masses = body.masses[:n_nodes]
+            self._mass = float(masses.sum())
+            self._least_mass = min(LEAST_MASS * self._mass / n_nodes, float(masses.min()))
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
@@ -140,7 +148,8 @@ class Elasticity:
             n = tighten(solid, body, visits, n, self._solid_frequency_squared)
             nodes = solid.listed[:n]
             if self._allowed < math.inf:
-                added = scale_masses(body, springs, solid, nodes, n, self._allowed)
+                limits = (self._allowed, self._least_mass)
+                added = scale_masses(body, springs, solid, nodes, n, *limits)
                 self._added_mass += added
                 nodes = self._limit_added_mass(body, nodes)
                 n = len(nodes)
@@ -162,7 +171,9 @@ class Elasticity:
         springs, solid, n = self.arrays.springs, self.arrays.solid, body.n_nodes
         while self._added_mass > LARGEST_ADDED_MASS * self._mass:
             self._allowed *= LIMIT_STEP**2
-            added = scale_masses(body, springs, solid, solid.every, n, self._allowed)
+            self._least_mass /= LIMIT_STEP**2
+            limits = (self._allowed, self._least_mass)
+            added = scale_masses(body, springs, solid, solid.every, n, *limits)
             self._added_mass += added
         return solid.every[:n]
 

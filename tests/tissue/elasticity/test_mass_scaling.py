@@ -6,7 +6,7 @@ import pytest
 from tests import bodies, incisions
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
-from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP
+from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LEAST_MASS, LIMIT_STEP
 from tissue.integrators.runge_kutta import accelerations
 
 MESH = block((6, 6, 3), (0.06, 0.06, 0.03))
@@ -56,6 +56,23 @@ def test_after_cuts_no_bound_is_above_the_limit(seed):
     assert highest_frequency(SolidBody(tissue._body, solid)) <= limit
     assert tissue.cut_report().now.frequency <= limit * (1.0 + 1e-9)
     assert cut_body(None, seed).cut_report().now.frequency > 1.1 * limit
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_after_cuts_no_node_is_much_lighter_than_before_them(seed):
+    """Where the added mass would become large the least mass is lowered."""
+    uncut, scaled, exact = body_of(LOW), cut_body(LOW, seed), cut_body(None, seed)
+    masses = uncut._body.masses[: uncut.n_nodes]
+    report = scaled.cut_report()
+    raised = max(report.now.frequency / max(LOW, report.initial.frequency), 1.0)
+    least = min(LEAST_MASS * masses.mean(), masses.min()) / (LIMIT_STEP * raised) ** 2
+    assert lightest(scaled) >= least > lightest(exact)
+
+
+def lightest(tissue: Tissue) -> float:
+    """Return the mass of the lightest free node [kg]."""
+    body, n = tissue._body, tissue.n_nodes
+    return body.masses[:n][~body.fixed[:n]].min()
 
 
 def test_the_report_tells_the_share_of_the_mass_that_was_added():

@@ -19,7 +19,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.mesh.body import Body
 
-BEGIN, PAIRS, LIST = 0, 1, 2
+BEGIN, _PAIRS, _LIST = 0, 1, 2
 """Stages of a search: it begins; pairs are updated; contacts are listed."""
 
 DONE, NO_ROOM_FOR_PAIRS, NO_ROOM_FOR_CONTACTS = 0, 1, 2
@@ -62,15 +62,15 @@ def search_contacts(
             return DONE
         search.is_anew = _needs_pairing(search, where != IN_BALL)
         _renew_normals(search, body)
-        search.stage = PAIRS
-    if search.stage == PAIRS:
+        search.stage = _PAIRS
+    if search.stage == _PAIRS:
         if search.is_anew == 1:
             if not update_pairs(pairs, ways, search.faces, body, search.normal):
                 return NO_ROOM_FOR_PAIRS
             search.since_pairing = 0
             search.is_pairing_due = search.has_new_faces = 0
             search.is_listing_due = 1
-        search.stage = LIST
+        search.stage = _LIST
     n_due = find_due(search, search.is_anew == 1)
     if n_due > 0 or search.is_listing_due == 1 or floor_changes(search, body):
         if _most_contacts(search, body) > len(forces.push) // 2:

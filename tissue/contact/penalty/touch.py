@@ -41,6 +41,11 @@ _HELD_RIM, _HELD_FACING = 0.3, 0.1
 """The same two where the node has a contact with that face. Without a difference contacts at a
 limit come and go, and the node trembles."""
 
+_HELD_SHARE = 0.7
+"""Share of its squared distance with which a face counts that the node has a contact with. Larger:
+a node in a corner goes to and fro between two faces and trembles; smaller: it keeps one that it
+left."""
+
 _SMOOTH, _STEEPNESS = 0.7, 4.0
 """Cosine between the normals of a corner and its face from which on the corner's counts, and how
 fast: it counts alone from 0.95 on. Without the blend nodes flutter at the switch."""
@@ -72,7 +77,7 @@ class Touch(NamedTuple):
     normal: Vec3
     """Unit vector in which the node is pushed."""
     distance_squared: float
-    """Squared distance of the node from the foot [m2]."""
+    """Squared distance of the node from the foot, less where it has that contact already [m2]."""
 
 
 @kernel
@@ -127,7 +132,7 @@ def touch_of(search: SearchState, forces: PenaltyForces, body: Body, node: int, 
         return nothing(0.0)
     if not _came_from_outside(search, forces, body, node, face, foot, normal, gap):
         return nothing(0.0)
-    return Touch(True, 0.0, foot, normal, dot(d, d))
+    return Touch(True, 0.0, foot, normal, (_HELD_SHARE if is_held else 1.0) * dot(d, d))
 
 
 @kernel
@@ -211,9 +216,7 @@ def _came_from_outside(
     deepest = _ENTRY * size + _CAUGHT * _depth_before(search, forces, node, normal)
     if gap_before >= -deepest:
         return True
-    if pairs.is_lost[node] == 1:
-        return True
-    if gap < -_RECAPTURED * size:
+    if pairs.is_lost[node] == 0 and gap < -_RECAPTURED * size:
         return False
     rest = body.rest
     i = vec3(rest, a)
