@@ -17,10 +17,10 @@ from tests import bodies
 from tests.tissue.kernels_of import cut_of
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.cutting.stellar_subdivision import split_edge
+from tissue.elasticity.energy_density import neo_hookean
 from tissue.elasticity.finite_elements import (
     build_stars,
     build_tetrahedra,
-    neo_hookean,
     no_solid,
     room_for_stars,
 )
@@ -37,6 +37,8 @@ LAWS = {
     "springs": UNDAMPED,
     "springs and volume": replace(UNDAMPED, poisson_ratio=0.45),
     "neo-Hookean": replace(UNDAMPED, law="neo_hookean", poisson_ratio=0.45),
+    "exponential": Material(law="exponential", poisson_ratio=0.45, stiffening=15.0),
+    "yeoh": Material(law="yeoh", poisson_ratio=0.45, yeoh_second=2.0),
 }
 SOLID = LAWS["neo-Hookean"]
 RANDOM = bodies.jittered(4, seed=3)

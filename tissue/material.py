@@ -4,9 +4,11 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
-Law = Literal["springs", "neo_hookean"]
+Law = Literal["springs", "neo_hookean", "exponential", "yeoh"]
 """How forces follow from deformation: `springs` along edges, as in the paper, or tetrahedra under a
-stable `neo_hookean` law."""
+stable `neo_hookean` law, or one of tissue that stiffens as it is stretched
+(`tissue.elasticity.stiffening`): `exponential` (Demiray), or a polynomial of third order
+(`yeoh`)."""
 
 CENTRAL_FORCE_RATIO = 0.25
 """Poisson's ratio of an isotropic network of springs: forces along the lines between nodes make
@@ -62,6 +64,13 @@ class Material:
     """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
     resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water
     and hardly compressible: 0.45 to 0.49."""
+    stiffening: float = 0.0
+    """b of the law `exponential`: stretched to length 1 + e its modulus is some exp(3 b e^2) times
+    that at rest. Soft organs have 5 to 30."""
+    yeoh_second: float = 0.0
+    """C20 / C10 of the law `yeoh`, in the notation of Yeoh's paper."""
+    yeoh_third: float = 0.0
+    """C30 / C10 of the law `yeoh`."""
     spring_calibration: float = 1.0
     """Stiffness of the springs over that of van Gelder's formula, under law springs only. 1 unless
     the mesh was calibrated by `tissue.elasticity.spring_calibration.calibrated`."""
@@ -77,6 +86,7 @@ class Material:
             if getattr(self, name) == 0.0:
                 raise ValueError(f"{name} is 0; it must be positive")
         self._check_ratio()
+        self._check_stiffening()
         if self.law != "springs" and self.spring_calibration != 1.0:
             raise ValueError(
                 f"spring_calibration is {self.spring_calibration} with law {self.law}, whose "
@@ -96,6 +106,27 @@ class Material:
                 f"poisson_ratio is {ratio}; springs act along the lines between nodes, and such "
                 "a body has at least 0.25. Use law neo_hookean, which allows 0 to below 0.5"
             )
+
+    def _check_stiffening(self) -> None:
+        """Refuse a parameter of another law, and a law that would not stiffen."""
+        laws = {"stiffening": "exponential", "yeoh_second": "yeoh", "yeoh_third": "yeoh"}
+        for name, law in laws.items():
+            if self.law != law and getattr(self, name) != 0.0:
+                raise ValueError(
+                    f"{name} is {getattr(self, name)} with law {self.law}, which does not have it: "
+                    f"leave it at 0, or choose law {law}"
+                )
+        given = [name for name, law in laws.items() if law == self.law]
+        if given and not any(getattr(self, name) for name in given):
+            raise ValueError(
+                f"law {self.law} without stiffening: {' or '.join(given)} must be positive. "
+                "Tissue that does not stiffen has law neo_hookean"
+            )
+
+    @property
+    def stiffens(self) -> bool:
+        """Whether it gets stiffer as it is stretched."""
+        return self.law in ("exponential", "yeoh")
 
     @property
     def mu(self) -> float:

@@ -10,7 +10,7 @@ from tissue.contact.resolve import note_all_positions, resolve
 from tissue.contact.state import REBUILD
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
-from tissue.elasticity.finite_elements import neo_hookean
+from tissue.elasticity.energy_density import neo_hookean
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.options import Global
 from tissue.integrators.runge_kutta import accelerations

@@ -32,6 +32,9 @@ class MaterialTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     law: _Law | None = None
     young_modulus: _Positive | None = None
     poisson_ratio: _Ratio | None = None
+    stiffening: _NotNegative | None = None
+    yeoh_second: _NotNegative | None = None
+    yeoh_third: _NotNegative | None = None
     density: _Positive | None = None
     toughness: _NotNegative | None = None
     skin_toughness: _NotNegative | None = None

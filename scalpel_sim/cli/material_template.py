@@ -14,10 +14,15 @@ _WIDTH = 96
 
 MATERIAL_COMMENTS = {
     "law": 'How forces follow from deformation: "springs" along the edges of the mesh, as in the '
-    'paper, or "neo_hookean" tetrahedra.',
+    'paper, or tetrahedra: "neo_hookean", or "exponential" or "yeoh", which stiffen as they are '
+    "stretched.",
     "young_modulus": "Young's modulus, the stiffness at small strain [Pa].",
     "poisson_ratio": "Poisson's ratio: below 0.5, and 0.25 or more for springs. Soft tissue has "
     "0.45 to 0.49; above 0.49 the time step becomes short.",
+    "stiffening": "b of law exponential, 0 under the others: stretched to length 1 + e, tissue is "
+    "exp(3 b e^2) times as stiff. Soft organs have 5 to 30.",
+    "yeoh_second": "C20 / C10 of law yeoh, 0 under the others.",
+    "yeoh_third": "C30 / C10 of law yeoh, 0 under the others.",
     "density": "Density [kg/m3].",
     "toughness": "Fracture toughness: the energy that a square metre of cut costs [J/m2].",
     "skin_toughness": "Fracture toughness until the edge has broken in [J/m2]: the peak of a "

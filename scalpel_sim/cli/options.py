@@ -58,11 +58,18 @@ class MaterialOptions:
     """Name of a material (liver, kidney, skin, fat, muscle, gelatin, silicone), or a FILE.toml. The
     command `materials` lists the names and writes a file to start from."""
     law: str | None = None
-    "How forces follow from deformation: springs, as in the paper, or neo_hookean tetrahedra."
+    """How forces follow from deformation: springs, as in the paper, or tetrahedra: neo_hookean, or
+    exponential or yeoh, which stiffen as they are stretched."""
     young: float | None = None
     "Young's modulus [Pa]."
     poisson_ratio: float | None = None
-    "Poisson's ratio: below 0.5; 0 or more for neo_hookean, 0.25 or more for springs."
+    "Poisson's ratio: below 0.5; 0.25 or more for springs, 0 or more for the other laws."
+    stiffening: float | None = None
+    "b of law exponential: stretched to length 1 + e, tissue is exp(3 b e^2) times as stiff."
+    yeoh_second: float | None = None
+    "C20 / C10 of law yeoh."
+    yeoh_third: float | None = None
+    "C30 / C10 of law yeoh."
     density: float | None = None
     "Density [kg/m3]."
     toughness: float | None = None

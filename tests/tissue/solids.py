@@ -9,16 +9,14 @@ from tests.tissue.kernels_of import springs_of
 from tissue import BoolArray, FloatArray, TetrahedralMesh
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
+from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
-    EnergyDensity,
     Solid,
     build_stars,
     build_tetrahedra,
     n_blocks,
-    neo_hookean,
     no_solid,
     room_for_stars,
-    volume_term,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
@@ -44,7 +42,11 @@ LAWS = {
     "plain": law_of(0.45, averaged=False),
     "averaged volume": volume_term(20e3),
     "plain volume": volume_term(20e3, averaged=False),
-    "half averaged": EnergyDensity(mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15),
+    "half averaged": law_of(0.45).replaced(
+        mu=4e3, lam_of_tetrahedra=10e3, lam_of_nodes=10e3, a=1.15
+    ),
+    "exponential": stiffening(*lame(0.45), exponent=12.0),
+    "yeoh": stiffening(*lame(0.45), second=2.0, third=5.0),
 }
 
 

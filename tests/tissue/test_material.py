@@ -16,6 +16,9 @@ from tissue import Material, Tissue, block
         ({"poisson_ratio": 0.5}, "below 0.5, where no force changes the volume"),
         ({"poisson_ratio": -0.1, "law": "neo_hookean"}, "poisson_ratio is -0.1"),
         ({"spring_calibration": 0.0}, "spring_calibration is 0"),
+        ({"law": "exponential"}, "stiffening must be positive. .* has law neo_hookean"),
+        ({"law": "yeoh"}, "yeoh_second or yeoh_third must be positive"),
+        ({"law": "neo_hookean", "stiffening": 15.0}, "leave it at 0, or choose law exponential"),
         ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),
     ],
 )

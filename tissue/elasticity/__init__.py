@@ -7,7 +7,9 @@ In the order in which they are best read:
     springs                 masses, and springs along the edges
     spring_forces           forces of springs and dampers
     finite_elements         tetrahedra as elements: rest shapes, and the star of each node
-    neo_hookean             forces of tetrahedra under a stable neo-Hookean law
+    energy_density          the laws of tetrahedra, and their constants
+    neo_hookean             forces of tetrahedra under a stable neo-Hookean law, or one that stiffens
+    stiffening              exponential and polynomial laws of tissue that stiffens
     energy                  energies of the body, and the power of damping
     frequency_bound         a bound on the frequencies of tetrahedra at rest
     frequency_refinement    the same bound brought near the truth

@@ -5,15 +5,13 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
-    EnergyDensity,
     build_stars,
     build_tetrahedra,
     grown_solid,
-    neo_hookean,
     no_solid,
     room_for_stars,
-    volume_term,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.elasticity.frequency_refinement import tighten
@@ -83,7 +81,7 @@ class Elasticity:
         the stiffness of springs under either law."""
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
-        if mass_scaling is not None and material.law == "neo_hookean":
+        if mass_scaling is not None and material.law != "springs":
             self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
             masses = body.masses[:n_nodes]
             self._mass = float(masses.sum())
@@ -206,6 +204,11 @@ def _law_of(material: Material) -> EnergyDensity | None:
     """Return the energy density of the tetrahedra; None where springs alone are elastic."""
     if material.law == "neo_hookean":
         return neo_hookean(material.mu, material.lam)
+    if material.law == "exponential":
+        return stiffening(material.mu, material.lam, exponent=material.stiffening)
+    if material.law == "yeoh":
+        second, third = material.yeoh_second, material.yeoh_third
+        return stiffening(material.mu, material.lam, second=second, third=third)
     if material.volume_modulus > 0.0:
         return volume_term(material.volume_modulus)
     return None

@@ -20,16 +20,10 @@ from tissue.core.simd import WIDTH, aligned, filled
 from tissue.core.simd_blocks import row_of_lane, width_of
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, cross, dot, scale, sub, vec3
+from tissue.elasticity.energy_density import EnergyDensity
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
-
-OWN_SHARE = 0.2
-"""Share of the volume term beside springs that acts on each tetrahedron by itself. Where one
-tetrahedron folds while its neighbours swell, averaged volumes do not change, and springs resist
-little: at 0 some 4 % were inverted in a block at half its height, with this share none; springs
-alone fold at 0.8 of the height. Bending locks a little: a bar of four cells deflects 0.68 of
-theory, not 0.73."""
 
 VOLUME, N_SHAPE = 9, 10
 """Place of V among the quantities of `Solid.shape`, and how many these are. Before it are grad N_1,
@@ -40,27 +34,6 @@ STAR_POOL_MARGIN = LARGEST_STAR + WIDTH
 
 LARGEST_RING = 3 * LARGEST_STAR + 1
 """Nodes of the tetrahedra around one node at most, itself among them."""
-
-
-class EnergyDensity(Arrays):
-    """Energy per volume at rest, stable neo-Hookean (Smith, de Goes and Kim 2018).
-
-    W = mu/2 (|F|^2 - 3) - mu/2 log(|F|^2 + 1) + lam/2 (J - a)^2
-
-    It is defined for J <= 0 as well: an inverted tetrahedron recovers. J of the last term is that
-    of each tetrahedron, or the average over the tetrahedra around each node (Bonet and Burton
-    1998), which does not lock where tissue is nearly incompressible, or a part of the term takes
-    each.
-    """
-
-    mu: float
-    """Shear modulus of the law [Pa], 0 where springs carry the shear."""
-    lam_of_tetrahedra: float
-    """The part of lam that acts on J of each tetrahedron [Pa]."""
-    lam_of_nodes: float
-    """The part of lam that acts on J averaged over the tetrahedra around each node [Pa]."""
-    a: float
-    """J at which the last term is 0: 1 + 3 mu / (4 lam), so that the body at rest is at rest."""
 
 
 class Solid(Arrays, two_precisions=True):
@@ -118,6 +91,19 @@ class Solid(Arrays, two_precisions=True):
     tested_growth: FloatArray
     """Growth of the faces of tetrahedron t at which its nodes were slow enough, behind a first
     block (`strained_frequency`); 1 where it was not tested."""
+    stiffening: FloatArray
+    """Scratch of `strained_frequency`, under laws that stiffen: shear modulus of tetrahedron t over
+    that at rest, behind a first block (`tissue.elasticity.stiffening`)."""
+    stiffening_slope: FloatArray
+    """Scratch of `strained_frequency`, under laws that stiffen: how fast that rises."""
+    stiffness: FloatArray
+    """Scratch of `strained_frequency`, under laws that stiffen: a bound on the stiffness of the
+    shear part over that at rest."""
+    tested_stiffness: FloatArray
+    """`stiffness` at the test of `tested_growth`."""
+    shear_frequency_squared: FloatArray
+    """The part of `frequency_squared` that the shear part of the law alone would have [1/s2],
+    under laws that stiffen; shape (nodes,)."""
     strained_dilatation: FloatArray
     """Scratch of `strained_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
     strained_frequency_squared: FloatArray
@@ -135,34 +121,6 @@ class Solid(Arrays, two_precisions=True):
     forces: FloatArray
     """Scratch: force on each corner of each tetrahedron [N], as rows x, y, z, 0, shape (rows, 4):
     a block of rows that are 0, then for each block its corners 0, 1, 2 and 3 (`corner_row`)."""
-
-
-def neo_hookean(mu: float, lam: float, *, averaged: bool = True) -> EnergyDensity:
-    """Return the law with the small-strain moduli `mu` and `lam` (Lame's) [Pa].
-
-    Args:
-        mu: Shear modulus.
-        lam: Lame's first constant.
-        averaged: Whether volume is kept on average around each node, or in each tetrahedron.
-    """
-    modulus = lam + 5.0 / 6.0 * mu
-    a = 1.0 + mu / modulus  # 3/4 of the law's own mu, which is 4/3 of the small-strain one
-    return _law(4.0 / 3.0 * mu, modulus, a, averaged)
-
-
-def volume_term(modulus: float, *, averaged: bool = True) -> EnergyDensity:
-    """Return the law that only resists changes of volume, by that modulus [Pa]: beside springs.
-
-    Args:
-        modulus: What springs leave to it, lam - mu.
-        averaged: Whether all but `OWN_SHARE` of it acts on averaged volumes; if not, none of it.
-    """
-    return _law(0.0, modulus, 1.0, averaged, OWN_SHARE)
-
-
-def _law(mu: float, lam: float, a: float, averaged: bool, own_share: float = 0.0) -> EnergyDensity:
-    own = own_share * lam if averaged else lam
-    return EnergyDensity(mu=mu, lam_of_tetrahedra=own, lam_of_nodes=lam - own, a=a)
 
 
 def no_solid(
@@ -183,6 +141,8 @@ def no_solid(
     room = width * (1 + blocks)
     tested_growth = aligned(room, real)
     tested_growth[:] = 1.0
+    tested_stiffness = aligned(room, real)
+    tested_stiffness[:] = 1.0
     return Solid(
         law=law,
         nodes=aligned(4 * width * blocks, np.int32),
@@ -207,6 +167,11 @@ def no_solid(
         dilated=aligned(room, real),
         growth=aligned(room, real),
         tested_growth=tested_growth,
+        stiffening=aligned(room, real),
+        stiffening_slope=aligned(room, real),
+        stiffness=aligned(room, real),
+        tested_stiffness=tested_stiffness,
+        shear_frequency_squared=np.zeros(n_nodes),
         strained_dilatation=np.zeros(n_nodes),
         strained_frequency_squared=np.zeros(n_nodes),
         dilatation_test=np.zeros(n_nodes, dtype=np.int64),

@@ -18,10 +18,11 @@ A fixed node does not move: it counts as infinitely heavy.
 """
 
 import math
+from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.vec3 import Vec3, add, axpy, norm, scale, store, vec3
+from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.elasticity.finite_elements import (
     Solid,
     corner_of_slot,
@@ -30,6 +31,7 @@ from tissue.elasticity.finite_elements import (
     rest_normals,
     tetrahedron_of_slot,
 )
+from tissue.elasticity.stiffening import stiffens
 from tissue.geometry.tetrahedron import add_square, largest_eigenvalue, nothing_symmetric
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -86,7 +88,9 @@ def bound_around(solid: Solid, body: Body, visits: Visits, listed: IntArray, n: 
             solid.dilatation[node] = dilatation_term(solid, body, body.rest, visits, node)
     n = with_neighbours(solid, visits, listed, n)
     for i in range(n):
-        solid.frequency_squared[listed[i]] = _bound(solid, body, visits, listed[i])
+        bounds = bounds_of_node(solid, body, body.rest, solid.dilatation, visits, listed[i], False)
+        solid.frequency_squared[listed[i]] = bounds.whole
+        solid.shear_frequency_squared[listed[i]] = bounds.shear
     return n
 
 
@@ -198,24 +202,29 @@ def _add_to_ring(solid: Solid, visits: Visits, n: int, t: int, k: int, normal: V
     return n
 
 
-@kernel
-def _bound(solid: Solid, body: Body, visits: Visits, node: int) -> float:
-    """Return |N_b| / m_b of a node, its bound on w^2 [1/s2]."""
-    return bound_of_node(solid, body, body.rest, solid.dilatation, visits, node)
+class NodeBounds(NamedTuple):
+    """Bounds on w^2 at a node [1/s2]."""
+
+    whole: float
+    """|N_b| / m_b."""
+    shear: float
+    """That of the part that grows under a law that stiffens."""
 
 
 @kernel
-def bound_of_node(
+def bounds_of_node(
     solid: Solid,
     body: Body,
     points: FloatArray,
     dilatation: FloatArray,
     visits: Visits,
     node: int,
-) -> float:
-    """Return the bound on w^2 at a node with its tetrahedra deformed [1/s2].
+    is_strained: bool,
+) -> NodeBounds:
+    """Return the bounds on w^2 at a node with its tetrahedra deformed.
 
-    The shear part of the law is never stiffer than at rest: it is taken there.
+    The shear part of the law is taken at rest; under a law that stiffens with the modulus
+    `solid.stiffening` and its slope (`tissue.elasticity.strained_frequency`).
 
     Args:
         solid: Weights and the row of the node.
@@ -224,15 +233,18 @@ def bound_of_node(
         dilatation: `dilatation_term` at the same points, of all nodes around, shape (nodes,).
         visits: For searches.
         node: The node.
+        is_strained: Whether `points` are not at rest.
     """
     weight = solid.weight[node]
     if weight == 0.0:
-        return 0.0
-    mu = 0.75 * solid.law.mu
+        return NodeBounds(0.0, 0.0)
+    law = solid.law
     # The part of lam that is not averaged, at small strain. Where it is negative it is limited: the
     # bound still holds.
-    lam = max(solid.law.lam_of_tetrahedra - 5.0 / 6.0 * mu, -2.0 / 3.0 * mu)
-    averaged = solid.law.lam_of_nodes != 0.0
+    mu = law.shear_modulus
+    lam = max(law.lam_of_tetrahedra - law.excess, -2.0 / 3.0 * mu)
+    averaged = law.lam_of_nodes != 0.0
+    has_stiffened = is_strained and stiffens(law)
     isotropic, stiffness = 0.0, nothing_symmetric()
     visits.epoch += 1
     n = 0
@@ -253,7 +265,14 @@ def bound_of_node(
             normal = scale(-1.0, add(n1, add(n2, n3)))
         length = norm(at_rest)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
-        isotropic += mu * share * length
+        if has_stiffened:
+            place = solid.around[slot]
+            isotropic += float(solid.stiffening[place]) * mu * share * length
+            slope = 2.0 * float(solid.stiffening_slope[place]) * mu * share / length
+            along = sub(_stretched(body, points, t, at_rest), normal)
+            stiffness = add_square(stiffness, slope, along)
+        else:
+            isotropic += mu * share * length
         c = (mu + lam) * share / length
         stiffness = add_square(stiffness, c, normal)
         if averaged:
@@ -265,5 +284,16 @@ def bound_of_node(
         if length > 0.0:
             c = dilatation[solid.ring_nodes[i]] / (weight * length)
             stiffness = add_square(stiffness, c, normal)
-    bound: float = (isotropic + largest_eigenvalue(stiffness)) / body.masses[node]
-    return bound
+    mass = body.masses[node]
+    return NodeBounds((isotropic + largest_eigenvalue(stiffness)) / mass, isotropic / mass)
+
+
+@inlined
+def _stretched(body: Body, points: FloatArray, t: int, a: Vec3) -> Vec3:
+    """Return F a of a tetrahedron with its nodes at `points`."""
+    n1, n2, n3, volume = rest_normals(body, t)
+    x0 = vec3(points, body.tetrahedra[t, 0])
+    total = scale(dot(n1, a), sub(vec3(points, body.tetrahedra[t, 1]), x0))
+    total = axpy(dot(n2, a), sub(vec3(points, body.tetrahedra[t, 2]), x0), total)
+    total = axpy(dot(n3, a), sub(vec3(points, body.tetrahedra[t, 3]), x0), total)
+    return scale(1.0 / (6.0 * volume), total)

@@ -71,6 +71,7 @@ def scale_masses(
         body.masses[node] = after
         body.added_masses[node] = after - own
         solid.frequency_squared[node] = stiffness / after
+        solid.shear_frequency_squared[node] *= before / after
         springs.stiffness_per_mass[node] *= before / after
     return change
 

@@ -1,5 +1,7 @@
 """Forces of tetrahedra under a stable neo-Hookean law, a block of tetrahedra at a time.
 
+Laws that stiffen differ in the factor of the shear alone (`tissue.elasticity.stiffening`).
+
 With H the gradient of the displacement, F = 1 + H, K = cof F - 1 = (tr H) 1 - H^T + cof H and
 |F|^2 - 3 = 2 tr H + |H|^2, the force on node k is -V P grad N_k, where
 
@@ -36,6 +38,12 @@ from tissue.core.simd_blocks import (
 from tissue.core.simd_gather import sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid, n_blocks
+from tissue.elasticity.stiffening import (
+    stiffening_factor,
+    stiffens,
+    stretch_energy,
+    stretch_invariant,
+)
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30
@@ -161,13 +169,17 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
             own = load_block(solid.dilated, width * (1 + block)) / (v + alike(NO_VOLUME, v))
             p = p + alike(law.lam_of_tetrahedra, v) * own
         trace = x.x + y.y + z.z
-        grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-        s = alike(0.25 * law.mu, v) * grown / (grown + alike(4.0, v))
-        rest = alike(0.75 * law.mu, v)
+        cx, cy, cz = _cofactors(x, y, z)
+        if stiffens(law):
+            rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+            s = alike(0.0, v)
+        else:
+            grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
+            s = alike(0.25 * law.mu, v) * grown / (grown + alike(4.0, v))
+            rest = alike(0.75 * law.mu, v)
         # The factors of H, K and 1, times -V:
         minus_v = alike(-1.0, v) * v
         a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
-        cx, cy, cz = _cofactors(x, y, z)
         px = Vec3(
             a * x.x + b * (trace - x.x + cx.x) + c,
             a * x.y + b * (cx.y - y.x),
@@ -350,9 +362,12 @@ def _energies(solid: Solid, block: int) -> Lanes:
     law, width = solid.law, width_of(solid.shape)
     x, y, z = known_gradient(solid, block)
     v = shape_of(solid, block, VOLUME)
-    trace = x.x + y.y + z.z
-    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
-    shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
+    if stiffens(law):
+        shear = stretch_energy(law, stretch_invariant(x, y, z, *_cofactors(x, y, z)))
+    else:
+        trace = x.x + y.y + z.z
+        grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
+        shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
     dilatation = load_block(solid.dilated, width * (1 + block))
     ratio = dilatation / (v + alike(NO_VOLUME, v))
     bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))

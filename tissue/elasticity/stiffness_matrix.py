@@ -7,7 +7,8 @@ order (a test compares the two).
 Springs: K = sum of k u u^T, k by van Gelder. Change of volume: each node has the mean dilatation of
 the tetrahedra around it, by volume; beside springs, a share acts on each tetrahedron by itself
 (`OWN_SHARE`). Neo-Hookean law: shear of each tetrahedron by itself, and dilatation averaged over
-nodes (Smith, de Goes and Kim 2018; see `tissue.elasticity.neo_hookean`).
+nodes (Smith, de Goes and Kim 2018; see `tissue.elasticity.neo_hookean`). Laws that stiffen: the
+same, but nothing is taken from the dilatation of a tetrahedron by itself.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.elasticity.finite_elements import OWN_SHARE
+from tissue.elasticity.energy_density import OWN_SHARE
 from tissue.material import Material
 from tissue.types import TetrahedralMesh
 
@@ -94,7 +95,7 @@ def stiffness_matrix(
         mixed = own * _own_dilatation(mesh) + (1.0 - own) * _mean_dilatation(mesh)
         return springs + material.volume_modulus * mixed
     dilatation = _mean_dilatation if averaged else _own_dilatation
-    taken = LOCAL_DILATATION * material.mu
+    taken = 0.0 if material.stiffens else LOCAL_DILATATION * material.mu
     return (
         _of_shear(mesh, material.mu)
         - taken * _own_dilatation(mesh)

@@ -16,20 +16,26 @@ Where the forces keep their gradients of displacement, the quick bound is that o
 forces were evaluated last, within a step from now: the bound has to hold for two steps to come.
 """
 
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import alike, gathered_alike, load_block, store_block, width_of
 from tissue.core.simd_gather import larger, largest, where_larger
 from tissue.core.vec3 import Vec3, add, cross, dot
 from tissue.elasticity.finite_elements import Solid, n_blocks, node_place, tetrahedron_of_slot
-from tissue.elasticity.frequency_bound import bound_of_node, dilatation_term
+from tissue.elasticity.frequency_bound import bounds_of_node, dilatation_term
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.neo_hookean import (
     displacements,
     gradient_of_displacement,
     gradient_of_shape,
     known_gradient,
+)
+from tissue.elasticity.stiffening import (
+    stiffening_factor,
+    stiffening_slope,
+    stiffens,
+    stretch_invariant,
 )
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
@@ -53,18 +59,25 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
     solid = elastic.solid
     width, highest = width_of(solid.shape), 0.0
     solid.test += 1
-    is_known = solid.has_gradients == 1
+    is_known, law = solid.has_gradients == 1, solid.law
     if not is_known:
         displacements(solid, body, body.positions, solid.every, 0, body.n_nodes)
     for block in range(n_blocks(solid, body.n_tetrahedra)):
         if is_known:
-            growth = _growth(solid, block, *known_gradient(solid, block))
+            gradient = known_gradient(solid, block)
         else:
-            growth = _growth(solid, block, *gradient_of_displacement(solid, block))
-        tested = load_block(solid.tested_growth, width * (1 + block))
-        tested = alike(FURTHER, growth) * tested
-        at_rest = _highest_at_rest(elastic, block, growth)
-        bound = where_larger(growth, tested, growth * at_rest, alike(0.0, growth))
+            gradient = gradient_of_displacement(solid, block)
+        growth = _growth(solid, block, *gradient)
+        at_rest = _highest_at_rest(elastic.frequency_squared, solid, block, growth)
+        bound, further = growth * at_rest, _further(solid.tested_growth, block, growth)
+        if stiffens(law):
+            stiffness = _stiffness_of_shear(solid, block, *gradient)
+            bound = bound + larger(stiffness - growth, alike(0.0, growth)) * _highest_at_rest(
+                solid.shear_frequency_squared, solid, block, growth
+            )
+            further = larger(further, _further(solid.tested_stiffness, block, stiffness))
+            store_block(solid.stiffness, width * (1 + block), stiffness)
+        bound = where_larger(further, alike(0.0, growth), bound, alike(0.0, growth))
         if largest(bound) <= allowed:
             highest = max(highest, largest(bound))
             continue
@@ -80,10 +93,15 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
 
 
 @inlined
-def _highest_at_rest(elastic: Elastic, block: int, a: Lanes) -> Lanes:
+def _further(tested: FloatArray, block: int, value: Lanes) -> Lanes:
+    """Return by how much a value is larger than that which was tested, times `FURTHER`."""
+    return value - alike(FURTHER, value) * load_block(tested, width_of(tested) * (1 + block))
+
+
+@inlined
+def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> Lanes:
     """Return the highest bound on w^2 at rest at the nodes of the tetrahedra of a block [1/s2]."""
-    values, nodes = elastic.frequency_squared, elastic.solid.nodes
-    width = width_of(elastic.solid.shape)
+    nodes, width = solid.nodes, width_of(solid.shape)
     first = 4 * width * block
     return larger(
         larger(
@@ -109,6 +127,7 @@ def _tested_bound(elastic: Elastic, body: Body, visits: Visits, t: int, allowed:
     if FURTHER * highest <= allowed:
         place = width_of(solid.shape) + t
         solid.tested_growth[place] = solid.growth[place]
+        solid.tested_stiffness[place] = solid.stiffness[place]
     return highest
 
 
@@ -128,7 +147,8 @@ def _strained_bound(elastic: Elastic, body: Body, visits: Visits, node: int) -> 
                     term = dilatation_term(solid, body, body.positions, visits, other)
                     solid.strained_dilatation[other] = term
                     solid.dilatation_test[other] = solid.test
-    bound = bound_of_node(solid, body, body.positions, solid.strained_dilatation, visits, node)
+    dilatation = solid.strained_dilatation
+    bound = bounds_of_node(solid, body, body.positions, dilatation, visits, node, True).whole
     if elastic.has_springs:
         bound += elastic.springs.frequency_squared[node]
     solid.strained_frequency_squared[node] = bound
@@ -143,6 +163,7 @@ def forget_tests(solid: Solid, nodes: IntArray, n: int) -> None:
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
             solid.tested_growth[solid.around[slot]] = 1.0
+            solid.tested_stiffness[solid.around[slot]] = 1.0
 
 
 @inlined
@@ -162,6 +183,30 @@ def _growth(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
         larger(_square(c1, c2, c3, g3), _square(c1, c2, c3, add(g1, add(g2, g3)))),
     )
     return larger(growth, one)
+
+
+@inlined
+def _stiffness_of_shear(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+    """Return a bound on the stiffness of the shear part over that at rest; write what it is of.
+
+    A node that moves by u changes F by u times grad N. The second derivative of J by that is 0, and
+    that of the energy is mu (g |dF|^2 + 2 g' ((F - cof F) : dF)^2).
+    """
+    trace = x.x + y.y + z.z
+    cx, cy, cz = cross(y, z), cross(z, x), cross(x, y)
+    two = alike(2.0, trace)
+    # The rows of H - K, K = (tr H) 1 - H^T + cof H:
+    ax = Vec3(two * x.x - trace - cx.x, x.y + y.x - cx.y, x.z + z.x - cx.z)
+    ay = Vec3(y.x + x.y - cy.x, two * y.y - trace - cy.y, y.z + z.y - cy.z)
+    az = Vec3(z.x + x.z - cz.x, z.y + y.z - cz.y, two * z.z - trace - cz.z)
+    squared = dot(ax, ax) + dot(ay, ay) + dot(az, az)
+    q = stretch_invariant(x, y, z, cx, cy, cz)
+    g = stiffening_factor(solid.law, q)
+    slope = stiffening_slope(solid.law, q, g)
+    place = width_of(solid.shape) * (1 + block)
+    store_block(solid.stiffening, place, g)
+    store_block(solid.stiffening_slope, place, slope)
+    return g + (slope + slope) * squared
 
 
 @inlined

@@ -9,6 +9,7 @@ from tests.tissue.kernels_of import cut_of, springs_of
 from tests.tissue.solids import LAWS, built, law_of, moved, solid_of
 from tissue import block
 from tissue.core.simd import WIDTH
+from tissue.elasticity.energy_density import neo_hookean, volume_term
 from tissue.elasticity.finite_elements import (
     STAR_POOL_MARGIN,
     VOLUME,
@@ -16,12 +17,10 @@ from tissue.elasticity.finite_elements import (
     build_tetrahedra,
     corner_of_slot,
     grown_solid,
-    neo_hookean,
     no_solid,
     room_for_stars,
     shape_place,
     tetrahedron_of_slot,
-    volume_term,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
 from tissue.mesh.changes import clear_changes, touched_nodes

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, incisions
-from tests.tissue.solids import SolidBody, highest_frequency, law_of, solid_of
+from tests.tissue.solids import LAWS, SolidBody, highest_frequency, law_of, solid_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.internal_forces import Elastic, deform
@@ -64,6 +64,17 @@ def test_the_bound_holds_however_the_body_is_stretched(stretch, poisson_ratio, a
         noise = np.random.default_rng(3).normal(size=MESH.positions.shape)
         x = MESH.positions @ stretch.T + shake * np.ptp(MESH.positions) * noise
         assert bound(solid, x) > 1.1 * highest_frequency(solid, x)
+
+
+@pytest.mark.parametrize("law", ["exponential", "yeoh"])
+@pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
+def test_the_bounds_hold_under_laws_that_stiffen(stretch, law):
+    solid = solid_of(MESH, LAWS[law])
+    for shake in (0.0, 0.01, 0.03):
+        noise = np.random.default_rng(3).normal(size=MESH.positions.shape)
+        x = MESH.positions @ stretch.T + shake * np.ptp(MESH.positions) * noise
+        highest = highest_frequency(solid, x)
+        assert bound(solid, x) >= bound(solid, x, allowed=0.0) > highest
 
 
 @pytest.mark.parametrize("allowed", [0.0, np.inf])
