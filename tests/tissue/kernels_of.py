@@ -14,7 +14,8 @@ from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
-from tissue.elasticity.finite_elements import no_solid, room_for_stars, volume_term
+from tissue.elasticity.energy_density import volume_term
+from tissue.elasticity.finite_elements import no_solid, room_for_stars
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.elasticity.springs import (
     SPRING_POOL_MARGIN,
@@ -198,7 +199,7 @@ def network_of(
     body = build_body(mesh, None, fixed)
     springs = springs_of(body)
     stages = new_stages(len(mesh.positions))
-    blade = line_blade(new_anchors(2, 1.0, YOUNG_MODULUS))
+    blade = line_blade(new_anchors(2, 1.0, 4.0 * YOUNG_MODULUS))
     surroundings = Surroundings(
         gravity=Vec3(0.0, 0.0, 0.0), drag=viscous_damping, retardation_time=retardation_time
     )

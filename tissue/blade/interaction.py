@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tissue.blade.anchors import is_engaged, new_anchors
+from tissue.blade.anchors import anchor_stiffness, is_engaged, new_anchors
 from tissue.blade.blade_context import (
     GRID_IS_FULL,
     NO_ROOM_FOR_FACES,
@@ -21,6 +21,7 @@ from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
 from tissue.blade.side_search import forget_cells, forget_changed_faces, release_faces
+from tissue.blade.toughness import toughness_law_of
 from tissue.blade.wrench import BladeReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
@@ -63,9 +64,10 @@ class BladeInteraction:
     def __init__(
         self, blade: BladeShape | None, material: Material, node_size: float, n_tetrahedra: int
     ) -> None:
-        self._young_modulus = material.young_modulus
         self._node_size = node_size
-        anchors = new_anchors(2, 1.0, material.young_modulus)
+        toughness = toughness_law_of(material, blade).skin_toughness
+        self._stiffness = anchor_stiffness(material, toughness, node_size)
+        anchors = new_anchors(2, 1.0, self._stiffness)
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
         self._has_sides = blade is not None
@@ -100,7 +102,7 @@ class BladeInteraction:
         """
         release_edge(self.state, body, edge, when)
         n = math.ceil(length / self._node_size * SAMPLES_PER_NODE_SIZE) + 1
-        anchors = new_anchors(min(max(n, 2), MOST_SAMPLES), length, self._young_modulus)
+        anchors = new_anchors(min(max(n, 2), MOST_SAMPLES), length, self._stiffness)
         self.state = self.state.replaced(anchors=anchors)
         self._report = new_report(self.state)
         self._edge_length = length

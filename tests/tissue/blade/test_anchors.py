@@ -60,7 +60,7 @@ class AnchoredBlade:
         self.body = build_body(BLOCK, None, None)
         self.springs = springs_of(self.body)
         self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
-        self.anchors = new_anchors(N, 0.016, STIFF)
+        self.anchors = new_anchors(N, 0.016, 4.0 * STIFF)
         self.blade = line_blade(self.anchors, Material(toughness=TOUGH)).replaced(reach=REACH)
         self.forces = np.zeros_like(self.body.rest)
         grid = build_grid(self.body, self.body.positions, 0.0)
@@ -100,13 +100,13 @@ def test_a_sample_in_the_tissue_is_anchored_where_it_is(held):
 
 
 def test_the_samples_stand_for_the_whole_edge():
-    anchors = new_anchors(7, 0.03, STIFF)
+    anchors = new_anchors(7, 0.03, 4.0 * STIFF)
     assert anchors.length.sum() == pytest.approx(0.03)
     assert anchors.length[0] == anchors.length[-1] == pytest.approx(anchors.length[1] / 2)
 
 
 def test_a_sample_outside_stays_free_and_pulls_nothing(held):
-    anchors = new_anchors(N, 0.016, STIFF)
+    anchors = new_anchors(N, 0.016, 4.0 * STIFF)
     grid = build_grid(held.body, held.body.positions, 0.0)
     assert not any_free_in_box(anchors, pose_at(edge_at(-0.001), 1.0), *BOX)
     assert any_free_in_box(anchors, pose_at(edge_at(0.001), 1.0), *BOX)

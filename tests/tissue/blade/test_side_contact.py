@@ -47,7 +47,7 @@ class Pressed:
     def __init__(self, x=0.0115, material=MATERIAL):
         self.body = build_body(BLOCK, None, None)
         self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
-        anchors = new_anchors(2, LENGTH, material.young_modulus)
+        anchors = new_anchors(2, LENGTH, 4.0 * material.young_modulus)
         n = len(BLOCK.tetrahedra)
         self.blade = new_blade_state(anchors, SHAPE, material, NODE_SIZE, n)
         self.totals = self.blade.totals

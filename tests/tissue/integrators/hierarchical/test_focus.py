@@ -26,7 +26,7 @@ TIP, HEEL = 0, len(BODY.tetrahedra) - 1
 
 
 def held_by(*tetrahedra):
-    anchors = new_anchors(len(tetrahedra) + 1, 0.01, 10e3)
+    anchors = new_anchors(len(tetrahedra) + 1, 0.01, 40e3)
     anchors.state[1:] = ANCHORED  # the sample at the tip is outside the tissue
     anchors.tetrahedron[1:] = tetrahedra
     held = new_rings(N_NODES)
@@ -75,6 +75,6 @@ def test_the_order_is_ring_by_ring_and_each_node_once():
 def test_the_focus_stays_when_no_anchor_is_left():
     held = held_by(TIP)
     before = found_nodes(held)
-    find_held(held, BODY, line_blade(new_anchors(2, 0.01, 10e3)))
+    find_held(held, BODY, line_blade(new_anchors(2, 0.01, 40e3)))
     assert found_nodes(held) == before
     assert ring_of(held, int(BODY.tetrahedra[HEEL, 0])) == UNREACHED
