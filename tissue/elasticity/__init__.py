@@ -8,7 +8,7 @@ In the order in which they are best read:
     spring_forces           forces of springs and dampers
     finite_elements         tetrahedra as elements: rest shapes, and the star of each node
     energy_density          the laws of tetrahedra, and their constants
-    neo_hookean             forces of tetrahedra under a stable neo-Hookean law, or one that stiffens
+    neo_hookean             forces of tetrahedra under these laws
     stiffening              exponential and polynomial laws of tissue that stiffens
     energy                  energies of the body, and the power of damping
     frequency_bound         a bound on the frequencies of tetrahedra at rest
