@@ -106,6 +106,17 @@ def test_the_steady_force_is_toughness_times_depth(variation):
     assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
 
 
+LIVER = {"young_modulus": 4.74e3, "toughness": 164.0, "poisson_ratio": 0.45}
+"""As published: toughness over Young's modulus is 35 mm, six times the depth of the block."""
+
+
+@pytest.mark.parametrize("stiffening", [15.0, 20.0])
+def test_liver_as_published_is_cut_where_it_stiffens(stiffening):
+    run = Run(upright(), law="exponential", stiffening=stiffening, **LIVER)
+    assert run.steady() == pytest.approx(164.0 * run.anchored(), rel=0.05)
+    assert run.results[-1].cut_area > 0.0
+
+
 @pytest.mark.parametrize("slice_ratio", [0.0, 0.5, 1.0])
 def test_slicing_lowers_the_normal_force_as_theory_says(slice_ratio):
     """Atkins: all work goes into area, so the force is along the motion: 1 / (1 + xi^2)."""

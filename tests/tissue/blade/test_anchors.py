@@ -11,6 +11,7 @@ from tissue.blade.anchors import (
     LEFT,
     RETRACTED,
     anchor_position,
+    anchor_stiffness,
     anchored_length,
     clear_anchor_forces,
     is_engaged,
@@ -97,6 +98,18 @@ THRESHOLD = TOUGH / (4.0 * STIFF)
 def test_a_sample_in_the_tissue_is_anchored_where_it_is(held):
     assert (held.anchors.state == ANCHORED).all()
     np.testing.assert_allclose(held.anchors.rest[:, :2], [[0.011, 0.009]] * N, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("toughness", "factor"),
+    [(1.0, 4.0), (60.0, 20.0), (1e3, 64.0)],
+    ids=["soft", "tough", "most"],
+)
+def test_anchors_stretch_by_a_share_of_a_node_at_most_where_tissue_stiffens(toughness, factor):
+    """J / (0.3 x 1 mm) between 4 and 64 times Young's modulus; without stiffening always 4."""
+    stiffens = Material(law="exponential", stiffening=15.0, young_modulus=10e3)
+    assert anchor_stiffness(stiffens, toughness, 1e-3) == pytest.approx(factor * 10e3)
+    assert anchor_stiffness(Material(young_modulus=10e3), toughness, 1e-3) == 4.0 * 10e3
 
 
 def test_the_samples_stand_for_the_whole_edge():
