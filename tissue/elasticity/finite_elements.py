@@ -114,8 +114,6 @@ class Solid(Arrays, two_precisions=True):
     """Test in which `strained_frequency_squared` was written, shape (nodes,)."""
     test: IntCell
     """Number of the test of strained frequencies."""
-    has_gradients: IntCell
-    """1 if `gradient` holds H of every tetrahedron when the forces were evaluated last, else 0."""
     pressure: FloatArray
     """Scratch: lam (J - 1) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
@@ -177,7 +175,6 @@ def no_solid(
         dilatation_test=np.zeros(n_nodes, dtype=np.int64),
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
-        has_gradients=0,
         pressure=np.zeros(n_nodes, real),
         forces=aligned(4 * 4 * room, real).reshape(-1, 4),
     )
@@ -187,7 +184,7 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
     larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool, is_single=is_single)
-    cells = {"used", "test", "has_gradients"}
+    cells = {"used", "test"}
     for name in cells:
         setattr(larger, name, getattr(solid, name))
     for name in set(Solid.__annotations__) - cells - {"law", "every"}:
@@ -235,7 +232,6 @@ def corner_row(solid: Solid, t: int, k: int) -> int:
 @kernel
 def build_tetrahedra(solid: Solid, body: Body, tetrahedra: IntArray, n: int) -> None:
     """Write the rest shapes of the first `n` of `tetrahedra`."""
-    solid.has_gradients = 0
     for i in range(n):
         t = tetrahedra[i]
         for k in range(4):

@@ -10,12 +10,7 @@ from tissue.core.simd import Point, point_of
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid, n_blocks
-from tissue.elasticity.neo_hookean import (
-    keeps_gradients,
-    solid_energy,
-    solid_force,
-    solid_forces,
-)
+from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
 from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
 from tissue.elasticity.springs import Springs, spring_energy
 from tissue.mesh.body import Body
@@ -54,7 +49,6 @@ def deform(elastic: Elastic, body: Body, positions: FloatArray) -> None:
         solid = elastic.solid
         blocks, nodes = n_blocks(solid, body.n_tetrahedra), body.n_nodes
         solid_forces(solid, body, positions, solid.every, blocks, solid.every, nodes)
-        solid.has_gradients = int(keeps_gradients(solid))
 
 
 @inlined

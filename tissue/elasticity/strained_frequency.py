@@ -11,9 +11,6 @@ its area adds little to what its nodes resist. Where it is too high to be of use
 is evaluated at the nodes of the tetrahedron with its neighbours as they are deformed: in an organ
 after a cut that concerns 20 of 5,900 tetrahedra. What was found slow enough is not evaluated again
 before it has grown further.
-
-Where the forces keep their gradients of displacement, the quick bound is that of the instant when
-forces were evaluated last, within a step from now: the bound has to hold for two steps to come.
 """
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -29,7 +26,6 @@ from tissue.elasticity.neo_hookean import (
     displacements,
     gradient_of_displacement,
     gradient_of_shape,
-    known_gradient,
 )
 from tissue.elasticity.stiffening import (
     stiffening_factor,
@@ -59,24 +55,22 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
     solid = elastic.solid
     width, highest = width_of(solid.shape), 0.0
     solid.test += 1
-    is_known, law = solid.has_gradients == 1, solid.law
-    if not is_known:
-        displacements(solid, body, body.positions, solid.every, 0, body.n_nodes)
-    for block in range(n_blocks(solid, body.n_tetrahedra)):
-        if is_known:
-            gradient = known_gradient(solid, block)
-        else:
-            gradient = gradient_of_displacement(solid, block)
-        growth = _growth(solid, block, *gradient)
+    law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
+    displacements(solid, body, body.positions, solid.every, 0, body.n_nodes)
+    if stiffens(law):
+        # Before any bound is evaluated at a node: that takes all tetrahedra around it.
+        for block in range(blocks):
+            _write_stiffness(solid, block, *gradient_of_displacement(solid, block))
+    for block in range(blocks):
+        growth = _growth(solid, block, *gradient_of_displacement(solid, block))
         at_rest = _highest_at_rest(elastic.frequency_squared, solid, block, growth)
         bound, further = growth * at_rest, _further(solid.tested_growth, block, growth)
         if stiffens(law):
-            stiffness = _stiffness_of_shear(solid, block, *gradient)
+            stiffness = load_block(solid.stiffness, width * (1 + block))
             bound = bound + larger(stiffness - growth, alike(0.0, growth)) * _highest_at_rest(
                 solid.shear_frequency_squared, solid, block, growth
             )
             further = larger(further, _further(solid.tested_stiffness, block, stiffness))
-            store_block(solid.stiffness, width * (1 + block), stiffness)
         bound = where_larger(further, alike(0.0, growth), bound, alike(0.0, growth))
         if largest(bound) <= allowed:
             highest = max(highest, largest(bound))
@@ -186,8 +180,8 @@ def _growth(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
 
 
 @inlined
-def _stiffness_of_shear(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
-    """Return a bound on the stiffness of the shear part over that at rest; write what it is of.
+def _write_stiffness(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> None:
+    """Write a bound on the stiffness of the shear part over that at rest, and what it is of.
 
     A node that moves by u changes F by u times grad N. The second derivative of J by that is 0, and
     that of the energy is mu (g |dF|^2 + 2 g' ((F - cof F) : dF)^2).
@@ -206,7 +200,7 @@ def _stiffness_of_shear(solid: Solid, block: int, x: Vec3, y: Vec3, z: Vec3) -> 
     place = width_of(solid.shape) * (1 + block)
     store_block(solid.stiffening, place, g)
     store_block(solid.stiffening_slope, place, slope)
-    return g + (slope + slope) * squared
+    store_block(solid.stiffness, place, g + (slope + slope) * squared)
 
 
 @inlined

@@ -19,7 +19,6 @@ from tissue.elasticity.neo_hookean import (
     displacement_gradients,
     displacements,
     has_averaged_volumes,
-    keeps_gradients,
     pressures,
 )
 from tissue.integrators.runge_kutta import (
@@ -107,7 +106,6 @@ class Threads:
         if has_averaged_volumes(solid):
             self._share(body.n_nodes, pressures, solid, solid.every)
         self._share(blocks, corner_forces, solid, solid.every)
-        solid.has_gradients = int(keeps_gradients(solid))
 
     def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:
         """Run `loop(*arguments, begin, end)` over 0 to `n`, a part of it on each thread."""
