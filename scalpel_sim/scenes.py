@@ -81,8 +81,10 @@ def check_relaxation(name: str, threads: int) -> None:
     """
     if name not in RELAXATIONS:
         raise unknown("relaxation", name, RELAXATIONS)
-    if threads != 1 and name != "global":
-        raise UsageError(f"--threads {threads} is for --relaxation global; {name} runs on one")
+    if threads != 1 and name == "hierarchical":
+        raise UsageError(
+            f"--threads {threads} is for --relaxation global or verlet; {name} runs on one"
+        )
     cores = os.cpu_count() or 1
     if not 1 <= threads <= cores:
         raise UsageError(
@@ -134,7 +136,7 @@ class Scene:
     contact: str = "impulses"
     """How the body is kept from passing through itself: `impulses`, or `penalty`."""
     threads: int = 1
-    """Threads that share a global relaxation."""
+    """Threads that share the loops over the body, with the relaxation global or verlet."""
     stretch: float = 0.05
     """How far opposite held sides are pulled apart before the run, as a fraction of their distance.
     Living tissue is under tension: a slit opens."""

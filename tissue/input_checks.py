@@ -256,10 +256,10 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
             "instants, so that the energy of the whole is not known. Omit the audit, or use one of "
             "these"
         )
-    if solver.threads > 1 and isinstance(options, Verlet):
+    if solver.threads > 1 and not isinstance(options, Global | Verlet):
         raise ValueError(
-            f"threads is {solver.threads}; relaxation='verlet' runs on one. Use threads=1, or "
-            "relaxation='global'"
+            f"threads is {solver.threads}; relaxation='hierarchical' runs on one. Use threads=1, "
+            "or relaxation='global' or 'verlet'"
         )
     if solver.precision not in PRECISIONS:
         raise ValueError(

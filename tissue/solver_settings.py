@@ -43,9 +43,9 @@ class SolverSettings:
     motion after each substep; or `penalty`, springs between contacts that are found once in a time
     step, for bodies of many cuts, with the relaxation `global` or `verlet`."""
     threads: int = 1
-    """How many threads share the loops over the body. The result is the same to the last bit; more
-    than one pays from about 30,000 tetrahedra on, and only where no other program needs the
-    cores."""
+    """How many threads share the loops over the body. The result is the same to the last bit;
+    with the relaxation `global` or `verlet`. More than one pays only where no other program needs
+    the cores: the others look for work for 1 ms at a time before they sleep."""
     audit: bool = False
     """Whether to keep an account of the energy (`StepResult.energies`), for the relaxations
     `global` and `verlet`."""

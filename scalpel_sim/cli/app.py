@@ -107,8 +107,7 @@ def _view(
     """Run at real-time speed, and show the cut live in a browser.
 
     On a terminal it waits for Enter, so that you can open the page first. Afterwards the page stays
-    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another or
-    several --threads.
+    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another.
 
     For example:
 

@@ -133,7 +133,8 @@ class SolverOptions:
     """How the body is kept from passing through itself: impulses, which correct its motion in each
     substep [default]; or penalty, springs found once a frame: for bodies of many cuts."""
     threads: int | None = None
-    "Threads that share a global relaxation; pays from about 30,000 tetrahedra on [default: 1]."
+    """Threads that share the loops over the body, to the same bits, with the relaxation global or
+    verlet; give it no more than there are idle cores [default: 1]."""
     snap: float | None = None
     """Where the blade passes nearer to a node than this share of the node's size, the cut goes
     through the node: 0 follows the blade exactly, 1 keeps elements large [default: 0.3]."""

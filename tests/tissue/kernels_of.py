@@ -10,6 +10,7 @@ from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
 from tissue.contact.penalty.contact_forces import new_penalty_forces
 from tissue.contact.self_contact import SelfContact
+from tissue.core.thread_team import new_team
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
@@ -24,11 +25,12 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
-from tissue.integrators.damping import Damping, damp
+from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
 from tissue.integrators.stages import Stages, new_stages
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.substeps import damp
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.star import LARGEST_STAR, no_visits
@@ -138,6 +140,7 @@ class Network(NamedTuple):
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
+            team=new_team(),
         )
 
     def forces(self) -> FloatArray:
@@ -179,7 +182,7 @@ class Network(NamedTuple):
         contact = SelfContact(self.body, 1.0, 0.0, None).arrays
         assert take_steps(context, contact, NOWHERE, n * h, 0.0, 1.0, 0, n) == n
         if not is_running:
-            damp(damping, self.body, context.elastic, self.stages, 0.0)
+            damp(context, 0.0)
         return damping
 
     def advance(self, h: float, n: int = 1) -> None:

@@ -50,23 +50,29 @@ class Damping(Arrays):
 
 
 @kernel
-def damp(damping: Damping, body: Body, elastic: Elastic, stages: Stages, h: float) -> None:
-    """Let half of the damping of the last steps act, and half of that of the steps to come.
+def damping_changes(
+    damping: Damping,
+    body: Body,
+    elastic: Elastic,
+    stages: Stages,
+    seconds: float,
+    begin: int,
+    end: int,
+) -> None:
+    """Find how damping changes the velocities of the nodes from `begin` to `end`.
 
     Args:
-        damping: What is owed and what is dissipated are written.
-        body: Velocities are written.
+        damping: How strong it is.
+        body: Masses, positions and velocities.
         elastic: The dampers.
-        stages: Scratch.
-        h: Length of the step to come, or of the two steps [s].
+        stages: The changes are written.
+        seconds: How long damping acts [s].
+        begin: First node.
+        end: End of the nodes.
     """
-    seconds = damping.owed + 0.5 * h
-    damping.owed = 0.5 * h
     time, drag = damping.retardation_time, damping.drag
-    if time == 0.0 and drag == 0.0:
-        return
     x, v = body.positions, body.velocities
-    for i in range(body.n_nodes):
+    for i in range(begin, end):
         change = point_of(0.0, 0.0, 0.0)
         if not body.fixed[i]:
             change = times(-drag, point(v, i))
@@ -74,6 +80,12 @@ def damp(damping: Damping, body: Body, elastic: Elastic, stages: Stages, h: floa
                 force = viscous_force(elastic, i, x, v, time)
                 change = change + times(1.0 / body.masses[i], force)
         store_point(stages.change, i, times(seconds, change))
+
+
+@kernel
+def change_velocities(damping: Damping, body: Body, stages: Stages) -> None:
+    """Change all velocities as `damping_changes` found, and count what is dissipated."""
+    v = body.velocities
     dissipated = 0.0
     for i in range(body.n_nodes):
         before = vec3(v, i)

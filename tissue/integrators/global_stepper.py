@@ -68,7 +68,7 @@ class GlobalStepper:
 
     Args:
         method: How they are moved.
-        threads: How many threads share the loops over the body; for the Runge-Kutta method.
+        threads: How many threads share the loops over the body.
     """
 
     moved = None
@@ -109,8 +109,7 @@ class GlobalStepper:
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
         if self._threads is not None:
-            self._threads.take_steps(system, increment, n)
-            return
+            self._threads.join(system.context)
         contact, done = system.contact, 0
         if not isinstance(contact, SelfContact):
             self.method.take_steps_with_forces(system.context, *increment, n)

@@ -6,6 +6,7 @@ from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import Edge
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.structs import Arrays
+from tissue.core.thread_team import Team
 from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
@@ -35,6 +36,8 @@ class StepContext(Arrays, two_precisions=True):
     """Scratch of a step, and the forces of the blade."""
     visits: Visits
     """Scratch for searches."""
+    team: Team
+    """The loop that threads share."""
 
 
 class Increment(NamedTuple):

@@ -8,8 +8,9 @@ from tissue.contact.state import ContactState
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
-from tissue.integrators.damping import damp
+from tissue.integrators.damping import change_velocities
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
+from tissue.integrators.shared_loops import DAMPING_CHANGES, run_loop
 from tissue.integrators.stage_damping import (
     begin_damped_step,
     counts_stage_damping,
@@ -151,8 +152,23 @@ def damp_if_due(context: StepContext, i: int, n: int, h: float) -> None:
     """
     interval = context.damping.interval
     if i % interval == 0:
-        seconds = min(interval, n - i) * h
-        damp(context.damping, context.body, context.elastic, context.stages, seconds)
+        damp(context, min(interval, n - i) * h)
+
+
+@kernel
+def damp(context: StepContext, h: float) -> None:
+    """Let half of the damping of the last steps act, and half of that of the steps to come.
+
+    Args:
+        context: What takes part.
+        h: Length of the step to come, or of the two steps [s].
+    """
+    damping = context.damping
+    seconds = damping.owed + 0.5 * h
+    damping.owed = 0.5 * h
+    if damping.retardation_time > 0.0 or damping.drag > 0.0:
+        run_loop(context, DAMPING_CHANGES, seconds)
+        change_velocities(damping, context.body, context.stages)
 
 
 @kernel

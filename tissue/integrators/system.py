@@ -10,6 +10,7 @@ from tissue.blade_shape import BladeShape
 from tissue.contact.contact import Contact
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
+from tissue.core.thread_team import new_team
 from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
@@ -97,6 +98,7 @@ class System:
                 contact_loss=self.contact_loss,
                 stages=self.stages,
                 visits=self.visits,
+                team=new_team(),
             )
         return context
 

@@ -1,43 +1,30 @@
-"""Runge-Kutta steps whose loops over the body are shared by several threads.
+"""Threads that take part in the loops of a body's steps (`tissue.integrators.shared_loops`).
 
-Each node and each tetrahedron is written by one thread, and sums are gathered in the order of rows:
-the bits are those of one thread. Between loops the threads wait for each other, which costs 30 to
-80 us a loop. Two threads measured: 60,000 tetrahedra step 1.35 (springs) to 1.8 times as fast,
-20,000 at 0.9 of the speed of one.
+The bits are those of one thread, and the thread that steps the body never waits for another to
+begin (`tissue.core.thread_team`). The others look for loops, and sleep where none comes for longer
+than a time step.
 """
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+import threading
+import weakref
+from queue import SimpleQueue
 
-from tissue.contact.self_contact import SelfContact
-from tissue.core.array_types import FloatArray
-from tissue.elasticity.finite_elements import n_blocks
-from tissue.elasticity.internal_forces import Elastic
-from tissue.elasticity.neo_hookean import (
-    corner_forces,
-    displacement_gradients,
-    displacements,
-    has_averaged_volumes,
-    pressures,
-)
-from tissue.integrators.runge_kutta import (
-    apply_outer_forces,
-    first_stage,
-    fourth_stage,
-    second_stage,
-    third_stage,
-)
-from tissue.integrators.stage_damping import (
-    begin_damped_step,
-    counts_stage_damping,
-    end_damped_step,
-)
-from tissue.integrators.step_context import Increment, StepContext
-from tissue.integrators.step_end import end_step
-from tissue.integrators.substeps import damp_if_due, end_substep
-from tissue.integrators.system import System
-from tissue.mesh.body import Body
+from tissue.core.jit import is_compiling
+from tissue.integrators.shared_loops import take_part
+from tissue.integrators.step_context import StepContext
+
+LONGEST_SPIN = 20_000
+"""Times that a thread looks for a loop before it sleeps: about 1 ms at some 50 ns. To wake it takes
+50 to 90 us of a time step, so that it should not sleep between two steps of 1 ms. It does not leave
+its core to others in between: where they are busy it came too late to nearly all loops then."""
+
+MOST_SKIPPED = 63
+"""Calls at most for which a thread is left asleep after it came too late to run anything, as it
+does where the cores are busy: one call after the first time, then 3, 7 and so on. To wake it for
+nothing made steps longer by up to a third."""
+
+_LONGEST_END = 1.0
+"""How long to wait for a thread to end [s], which takes it `LONGEST_SPIN` where it runs."""
 
 
 class Threads:
@@ -48,71 +35,60 @@ class Threads:
     """
 
     def __init__(self, n: int) -> None:
-        self._n = n
-        self._pool = ThreadPoolExecutor(n - 1, thread_name_prefix="tissue")
+        self._workers = [_Worker() for _ in range(n - 1)] if is_compiling() else []
+        # Also where Python exits: a thread that ran on would use arrays that are gone.
+        weakref.finalize(self, _end_all, self._workers)
 
-    def take_steps(self, system: System, increment: Increment, n: int) -> None:
-        """Advance the motion by an increment in `n` Runge-Kutta steps, as `runge_kutta_steps`."""
-        share = (increment.end - increment.begin) / n
-        for i in range(n):
-            at = increment.begin + i * share
-            seconds, when = share * increment.dt, at + share
-            system.contact.start_substep(system.body)
-            context = system.context
-            damp_if_due(context, i, n, seconds)
-            is_counted = counts_stage_damping(context)
-            before = begin_damped_step(context) if is_counted else 0.0
-            self._step(context, increment, at, share)
-            if is_counted:
-                end_damped_step(context, before, seconds)
-            self._end(system, increment, seconds, when)
+    def join(self, context: StepContext) -> None:
+        """Let all threads take part in the loops of this context from now on."""
+        context.team.is_shared = 1
+        for worker in self._workers:
+            worker.wake(context)
 
-    def _end(self, system: System, increment: Increment, seconds: float, when: float) -> None:
-        """Resolve contact, and let the blade slip."""
-        contact, edge = system.contact, increment.edge
-        if not isinstance(contact, SelfContact):
-            end_step(system, increment, seconds, when)
+
+class _Worker:
+    """A thread that takes part while another steps a body. It begins when it is woken first."""
+
+    def __init__(self) -> None:
+        self._contexts: SimpleQueue[StepContext | None] = SimpleQueue()
+        self._thread: threading.Thread | None = None
+        self._is_asleep = True
+        self._skipped = self._to_skip = 0
+
+    def wake(self, context: StepContext) -> None:
+        """Let the thread look for loops of this context, unless it is still looking for others."""
+        if not self._is_asleep:
             return
-        while not end_substep(system.context, contact.arrays, edge, seconds, when):
-            contact.make_room()
-
-    def _step(self, context: StepContext, increment: Increment, at: float, share: float) -> None:
-        """Take one step of Nystroem's form, as `runge_kutta_nystroem`."""
-        body, elastic, stages = context.body, context.elastic, context.stages
-        x2, x4 = stages.positions, stages.positions_4
-        n, h = body.n_nodes, share * increment.dt
-        half, end = at + 0.5 * share, at + share
-        edge, dt, v = increment.edge, increment.dt, stages.velocities
-        apply_outer_forces(context, edge, body.positions, body.velocities, at, share / 6.0, dt)
-        self._deform(body, elastic, body.positions)
-        self._share(n, first_stage, context, h)
-        apply_outer_forces(context, edge, x2, v, half, share * 2.0 / 3.0, dt)
-        self._deform(body, elastic, x2)
-        self._share(n, second_stage, context, h)
-        if context.surroundings.retardation_time > 0.0:
-            self._share(n, third_stage, context, h)
-        apply_outer_forces(context, edge, x4, v, end, share / 6.0, dt)
-        self._deform(body, elastic, x4)
-        self._share(n, fourth_stage, context, h)
-
-    def _deform(self, body: Body, elastic: Elastic, positions: FloatArray) -> None:
-        """Evaluate all tetrahedra (see `tissue.elasticity.internal_forces.deform`)."""
-        if not elastic.has_tetrahedra:
+        if self._to_skip > 0:
+            self._to_skip -= 1
             return
-        solid = elastic.solid
-        blocks = n_blocks(solid, body.n_tetrahedra)
-        self._share(body.n_nodes, displacements, solid, body, positions, solid.every)
-        self._share(blocks, displacement_gradients, solid, solid.every)
-        if has_averaged_volumes(solid):
-            self._share(body.n_nodes, pressures, solid, solid.every)
-        self._share(blocks, corner_forces, solid, solid.every)
+        if self._thread is None:
+            take_part(context, 0)  # compiles it here, not beside what is compiled next
+            self._thread = threading.Thread(target=self._work, name="tissue", daemon=True)
+            self._thread.start()
+        self._is_asleep = False
+        self._contexts.put(context)
 
-    def _share(self, n: int, loop: Callable[..., None], *arguments: Any) -> None:
-        """Run `loop(*arguments, begin, end)` over 0 to `n`, a part of it on each thread."""
-        bounds = [n * i // self._n for i in range(self._n + 1)]
-        others = [
-            self._pool.submit(loop, *arguments, bounds[i], bounds[i + 1]) for i in range(1, self._n)
-        ]
-        loop(*arguments, bounds[0], bounds[1])
-        for other in others:
-            other.result()
+    def end(self) -> None:
+        """End the thread, once it is out of loops."""
+        thread = self._thread
+        if thread is not None:
+            self._contexts.put(None)
+            if thread is not threading.current_thread():
+                thread.join(_LONGEST_END)
+
+    def _work(self) -> None:
+        while True:
+            context = self._contexts.get()
+            if context is None:
+                return
+            has_run = take_part(context, LONGEST_SPIN) > 0
+            self._skipped = 0 if has_run else min(2 * self._skipped + 1, MOST_SKIPPED)
+            self._to_skip = self._skipped
+            del context  # its arrays may be replaced while this thread sleeps
+            self._is_asleep = True
+
+
+def _end_all(workers: list[_Worker]) -> None:
+    for worker in workers:
+        worker.end()

@@ -10,9 +10,14 @@ between the steps (`tissue.integrators.damping`).
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
-from tissue.core.simd import point, store_point, times
-from tissue.elasticity.internal_forces import deform
-from tissue.integrators.runge_kutta import acceleration, apply_outer_forces
+from tissue.integrators.runge_kutta import apply_outer_forces
+from tissue.integrators.shared_loops import (
+    DISPLACEMENTS,
+    DRIFTING,
+    KICKING,
+    deform_shared,
+    run_loop,
+)
 from tissue.integrators.step_context import StepContext
 
 
@@ -28,13 +33,10 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
         share: Length of the step as a fraction of the time step.
     """
     body, h = context.body, share * dt
-    x, v = body.positions, body.velocities
-    for i in range(body.n_nodes):
-        store_point(x, i, point(x, i) + times(0.5 * h, point(v, i)))
-    apply_outer_forces(context, edge, x, v, at + 0.5 * share, share, dt)
-    deform(context.elastic, body, x)
-    for i in range(body.n_nodes):
-        store_point(v, i, point(v, i) + times(h, acceleration(context, i, x, v)))
+    run_loop(context, DRIFTING, 0.5 * h)
+    at_middle = at + 0.5 * share
+    apply_outer_forces(context, edge, body.positions, body.velocities, at_middle, share, dt)
+    deform_shared(context, DISPLACEMENTS)
+    run_loop(context, KICKING, h)
     # Only now: until here springs saw all nodes at the middle of the step.
-    for i in range(body.n_nodes):
-        store_point(x, i, point(x, i) + times(0.5 * h, point(v, i)))
+    run_loop(context, DRIFTING, 0.5 * h)

@@ -126,9 +126,9 @@ WRONG_USE = {
         ["run", "slab", "--threads", "0"],
         "--threads is 0; it must be from 1",
     ),
-    "verlet on two threads": (
-        ["run", "slab", "--relaxation", "verlet", "--threads", "2"],
-        "--threads 2 is for --relaxation global; verlet runs on one",
+    "the hierarchy on two threads": (
+        ["run", "slab", "--relaxation", "hierarchical", "--threads", "2"],
+        "--threads 2 is for --relaxation global or verlet; hierarchical runs on one",
     ),
     "a negative mass scaling": (
         ["run", "slab", "--mass-scaling", "-1"],

@@ -32,11 +32,11 @@ def test_mass_scaling_of_zero_is_none_and_without_the_option_it_is_the_default(a
 
 @pytest.mark.parametrize(
     ("asked", "expected"),
-    [({}, "verlet"), ({"relaxation": "hierarchical"}, "hierarchical"), ({"threads": 2}, "global")],
+    [({}, "verlet"), ({"relaxation": "hierarchical"}, "hierarchical"), ({"threads": 2}, "verlet")],
     ids=str,
 )
 def test_a_command_may_have_another_relaxation_where_none_is_asked_for(tmp_path, asked, expected):
-    """As `view` has; several threads are for the global one."""
+    """As `view` has, on any number of threads."""
     run = prepared_run("grid2", options(tmp_path, **asked), relaxation="verlet")
     with run as prepared:
         assert prepared.settings["relaxation"] == expected

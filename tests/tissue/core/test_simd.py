@@ -21,7 +21,7 @@ from tissue.core.simd import (
     times,
 )
 from tissue.integrators.hierarchical.kernels import new_trails
-from tissue.integrators.runge_kutta import Stages
+from tissue.integrators.stages import Stages
 from tissue.mesh.body import grown
 
 pytestmark = pytest.mark.kernel
