@@ -33,7 +33,7 @@ class SolverSettings:
     mass_scaling: float | None = MASS_SCALING_FREQUENCY
     """Angular frequency [1/s] above which nodes get mass where a cut has left slivers, so that
     these do not set the time step; None: no mass is added. The added mass has no weight, and
-    `CutReport.now.added_mass` tells how much it is. For the law `neo_hookean`; where the elements
+    `CutReport.now.added_mass` tells how much it is. For the laws of tetrahedra; where the elements
     of the uncut body are faster, their frequency is the limit."""
     precision: str = "double"
     """Precision in which the forces of tetrahedra are computed: `double`, or `single`, which takes
