@@ -34,7 +34,6 @@ from .shapes.block import block as block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
-from .tissue import TissueError as TissueError
 from .types import BladeContacts as BladeContacts
 from .types import BladeSegment as BladeSegment
 from .types import BladeSweep as BladeSweep
@@ -48,6 +47,7 @@ from .types import StageTimes as StageTimes
 from .types import StepResult as StepResult
 from .types import Surface as Surface
 from .types import TetrahedralMesh as TetrahedralMesh
+from .types import TissueError as TissueError
 from .types import Wrench as Wrench
 
 __all__ = [

@@ -10,8 +10,8 @@ import numpy as np
 from tissue.boundary_conditions import fixed_nodes
 from tissue.core.array_types import FloatArray
 from tissue.shapes.block import block
-from tissue.tissue import Tissue, TissueError
-from tissue.types import BladeSegment, BladeSweep, StepResult, TetrahedralMesh
+from tissue.tissue import Tissue
+from tissue.types import BladeSegment, BladeSweep, StepResult, TetrahedralMesh, TissueError
 
 _DT = 1e-3
 """Length of a frame [s]: 1 kHz, the rate of a haptic device."""

@@ -52,14 +52,11 @@ from tissue.types import (
     StageTimes,
     StepResult,
     TetrahedralMesh,
+    TissueError,
 )
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
 """The edge of no blade."""
-
-
-class TissueError(RuntimeError):
-    """The tissue cannot go on."""
 
 
 class Tissue(BodyQueries):

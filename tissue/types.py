@@ -18,6 +18,10 @@ CUT_COLOUR = (212, 68, 60, 255)
 """Red, green, blue and opacity of skin and of cut faces in exported meshes, 0 to 255 (sRGB)."""
 
 
+class TissueError(RuntimeError):
+    """The tissue cannot go on: its motion became unstable. What it was before can still be read."""
+
+
 class BladeSegment(NamedTuple):
     """The cutting edge at one instant: the paper's thin line, and where it faces."""
 

@@ -18,7 +18,6 @@ from tissue.elasticity.frequency_refinement import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
-    LEAST_MASS,
     LIMIT_STEP,
     scale_masses,
 )
@@ -43,6 +42,8 @@ class Elasticity:
         mass_scaling: Angular frequency [1/s] above which nodes get mass where tetrahedra carry the
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
             cut makes faster gets mass.
+        least_mass: With mass scaling, the mass that every node has at least, as a share of the mean
+            at first; or that of the lightest node of the uncut body, if that is less.
         is_single: Whether forces of tetrahedra are computed in single precision.
     """
 
@@ -53,6 +54,7 @@ class Elasticity:
         visits: Visits,
         *,
         mass_scaling: float | None = None,
+        least_mass: float = 0.0,
         is_single: bool = False,
     ) -> None:
         self._material = material
@@ -85,7 +87,7 @@ class Elasticity:
             self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
             masses = body.masses[:n_nodes]
             self._mass = float(masses.sum())
-            self._least_mass = min(LEAST_MASS * self._mass / n_nodes, float(masses.min()))
+            self._least_mass = min(least_mass * self._mass / n_nodes, float(masses.min()))
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int

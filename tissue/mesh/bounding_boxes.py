@@ -7,7 +7,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.vec3 import Vec3, store, vec3
+from tissue.core.vec3 import Vec3, dot, store, vec3
 from tissue.geometry.aabb import Aabb, box_between, empty_box, with_point
 from tissue.mesh.body import Body
 from tissue.types import Chunks
@@ -102,7 +102,7 @@ def chunks_of(body: Body, chunks: ChunkNodes) -> Chunks:
 @kernel
 def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
     """Write the lowest and highest corner of each chunk; return the largest speed [m/s]."""
-    x, v = body.positions, body.velocities
+    x = body.positions
     for chunk in range(len(boxes)):
         first = chunks.first[chunk]
         for axis in range(3):
@@ -111,8 +111,14 @@ def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
                 here = x[chunks.nodes[i], axis]
                 low, high = min(low, here), max(high, here)
             boxes[chunk, 0, axis], boxes[chunk, 1, axis] = low, high
-    largest = 0.0
+    return largest_speed(body)
+
+
+@kernel
+def largest_speed(body: Body) -> float:
+    """Return the speed of the fastest node [m/s]."""
+    largest, v = 0.0, body.velocities
     for node in range(body.n_nodes):
-        largest = max(largest, v[node, 0] ** 2 + v[node, 1] ** 2 + v[node, 2] ** 2)
-    speed: float = np.sqrt(largest)
-    return speed
+        speed = vec3(v, node)
+        largest = max(largest, dot(speed, speed))
+    return math.sqrt(largest)
