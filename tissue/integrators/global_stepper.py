@@ -34,13 +34,14 @@ STEPS_BETWEEN_STRAIN_BOUNDS = 2
 """Steps between two bounds on the frequencies of the strained body. A lip that snaps back, or is
 pinched, is as much shorter within a frame of eight steps as an element is long."""
 
-LONGEST_MOTION = 0.25
+LONGEST_MOTION = 0.5
 """How far the fastest node moves in a step, as a share of the node size, at most. A bound on
-frequencies holds where the body is; what moves farther may be stiffer before the next bound."""
+frequencies holds where the body is; what moves farther may be stiffer before the next bound. With
+less, strokes take more steps; without it, a body far from rest can become unstable."""
 
 MOST_STEPS = 10_000.0
 """Steps of an increment at most, per step that the body at rest would take. In 160 blocks that
-recovered from random positions of their nodes it was 290. Without a limit, motion that has become
+recovered from random positions of their nodes it was 150. Without a limit, motion that has become
 unstable takes more and more steps and never ends."""
 
 _ROUNDING = 1e-9
