@@ -6,12 +6,22 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
-from tissue import FloatArray, SolverSettings, Tissue, fixed_nodes, toughness_law_of
+from tissue import FloatArray, Material, SolverSettings, Tissue, fixed_nodes, toughness_law_of
 
 _log = logging.getLogger("scalpel_sim")
 
 LONG_DRAG = 0.1
 """How far a blade may drag the tissue without a warning, as a share of the body's median extent."""
+
+MOST_INVERTED = 0.0
+"""Share of tetrahedra that may be inside out after settling without a warning."""
+
+LEAST_VOLUME = 0.9
+"""Volume after settling over that at rest below which there is a warning. Soft tissue hardly
+changes its volume; held at its sides the softest scene keeps 0.99."""
+
+_HARDLY_COMPRESSIBLE = 0.45
+"""Poisson's ratio that most presets have [1]."""
 
 OPPOSITE_SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
 """Pairs of sides that can be pulled apart, one pair per axis."""
@@ -47,7 +57,29 @@ def make_tissue(scene: Scene) -> Tissue:
     )
     if fixed.any():
         tissue.settle()
+        _warn_of_collapse(tissue, scene.material)
     return tissue
+
+
+def _warn_of_collapse(tissue: Tissue, material: Material) -> None:
+    """Say where a body that has settled has folded over, or has lost volume."""
+    inverted = tissue.cut_report().now.inverted
+    pieces = tissue.pieces()
+    volume = sum(piece.volume for piece in pieces) / sum(piece.rest_volume for piece in pieces)
+    if inverted <= MOST_INVERTED and volume >= LEAST_VOLUME:
+        return
+    ways = ["--law neo_hookean"] if material.law == "springs" else []
+    if material.poisson_ratio < _HARDLY_COMPRESSIBLE:
+        ways.append(f"--poisson-ratio {_HARDLY_COMPRESSIBLE}")
+    ways += ["a larger --young", "less --stretch or --gravity"]
+    _log.warning(
+        "settled under gravity, %.2g %% of the tetrahedra are inside out, and the body has %.3g %% "
+        "of its volume: forces on a blade there mean little. What helps: %s, or a mesh without "
+        "flat tetrahedra",
+        1e2 * inverted,
+        1e2 * volume,
+        ", ".join(ways),
+    )
 
 
 def check_scene(scene: Scene) -> None:

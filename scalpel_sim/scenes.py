@@ -48,6 +48,10 @@ PHANTOM = Material(
 tissue along before the tissue parts. It must be small against the body, or the blade drags the
 body along instead of cutting it."""
 
+GEL = replace(PHANTOM, law="neo_hookean", poisson_ratio=0.45)
+"""The same gel as tetrahedra that hardly change their volume: what a mesh from a file is made of,
+unless another material is asked for. Springs turn flat elements of such meshes inside out."""
+
 PARENCHYMA = replace(MATERIALS["liver"].material, toughness=10.0)
 """Liver in all but its toughness, which is well below the 164 J/m2 of liver with its vessels, so
 that toughness / young_modulus is 2 mm here too, and one stroke cuts through. With the toughness of
@@ -307,7 +311,7 @@ def mesh_scene(path: Path, scale: float = 1.0) -> Scene:
     from tissue import read_mesh  # loads numba
 
     mesh = read_mesh(path, scale)
-    return Scene(path.stem, f"the mesh {path.name}", lambda: mesh)
+    return Scene(path.stem, f"the mesh {path.name}", lambda: mesh, material=GEL)
 
 
 def scene_of(link: TissueLink) -> Scene:

@@ -61,6 +61,8 @@ class MeshMeasures(NamedTuple):
     """Longest stable step of the body alone, without a blade [s]."""
     added_mass: float
     """Mass that mass scaling has added, as a share of the body's own."""
+    inverted: float
+    """Tetrahedra that are inside out, as a share of all: forces around them mean little."""
 
 
 class CutReport(NamedTuple):

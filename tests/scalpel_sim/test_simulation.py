@@ -12,8 +12,8 @@ from scalpel_sim.output.recording import COLUMNS, read_forces
 from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, Outputs
 from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
-from scalpel_sim.scenes import DEFAULT_SCENE, changed, scene_called, scene_of
-from tissue import block
+from scalpel_sim.scenes import DEFAULT_SCENE, changed, mesh_scene, scene_called, scene_of
+from tissue import block, write_vtu
 
 GRID2 = SCENES["grid2"]
 UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
@@ -203,6 +203,25 @@ def test_a_run_that_ends_by_a_bug_keeps_its_files_too(tmp_path):
     with pytest.raises(RunError, match=r"ZeroDivisionError.*fault of the program"):
         perform_in(tmp_path, simulation)
     assert {path.name for path in tmp_path.iterdir()} == UNAUDITED
+
+
+def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(caplog):
+    make_tissue(GRID2)
+    assert "inside out" not in caplog.text
+    make_tissue(changed(GRID2, young_modulus=200.0, gravity=50.0))
+    assert re.search(
+        r"[\d.]+ % of the tetrahedra are inside out, and the body has [\d.]+ % of its volume.*"
+        r"--law neo_hookean, --poisson-ratio 0.45, a larger --young",
+        caplog.text,
+    )
+
+
+def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_path):
+    path = tmp_path / "body.vtu"
+    write_vtu(path, make_tissue(GRID2).snapshot())
+    scene = mesh_scene(path)
+    assert (scene.material.law, scene.material.poisson_ratio) == ("neo_hookean", 0.45)
+    assert changed(scene, law="springs").material.law == "springs"
 
 
 def test_a_body_that_makes_a_run_slow_gets_a_warning(tmp_path, caplog):

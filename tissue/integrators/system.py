@@ -23,7 +23,7 @@ from tissue.integrators.step_context import StepContext
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import Change
-from tissue.mesh.cut_error import lowest_altitude
+from tissue.mesh.cut_error import inverted_share, lowest_altitude
 from tissue.mesh.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 
 
@@ -138,6 +138,7 @@ class System:
             frequency=math.sqrt(squared),
             time_step=stable_step(self.elasticity, squared, self.surroundings),
             added_mass=added_mass_share(self.body),
+            inverted=inverted_share(self.body),
         )
 
 

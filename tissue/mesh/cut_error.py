@@ -1,4 +1,4 @@
-"""How far cut faces lie from the blade's path, and the smallest altitude of a tetrahedron."""
+"""How far cut faces lie from the blade's path, and what state the tetrahedra are in."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 from tissue.core.array_types import BoolArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import vec3
-from tissue.geometry.tetrahedron import smallest_altitude
+from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.body import CUT, Body
 
 
@@ -63,3 +63,12 @@ def lowest_altitude(body: Body) -> float:
             ),
         )
     return lowest
+
+
+@kernel
+def inverted_share(body: Body) -> float:
+    """Return how many tetrahedra are inside out, as a share of all."""
+    n = 0
+    for t in range(body.n_tetrahedra):
+        n += tetrahedron_volume(body.positions, body.tetrahedra, t) <= 0.0
+    return n / body.n_tetrahedra
