@@ -95,7 +95,7 @@ def check_scene(scene: Scene) -> None:
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)
     drag = highest_toughness(scene) / scene.material.young_modulus
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
-    if drag > LONG_DRAG * extent:
+    if drag > LONG_DRAG * extent and not scene.material.stiffens:
         _log.warning(
             "the blade will drag the tissue along by some %.2g mm (toughness / Young's modulus) "
             "before the tissue parts, and the body measures %.3g mm: the cut may stay unfinished. "

@@ -47,6 +47,13 @@ DEPTH_GROWTH = 1.25
 MIN_SPREAD = 1e-3
 """Spread of nodes across a line, over that along it, from which they count as off the line."""
 
+UNDERSIDE = "underside"
+"""Name of what a body lies on: all of its surface that faces down."""
+
+FACING_DOWN = 0.3
+"""Least downward part of the outward unit normal of a face of the underside: 17 degrees from
+upright. Less, and the sides of a round body would be held as well."""
+
 _ROUNDING = 1e-9
 """Distance from a box or a plane at which nodes are on it, in units of the body's extent."""
 
@@ -56,8 +63,8 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
 
     Args:
         mesh: The body.
-        specification: Sides joined by commas ("left,right"), or the corners of a box in m
-            ("0,0,0:0.01,0.06,0.04"), or "none".
+        specification: Sides joined by commas ("left,right"; "underside": all that faces down), or
+            the corners of a box in m ("0,0,0:0.01,0.06,0.04"), or "none".
 
     Raises:
         ValueError: The text is none of these, or the box holds no node.
@@ -76,14 +83,17 @@ def side_nodes(mesh: TetrahedralMesh, names: Sequence[str]) -> BoolArray:
     left and right are the low and the high end of x, front and back of y, bottom and top of z. A
     flat side is the nodes in its plane, exactly. A round side is the nodes less than `_DEPTH` of
     the body's extent deep, and deeper ones where these would not hold the body: three nodes off a
-    line.
+    line. The underside is the nodes of all faces that face down, whatever their height.
 
     Raises:
         ValueError: A name is not a side.
     """
-    axes = [_side(name) for name in ([names] if isinstance(names, str) else names)]
+    given = [name.strip().lower() for name in ([names] if isinstance(names, str) else names)]
+    axes = [_side(name) for name in given if name != UNDERSIDE]
     triangles = boundary_faces(mesh.tetrahedra)
     mask = np.zeros(len(mesh.positions), dtype=bool)
+    if UNDERSIDE in given:
+        mask[triangles[_faces_down(mesh.positions, triangles)]] = True
     for axis, is_high in axes:
         mask |= _one_side(mesh.positions, triangles, axis, is_high)
     return mask
@@ -158,13 +168,20 @@ def _side(name: str) -> tuple[int, bool]:
     """Return the axis of a side, and whether it is the high end."""
     key = name.strip().lower()
     if key not in SIDES:
-        close = difflib.get_close_matches(key, [*SIDES, "none"], n=1)
+        close = difflib.get_close_matches(key, [*SIDES, UNDERSIDE, "none"], n=1)
         hint = f" Did you mean '{close[0]}'?" if close else ""
         raise ValueError(
-            f"'{name.strip()}' is not a side of the body.{hint} Sides: {', '.join(SIDES)}; "
-            "or a box x0,y0,z0:x1,y1,z1 in m; or none"
+            f"'{name.strip()}' is not a side of the body.{hint} Sides: {', '.join(SIDES)}, "
+            f"{UNDERSIDE}; or a box x0,y0,z0:x1,y1,z1 in m; or none"
         )
     return SIDES[key]
+
+
+def _faces_down(positions: FloatArray, triangles: npt.NDArray[np.int64]) -> BoolArray:
+    """Return which triangles, counter-clockwise seen from outside, face down."""
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    return np.asarray(normals[:, 2] < -FACING_DOWN * np.linalg.norm(normals, axis=1))
 
 
 def _one_side(

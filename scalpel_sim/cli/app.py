@@ -107,7 +107,8 @@ def _view(
     """Run at real-time speed, and show the cut live in a browser.
 
     On a terminal it waits for Enter, so that you can open the page first. Afterwards the page stays
-    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another.
+    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another
+    or the tissue stiffens.
 
     For example:
 

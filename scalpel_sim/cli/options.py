@@ -40,7 +40,8 @@ class BodyOptions:
     scale: float | None = None
     "Metres in one unit of the mesh file: 0.001 for millimetres."
     fix: str | None = None
-    "What is held: sides (left, right, front, back, bottom, top), a box x0,y0,z0:x1,y1,z1, or none."
+    """What is held: sides (left, right, front, back, bottom, top), the underside (all that faces
+    down), a box x0,y0,z0:x1,y1,z1, or none."""
     stretch: float | None = None
     "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
     gravity: float | None = None

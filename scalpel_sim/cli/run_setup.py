@@ -100,8 +100,8 @@ def prepared_run(
         name: The scene; None for the default one.
         options: What the command line asks for.
         audits: Whether an account of the energy is kept where nothing is said of it.
-        relaxation: How the motion is advanced where nothing is said of it; None: as the scene has
-            it.
+        relaxation: How the motion is advanced where nothing is said of it, and the tissue does not
+            stiffen; None: as the scene has it.
 
     Raises:
         UsageError: options that make no sense, or not together.
@@ -131,7 +131,8 @@ def _tissue_here(
     """Make the tissue in this process, after all checks that need none."""
     tissue = options.tissue
     scene = changed(chosen_scene(name, tissue), **_changes_of_scene(options.arm))
-    if relaxation is not None and tissue.solver.relaxation is None:
+    is_free = tissue.solver.relaxation is None and not scene.material.stiffens
+    if relaxation is not None and is_free:
         scene = replace(scene, relaxation=relaxation)
     if audits and tissue.solver.audit is None and can_audit(scene.relaxation):
         scene = replace(scene, audit=True)

@@ -87,7 +87,8 @@ def _speed(summary: Summary) -> str:
         return factor
     settings = summary.settings
     faster = []
-    if settings.get("relaxation") == "global":
+    stiffens = settings.get("material", {}).get("law") in ("exponential", "yeoh")
+    if settings.get("relaxation") == "global" and not stiffens:
         faster.append("--relaxation verlet")
     if settings.get("audit"):
         faster.append("--no-audit")
@@ -156,6 +157,9 @@ def _add_springs(rows: _Rows, springs: dict[str, float]) -> None:
 def _add_cut(rows: _Rows, summary: Summary) -> None:
     """Add the area of the cut, the forces, the collisions and the work."""
     rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
+    paid, cut = summary.cut_area_paid_m2, summary.cut_area_m2
+    if paid is not None and cut > 0.0:
+        rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {paid / cut:.0%} of the cut")
     rows.add("peak force", f"{summary.force_peak_n:.3f} N")
     rows.add("mean force", f"{summary.force_mean_n:.3f} N")
     for pair, frames in summary.touched.items():

@@ -46,6 +46,9 @@ class Summary(NamedTuple):
     """How closely the cut follows the blade, and what it did to the mesh; None where the link was
     lost."""
     cut_area_m2: float
+    cut_area_paid_m2: float | None
+    """The area that the blade paid for: work of cutting over toughness. None without an audit, or
+    where the toughness depends on speed, skin or sharpness."""
     force_peak_n: float
     """Largest force on the blade, after the device's limits."""
     force_mean_n: float
@@ -116,6 +119,7 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
         quality=None if facts.quality is None else quality_figures(facts.quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
+        cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         work_of_blade_j=work,
@@ -127,6 +131,15 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         settings=facts.settings,
         versions=versions(),
     )
+
+
+def _area_paid_for(energies: dict[str, float] | None, material: dict[str, float]) -> float | None:
+    """Return the work of cutting over the toughness [m2]; None where there is no one toughness."""
+    toughness = material.get("toughness", 0.0)
+    others = ("skin_toughness", "toughness_exponent", "work_to_rupture")
+    if energies is None or not toughness or any(material.get(name) for name in others):
+        return None
+    return energies["cutting"] / toughness
 
 
 def _as_numbers(piece: Piece) -> dict[str, Any]:

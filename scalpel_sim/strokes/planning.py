@@ -1,4 +1,4 @@
-"""Strokes that are planned for a body: through its middle, part of the way, or against it."""
+"""Strokes that are planned for a body: through its middle, along its upper side, or against it."""
 
 import logging
 import math
@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from scalpel_sim.errors import unknown
+from scalpel_sim.strokes.incision import plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
 
 STROKES = {
@@ -16,6 +18,7 @@ STROKES = {
     "slanted": "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
     "curved": "a bent sheet across the middle of the body, clean through",
     "stop": "the straight stroke, ended inside the body: a slit",
+    "incision": "the tip goes in from above, is drawn along the body, and is lifted out",
     "press": "the blade pushed against the body, not far enough to cut",
 }
 """The strokes that have a name, and what each does."""
@@ -81,16 +84,6 @@ DEEPEST_PRESS = 0.1
 PRESS_DWELL = 0.5
 """Time for which the blade rests at the end of a press [s]: the tissue comes to rest under it."""
 
-_RAMP = 0.1
-"""Time in which the blade speeds up, and slows down [s]: the arm has inertia."""
-
-SAMPLE = 5e-3
-"""Time between the poses of a planned stroke [s]. 20 of them make a ramp."""
-
-_MOST_SAMPLES = 2000
-"""Largest number of poses between the ramps: that of a stroke of 10 s. On a longer one they are
-farther apart, so that a mesh in millimetres that is read as metres is soon refused for its size."""
-
 _log = logging.getLogger("scalpel_sim")
 
 
@@ -114,7 +107,8 @@ def plan_stroke(
         speed: Speed of the blade between its ramps [m/s].
         material: What the body is made of: how far the blade displaces it, and how deep a press may
             go.
-        depth: Depth of a press [m]. None: half of what would cut.
+        depth: Depth of a press [m], None for half of what would cut; or of an incision, None for
+            8 mm, or a share of a thin body.
 
     Raises:
         UsageError: no stroke has this name.
@@ -123,13 +117,17 @@ def plan_stroke(
     if name not in STROKES:
         raise unknown("stroke", name, STROKES)
     _check_positive("speed", speed, "m/s")
+    if name == "incision":
+        if depth is not None:
+            _check_positive("depth", depth, "m")
+        return plan_incision(mesh, speed=speed, depth=depth)
     edges = mesh_edges(mesh.tetrahedra)
     sheet = _sheet(name, mesh, edges)
     cut = section(mesh.positions, edges, sheet.height(mesh.positions))
     travels, depths = sheet.travel(cut), sheet.depth(cut)
     first, last = float(travels.min()), float(travels.max())
     length = last - first
-    start = first - max(_GAP + GAP_SHARE * length, 0.5 * speed * _RAMP)
+    start = first - max(_GAP + GAP_SHARE * length, 0.5 * speed * SPEED_UP_TIME)
     thickness = float(np.ptp(depths))
     displacement = _displacement(float(np.ptp(mesh.positions[:, 0])), length, thickness, material)
     end = last + max(OVERSHOOT, OVERSHOOT_SHARE * length) + displacement
@@ -267,35 +265,12 @@ def _displacement(width: float, length: float, thickness: float, material: Mater
 def _timed(
     sheet: PlannedSheet, start: float, end: float, speed: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return times [s] and travels [m] along the motion, at an even speed along the sheet's bend.
-
-    The speed rises and falls as half a cosine over `_RAMP`; on a path too short for that it is
-    lower.
-    """
+    """Return times [s] and travels [m], at an even speed along the bend of the sheet."""
     fine = np.linspace(start, end, 1001)  # a bend of 11 % is followed to 1e-6 of its length
     pieces = np.hypot(np.diff(fine), np.diff(sheet.bulge(fine)[0]))
     paths = np.concatenate([[0.0], np.cumsum(pieces)])
-    speed = min(speed, paths[-1] / _RAMP)
-    duration = paths[-1] / speed + _RAMP
-    ramp = np.linspace(0.0, _RAMP, math.ceil(_RAMP / SAMPLE) + 1)
-    n_even = min(math.ceil((duration - 2.0 * _RAMP) / SAMPLE), _MOST_SAMPLES)
-    even = np.linspace(_RAMP, duration - _RAMP, n_even + 1)
-    # Rounded to a nanosecond, so that the ends of two parts are equal.
-    times = np.unique(np.concatenate([ramp, even, duration - ramp]).round(9))
-    duration = float(times[-1])
-    done = np.where(
-        times <= duration / 2.0,
-        _ramped(times, speed),
-        paths[-1] - _ramped(duration - times, speed),
-    )
+    times, done = timed(float(paths[-1]), speed)
     return times, np.interp(done, paths, fine)
-
-
-def _ramped(times: FloatArray, speed: float) -> FloatArray:
-    """Return the distance covered since a start from rest [m]."""
-    ramp = np.minimum(times, _RAMP)
-    gathering = 0.5 * speed * (ramp - _RAMP / math.pi * np.sin(math.pi * ramp / _RAMP))
-    return gathering + speed * (times - ramp)
 
 
 def _distance(stroke: Stroke, mesh: TetrahedralMesh) -> float:

@@ -90,7 +90,9 @@ def test_the_scenes_are_those_of_the_paper_and_an_organ():
     assert (counts["slab"], counts["grid2"], counts["grid7"]) == (576, 48, 2058)
     assert 4500 <= counts["organ"] <= 5500
     assert DEFAULT_SCENE == "organ"
-    with pytest.raises(UsageError, match=r"Did you mean 'grid7'. Known: organ, slab, grid2"):
+    with pytest.raises(
+        UsageError, match=r"Did you mean 'grid7'. Known: organ, incision, slab, grid2"
+    ):
         scene_called("grid77")
 
 
@@ -103,10 +105,14 @@ def test_a_body_that_would_be_dragged_instead_of_cut_gets_a_warning(caplog):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_body_of_a_scene_is_cut_before_it_is_dragged_far(name):
-    """The blade drags tissue along by toughness / stiffness: little against the body."""
+    """The blade drags tissue along by toughness / stiffness: little against the body.
+
+    Tissue that stiffens is dragged much less far; `incision` has a test of its own.
+    """
     scene = SCENES[name]
     drag = scene.material.toughness / scene.material.young_modulus
-    assert drag <= 0.1 * np.ptp(scene.mesh().positions, axis=0).min()
+    far = 0.1 * np.ptp(scene.mesh().positions, axis=0).min()
+    assert drag <= far or scene.material.stiffens
 
 
 def test_a_stretch_moves_held_sides_apart_and_nothing_else():

@@ -34,6 +34,25 @@ def test_a_side_of_the_organ_is_a_cap_of_its_surface_that_prevents_rotation(side
     assert np.linalg.matrix_rank(mesh.positions[nodes] - mesh.positions[nodes][0], tol=1e-3) >= 2
 
 
+def test_the_underside_is_all_of_the_surface_that_faces_down():
+    cells = block((2, 2, 2))
+    lying = fixed_nodes(cells, "underside")
+    assert np.array_equal(lying, cells.positions[:, 2] == 0.0)
+    both = fixed_nodes(cells, "left, Underside")
+    assert np.array_equal(both, lying | (cells.positions[:, 0] == 0.0))
+    arch = cells.tetrahedra[
+        ~(
+            (
+                cells.positions[cells.tetrahedra].mean(axis=1)[:, [0, 2]]
+                < 0.5 * cells.positions.max(axis=0)[[0, 2]]
+            ).all(axis=1)
+        )
+    ]
+    under_arch = fixed_nodes(TetrahedralMesh(cells.positions, arch), "underside")
+    heights = np.unique(cells.positions[under_arch, 2])
+    assert np.allclose(heights, [0.0, 0.5 * cells.positions[:, 2].max()])
+
+
 def test_a_side_that_ends_in_a_point_is_deepened_until_it_has_three_nodes():
     tip = [[1.0, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1]]
     mesh = TetrahedralMesh(0.1 * np.array(tip), np.array([[0, 1, 3, 2]]))

@@ -105,4 +105,10 @@ def checked_relaxation(choice: str | IntegratorOptions, material: Material) -> I
             "Choose law springs with poisson_ratio 0.25, or relaxation verlet, which is fast under "
             "every law"
         )
+    if isinstance(choice, Verlet) and material.stiffens:
+        raise ValueError(
+            f"relaxation verlet gains energy under law {material.law}: beside a blade elements get "
+            "many times as stiff from one step to the next. Choose relaxation global, which does "
+            "not, or law neo_hookean"
+        )
     return choice

@@ -68,7 +68,9 @@ def recorded(n_frames: int) -> Recording:
     return recording
 
 
-def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any) -> Summary:
+def summary_of(
+    recording: Recording, wall_seconds: float = 1.0, material: Any = None, **counters: Any
+) -> Summary:
     return summarise(
         recording,
         RunFacts(
@@ -82,7 +84,7 @@ def summary_of(recording: Recording, wall_seconds: float = 1.0, **counters: Any)
             quality=CUT_REPORT,
             counters=counters,
             touched={},
-            settings={"stroke": "straight"},
+            settings={"stroke": "straight", "material": material or {}},
         ),
     )
 
@@ -288,6 +290,11 @@ def test_the_table_has_a_row_for_each_piece():
             {"relaxation": "global", "audit": True},
             "0.50: slower than real time; try --relaxation verlet, --no-audit",
         ),
+        (
+            0.02,
+            {"relaxation": "global", "audit": True, "material": {"law": "yeoh"}},
+            "0.50: slower than real time; try --no-audit",
+        ),
     ],
 )
 def test_the_table_says_when_a_run_was_slower_than_real_time(wall_seconds, settings, words):
@@ -326,6 +333,22 @@ def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
     print_summary(summary, console)
     assert summary.quality["added_mass"] == 1e-3
     assert re.search("mass added to slivers.* 0.1 %", console.export_text())
+
+
+@pytest.mark.parametrize(
+    ("material", "paid"),
+    [({"toughness": 20.0}, 2e-4), ({"toughness": 20.0, "skin_toughness": 40.0}, None), ({}, None)],
+)
+def test_the_table_tells_which_area_the_blade_paid_for(material, paid):
+    recording = zero_recording()
+    recording.column("cutting_j")[-1] = 4e-3
+    recording.column("cut_area_m2")[-1] = 2.5e-4
+    summary = summary_of(recording, material=material)
+    assert summary.cut_area_paid_m2 == paid
+    console = Console(record=True, width=100)
+    print_summary(summary, console)
+    found = re.search("area paid for.* 200 mm², 80% of the cut", console.export_text())
+    assert (found is not None) == (paid is not None)
 
 
 def test_the_summary_and_the_table_tell_how_many_tetrahedra_are_inside_out():

@@ -29,6 +29,16 @@ def test_an_unknown_choice_is_refused(choice, message):
 
 
 @pytest.mark.parametrize(
+    "stiffening", [{"law": "exponential", "stiffening": 15.0}, {"law": "yeoh", "yeoh_second": 2.0}]
+)
+def test_verlet_is_not_for_tissue_that_stiffens(stiffening):
+    material = Material(poisson_ratio=0.45, **stiffening)
+    with pytest.raises(ValueError, match=r"gains energy under law .* Choose relaxation global"):
+        checked_relaxation("verlet", material)
+    assert checked_relaxation("global", material) == Global()
+
+
+@pytest.mark.parametrize(
     "material", [Material(law="neo_hookean", poisson_ratio=0.4), Material(poisson_ratio=0.4)]
 )
 def test_the_hierarchy_is_for_springs_alone(material):
