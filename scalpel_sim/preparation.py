@@ -1,17 +1,23 @@
 """From a scene to a simulation: the tissue, a stroke through it, and an arm that reaches."""
 
+import logging
 from collections.abc import Iterable
 
 import numpy as np
 
 from bridge import Fixture, InProcessLink, TissueFrame, TissueLink
+from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.placement import place
-from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.scene_body import highest_toughness, make_tissue
 from scalpel_sim.scenes import Scene, read_stroke
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.planning import check_meets, plan_stroke
+from scalpel_sim.strokes.stroke import Stroke
 from tissue import TetrahedralMesh
+
+_log = logging.getLogger("scalpel_sim")
 
 
 def prepare(
@@ -40,7 +46,9 @@ def prepare(
         scene.stroke, mesh, speed=scene.speed, material=link.describe().material
     )
     check_meets(stroke, mesh)
-    placement = place(stroke, link.describe().bounds, scene.arm)
+    needed = _needed(stroke, mesh, scene)
+    placement = place(stroke, link.describe().bounds, scene.arm, force=needed.force)
+    _warn_of_weakness(needed, placement.preset)
     frame = TissueFrame(origin=placement.tissue_origin)
     tissue = link.describe()
     floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
@@ -58,3 +66,26 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
+
+
+def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:
+    """Return what the cut will take; nothing for a press, which is not to cut."""
+    if stroke.name == "press":
+        return ExpectedForce(0.0, 0.0)
+    return expected_force(stroke, mesh, highest_toughness(scene))
+
+
+def _warn_of_weakness(needed: ExpectedForce, preset: str) -> None:
+    """Say before the start that an arm cannot do what it is asked to."""
+    most = ARMS[preset].force
+    if needed.force > most:
+        _log.warning(
+            "the cut will take some %.2g N (%.3g J/m2 over %.2g mm of edge), and the arm '%s' "
+            "renders %.2g N at most: forces above are cut off, and the hand may not lead the blade "
+            "through. A smaller --toughness or a shallower stroke takes less",
+            needed.force,
+            needed.force / needed.width,
+            1e3 * needed.width,
+            preset,
+            most,
+        )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from scalpel_sim.errors import unknown
+from scalpel_sim.strokes.expected_force import is_inside
 from scalpel_sim.strokes.incision import plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
@@ -285,7 +286,7 @@ def _distance(stroke: Stroke, mesh: TetrahedralMesh) -> float:
         return fcl.CollisionObject(model, fcl.Transform())
 
     poses = stroke.poses(201)
-    if _is_inside(poses[0].tip, mesh):
+    if is_inside(poses[0].tip, mesh):
         return 0.0
     swept = np.array([end for pose in poses for end in (pose.heel, pose.tip)])
     heels = 2 * np.arange(len(poses) - 1)[:, None]
@@ -293,16 +294,6 @@ def _distance(stroke: Stroke, mesh: TetrahedralMesh) -> float:
     skin = surface(mesh.positions, boundary_faces(mesh.tetrahedra))
     distance: float = fcl.distance(skin, surface(swept, strips))
     return max(0.0, distance)
-
-
-def _is_inside(point: FloatArray, mesh: TetrahedralMesh) -> bool:
-    """Whether some tetrahedron of the body holds the point."""
-    corners = mesh.positions[mesh.tetrahedra]
-    near = (corners.min(axis=1) <= point).all(axis=1) & (corners.max(axis=1) >= point).all(axis=1)
-    origins, others = corners[near, 0], corners[near, 1:]
-    axes = np.swapaxes(others - origins[:, None], 1, 2)
-    weights = np.linalg.solve(axes, (point - origins)[:, :, None])[:, :, 0]
-    return bool(((weights >= 0.0).all(axis=1) & (weights.sum(axis=1) <= 1.0)).any())
 
 
 def _check_positive(what: str, value: float, unit: str) -> None:
