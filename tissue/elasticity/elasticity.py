@@ -58,6 +58,8 @@ class Elasticity:
         is_single: bool = False,
     ) -> None:
         self._material = material
+        self.is_single = is_single
+        """Whether forces of tetrahedra are computed in single precision."""
         self._around = np.zeros(LARGEST_STAR, dtype=np.int64)
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         law = _law_of(material)

@@ -15,6 +15,13 @@ from tissue.integrators.system import System
 
 SETTLED = 1e-3
 """Acceleration at which the body counts as settled, in units of 9.81 m/s2."""
+ROUNDING = 10.0 * 2.0**-24
+"""Part of a displacement that single precision makes of it, up to the force on a node. Measured 7
+times 2^-24 in the organ, where accelerations fall to 0.01 to 0.03 m/s2 and no further."""
+QUIET = 200
+"""Evaluations in a row at which accelerations are mere rounding, until the body counts as settled:
+800 steps, in which slow motion comes to rest below the rounding. The organ is then 0.4 um from
+where it would be at last; after a quarter of these steps 25 um."""
 LONGEST_SETTLING = 20_000
 """Runge-Kutta steps after which to give up waiting."""
 STEPS_BETWEEN_PEAKS = 4
@@ -30,7 +37,7 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
         edge: The edge of no blade.
     """
     body, elasticity = system.body, system.elasticity
-    n, energy = body.n_nodes, 0.0
+    n, energy, n_quiet = body.n_nodes, 0.0, 0
     velocities, masses = body.velocities[:n], body.masses[:n, None]
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         at_rest = elasticity.frequency_squared
@@ -52,7 +59,22 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
         if energy < before:
             velocities[:] = 0.0
             energy = 0.0
-        if largest < SETTLED * 9.81:
+        n_quiet = n_quiet + 1 if largest < _rounding(system, highest) else 0
+        if largest < SETTLED * 9.81 or n_quiet == QUIET:
             velocities[:] = 0.0
             return done + STEPS_BETWEEN_PEAKS
     return LONGEST_SETTLING
+
+
+def _rounding(system: System, frequency_squared: float) -> float:
+    """Return the acceleration that is made by the rounding of displacements [m/s2].
+
+    Args:
+        system: The body.
+        frequency_squared: Its highest w^2 [1/s2].
+    """
+    if not system.elasticity.is_single:
+        return 0.0
+    body, n = system.body, system.body.n_nodes
+    moved = float(np.abs(body.positions[:n] - body.rest[:n]).max())
+    return ROUNDING * moved * frequency_squared
