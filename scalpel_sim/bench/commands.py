@@ -77,7 +77,7 @@ def bench_scenes(
     """Run whole scenes: time of a frame, and of each of its stages.
 
     Args:
-        names: organ, slab, grid2, grid7; without a name all of them.
+        names: organ, incision, slab, grid2, grid7; without a name all of them.
     """
     from scalpel_sim.bench.scenes import checked_scene_names, measure_scenes
 
@@ -104,7 +104,7 @@ def bench_real_time(
     ```
 
     Args:
-        scenes: organ, slab, grid2, grid7 [default: all].
+        scenes: organ, incision, slab, grid2, grid7 [default: all].
         materials: Names of materials, or "as shipped" [default: that, and all].
         strokes: After how many random strokes frames are timed [default: 0 10 26 50].
         quick: Only the begin of each stroke, as shipped, once, without and after one stroke.

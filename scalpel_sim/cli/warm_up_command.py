@@ -33,7 +33,7 @@ def warm_up(
     ```
 
     Args:
-        scenes: organ, slab, grid2, grid7, or all [default: organ].
+        scenes: organ, incision, slab, grid2, grid7, or all [default: organ].
     """
     with log_to_stderr(printing):
         from scalpel_sim.scenes import SCENES
