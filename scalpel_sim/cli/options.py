@@ -12,7 +12,7 @@ from cyclopts import Group, Parameter
 
 SceneName = Annotated[
     str | None,
-    Parameter(help="organ (default), slab, grid2 or grid7."),
+    Parameter(help="organ (default), incision, slab, grid2 or grid7."),
 ]
 
 FigureNumber = Annotated[Literal[10, 11, 12, "organ"], Parameter(help="10, 11, 12 or organ.")]
