@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.core.simd import room_for_points
 from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -22,6 +23,7 @@ from tissue.elasticity.mass_scaling import (
     scale_masses,
 )
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
+from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
 from tissue.material import Material
 from tissue.mesh.body import Body
@@ -74,6 +76,7 @@ class Elasticity:
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
+        self._ahead = room_for_points(n_nodes)
         self._solid_frequency_squared = 0.0
         self._allowed = math.inf
         self._least_mass = 0.0
@@ -123,7 +126,25 @@ class Elasticity:
         """
         if not self._has_solid:
             return 0.0
-        return strained_frequency(self.arrays, body, visits, allowed)
+        return strained_frequency(self.arrays, body, body.positions, visits, allowed)
+
+    @property
+    def stiffens(self) -> bool:
+        """Whether the shear part of the law stiffens as tissue is stretched."""
+        return self._has_solid and stiffens(self.arrays.solid.law)
+
+    def frequency_squared_ahead(
+        self, body: Body, visits: Visits, allowed: float, duration: float
+    ) -> float:
+        """Return a bound on w^2 of the tetrahedra as they will be deformed [1/s2].
+
+        That is where the nodes are after `duration` [s] with the velocities that they have. Other
+        arguments are those of `strained_frequency_squared`.
+        """
+        n, ahead = body.n_nodes, self._ahead
+        np.multiply(body.velocities[:n], duration, out=ahead[:n])
+        ahead[:n] += body.positions[:n]
+        return strained_frequency(self.arrays, body, ahead, visits, allowed)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
@@ -131,6 +152,7 @@ class Elasticity:
         if self._has_solid:
             pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
             solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
+        self._ahead = room_for_points(n_nodes)
         frequencies = np.zeros(n_nodes)
         frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
         self.arrays = arrays.replaced(

@@ -89,8 +89,11 @@ class Solid(Arrays, two_precisions=True):
     """Scratch of `strained_frequency` and of energies: growth of the faces of tetrahedron t,
     behind a first block."""
     tested_growth: FloatArray
-    """Growth of the faces of tetrahedron t at which its nodes were slow enough, behind a first
-    block (`strained_frequency`); 1 where it was not tested."""
+    """Growth of the faces of tetrahedron t when the bound was last evaluated at its nodes, behind a
+    first block (`strained_frequency`); 1 where it was not."""
+    tested_bound: FloatArray
+    """Bound on w^2 at the nodes of tetrahedron t that was found then [1/s2], behind a first
+    block; 0 where it was not evaluated."""
     stiffening: FloatArray
     """Scratch of `strained_frequency`, under laws that stiffen: shear modulus of tetrahedron t over
     that at rest, behind a first block (`tissue.elasticity.stiffening`)."""
@@ -165,6 +168,7 @@ def no_solid(
         dilated=aligned(room, real),
         growth=aligned(room, real),
         tested_growth=tested_growth,
+        tested_bound=aligned(room, real),
         stiffening=aligned(room, real),
         stiffening_slope=aligned(room, real),
         stiffness=aligned(room, real),

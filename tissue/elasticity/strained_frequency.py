@@ -9,8 +9,8 @@ length and half of it, at Poisson's ratios from 0.3 to 0.49, that was 1.6 to 10 
 It is quick to find for all tetrahedra, and so wide because a sliver that is stretched to four times
 its area adds little to what its nodes resist. Where it is too high to be of use, the bound at rest
 is evaluated at the nodes of the tetrahedron with its neighbours as they are deformed: in an organ
-after a cut that concerns 20 of 5,900 tetrahedra. What was found slow enough is not evaluated again
-before it has grown further.
+after a cut that concerns 20 of 5,900 tetrahedra. What was found is kept, and is not evaluated again
+before the tetrahedron has grown further, or a lower bound is asked for.
 """
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -43,12 +43,15 @@ larger: more of it is found too fast."""
 
 
 @kernel
-def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: float) -> float:
+def strained_frequency(
+    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, allowed: float
+) -> float:
     """Return a bound on w^2 of the tetrahedra as they are deformed [1/s2].
 
     Args:
         elastic: The bounds at rest; what was tested is written.
-        body: Positions of the nodes.
+        body: Rest positions and masses.
+        points: Where the nodes are [m].
         visits: For searches.
         allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
     """
@@ -56,7 +59,7 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
     width, highest = width_of(solid.shape), 0.0
     solid.test += 1
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
-    displacements(solid, body, body.positions, solid.every, 0, body.n_nodes)
+    displacements(solid, body, points, solid.every, 0, body.n_nodes)
     if stiffens(law):
         # Before any bound is evaluated at a node: that takes all tetrahedra around it.
         for block in range(blocks):
@@ -71,7 +74,8 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
                 solid.shear_frequency_squared, solid, block, growth
             )
             further = larger(further, _further(solid.tested_stiffness, block, stiffness))
-        bound = where_larger(further, alike(0.0, growth), bound, alike(0.0, growth))
+        found = load_block(solid.tested_bound, width * (1 + block))
+        bound = where_larger(further, alike(0.0, growth), bound, alike(FURTHER, growth) * found)
         if largest(bound) <= allowed:
             highest = max(highest, largest(bound))
             continue
@@ -82,7 +86,7 @@ def strained_frequency(elastic: Elastic, body: Body, visits: Visits, allowed: fl
                 highest = max(highest, float(solid.growth[lane]))
             else:
                 t = width * block + lane
-                highest = max(highest, _tested_bound(elastic, body, visits, t, allowed))
+                highest = max(highest, _tested_bound(elastic, body, points, visits, t))
     return highest
 
 
@@ -110,23 +114,27 @@ def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> 
 
 
 @kernel
-def _tested_bound(elastic: Elastic, body: Body, visits: Visits, t: int, allowed: float) -> float:
+def _tested_bound(
+    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, t: int
+) -> float:
     """Return the bound on w^2 at the nodes of a tetrahedron as they are deformed [1/s2]."""
     solid = elastic.solid
     highest = 0.0
     for k in range(4):
         node = solid.nodes[node_place(solid, t, k)]
         if not body.fixed[node]:
-            highest = max(highest, _strained_bound(elastic, body, visits, node))
-    if FURTHER * highest <= allowed:
-        place = width_of(solid.shape) + t
-        solid.tested_growth[place] = solid.growth[place]
-        solid.tested_stiffness[place] = solid.stiffness[place]
+            highest = max(highest, _strained_bound(elastic, body, points, visits, node))
+    place = width_of(solid.shape) + t
+    solid.tested_growth[place] = solid.growth[place]
+    solid.tested_stiffness[place] = solid.stiffness[place]
+    solid.tested_bound[place] = highest
     return highest
 
 
 @kernel
-def _strained_bound(elastic: Elastic, body: Body, visits: Visits, node: int) -> float:
+def _strained_bound(
+    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, node: int
+) -> float:
     """Return the bound on w^2 at a node as its neighbourhood is deformed [1/s2]."""
     solid = elastic.solid
     if solid.frequency_test[node] == solid.test:
@@ -138,11 +146,11 @@ def _strained_bound(elastic: Elastic, body: Body, visits: Visits, node: int) -> 
             for k in range(4):
                 other = solid.nodes[node_place(solid, t, k)]
                 if solid.dilatation_test[other] != solid.test:
-                    term = dilatation_term(solid, body, body.positions, visits, other)
+                    term = dilatation_term(solid, body, points, visits, other)
                     solid.strained_dilatation[other] = term
                     solid.dilatation_test[other] = solid.test
     dilatation = solid.strained_dilatation
-    bound = bounds_of_node(solid, body, body.positions, dilatation, visits, node, True).whole
+    bound = bounds_of_node(solid, body, points, dilatation, visits, node, True).whole
     if elastic.has_springs:
         bound += elastic.springs.frequency_squared[node]
     solid.strained_frequency_squared[node] = bound
@@ -152,12 +160,13 @@ def _strained_bound(elastic: Elastic, body: Body, visits: Visits, node: int) -> 
 
 @kernel
 def forget_tests(solid: Solid, nodes: IntArray, n: int) -> None:
-    """Forget which of the tetrahedra around the first `n` of `nodes` were slow enough."""
+    """Forget the bounds found at the tetrahedra around the first `n` of `nodes`."""
     for i in range(n):
         node = nodes[i]
         for slot in range(solid.first[node], solid.first[node] + solid.count[node]):
-            solid.tested_growth[solid.around[slot]] = 1.0
-            solid.tested_stiffness[solid.around[slot]] = 1.0
+            place = solid.around[slot]
+            solid.tested_growth[place] = solid.tested_stiffness[place] = 1.0
+            solid.tested_bound[place] = 0.0
 
 
 @inlined

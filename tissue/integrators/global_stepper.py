@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
@@ -89,6 +91,7 @@ class GlobalStepper:
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
         self._threads = Threads(threads) if threads > 1 else None
+        self._nothing = np.zeros(0)
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""
@@ -96,15 +99,15 @@ class GlobalStepper:
         elasticity, blade = system.elasticity, system.interaction.state
         by_node = elasticity.arrays.frequency_squared
         near = frequency_with_blade(blade, system.body, by_node, system.stages.external)
-        of_contact = system.contact.added_frequency_squared
-        least = max(elasticity.frequency_squared, near) + of_contact
+        added = system.contact.added_frequency_squared
+        least = max(elasticity.frequency_squared, near) + added
+        if elasticity.stiffens:
+            added += self._added_by_blade(system)
         longest = self.method.stable_step(elasticity, least, system.surroundings)
         done = 0
         while True:
-            allowed = _without_another_step(least, longest, increment.span) - of_contact
-            strained = elasticity.strained_frequency_squared(system.body, system.visits, allowed)
-            highest = max(least, strained + of_contact)
-            step = self.method.stable_step(elasticity, highest, system.surroundings)
+            allowed = _without_another_step(least, longest, increment.span) - added
+            step = self._stable_step(system, least, added, allowed)
             moved = largest_speed(system.body) * increment.span / system.node_size
             n = _number_of_steps(
                 max(increment.span / step, moved / LONGEST_MOTION),
@@ -121,6 +124,39 @@ class GlobalStepper:
             self.take_steps(system, increment._replace(end=end), STEPS_BETWEEN_STRAIN_BOUNDS)
             increment = increment._replace(begin=end)
             done += STEPS_BETWEEN_STRAIN_BOUNDS
+
+    def _added_by_blade(self, system: System) -> float:
+        """Return what the blade adds to w^2 [1/s2] at most.
+
+        Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
+        """
+        if len(self._nothing) != len(system.body.masses):
+            self._nothing = np.zeros(len(system.body.masses))
+        blade, scratch = system.interaction.state, system.stages.external
+        return frequency_with_blade(blade, system.body, self._nothing, scratch)
+
+    def _stable_step(self, system: System, least: float, added: float, allowed: float) -> float:
+        """Return the largest stable step [s] until the next bound on the strained body.
+
+        Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes
+        will be then: an exponential law can double its modulus in two steps.
+
+        Args:
+            system: Body and forces.
+            least: Bound on w^2 with the body at rest [1/s2].
+            added: What blade and contact add to that of the strained body [1/s2].
+            allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
+        """
+        elasticity, surroundings = system.elasticity, system.surroundings
+        body, visits = system.body, system.visits
+        strained = elasticity.strained_frequency_squared(body, visits, allowed)
+        step = self.method.stable_step(elasticity, max(least, strained + added), surroundings)
+        if not elasticity.stiffens:
+            return step
+        duration = STEPS_BETWEEN_STRAIN_BOUNDS * step
+        ahead = elasticity.frequency_squared_ahead(body, visits, allowed, duration)
+        highest = max(least, max(strained, ahead) + added)
+        return self.method.stable_step(elasticity, highest, surroundings)
 
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
         """Advance the motion by an increment in `n` steps."""
