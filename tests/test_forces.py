@@ -10,6 +10,7 @@ import pytest
 
 from tests.bodies import sides
 from tissue import (
+    MATERIALS,
     BladeSegment,
     BladeShape,
     BladeSweep,
@@ -212,6 +213,16 @@ def test_the_energy_balance_closes_within_half_a_percent(stroke, blade):
     poses, material = STROKES[stroke]
     run = Run(poses, blade=blade, blade_friction=0.3, **material)
     assert abs(run.energies.residual) < 5e-3 * run.energies.work_of_blade
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("preset", ["liver", "fat", "skin"])
+def test_the_energy_balance_closes_where_tissue_stiffens_ahead_of_the_blade(preset):
+    source = MATERIALS[preset].material
+    figures = {name: getattr(source, name) for name in ("young_modulus", "toughness")}
+    law = {"law": "exponential", "stiffening": 15.0, "poisson_ratio": 0.45}
+    run = Run(upright(0.1), blade=SCALPEL, **law, **figures)
+    assert abs(run.energies.residual) < 0.01 * run.energies.work_of_blade
 
 
 @pytest.mark.filterwarnings("ignore")
