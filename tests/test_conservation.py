@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tests import bodies, strokes
+from tests import bodies, incisions, strokes
 from tests.tissue.kernels_of import row, springs_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.elasticity.internal_forces import elastic_energy
@@ -35,6 +35,26 @@ def drifting(mesh, undamped=True):
     wobble = 0.05 * np.random.default_rng(0).normal(size=(n, 3))
     tissue._body.velocities[:n] = np.array([0.3, 0.1, -0.2]) + spin + wobble
     return tissue
+
+
+@pytest.mark.parametrize("scheme", ["stellar", "paper"])
+@pytest.mark.parametrize("law", ["springs", "neo_hookean"])
+def test_a_cut_keeps_both_momenta_of_a_body_that_spins(law, scheme):
+    """No time passes: what changes is the mesh. Mass scaling is off, as it adds momentum."""
+    mesh = bodies.jittered(4, 1)
+    solver = SolverSettings(mass_scaling=None, scheme=scheme)
+    material = Material(law=law, poisson_ratio=0.45)
+    tissue = Tissue(mesh, material, gravity=NO_GRAVITY, solver=solver)
+    n = tissue.n_nodes
+    spin = np.cross([30.0, -20.0, 50.0], mesh.positions - mesh.positions.mean(axis=0))
+    tissue._body.velocities[:n] = np.array([0.3, 0.1, -0.2]) + spin
+    linear, angular = momentum(tissue)
+    for seed, kind in enumerate(incisions.KINDS):
+        tissue.incise(*incisions.incision(mesh, kind, seed))
+    assert tissue.n_nodes > n
+    linear_t1, angular_t1 = momentum(tissue)
+    np.testing.assert_allclose(linear_t1, linear, atol=1e-12 * np.linalg.norm(linear))
+    np.testing.assert_allclose(angular_t1, angular, atol=1e-9 * np.linalg.norm(angular))
 
 
 @pytest.mark.parametrize("undamped", [True, False])

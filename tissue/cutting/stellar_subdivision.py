@@ -7,11 +7,12 @@ children of positive volume.
 
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, vec3
+from tissue.core.vec3 import Vec3, sub, vec3
 from tissue.cutting.cut_surface import decide_side, decided_side, touch
 from tissue.cutting.workspace import Cut
 from tissue.geometry.exact_predicates import nearest
-from tissue.geometry.tetrahedron import smallest_altitude
+from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
+from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import local_index
 from tissue.mesh.changes import note_dirty
 from tissue.mesh.star import edge_star
@@ -136,6 +137,7 @@ def _split(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3) -> in
             body.n_tetrahedra += 1
         for f in range(4):
             scratch.parent_links[i, f] = body.links[t, f]
+    _note_spin(cut, n, n_ends, a, b, c, w, node)
     for i in range(n):
         _make_children(cut, i, n_ends, a, b, c, node)
     for i in range(n):
@@ -164,6 +166,21 @@ def _new_node(cut: Cut, a: int, b: int, c: int, w: Vec3) -> int:
     body.off_path[node] = 0.0
     touch(cut.sheet, node)
     return node
+
+
+@kernel
+def _note_spin(cut: Cut, n: int, n_ends: int, a: int, b: int, c: int, w: Vec3, node: int) -> None:
+    """Note the rotation of the ends about the new node: it has a share of their masses now."""
+    body, volume = cut.body, 0.0
+    for i in range(n):
+        volume += tetrahedron_volume(body.rest, body.tetrahedra, cut.scratch.parents[i])
+    place, velocity = vec3(body.positions, node), vec3(body.velocities, node)
+    for e in range(n_ends):
+        end = _pick(e, a, b, c)
+        weight = w.x if e == 0 else (w.y if e == 1 else w.z)
+        arm = sub(vec3(body.positions, end), place)
+        motion = sub(vec3(body.velocities, end), velocity)
+        note_spin(cut.change, weight * volume, arm, motion)
 
 
 @kernel

@@ -26,6 +26,7 @@ from tissue.elasticity.springs import bound_frequencies, build_rows, grown_sprin
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
 from tissue.material import Material
+from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
 from tissue.mesh.changes import Change, largest_frequency
 from tissue.mesh.star import LARGEST_STAR, Visits
@@ -97,16 +98,17 @@ class Elasticity:
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
     ) -> None:
-        """Update springs, elements and bounds after a cut.
+        """Update masses, springs, elements and bounds after a cut.
 
         Args:
-            body: The body; masses of the touched nodes are written.
+            body: The body; masses and velocities of the touched nodes are written.
             visits: For searches.
             change: The tetrahedra that changed.
             nodes: Nodes, of which the first `n` are the nodes of those tetrahedra.
             n: How many these are.
         """
         self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
+        return_spin(body, change, self._material.density, nodes, n)
 
     @property
     def follows_strain(self) -> bool:

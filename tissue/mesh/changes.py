@@ -29,6 +29,9 @@ class Change(Arrays):
     """Number of entries in `faces`."""
     is_full: IntCell
     """1 if the pass stopped for want of room, else 0."""
+    lost_spin: FloatArray
+    """Angular momentum that the masses at nodes lost by splits, over the density [m5/s], shape
+    (3,)."""
     area: FloatCell
     """Area of the faces cut, at rest, one side of each, since the body was made [m2]."""
 
@@ -43,6 +46,7 @@ def new_change() -> Change:
         n_dirty=0,
         n_faces=0,
         is_full=0,
+        lost_spin=np.zeros(3),
         area=0.0,
     )
 

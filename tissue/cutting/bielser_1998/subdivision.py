@@ -1,12 +1,14 @@
 """Split one tetrahedron in seventeen, and open it along the triangles of its case (section 4.2)."""
 
 from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, axpy, store, sub, vec3
 from tissue.cutting.bielser_1998.mesh_records import Records, child_of, is_whole
 from tissue.cutting.bielser_1998.node_placement import place_nodes
 from tissue.cutting.bielser_1998.split_operators import refer_to_nodes
 from tissue.cutting.bielser_1998.template_1_to_17 import N_CHILDREN
 from tissue.cutting.bielser_1998.workspace import Split
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
+from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import CUT, OUTER
 from tissue.mesh.changes import note_dirty
 from tissue.mesh.nonconforming import HANGING, join_list, leave_list
@@ -35,6 +37,7 @@ def split_tetrahedron(s: Split, t: int, code: int) -> bool:
         corner = records.tetrahedra[t, i]
         leave_list(body.hanging, corner, t)
         body.masses[corner] -= 0.25 * s.density * volume
+        note_spin(s.change, volume, _arm(s, t, corner), vec3(body.velocities, corner))
     records.first_child[t] = body.n_tetrahedra
     body.n_tetrahedra += N_CHILDREN - 1
     for c in range(N_CHILDREN):
@@ -54,29 +57,44 @@ def _make_child(s: Split, t: int, c: int) -> None:
         body.tetrahedra[child, k] = node
         body.node_tetrahedron[node] = child
         join_list(body.hanging, node, child, k)
-    mass = 0.25 * s.density * tetrahedron_volume(body.rest, body.tetrahedra, child)
+    volume = tetrahedron_volume(body.rest, body.tetrahedra, child)
     for k in range(4):
-        _add_mass(s, t, table.children[c, k], body.tetrahedra[child, k], mass)
+        _add_mass(s, t, table.children[c, k], body.tetrahedra[child, k], volume)
     note_dirty(s.change, child)
 
 
 @kernel
-def _add_mass(s: Split, t: int, local: int, node: int, mass: float) -> None:
-    """Add `mass` [kg] of tetrahedron `t` to `node`, with the velocity interpolated in `t`.
+def _add_mass(s: Split, t: int, local: int, node: int, volume: float) -> None:
+    """Add the mass of a fourth of `volume` [m3] of tetrahedron `t` to `node`, as it moves in `t`.
 
     A node that a neighbour made earlier has moved by itself since: the collision is inelastic, and
     momentum is kept.
     """
-    body = s.body
+    body, mass = s.body, 0.25 * s.density * volume
     total = body.masses[node] + mass
+    velocity = vec3(body.velocities, node) if local < 4 else _velocity_within(s, t, local)
+    note_spin(s.change, -volume, _arm(s, t, node), velocity)
     if local >= 4 and not body.fixed[node]:
-        for x in range(3):
-            velocity = 0.0
-            for i in range(4):
-                corner = s.records.tetrahedra[t, i]
-                velocity += s.placing.weights[local, i] * body.velocities[corner, x]
-            body.velocities[node, x] += mass / total * (velocity - body.velocities[node, x])
+        before = vec3(body.velocities, node)
+        store(body.velocities, node, axpy(mass / total, sub(velocity, before), before))
     body.masses[node] = total
+
+
+@kernel
+def _velocity_within(s: Split, t: int, local: int) -> Vec3:
+    """Return the velocity of the initial tetrahedron `t` where a node of its template is [m/s]."""
+    velocity = Vec3(0.0, 0.0, 0.0)
+    for i in range(4):
+        corner = s.records.tetrahedra[t, i]
+        velocity = axpy(s.placing.weights[local, i], vec3(s.body.velocities, corner), velocity)
+    return velocity
+
+
+@kernel
+def _arm(s: Split, t: int, node: int) -> Vec3:
+    """Return the way from the first corner of the initial tetrahedron `t` to a node [m]."""
+    origin = vec3(s.body.positions, s.records.tetrahedra[t, 0])
+    return sub(vec3(s.body.positions, node), origin)
 
 
 @kernel
