@@ -15,6 +15,7 @@ from scalpel_sim.strokes.planning import STROKES
 from scalpel_sim.strokes.stroke import Stroke, from_csv
 from tissue import (
     MATERIALS,
+    PARAMETERS_OF_LAWS,
     BladeShape,
     CutSettings,
     Material,
@@ -52,14 +53,10 @@ GEL = replace(PHANTOM, law="neo_hookean", poisson_ratio=0.45)
 """The same gel as tetrahedra that hardly change their volume: what a mesh from a file is made of,
 unless another material is asked for. Springs turn flat elements of such meshes inside out."""
 
-PARENCHYMA = replace(MATERIALS["liver"].material, toughness=10.0)
-"""Liver in all but its toughness, which is well below the 164 J/m2 of liver with its vessels, so
-that toughness / young_modulus is 2 mm here too, and one stroke cuts through. With the toughness of
-liver the blade would drag it along by 35 mm first (`--material liver`)."""
-
-LIVER = replace(MATERIALS["liver"].material, law="exponential", stiffening=15.0)
-"""Liver with its published stiffness and toughness, which stiffens as it is stretched. Its b is
-chosen between what two tension tests of liver to rupture give, 12 and 28 (docs/materials.md)."""
+PARENCHYMA = replace(MATERIALS["liver"].material, law="neo_hookean", stiffening=0.0, toughness=10.0)
+"""Liver that does not stiffen, of a toughness well below the 164 J/m2 of liver with its vessels, so
+that toughness / young_modulus is 2 mm here too, and one stroke cuts through. `--material liver` is
+liver as published."""
 
 DEFAULT_CUT_SETTINGS = CutSettings()
 """How closely cuts follow the blade, unless a scene says otherwise."""
@@ -262,7 +259,7 @@ SCENES = {
             "incision",
             "liver as published, on its underside; a scalpel is drawn along it, 8 mm deep",
             _liver_lobe,
-            material=LIVER,
+            material=MATERIALS["liver"].material,
             fixed="underside",
             stretch=0.0,
             stroke="incision",
@@ -374,7 +371,8 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     """Return the scene with some fields replaced; a change that is None is ignored.
 
     Names are those of fields of the scene, of its material or of its cut settings. Properties of a
-    material change the `material` that is given beside them, else the scene's. `snap` sets the
+    material change the `material` that is given beside them, else the scene's; another `law` drops
+    the parameters of the law before. `snap` sets the
     floor of snapping too: nodes of slivers snap like those of the mean element.
 
     The stretch of the scene is dropped where other sides are held; one that is given stays, and is
@@ -388,6 +386,8 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     if "snap" in given:
         snap = given.pop("snap")
         parts["cut"] = replace(parts["cut"], snap=snap, floor=snap)
+    if given.get("law", parts["material"].law) != parts["material"].law:
+        given = dict.fromkeys(PARAMETERS_OF_LAWS, 0.0) | given
     for name, part in parts.items():
         properties = {field.name for field in fields(part)} - of_scene
         parts[name] = replace(part, **{key: given.pop(key) for key in properties & given.keys()})

@@ -21,6 +21,7 @@ from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .material import PARAMETERS_OF_LAWS as PARAMETERS_OF_LAWS
 from .material import Law as Law
 from .material import Material as Material
 from .material_presets import DAMPING_BAND as DAMPING_BAND
@@ -71,6 +72,7 @@ __all__ = [
     "Material",
     "MeshError",
     "MeshMeasures",
+    "PARAMETERS_OF_LAWS",
     "Piece",
     "Preset",
     "SchemeStatistics",

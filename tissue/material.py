@@ -10,6 +10,13 @@ stable `neo_hookean` law, or one of tissue that stiffens as it is stretched
 (`tissue.elasticity.stiffening`): `exponential` (Demiray), or a polynomial of third order
 (`yeoh`)."""
 
+PARAMETERS_OF_LAWS: dict[str, Law] = {
+    "stiffening": "exponential",
+    "yeoh_second": "yeoh",
+    "yeoh_third": "yeoh",
+}
+"""Parameters that only one law has, and the law. Under the others they are 0."""
+
 CENTRAL_FORCE_RATIO = 0.25
 """Poisson's ratio of an isotropic network of springs: forces along the lines between nodes make
 both of Lame's constants the same (Cauchy's relation), whatever the stiffnesses."""
@@ -109,14 +116,13 @@ class Material:
 
     def _check_stiffening(self) -> None:
         """Refuse a parameter of another law, and a law that would not stiffen."""
-        laws = {"stiffening": "exponential", "yeoh_second": "yeoh", "yeoh_third": "yeoh"}
-        for name, law in laws.items():
+        for name, law in PARAMETERS_OF_LAWS.items():
             if self.law != law and getattr(self, name) != 0.0:
                 raise ValueError(
                     f"{name} is {getattr(self, name)} with law {self.law}, which does not have it: "
                     f"leave it at 0, or choose law {law}"
                 )
-        given = [name for name, law in laws.items() if law == self.law]
+        given = [name for name, law in PARAMETERS_OF_LAWS.items() if law == self.law]
         if given and not any(getattr(self, name) for name in given):
             raise ValueError(
                 f"law {self.law} without stiffening: {' or '.join(given)} must be positive. "

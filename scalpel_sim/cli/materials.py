@@ -16,10 +16,11 @@ _MM_PER_M = 1e3
 _NOT_CONFIRMED = "*"
 """Marks a figure that could not be traced to a measurement."""
 
-HEADINGS = ("name", "E, kPa", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
+HEADINGS = ("name", "E, kPa", "b", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
 
 SOURCED = (
     "young_modulus",
+    "stiffening",
     "poisson_ratio",
     "density",
     "toughness",
@@ -57,6 +58,7 @@ def print_presets(presets: Sequence[Preset]) -> None:
         table.add_row(
             preset.name,
             _marked(preset.young_modulus, _KPA_PER_PA),
+            _marked(preset.stiffening) if preset.stiffening else "",
             _marked(preset.poisson_ratio),
             _marked(preset.density),
             _marked(preset.toughness),
@@ -68,9 +70,9 @@ def print_presets(presets: Sequence[Preset]) -> None:
     low, high = DAMPING_BAND
     console.print(
         f"{_NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
-        "strain, nu: Poisson's ratio, J: toughness. damping: damping ratio of bending and of "
-        f"stretching at {low:g} and {high:g} Hz, less between. friction: on the faces of "
-        "a blade. J / E: how far a blade drags the tissue along before the tissue parts.",
+        "strain, b: how soon it stiffens, nu: Poisson's ratio, J: toughness. damping: damping "
+        f"ratio of bending and of stretching at {low:g} and {high:g} Hz, less between. friction: "
+        "on the faces of a blade. J / E: how far a blade drags tissue along before it parts.",
         markup=False,
         highlight=False,
         soft_wrap=True,
@@ -79,9 +81,15 @@ def print_presets(presets: Sequence[Preset]) -> None:
         console.print(
             f"\n[bold]{preset.name}[/bold]: {preset.about}; law {preset.law}", highlight=False
         )
-        for name in SOURCED:
-            line = _line(name, getattr(preset, name))
+        for name, figure in _figures(preset).items():
+            line = _line(name, figure)
             console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _figures(preset: Preset) -> dict[str, SourcedValue]:
+    """Return the figures of a preset by name; its law may have none of a name."""
+    figures = {name: getattr(preset, name) for name in SOURCED}
+    return {name: figure for name, figure in figures.items() if figure is not None}
 
 
 def _marked(figure: SourcedValue, scale: float = 1.0) -> str:
@@ -98,5 +106,5 @@ def _line(name: str, figure: SourcedValue) -> str:
 
 def _as_numbers(preset: Preset) -> dict[str, Any]:
     """Return a preset as numbers and text, for JSON."""
-    figures = {name: getattr(preset, name)._asdict() for name in SOURCED}
+    figures = {name: figure._asdict() for name, figure in _figures(preset).items()}
     return {"name": preset.name, "about": preset.about, "law": preset.law} | figures

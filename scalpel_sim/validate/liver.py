@@ -68,7 +68,8 @@ class _Insertions(NamedTuple):
 def _liver(friction: float) -> Material:
     """Return the liver of the presets with the stiffness that it has where it is pressed hard."""
     material = MATERIALS["liver"].material
-    return replace(material, young_modulus=_STIFFNESS, blade_friction=friction)
+    unstiffened = replace(material, law="neo_hookean", stiffening=0.0)
+    return replace(unstiffened, young_modulus=_STIFFNESS, blade_friction=friction)
 
 
 def _insert_twice(material: Material) -> _Insertions:

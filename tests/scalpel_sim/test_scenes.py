@@ -22,6 +22,14 @@ def test_properties_change_the_material_that_is_given_beside_them():
     assert scene.material.poisson_ratio == liver.poisson_ratio
 
 
+def test_another_law_drops_the_parameters_of_the_law_before():
+    liver = changed(SCENES["organ"], material=material_called("liver"))
+    assert changed(liver, law="neo_hookean").material.stiffening == 0.0
+    assert changed(liver, law="exponential").material.stiffening == 15.0
+    yeoh = changed(liver, law="yeoh", yeoh_second=2.0).material
+    assert (yeoh.stiffening, yeoh.yeoh_second) == (0.0, 2.0)
+
+
 def test_what_is_not_given_stays():
     assert changed(GRID2, material=None, law=None, floor=None) == GRID2
 

@@ -11,7 +11,7 @@ from tissue.core.vec3 import Vec3, add, cross, dot, scale, sub, vec3
 from tissue.mesh.body import Body
 from tissue.mesh.changes import Change
 
-FLATTEST = 1e-9
+SLENDEREST = 1e-9
 """Determinant of the inertia of nodes over the cube of a third of its trace below which they count
 as lying on a line, about which no rotation has an angular momentum: nothing is given back then."""
 
@@ -58,7 +58,7 @@ def return_spin(body: Body, change: Change, density: float, nodes: IntArray, n: 
             y = add(y, scale(mass, Vec3(-r.x * r.y, squared - r.y * r.y, -r.y * r.z)))
             z = add(z, scale(mass, Vec3(-r.x * r.z, -r.y * r.z, squared - r.z * r.z)))
     determinant = dot(x, cross(y, z))
-    if determinant <= FLATTEST * ((x.x + y.y + z.z) / 3.0) ** 3:
+    if determinant <= SLENDEREST * ((x.x + y.y + z.z) / 3.0) ** 3:
         return
     # By Cramer's rule; the inertia is symmetric, so its rows are its columns.
     turn = scale(
