@@ -24,8 +24,8 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
-from tissue.elasticity.neo_hookean import solid_energy
 from tissue.elasticity.stiffness_matrix import stiffness_matrix
+from tissue.elasticity.stored_energy import solid_energy
 from tissue.mesh.changes import clear_changes
 from tissue.mesh.faces import sorted_faces
 from tissue.mesh.star import LARGEST_STAR, no_visits

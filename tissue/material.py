@@ -1,6 +1,7 @@
 """The material of the tissue, in quantities that can be measured."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
@@ -24,6 +25,15 @@ both of Lame's constants the same (Cauchy's relation), whatever the stiffnesses.
 NEARLY_INCOMPRESSIBLE = 0.49
 """Poisson's ratio above which the time step gets very short: waves of compression are
 sqrt(1 / (1 - 2 nu)) times as fast, 7 times at 0.49, and an explicit step must resolve them."""
+
+
+MOST_TERMS = 3
+"""Terms of a Prony series at most: each costs memory and time, and a relaxation test of five
+decades of time is fitted by three."""
+
+SHORTEST_RELAXATION = 0.01
+"""Shortest time constant of a Prony series [s]: ten steps of 1 ms, which resolve it. Damping is for
+what is faster."""
 
 
 @dataclass(frozen=True)
@@ -81,13 +91,18 @@ class Material:
     spring_calibration: float = 1.0
     """Stiffness of the springs over that of van Gelder's formula, under law springs only. 1 unless
     the mesh was calibrated by `tissue.elasticity.spring_calibration.calibrated`."""
+    prony: tuple[tuple[float, float], ...] = ()
+    """Relaxation of stress, as g and tau [s] of one to three terms; none: no stress relaxes. Held
+    tissue keeps G(t) = 1 - sum of g (1 - exp(-t / tau)) of its stress (Fung's quasi-linear
+    viscoelasticity, `tissue.elasticity.viscoelasticity`). `young_modulus` and the other stiffnesses
+    are those of fast motion."""
 
     def __post_init__(self) -> None:
         if self.law not in get_args(Law):
             raise ValueError(f"no law is called {self.law!r}. Known: {', '.join(get_args(Law))}")
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name != "law" and (not math.isfinite(value) or value < 0.0):
+            if field.name not in ("law", "prony") and (not math.isfinite(value) or value < 0.0):
                 raise ValueError(f"{field.name} is {value}; it must be finite and not negative")
         for name in ("young_modulus", "density", "spring_calibration", "toughness_speed"):
             if getattr(self, name) == 0.0:
@@ -98,6 +113,12 @@ class Material:
             raise ValueError(
                 f"spring_calibration is {self.spring_calibration} with law {self.law}, whose "
                 "stiffness is exact on any mesh: leave it at 1, or choose law springs"
+            )
+        object.__setattr__(self, "prony", checked_series(self.prony))
+        if self.prony and self.law == "springs":
+            raise ValueError(
+                "prony is given with law springs, whose stress does not relax: leave it out, or "
+                "choose law neo_hookean, exponential or yeoh"
             )
 
     def _check_ratio(self) -> None:
@@ -229,3 +250,34 @@ class Material:
         has viscosity 2.5 mu per second of retardation time, and Young's modulus 2 mu (1 + nu).
         """
         return 0.8 * (1.0 + self.poisson_ratio)
+
+
+def checked_series(series: Iterable[Iterable[float]]) -> tuple[tuple[float, float], ...]:
+    """Return the terms of a Prony series as pairs of numbers, g and tau [s].
+
+    Raises:
+        ValueError: it is no series of such pairs, has too many terms, a g that is not between 0 and
+            1, or g whose sum is not, or a tau that is too short.
+    """
+    try:
+        terms = [tuple(float(number) for number in term) for term in series]
+        pairs = tuple((share, time) for share, time in terms)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"prony is {series}; it must be pairs of numbers, g and tau") from error
+    if len(pairs) > MOST_TERMS:
+        raise ValueError(f"prony has {len(pairs)} terms; it may have {MOST_TERMS} at most")
+    for share, time in pairs:
+        if not 0.0 < share < 1.0:
+            raise ValueError(f"prony has a g of {share}; it must be between 0 and 1")
+        if not (math.isfinite(time) and time >= SHORTEST_RELAXATION):
+            raise ValueError(
+                f"prony has a tau of {time} s; it must be finite and at least "
+                f"{SHORTEST_RELAXATION} s. What relaxes faster is damping: retardation_time"
+            )
+    total = sum(share for share, _ in pairs)
+    if not total < 1.0:
+        raise ValueError(
+            f"prony has g whose sum is {total:g}; it must be below 1, or nothing of the stress is "
+            "left at last"
+        )
+    return pairs

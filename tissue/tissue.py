@@ -207,7 +207,8 @@ class Tissue(BodyQueries):
         """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
 
         Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
-        has passed a peak. All nodes are moved together, whatever the relaxation.
+        has passed a peak. All nodes are moved together, whatever the integrator. Stress that
+        relaxes (`Material.prony`) has relaxed wholly: this is where the body comes to rest at last.
         """
         self._take_edge(None)
         system = self._system
@@ -260,6 +261,7 @@ class Tissue(BodyQueries):
         self._edge_now = (increment.edge, increment.end)
         if n == 0:
             return 0
+        self._system.relax_stress(increment.span)
         moving, body = self._integrator.moving, self._system.body
         if moving is None or 2 * moving[1] > self.n_nodes:
             is_finite = write_bounds(body, self._bounds)

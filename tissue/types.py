@@ -85,7 +85,8 @@ class Energies(NamedTuple):
     work_of_blade: float
     """Work that the blade did on the tissue."""
     elastic: float
-    """Change of the elastic energy of the tissue."""
+    """Change of the elastic energy of the tissue, and of that in the springs of Maxwell elements
+    where stress relaxes."""
     kinetic: float
     """Change of the kinetic energy of the tissue."""
     potential: float
@@ -94,7 +95,7 @@ class Energies(NamedTuple):
     """Change of the elastic energy of the contact of edge and faces of the blade with the tissue,
     and of contacts of the tissue that act as springs."""
     damping: float
-    """Energy dissipated by viscosity and drag."""
+    """Energy dissipated by viscosity, drag and Maxwell elements."""
     cutting: float
     """Energy of cutting: toughness times area."""
     breaking: float

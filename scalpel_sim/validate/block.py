@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -49,7 +49,7 @@ def soft_material(
     young_modulus: float = 10e3,
     poisson_ratio: float | None = None,
     toughness: float = 20.0,
-    **more: float,
+    **more: Any,
 ) -> Material:
     """Return the material of the block: as soft as an organ.
 

@@ -1,5 +1,6 @@
 """A body of tetrahedra without springs: its forces, its energy and its relaxation."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,16 @@ from tissue.elasticity.finite_elements import (
     room_for_stars,
 )
 from tissue.elasticity.frequency_bound import bound_solid_frequencies
-from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
+from tissue.elasticity.neo_hookean import (
+    displacement_gradients,
+    displacements,
+    has_averaged_volumes,
+    pressures,
+    solid_force,
+    solid_forces,
+)
+from tissue.elasticity.stored_energy import solid_energy
+from tissue.elasticity.viscoelasticity import prepare_relaxation, relax_blocks
 from tissue.mesh.body import Body, build_body
 from tissue.mesh.star import LARGEST_STAR, no_visits
 
@@ -96,25 +106,38 @@ def solid_of(
     law: EnergyDensity,
     fixed: BoolArray | None = None,
     *,
+    prony: Sequence[tuple[float, float]] = (),
     is_single: bool = False,
 ) -> SolidBody:
     """Return the body of a mesh as a solid."""
     body = build_body(mesh, None, fixed)
     springs_of(body)
-    return built(body, law, is_single=is_single)
+    return built(body, law, prony=prony, is_single=is_single)
 
 
-def built(body: Body, law: EnergyDensity, *, is_single: bool = False) -> SolidBody:
+def built(
+    body: Body,
+    law: EnergyDensity,
+    *,
+    prony: Sequence[tuple[float, float]] = (),
+    is_single: bool = False,
+) -> SolidBody:
     """Return the solid of a body whose masses are set."""
     n, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     room = (len(body.rest), len(body.tetrahedra))
-    solid = no_solid(law, *room, room_for_stars(*room), is_single=is_single)
+    solid = no_solid(law, *room, room_for_stars(*room), prony=prony, is_single=is_single)
     visits = no_visits(*room)
     build_tetrahedra(solid, body, solid.every, n_tetrahedra)
     around = np.zeros(LARGEST_STAR, dtype=np.int64)
     assert build_stars(solid, body, visits, solid.every, n, around) == n
     assert bound_solid_frequencies(solid, body, visits, solid.every, n) == n
     return SolidBody(body, solid)
+
+
+def relax(solid: SolidBody, positions: FloatArray, seconds: float) -> None:
+    """Let the stress of the nodes at `positions` relax for that time [s]."""
+    solid.placed(positions)
+    relax_where_it_is(solid.solid, solid.body, seconds)
 
 
 def moved(mesh: TetrahedralMesh, share: float = 0.1, seed: int = 0) -> FloatArray:
@@ -159,6 +182,18 @@ def evaluate(solid: Solid, body: Body, positions: FloatArray, out: FloatArray) -
     solid_forces(solid, body, positions, solid.every, blocks, solid.every, n)
     for i in range(n):
         store_point(out, i, solid_force(solid, i))
+
+
+@kernel
+def relax_where_it_is(solid: Solid, body: Body, seconds: float) -> None:
+    """Let the stress of a body relax for that time [s]."""
+    blocks, n = n_blocks(solid, body.n_tetrahedra), body.n_nodes
+    displacements(solid, body, body.positions, solid.every, 0, n)
+    displacement_gradients(solid, solid.every, 0, blocks)
+    if has_averaged_volumes(solid):
+        pressures(solid, solid.every, 0, n)
+    prepare_relaxation(solid, seconds)
+    relax_blocks(solid, 0, blocks)
 
 
 @kernel

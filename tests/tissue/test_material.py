@@ -1,5 +1,6 @@
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,11 +21,30 @@ from tissue import Material, Tissue, block
         ({"law": "yeoh"}, "yeoh_second or yeoh_third must be positive"),
         ({"law": "neo_hookean", "stiffening": 15.0}, "leave it at 0, or choose law exponential"),
         ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),
+        ({"prony": [(0.3, 0.1)]}, "prony is given with law springs.* choose law neo_hookean"),
+        ({"prony": [(0.6, 0.1), (0.4, 1.0)], "law": "neo_hookean"}, "sum is 1; it must be below 1"),
+        ({"prony": [(0.3, 0.005)], "law": "neo_hookean"}, "tau of 0.005 s; .* at least 0.01 s"),
+        ({"prony": [(0.3, np.inf)], "law": "neo_hookean"}, "tau of inf s; it must be finite"),
+        ({"prony": [(0.0, 0.1)], "law": "neo_hookean"}, "g of 0.0; it must be between 0 and 1"),
+        ({"prony": [(np.nan, 0.1)], "law": "neo_hookean"}, "g of nan; it must be between 0 and 1"),
+        ({"prony": [(0.1, 0.1)] * 4, "law": "neo_hookean"}, "4 terms; it may have 3 at most"),
+        ({"prony": [(0.1, 0.1, 2.0)], "law": "neo_hookean"}, "must be pairs of numbers, g and tau"),
+        ({"prony": [0.3, 0.1], "law": "neo_hookean"}, "must be pairs of numbers, g and tau"),
+        ({"prony": "0.3:0.1", "law": "neo_hookean"}, "must be pairs of numbers, g and tau"),
+        ({"prony": None, "law": "neo_hookean"}, "must be pairs of numbers, g and tau"),
     ],
 )
 def test_an_impossible_material_is_refused_with_the_valid_range(changes, message):
     with pytest.raises(ValueError, match=message):
         Material(**changes)
+
+
+def test_a_prony_series_is_kept_as_pairs_whatever_it_was_given_as():
+    pairs = ((0.3, 0.1), (0.2, 5.0))
+    for given in (pairs, [[0.3, 0.1], [0.2, 5]], np.array(pairs)):
+        material = Material(law="exponential", stiffening=5.0, prony=given)
+        assert material.prony == pairs
+        assert hash(material) == hash(replace(material, prony=pairs))
 
 
 def test_lames_constants_are_those_of_the_textbook():

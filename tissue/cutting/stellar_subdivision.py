@@ -14,7 +14,7 @@ from tissue.geometry.exact_predicates import nearest
 from tissue.geometry.tetrahedron import smallest_altitude, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import local_index
-from tissue.mesh.changes import note_dirty
+from tissue.mesh.changes import note_child, note_dirty
 from tissue.mesh.star import edge_star
 from tissue.mesh.workspace import PASS_NODES, SPARE_NODES
 
@@ -197,6 +197,8 @@ def _make_children(cut: Cut, i: int, n_ends: int, a: int, b: int, c: int, node: 
             body.tetrahedra[child, k] = node if old == _pick(e, a, b, c) else old
         decide_side(cut.sheet, child, side)
         note_dirty(cut.change, child)
+        if child != parent:
+            note_child(cut.change, child, parent)
     for e in range(n_ends):
         child = scratch.children[i, e]
         for k in range(4):

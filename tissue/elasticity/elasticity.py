@@ -22,6 +22,7 @@ from tissue.elasticity.mass_scaling import (
     LIMIT_STEP,
     scale_masses,
 )
+from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
@@ -70,7 +71,11 @@ class Elasticity:
         self.arrays = Elastic(
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
             solid=no_solid(
-                law or volume_term(0.0), *room, room_for_stars(*room), is_single=is_single
+                law or volume_term(0.0),
+                *room,
+                room_for_stars(*room),
+                prony=material.prony,
+                is_single=is_single,
             ),
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
@@ -107,8 +112,15 @@ class Elasticity:
             nodes: Nodes, of which the first `n` are the nodes of those tetrahedra.
             n: How many these are.
         """
+        if self.relaxes:
+            inherit_relaxed(self.arrays.solid, change.children, change.n_children)
         self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
         return_spin(body, change, self._material.density, nodes, n)
+
+    @property
+    def relaxes(self) -> bool:
+        """Whether the stress of held tissue relaxes."""
+        return bool(self._material.prony)
 
     @property
     def follows_strain(self) -> bool:

@@ -12,6 +12,8 @@ in single: block b of width w holds tetrahedra w b to w b + w - 1, and the value
 stand in a row. The state, positions and velocities, is always double.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
@@ -24,6 +26,9 @@ from tissue.elasticity.energy_density import EnergyDensity
 from tissue.geometry.tetrahedron import tetrahedron_volume
 from tissue.mesh.body import Body
 from tissue.mesh.star import LARGEST_STAR, Visits, sorted_star
+
+N_RELAXED = 7
+"""Numbers of the stress that has relaxed in a tetrahedron (`relaxed_stress`)."""
 
 VOLUME, N_SHAPE = 9, 10
 """Place of V among the quantities of `Solid.shape`, and how many these are. Before it are grad N_1,
@@ -46,6 +51,18 @@ class Solid(Arrays, two_precisions=True):
     shape: FloatArray
     """grad N_1, grad N_2, grad N_3 [1/m] and V [m3] of each tetrahedron, in blocks of ten rows
     (`shape_place`). Its precision is that of all scratch but the node's own."""
+    relaxing_shares: FloatArray
+    """g of each term of the Prony series, shape (terms,); empty where no stress relaxes."""
+    relaxation_times: FloatArray
+    """tau of each term [s], shape (terms,)."""
+    relaxation_weights: FloatArray
+    """Scratch of `viscoelasticity`: how far each term goes to its limit in a step, shape
+    (terms,)."""
+    relaxed: FloatArray
+    """Stress that has relaxed in each tetrahedron [Pa], the sum of all terms, in blocks of seven
+    rows; empty where no stress relaxes."""
+    relaxed_terms: FloatArray
+    """The same of each term, in blocks of seven rows for each term."""
     first: IntArray
     """Where each node's row begins in the pool, shape (nodes,)."""
     room: IntArray
@@ -125,7 +142,13 @@ class Solid(Arrays, two_precisions=True):
 
 
 def no_solid(
-    law: EnergyDensity, n_nodes: int, n_tetrahedra: int, pool: int, *, is_single: bool = False
+    law: EnergyDensity,
+    n_nodes: int,
+    n_tetrahedra: int,
+    pool: int,
+    *,
+    prony: Sequence[tuple[float, float]] = (),
+    is_single: bool = False,
 ) -> Solid:
     """Return empty rows with room for that many nodes, tetrahedra and slots.
 
@@ -134,6 +157,7 @@ def no_solid(
         n_nodes: Number of nodes.
         n_tetrahedra: Number of tetrahedra.
         pool: Number of slots.
+        prony: g and tau [s] of each term of the Prony series; none where no stress relaxes.
         is_single: Whether forces are computed in single precision.
     """
     real = np.float32 if is_single else np.float64
@@ -144,10 +168,16 @@ def no_solid(
     tested_growth[:] = 1.0
     tested_stiffness = aligned(room, real)
     tested_stiffness[:] = 1.0
+    terms = np.array(prony, dtype=np.float64).reshape(-1, 2)
     return Solid(
         law=law,
         nodes=aligned(4 * width * blocks, np.int32),
         shape=aligned(N_SHAPE * width * blocks, real),
+        relaxing_shares=terms[:, 0].copy(),
+        relaxation_times=terms[:, 1].copy(),
+        relaxation_weights=np.zeros(len(terms)),
+        relaxed=aligned(N_RELAXED * width * blocks if len(terms) else 0, real),
+        relaxed_terms=aligned(N_RELAXED * width * blocks * len(terms), real),
         first=np.zeros(n_nodes, dtype=np.int64),
         room=np.zeros(n_nodes, dtype=np.int64),
         count=np.zeros(n_nodes, dtype=np.int64),
@@ -187,7 +217,9 @@ def no_solid(
 def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Solid:
     """Return the rows with room for that many nodes, tetrahedra and slots."""
     is_single = solid.shape.dtype == np.float32
-    larger = no_solid(solid.law, n_nodes, n_tetrahedra, pool, is_single=is_single)
+    prony = list(zip(solid.relaxing_shares, solid.relaxation_times, strict=True))
+    room = (n_nodes, n_tetrahedra, pool)
+    larger = no_solid(solid.law, *room, prony=prony, is_single=is_single)
     cells = {"used", "test"}
     for name in cells:
         setattr(larger, name, getattr(solid, name))

@@ -10,9 +10,10 @@ from tissue.core.simd import Point, point_of
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid, n_blocks
-from tissue.elasticity.neo_hookean import solid_energy, solid_force, solid_forces
+from tissue.elasticity.neo_hookean import solid_force, solid_forces
 from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
 from tissue.elasticity.springs import Springs, spring_energy
+from tissue.elasticity.stored_energy import solid_energy
 from tissue.mesh.body import Body
 
 
@@ -117,7 +118,10 @@ def bound_both_frequencies(elastic: Elastic, nodes: IntArray, n: int) -> None:
 
 @kernel
 def elastic_energy(elastic: Elastic, body: Body) -> float:
-    """Return the elastic energy of the body now, less that at rest [J]."""
+    """Return the elastic energy of the body now, less that at rest [J].
+
+    Where stress relaxes, that in the springs of the Maxwell elements is a part of it.
+    """
     energy = 0.0
     if elastic.has_springs:
         energy += spring_energy(elastic.springs, body)

@@ -14,7 +14,8 @@ What is not zero at rest cancels, which leaves
 
 every term of which is small where the strain is. The pressure p is that of the tetrahedron, or the
 mean of those at its nodes, where J is averaged over the tetrahedra around the node: the exact
-gradient of the energy either way.
+gradient of the energy either way. Where stress relaxes, F R + r cof F is taken from P
+(`tissue.elasticity.relaxed_stress`).
 
 Four loops: displacements of nodes, gradients of blocks, pressures of nodes, forces of blocks; then
 the force on a node is the sum over its row. Threads may share a loop, each taking a part of it.
@@ -22,7 +23,7 @@ the force on a node is the sum over its row. Threads may share a loop, each taki
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, Lanes, Point, logarithm, point, point_of
+from tissue.core.simd import WIDTH, Lanes, Point, point, point_of
 from tissue.core.simd_blocks import (
     alike,
     gathered_alike,
@@ -32,18 +33,14 @@ from tissue.core.simd_blocks import (
     store_row,
     store_rows,
     sum_of_eight_rows,
-    sum_of_lanes,
     width_of,
 )
 from tissue.core.simd_gather import sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
-from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid, n_blocks
-from tissue.elasticity.stiffening import (
-    stiffening_factor,
-    stiffens,
-    stretch_energy,
-    stretch_invariant,
-)
+from tissue.elasticity.energy_density import EnergyDensity
+from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
+from tissue.elasticity.relaxed_stress import relaxed_pressure, relaxes, with_relaxed
+from tissue.elasticity.stiffening import stiffening_factor, stiffens, stretch_invariant
 from tissue.mesh.body import Body
 
 NO_VOLUME = 1e-30
@@ -134,7 +131,7 @@ def displacement_gradients(solid: Solid, blocks: IntArray, begin: int, end: int)
             _store_vector(solid, at, x)
             _store_vector(solid, at + 3 * width, y)
             _store_vector(solid, at + 6 * width, z)
-        cofactors = _cofactors(x, y, z)
+        cofactors = cofactors_of(x, y, z)
         store_block(solid.dilated, width * (1 + block), _dilated(solid, block, x, y, z, cofactors))
 
 
@@ -143,7 +140,7 @@ def pressures(solid: Solid, nodes: IntArray, begin: int, end: int) -> None:
     """Write lam (J - 1) of `nodes[begin:end]`, from the volumes around them."""
     for i in range(begin, end):
         node = nodes[i]
-        grown = _dilated_around(solid, node) / solid.node_volume[node]
+        grown = dilated_around(solid, node) / solid.node_volume[node]
         solid.pressure[node] = solid.law.lam_of_nodes * grown
 
 
@@ -162,21 +159,12 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
         block = blocks[i]
         x, y, z = known_gradient(solid, block)
         v = shape_of(solid, block, VOLUME)
-        p = alike(0.0, v)
-        if law.lam_of_nodes != 0.0:
-            p = alike(0.25, v) * _pressure_of_nodes(solid, block, v)
-        if law.lam_of_tetrahedra != 0.0:
-            own = load_block(solid.dilated, width * (1 + block)) / (v + alike(NO_VOLUME, v))
-            p = p + alike(law.lam_of_tetrahedra, v) * own
+        p = pressure_of(solid, block, v)
+        if relaxes(solid):
+            p = p - relaxed_pressure(solid, block)
         trace = x.x + y.y + z.z
-        cx, cy, cz = _cofactors(x, y, z)
-        if stiffens(law):
-            rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
-            s = alike(0.0, v)
-        else:
-            grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-            s = alike(0.25 * law.mu, v) * grown / (grown + alike(4.0, v))
-            rest = alike(0.75 * law.mu, v)
+        cx, cy, cz = cofactors_of(x, y, z)
+        rest, s = shear_factors(law, x, y, z, cx, cy, cz)
         # The factors of H, K and 1, times -V:
         minus_v = alike(-1.0, v) * v
         a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
@@ -195,6 +183,8 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
             a * z.y + b * (cz.y - y.z),
             a * z.z + b * (trace - z.z + cz.z) + c,
         )
+        if relaxes(solid):
+            px, py, pz = with_relaxed(solid, block, v, (px, py, pz), (x, y, z))
         f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
         f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
         f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
@@ -204,6 +194,49 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
         store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
         store_rows(solid.forces, row + 2 * width, f2.x, f2.y, f2.z)
         store_rows(solid.forces, row + 3 * width, f3.x, f3.y, f3.z)
+
+
+@inlined
+def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
+    """Return the elastic pressures p of the tetrahedra of a block [Pa], of volumes `v` [m3]."""
+    law, p = solid.law, alike(0.0, v)
+    if law.lam_of_nodes != 0.0:
+        p = alike(0.25, v) * _pressure_of_nodes(solid, block, v)
+    if law.lam_of_tetrahedra != 0.0:
+        p = p + alike(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
+    return p
+
+
+@inlined
+def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
+    """Return J - 1 of the tetrahedra of a block by themselves, after `displacement_gradients`."""
+    dilated = load_block(solid.dilated, width_of(solid.shape) * (1 + block))
+    return dilated / (v + alike(NO_VOLUME, v))
+
+
+@inlined
+def shear_factors(
+    law: EnergyDensity, x: Vec3, y: Vec3, z: Vec3, cx: Vec3, cy: Vec3, cz: Vec3
+) -> tuple[Lanes, Lanes]:
+    """Return c and s of the shear part of the stress, c (F - cof F) + s F [Pa].
+
+    Args:
+        law: The law.
+        x: First row of H.
+        y: Second row.
+        z: Third row.
+        cx: First row of cof H.
+        cy: Second row.
+        cz: Third row.
+    """
+    one = alike(1.0, x.x)
+    if stiffens(law):
+        g = stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        return alike(law.mu, one) * g, alike(0.0, one)
+    trace = x.x + y.y + z.z
+    grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
+    s = alike(0.25 * law.mu, one) * grown / (grown + alike(4.0, one))
+    return alike(0.75 * law.mu, one), s
 
 
 @inlined
@@ -256,7 +289,7 @@ def _row_of_gradient(d1: Lanes, d2: Lanes, d3: Lanes, g1: Vec3, g2: Vec3, g3: Ve
 
 
 @inlined
-def _cofactors(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
+def cofactors_of(x: Vec3, y: Vec3, z: Vec3) -> tuple[Vec3, Vec3, Vec3]:
     """Return the rows of cof H from the rows of H."""
     return cross(y, z), cross(z, x), cross(x, y)
 
@@ -329,52 +362,10 @@ def _pressure_of_nodes(solid: Solid, block: int, a: Lanes) -> Lanes:
 
 
 @inlined
-def _dilated_around(solid: Solid, node: int) -> float:
+def dilated_around(solid: Solid, node: int) -> float:
     """Return a quarter of V (J - 1) of the tetrahedra around a node [m3]."""
     total = 0.0
     first = solid.first[node]
     for slot in range(first, first + solid.count[node], WIDTH):
         total += sum_of_eight(solid.dilated, solid.around, slot)
     return 0.25 * total
-
-
-@kernel
-def solid_energy(solid: Solid, body: Body, positions: FloatArray) -> float:
-    """Return the elastic energy of the body at `positions` [m], less that at rest [J]."""
-    law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
-    displacements(solid, body, positions, solid.every, 0, body.n_nodes)
-    displacement_gradients(solid, solid.every, 0, blocks)
-    energy = 0.0
-    for block in range(blocks):
-        energy += sum_of_lanes(_energies(solid, block))
-    for node in range(body.n_nodes):
-        v = solid.node_volume[node]
-        energy += v * _bulk_energy(law.lam_of_nodes, _dilated_around(solid, node) / v, law.a)
-    return energy
-
-
-@inlined
-def _energies(solid: Solid, block: int) -> Lanes:
-    """Return the energies of the tetrahedra of a block by themselves [J].
-
-    After `displacement_gradients`.
-    """
-    law, width = solid.law, width_of(solid.shape)
-    x, y, z = known_gradient(solid, block)
-    v = shape_of(solid, block, VOLUME)
-    if stiffens(law):
-        shear = stretch_energy(law, stretch_invariant(x, y, z, *_cofactors(x, y, z)))
-    else:
-        trace = x.x + y.y + z.z
-        grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))
-        shear = grown - logarithm(alike(1.0, v) + alike(0.25, v) * grown)
-    dilatation = load_block(solid.dilated, width * (1 + block))
-    ratio = dilatation / (v + alike(NO_VOLUME, v))
-    bulk = dilatation * (ratio + alike(2.0 * (1.0 - law.a), v))
-    return alike(0.5 * law.mu, v) * v * shear + alike(0.5 * law.lam_of_tetrahedra, v) * bulk
-
-
-@kernel
-def _bulk_energy(lam: float, dilatation: float, a: float) -> float:
-    """Return lam/2 ((J - a)^2 - (1 - a)^2) [J/m3], `dilatation` is J - 1."""
-    return 0.5 * lam * dilatation * (dilatation + 2.0 * (1.0 - a))

@@ -17,8 +17,10 @@ With H = F - 1 and K = cof F - 1, F - cof F = H - K and
 without any difference of large numbers. Under pure dilatation q is negative: there g is 1.
 """
 
+import math
+
 from tissue.core.jit import inlined
-from tissue.core.simd import Lanes
+from tissue.core.simd import Lanes, logarithm
 from tissue.core.simd_blocks import alike
 from tissue.core.simd_gather import larger, where_larger
 from tissue.core.vec3 import Vec3, dot
@@ -30,6 +32,14 @@ the strain at which tissue tears. It bounds the step of an explicit method."""
 
 _HALVINGS = 5
 """The exponent is halved so many times, and its exponential squared as often."""
+
+_NEWTON_STEPS_EXPONENTIAL = 6
+_NEWTON_STEPS_YEOH = 30
+"""Steps of Newton's method in `complementary_energy`: from y on, a polynomial of fifth degree falls
+to a third in each at first."""
+
+_NO_STRESS = 1e-30
+"""Added to y, of which the logarithm is taken."""
 
 _FACTORIALS = (362880.0, 40320.0, 5040.0, 720.0, 120.0, 24.0, 6.0, 2.0, 1.0)
 """Of the series of the exponential: with nine terms its error at an exponent of 4 / 32 is
@@ -81,6 +91,48 @@ def stretch_energy(law: EnergyDensity, q: Lanes) -> Lanes:
         return (grown + (grown + alike(1.0, q)) * (b * q - x)) / b
     second, third = alike(law.second, q), alike(law.third, q)
     return q + positive * positive * (second + third * positive)
+
+
+@inlined
+def complementary_energy(law: EnergyDensity, y: Lanes) -> Lanes:
+    """Return 2 g q - w(q), with q from g^2 q = y.
+
+    With y = |dev S|^2 / (2 mu^2), mu/2 times it is S : E - W at small strain: the energy that the
+    stress S has by itself, |dev S|^2 / (4 mu) where nothing stiffens.
+    """
+    if not stiffens(law):
+        return y
+    q = _stretch_of_exponential(law, y) if law.exponent > 0.0 else _stretch_of_yeoh(law, y)
+    gq = stiffening_factor(law, q) * q
+    return gq + gq - stretch_energy(law, q)
+
+
+@inlined
+def _stretch_of_exponential(law: EnergyDensity, y: Lanes) -> Lanes:
+    """Return q of exp(2 b q) q = y: in u = b q the root of 2 u + log u - log(b y), a concave one.
+
+    From the left Newton's method stays there. Beyond `LARGEST_EXPONENT` g is constant.
+    """
+    one, two, b = alike(1.0, y), alike(2.0, y), alike(law.exponent, y)
+    by = b * (y + alike(_NO_STRESS, y))
+    goal = logarithm(by)
+    u = by / (one + two * by)
+    for _ in range(_NEWTON_STEPS_EXPONENTIAL):
+        u = u - u * (two * u + logarithm(u) - goal) / (two * u + one)
+    factor = math.exp(2.0 * LARGEST_EXPONENT)
+    u = where_larger(by, alike(LARGEST_EXPONENT * factor, y), alike(1.0 / factor, y) * by, u)
+    return u / b
+
+
+@inlined
+def _stretch_of_yeoh(law: EnergyDensity, y: Lanes) -> Lanes:
+    """Return q of g^2 q = y, which is convex: from the right Newton's method stays there."""
+    q = y
+    for _ in range(_NEWTON_STEPS_YEOH):
+        g = stiffening_factor(law, q)
+        slope = stiffening_slope(law, q, g)
+        q = q - (g * g * q - y) / (g * (g + (slope + slope) * q))
+    return q
 
 
 @inlined

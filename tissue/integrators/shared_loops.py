@@ -22,6 +22,7 @@ from tissue.elasticity.neo_hookean import (
     has_averaged_volumes,
     pressures,
 )
+from tissue.elasticity.viscoelasticity import relax_blocks
 from tissue.integrators.damping import damping_changes
 from tissue.integrators.node_loops import (
     drift,
@@ -33,15 +34,15 @@ from tissue.integrators.node_loops import (
 )
 from tissue.integrators.step_context import StepContext
 
-GRADIENTS, CORNER_FORCES = 0, 1
+GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
 """Loops over blocks of tetrahedra."""
-DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_4, PRESSURES = 2, 3, 4, 5
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_4, PRESSURES = 3, 4, 5, 6
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `positions_4`."""
-FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 6, 7, 8, 9
+FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
 """Loops over nodes of the Runge-Kutta method."""
-DRIFTING, KICKING = 10, 11
+DRIFTING, KICKING = 11, 12
 """Loops over nodes of position Verlet."""
-DAMPING_CHANGES = 12
+DAMPING_CHANGES = 13
 """The loop over nodes of damping between steps."""
 
 BLOCKS_OF_A_CHUNK = 32
@@ -61,7 +62,7 @@ def run_loop(context: StepContext, loop: int, seconds: float) -> None:
         loop: Which loop.
         seconds: The step that it is for [s]; some loops need none.
     """
-    is_of_blocks = loop <= CORNER_FORCES
+    is_of_blocks = loop <= STRESS_RELAXATION
     body, team = context.body, context.team
     n = n_blocks(context.elastic.solid, body.n_tetrahedra) if is_of_blocks else body.n_nodes
     if team.is_shared == 0:
@@ -146,12 +147,14 @@ def _run_part(context: StepContext, loop: int, seconds: float, begin: int, end: 
 
 @kernel
 def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
-    """Run a part of a loop of `deform_shared`."""
+    """Run a part of a loop of `deform_shared`, or of relaxation."""
     solid, body, stages = context.elastic.solid, context.body, context.stages
     if loop == GRADIENTS:
         displacement_gradients(solid, solid.every, begin, end)
     elif loop == CORNER_FORCES:
         corner_forces(solid, solid.every, begin, end)
+    elif loop == STRESS_RELAXATION:
+        relax_blocks(solid, begin, end)
     elif loop == PRESSURES:
         pressures(solid, solid.every, begin, end)
     else:

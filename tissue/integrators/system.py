@@ -108,6 +108,14 @@ class System:
         assert isinstance(self.contact, SelfContact)
         return self.contact
 
+    def relax_stress(self, seconds: float) -> None:
+        """Let the stress of the tissue relax where it is, for that time [s] or for ever (inf)."""
+        if self.elasticity.relaxes:
+            # Imported late: kernels that are not used cost no start.
+            from tissue.integrators.stress_relaxation import relax_stress
+
+            relax_stress(self.context, seconds)
+
     def find_contacts(self, seconds: float) -> None:
         """Find the contacts that act as forces in a time step of that length [s]."""
         elasticity = self.elasticity

@@ -21,12 +21,17 @@ class Change(Arrays):
     """Tetrahedra that were split or got another node, with repeats; shape (CHANGES,)."""
     faces: IntArray
     """Faces cut, each as tetrahedron, local face, tetrahedron, local face; shape (CHANGES, 4)."""
+    children: IntArray
+    """Tetrahedra that were appended, and the tetrahedron that each is a part of: in order, so that
+    a parent stands before its children; shape (CHANGES, 2)."""
     n_flagged: IntCell
     """Number of entries in `flagged`."""
     n_dirty: IntCell
     """Number of entries in `dirty`."""
     n_faces: IntCell
     """Number of entries in `faces`."""
+    n_children: IntCell
+    """Number of entries in `children`."""
     is_full: IntCell
     """1 if the pass stopped for want of room, else 0."""
     lost_spin: FloatArray
@@ -42,9 +47,11 @@ def new_change() -> Change:
         flagged=np.zeros(CHANGES, np.int64),
         dirty=np.zeros(CHANGES, np.int64),
         faces=np.zeros((CHANGES, 4), np.int64),
+        children=np.zeros((CHANGES, 2), np.int64),
         n_flagged=0,
         n_dirty=0,
         n_faces=0,
+        n_children=0,
         is_full=0,
         lost_spin=np.zeros(3),
         area=0.0,
@@ -57,6 +64,7 @@ def clear_changes(change: Change) -> None:
     change.n_flagged = 0
     change.n_dirty = 0
     change.n_faces = 0
+    change.n_children = 0
     change.is_full = 0
 
 
@@ -66,6 +74,15 @@ def note_dirty(change: Change, t: int) -> None:
     if change.n_dirty < len(change.dirty):
         change.dirty[change.n_dirty] = t
         change.n_dirty += 1
+
+
+@kernel
+def note_child(change: Change, child: int, parent: int) -> None:
+    """Note that tetrahedron `child`, which was appended, is a part of `parent`."""
+    if change.n_children < len(change.children):
+        change.children[change.n_children, 0] = child
+        change.children[change.n_children, 1] = parent
+        change.n_children += 1
 
 
 @kernel

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ CASES = {
     "springs, damped between steps": (SPRINGS, {"relaxation": Global(damping="step")}, 300),
     "solid": (SOLID, {}, 300),
     "solid, single": (SOLID, {"precision": "single"}, 300),
+    "solid, stress relaxes": (replace(SOLID, prony=((0.3, 0.1), (0.2, 5.0))), {"audit": True}, 300),
     "solid, damped in stages": (SOLID, {"relaxation": Global(damping="stage")}, 300),
     "solid, contact as forces": (SOLID, {"contact": "penalty"}, 300),
     "solid, Verlet": (SOLID, {"relaxation": "verlet"}, 300),

@@ -10,7 +10,7 @@ from tissue.cutting.bielser_1998.workspace import Split
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.angular_momentum import note_spin
 from tissue.mesh.body import CUT, OUTER
-from tissue.mesh.changes import note_dirty
+from tissue.mesh.changes import note_child, note_dirty
 from tissue.mesh.nonconforming import HANGING, join_list, leave_list
 
 MOST_NEW_NODES = 20
@@ -61,6 +61,8 @@ def _make_child(s: Split, t: int, c: int) -> None:
     for k in range(4):
         _add_mass(s, t, table.children[c, k], body.tetrahedra[child, k], volume)
     note_dirty(s.change, child)
+    if child != t:
+        note_child(s.change, child, t)
 
 
 @kernel
