@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,6 +58,8 @@ class KernelSet(NamedTuple):
     """Whether the blade has a thickness."""
     precision: str = "single"
     contact: str = "impulses"
+    relaxes: bool = False
+    """Whether the stress of the material relaxes."""
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
@@ -64,7 +67,12 @@ class KernelSet(NamedTuple):
         has_sides = scene.blade is not None
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
         how = (scene.audit, has_sides, scene.precision, scene.contact)
-        return cls(law, scheme, relaxation, *how)
+        return cls(law, scheme, relaxation, *how, relaxes=bool(scene.material.prony))
+
+    @property
+    def _prony(self) -> tuple[tuple[float, float], ...]:
+        """Return a Prony series that needs this set."""
+        return ((0.5, 1.0),) if self.relaxes else ()
 
     def solver(self) -> SolverSettings:
         """Return settings that need this set."""
@@ -80,7 +88,7 @@ class KernelSet(NamedTuple):
         """Return a tissue that needs this set."""
         return Tissue(
             mesh,
-            PHANTOM if self.law == "springs" else PARENCHYMA,
+            PHANTOM if self.law == "springs" else replace(PARENCHYMA, prony=self._prony),
             fixed=fixed_nodes(mesh, fixed),
             blade=BladeShape() if self.has_sides else None,
             solver=self.solver(),

@@ -23,6 +23,10 @@ _LARGEST = sys.float_info.max  # refuses infinity
 _Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST, description="a number above 0")]
 _NotNegative = Annotated[float, Meta(ge=0.0, le=_LARGEST, description="a number, 0 or more")]
 _Ratio = Annotated[float, Meta(ge=0.0, lt=0.5, description="a number from 0 to below 0.5")]
+_Series = Annotated[
+    list[tuple[float, float]],
+    Meta(description="a list of pairs of numbers, [[g, tau], ...]"),
+]
 _Law = Annotated[Law, Meta(description=" or ".join(f'"{law}"' for law in get_args(Law)))]
 
 
@@ -35,6 +39,7 @@ class MaterialTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     stiffening: _NotNegative | None = None
     yeoh_second: _NotNegative | None = None
     yeoh_third: _NotNegative | None = None
+    prony: _Series | None = None
     density: _Positive | None = None
     toughness: _NotNegative | None = None
     skin_toughness: _NotNegative | None = None

@@ -23,6 +23,9 @@ MATERIAL_COMMENTS = {
     "exp(3 b e^2) times as stiff. Soft organs have 5 to 30.",
     "yeoh_second": "C20 / C10 of law yeoh, 0 under the others.",
     "yeoh_third": "C30 / C10 of law yeoh, 0 under the others.",
+    "prony": "Relaxation of stress: g and tau [s] of one to three terms, [[g, tau], ...]; held "
+    "tissue keeps 1 - sum of g (1 - exp(-t / tau)) of its stress. []: none relaxes, as under "
+    "springs.",
     "density": "Density [kg/m3].",
     "toughness": "Fracture toughness: the energy that a square metre of cut costs [J/m2].",
     "skin_toughness": "Fracture toughness until the edge has broken in [J/m2]: the peak of a "
@@ -127,6 +130,8 @@ def _comment(text: str) -> list[str]:
     return [f"# {line}" for line in textwrap.wrap(text, _WIDTH, break_on_hyphens=False)]
 
 
-def _as_toml(value: float | str) -> str:
+def _as_toml(value: float | str | tuple[tuple[float, float], ...]) -> str:
     """Return a value as TOML has it; reading it gives the same bits."""
+    if isinstance(value, tuple):
+        return str([list(term) for term in value])
     return f'"{value}"' if isinstance(value, str) else repr(float(value))

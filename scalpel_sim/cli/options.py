@@ -71,6 +71,9 @@ class MaterialOptions:
     "C20 / C10 of law yeoh."
     yeoh_third: float | None = None
     "C30 / C10 of law yeoh."
+    prony: str | None = None
+    """Relaxation of stress, as G:TAU of one to three terms, such as 0.3:0.1,0.2:5: held tissue
+    keeps 1 - sum of G (1 - exp(-t / TAU)) of its stress. Not under law springs."""
     density: float | None = None
     "Density [kg/m3]."
     toughness: float | None = None

@@ -26,6 +26,7 @@ from scalpel_sim.cli.options import (
     PrintOptions,
     TissueOptions,
 )
+from scalpel_sim.cli.prony_series import series_of
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
@@ -307,6 +308,7 @@ def _material_as_asked(usual: Material, options: MaterialOptions) -> Material:
         "stiffening": options.stiffening,
         "yeoh_second": options.yeoh_second,
         "yeoh_third": options.yeoh_third,
+        "prony": None if options.prony is None else series_of(options.prony),
         "density": options.density,
         "toughness": options.toughness,
         "skin_toughness": options.skin_toughness,

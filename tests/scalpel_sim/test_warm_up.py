@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ import scalpel_sim
 from scalpel_sim import warm_up
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.warm_up import KernelSet, compile_ahead, kernels_are_compiled
-from tissue import cache_directory
+from tissue import block, cache_directory
 
 SMALL = KernelSet.of(SCENES["grid2"])
 """A set whose blade is a line."""
@@ -36,6 +37,14 @@ import scalpel_sim
 print(scalpel_sim.__file__)
 print(counted.names)
 """
+
+
+def test_a_material_whose_stress_relaxes_needs_more_kernels():
+    scene = SCENES["organ"]
+    relaxing = replace(scene, material=replace(scene.material, prony=((0.3, 0.1),)))
+    assert KernelSet.of(relaxing) == KernelSet.of(scene)._replace(relaxes=True)
+    assert KernelSet.of(relaxing).body(block((2, 2, 2))).material.prony
+    assert not KernelSet.of(scene).body(block((2, 2, 2))).material.prony
 
 
 @pytest.fixture

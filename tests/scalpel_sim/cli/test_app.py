@@ -78,6 +78,19 @@ WRONG_USE = {
         "--spring-error belongs to the tissue",
     ),
     "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
+    "a Prony series of springs": (
+        ["run", "slab", "--prony", "0.3:0.1"],
+        "prony is given with law springs",
+    ),
+    "a Prony series without a time": (
+        ["run", "organ", "--prony", "0.3:0.1,0.2"],
+        "the term '0.2'; write g:tau",
+    ),
+    "a Prony series that leaves nothing": (
+        ["run", "organ", "--prony", "0.6:0.1,0.4:1"],
+        "sum is 1; it must be below 1",
+    ),
+    "stress that relaxes too fast": (["run", "organ", "--prony", "0.6:0.001"], "at least 0.01 s"),
     "springs with a Poisson's ratio of 0": (
         ["run", "slab", "--poisson-ratio", "0"],
         "Use law neo_hookean",
@@ -292,6 +305,13 @@ def test_a_material_on_the_command_line_reaches_the_tissue(files, capsys):
     assert command_line(words) == 0
     material = json.loads(capsys.readouterr().out)["settings"]["material"]
     assert (material["young_modulus"], material["toughness"]) == (2e4, 7.0)
+
+
+def test_a_prony_series_on_the_command_line_reaches_the_tissue(files, capsys):
+    words = ["run", "grid2", "--seconds", "0.01", "--json", "--law", "neo_hookean"]
+    assert command_line([*words, "--prony", "0.3:0.1,0.2:5"]) == 0
+    material = json.loads(capsys.readouterr().out)["settings"]["material"]
+    assert material["prony"] == [[0.3, 0.1], [0.2, 5.0]]
 
 
 def test_the_coupling_of_the_command_line_reaches_the_arm(files, capsys):

@@ -2,7 +2,7 @@ import json
 import math
 import re
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import get_args, get_type_hints
 
 import pytest
@@ -43,6 +43,17 @@ WRONG_FILES = {
     "no number": ("[material]\ntoughness = nan", "toughness is nan; .* 0 or more"),
     "infinity": ("[material]\ntoughness = inf", "toughness is inf; .* 0 or more"),
     "a Poisson's ratio of 1/2": ("[material]\npoisson_ratio = 0.5", "0 to below 0.5"),
+    "one pair for a series": ("[material]\nprony = [0.3, 0.1]", r"\[\[g, tau\], ...\]"),
+    "three numbers for a pair": ("[material]\nprony = [[0.3, 0.1, 1]]", "list of pairs of numbers"),
+    "a text for a series": ('[material]\nprony = "0.3:0.1"', '"0.3:0.1"; .* pairs of numbers'),
+    "a series that leaves nothing": (
+        '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]',
+        "mine.toml: prony has g whose sum is 1.1",
+    ),
+    "a series of springs": (
+        '[material]\nlaw = "springs"\npoisson_ratio = 0.3\nprony = [[0.6, 0.1]]',
+        "mine.toml: prony is given with law springs",
+    ),
     "an unknown law": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
     "a number for a law": ("[material]\nlaw = 1", 'law is 1; .*"springs" or "neo_hookean"'),
     "a ratio that the law cannot have": (
@@ -102,6 +113,16 @@ def test_any_material_reads_back_to_the_same_bits(tmp_path):
     path = tmp_path / "odd.toml"
     path.write_text(template(odd, "an odd one"), encoding="utf-8")
     assert Material(**read_material(path)) == odd
+
+
+def test_a_prony_series_reads_back_and_an_option_overrides_it(tmp_path):
+    relaxing = Material(law="neo_hookean", prony=((1 / 3, 0.1), (0.2, 5.0)))
+    path = tmp_path / "mine.toml"
+    path.write_text(template(relaxing, "one that relaxes"), encoding="utf-8")
+    assert Material(**read_material(path)) == relaxing
+    assert chosen_scene("organ", options(path)).material.prony == relaxing.prony
+    overridden = chosen_scene("organ", options(path, prony="0.25:3")).material
+    assert overridden == replace(relaxing, prony=((0.25, 3.0),))
 
 
 def test_every_number_of_the_file_has_a_comment_and_a_preset_its_sources(tmp_path):

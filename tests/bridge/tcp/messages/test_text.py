@@ -30,6 +30,7 @@ def test_a_description_arrives_with_every_property_of_material_and_blade():
         friction=0.2,
         law="neo_hookean",
         poisson_ratio=0.45,
+        prony=((0.3, 0.1), (0.2, 5.0)),
     )
     sent = TissueDescription(
         "slab",
@@ -56,6 +57,18 @@ def test_a_description_of_an_impossible_material_is_refused(density):
     assert unpack_description(packed)
     with pytest.raises(MessageError, match=r"density|out of range"):
         unpack_description(packed.replace(b'"density":1000.0', b'"density":' + density))
+
+
+@pytest.mark.parametrize(
+    "series", [b"null", b"[0.3]", b'[["a", 0.1]]', b"[[0.3, 0.1, 1]]", b"[[2, 1]]"]
+)
+def test_a_description_of_an_impossible_prony_series_is_refused(series):
+    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    material = Material(law="neo_hookean", prony=((0.3, 0.1),))
+    packed = pack_description(TissueDescription("", material, bounds, 1, 4))
+    assert unpack_description(packed).material == material
+    with pytest.raises(MessageError, match=r"prony|\$\.material"):
+        unpack_description(packed.replace(b'"prony":[[0.3,0.1]]', b'"prony":' + series))
 
 
 def test_an_error_arrives_without_its_control_characters():
