@@ -154,46 +154,67 @@ def corner_forces(solid: Solid, blocks: IntArray, begin: int, end: int) -> None:
         begin: First block, as an index in `blocks`.
         end: End of the blocks.
     """
+    # Two loops, so that the code of elastic blocks is without a branch.
+    if relaxes(solid):
+        for i in range(begin, end):
+            _corner_forces_of(solid, blocks[i], True)
+    else:
+        for i in range(begin, end):
+            _corner_forces_of(solid, blocks[i], False)
+
+
+@inlined
+def _corner_forces_of(solid: Solid, block: int, has_relaxed: bool) -> None:
+    """Write the forces on the corners of the tetrahedra of a block.
+
+    Args:
+        solid: Written.
+        block: The block.
+        has_relaxed: Whether stress has relaxed in it; a constant where this is called.
+    """
     law, width = solid.law, width_of(solid.shape)
-    for i in range(begin, end):
-        block = blocks[i]
-        x, y, z = known_gradient(solid, block)
-        v = shape_of(solid, block, VOLUME)
-        p = pressure_of(solid, block, v)
-        if relaxes(solid):
-            p = p - relaxed_pressure(solid, block)
-        trace = x.x + y.y + z.z
-        cx, cy, cz = cofactors_of(x, y, z)
-        rest, s = shear_factors(law, x, y, z, cx, cy, cz)
-        # The factors of H, K and 1, times -V:
-        minus_v = alike(-1.0, v) * v
-        a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
-        px = Vec3(
-            a * x.x + b * (trace - x.x + cx.x) + c,
-            a * x.y + b * (cx.y - y.x),
-            a * x.z + b * (cx.z - z.x),
-        )
-        py = Vec3(
-            a * y.x + b * (cy.x - x.y),
-            a * y.y + b * (trace - y.y + cy.y) + c,
-            a * y.z + b * (cy.z - z.y),
-        )
-        pz = Vec3(
-            a * z.x + b * (cz.x - x.z),
-            a * z.y + b * (cz.y - y.z),
-            a * z.z + b * (trace - z.z + cz.z) + c,
-        )
-        if relaxes(solid):
-            px, py, pz = with_relaxed(solid, block, v, (px, py, pz), (x, y, z))
-        f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
-        f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
-        f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
-        f0 = scale(alike(-1.0, v), add(f1, add(f2, f3)))
-        row = 4 * width * (1 + block)
-        store_rows(solid.forces, row, f0.x, f0.y, f0.z)
-        store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
-        store_rows(solid.forces, row + 2 * width, f2.x, f2.y, f2.z)
-        store_rows(solid.forces, row + 3 * width, f3.x, f3.y, f3.z)
+    x, y, z = known_gradient(solid, block)
+    v = shape_of(solid, block, VOLUME)
+    p = pressure_of(solid, block, v)
+    if has_relaxed:
+        p = p - relaxed_pressure(solid, block)
+    trace = x.x + y.y + z.z
+    cx, cy, cz = cofactors_of(x, y, z)
+    if stiffens(law):
+        rest = alike(law.mu, v) * stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
+        s = alike(0.0, v)
+    else:
+        s = isotropic_factor(law, trace, x, y, z)
+        rest = alike(0.75 * law.mu, v)
+    # The factors of H, K and 1, times -V:
+    minus_v = alike(-1.0, v) * v
+    a, b, c = (rest + s) * minus_v, (p - rest) * minus_v, (s + p) * minus_v
+    px = Vec3(
+        a * x.x + b * (trace - x.x + cx.x) + c,
+        a * x.y + b * (cx.y - y.x),
+        a * x.z + b * (cx.z - z.x),
+    )
+    py = Vec3(
+        a * y.x + b * (cy.x - x.y),
+        a * y.y + b * (trace - y.y + cy.y) + c,
+        a * y.z + b * (cy.z - z.y),
+    )
+    pz = Vec3(
+        a * z.x + b * (cz.x - x.z),
+        a * z.y + b * (cz.y - y.z),
+        a * z.z + b * (trace - z.z + cz.z) + c,
+    )
+    if has_relaxed:
+        px, py, pz = with_relaxed(solid, block, v, (px, py, pz), (x, y, z))
+    f1 = _product(px, py, pz, gradient_of_shape(solid, block, 0))
+    f2 = _product(px, py, pz, gradient_of_shape(solid, block, 3))
+    f3 = _product(px, py, pz, gradient_of_shape(solid, block, 6))
+    f0 = scale(alike(-1.0, v), add(f1, add(f2, f3)))
+    row = 4 * width * (1 + block)
+    store_rows(solid.forces, row, f0.x, f0.y, f0.z)
+    store_rows(solid.forces, row + width, f1.x, f1.y, f1.z)
+    store_rows(solid.forces, row + 2 * width, f2.x, f2.y, f2.z)
+    store_rows(solid.forces, row + 3 * width, f3.x, f3.y, f3.z)
 
 
 @inlined
@@ -215,28 +236,18 @@ def own_dilatation(solid: Solid, block: int, v: Lanes) -> Lanes:
 
 
 @inlined
-def shear_factors(
-    law: EnergyDensity, x: Vec3, y: Vec3, z: Vec3, cx: Vec3, cy: Vec3, cz: Vec3
-) -> tuple[Lanes, Lanes]:
-    """Return c and s of the shear part of the stress, c (F - cof F) + s F [Pa].
+def isotropic_factor(law: EnergyDensity, trace: Lanes, x: Vec3, y: Vec3, z: Vec3) -> Lanes:
+    """Return s of the neo-Hookean law [Pa].
 
     Args:
         law: The law.
+        trace: tr H.
         x: First row of H.
         y: Second row.
         z: Third row.
-        cx: First row of cof H.
-        cy: Second row.
-        cz: Third row.
     """
-    one = alike(1.0, x.x)
-    if stiffens(law):
-        g = stiffening_factor(law, stretch_invariant(x, y, z, cx, cy, cz))
-        return alike(law.mu, one) * g, alike(0.0, one)
-    trace = x.x + y.y + z.z
     grown = trace + trace + (dot(x, x) + dot(y, y) + dot(z, z))  # |F|^2 - 3
-    s = alike(0.25 * law.mu, one) * grown / (grown + alike(4.0, one))
-    return alike(0.75 * law.mu, one), s
+    return alike(0.25 * law.mu, trace) * grown / (grown + alike(4.0, trace))
 
 
 @inlined
