@@ -21,6 +21,8 @@ from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .loads.load import Load as Load
+from .loads.material_points import MaterialPoints as MaterialPoints
 from .material import PARAMETERS_OF_LAWS as PARAMETERS_OF_LAWS
 from .material import Law as Law
 from .material import Material as Material
@@ -68,8 +70,10 @@ __all__ = [
     "Hierarchical",
     "IntArray",
     "Law",
+    "Load",
     "MATERIALS",
     "Material",
+    "MaterialPoints",
     "MeshError",
     "MeshMeasures",
     "PARAMETERS_OF_LAWS",

@@ -1,4 +1,4 @@
-"""`Audit`: the account of energy of a body, from the work of the blade to where it went."""
+"""`Audit`: the account of energy of a body: the work done on it, and where that went."""
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import edge_energy
@@ -27,6 +27,8 @@ class Audit:
         self._is_kept = is_kept
         self._gravity = gravity
         self._topology = self._before_cut = 0.0
+        self.work_of_loads = 0.0
+        """Work of the loads since the account began [J]."""
         self._now: tuple[float, float, float] | None = None
         self._at_first = (0.0, 0.0, 0.0)
         self._contacts_at_first = (0.0, 0.0)
@@ -38,6 +40,7 @@ class Audit:
         system.contact_loss.is_counted = 1
         system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
         clear_works(system.interaction.state.totals)
+        system.supports.work = self.work_of_loads = 0.0
         self._at_first = self._stored(system)
         contacts = system.contact.forces
         self._contacts_at_first = (contacts.work, contacts.stored)
@@ -68,6 +71,8 @@ class Audit:
         contacts = system.contact.forces
         return Energies(
             work_of_blade=totals.work_of_blade,
+            work_of_loads=self.work_of_loads,
+            work_of_supports=system.supports.work,
             elastic=elastic - elastic_first,
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,

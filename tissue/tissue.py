@@ -36,9 +36,10 @@ from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import Numerics, assembled
+from tissue.loads.driven_body import DrivenBody
+from tissue.loads.load import Loads
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
-from tissue.mesh.body_queries import BodyQueries
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
 from tissue.mesh.changes import touched_nodes
 from tissue.mesh.cut_error import path_error
@@ -59,13 +60,14 @@ NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 
 """The edge of no blade."""
 
 
-class Tissue(BodyQueries):
+class Tissue(DrivenBody):
     """A soft body of tetrahedra: masses at nodes, a material between them, a blade that cuts it.
 
     Args:
         mesh: The body at rest.
         material: What it is made of.
-        fixed: Nodes that do not move, shape (n_nodes,).
+        fixed: The supports: nodes that do not move, or move as `move_supports` says, shape
+            (n_nodes,).
         positions: Where the nodes are at first [m], shape (n_nodes, 3); default at rest. Fixed
             nodes stay there: the paper's displacement boundary conditions.
         gravity: Acceleration of free fall [m/s2].
@@ -122,6 +124,7 @@ class Tissue(BodyQueries):
         checked_floor(floor, float(self.bounds[0, 2]))
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
         self._incision = Incision(scheme, self.node_size)
+        self._loads = Loads()
         self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.stable_step)
@@ -132,10 +135,6 @@ class Tissue(BodyQueries):
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
         self._audit.begin(self._system)
-
-    @property
-    def _body(self) -> Body:
-        return self._system.body
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.
@@ -204,7 +203,7 @@ class Tissue(BodyQueries):
         return incision.cut_area - before
 
     def settle(self) -> int:
-        """Relax to equilibrium under gravity and fixed displacements; return the steps it took.
+        """Relax to equilibrium under gravity, loads and supports; return the steps it took.
 
         Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
         has passed a peak. All nodes are moved together, whatever the integrator. Stress that
@@ -212,6 +211,7 @@ class Tissue(BodyQueries):
         """
         self._take_edge(None)
         system = self._system
+        self._loads.spread(system.body, system.stages.loads)
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
         write_bounds(system.body, self._bounds)
@@ -256,7 +256,11 @@ class Tissue(BodyQueries):
 
     def _advance(self, increment: Increment) -> int:
         """Advance the motion by an increment; return the substeps that it took."""
-        n = self._integrator.advance(self._system, increment) if increment.span > 0.0 else 0
+        loads, system = self._loads, self._system
+        loads.spread(system.body, system.stages.loads)
+        before = loads.virtual_work(system.body)
+        n = self._integrator.advance(system, increment) if increment.span > 0.0 else 0
+        self._audit.work_of_loads += loads.virtual_work(system.body) - before
         self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
         if n == 0:

@@ -74,21 +74,28 @@ class BladeContacts(NamedTuple):
     """Area that each sample of the edge has cut in this step [m2], 0 for others; shape (n,)."""
 
 
+N_WORKS = 3
+"""Number of works in an energy balance; they come first."""
+
+
 class Energies(NamedTuple):
     """The energy balance since the body was made [J].
 
-    work_of_blade = change of elastic, kinetic, potential and held + damping + cutting + breaking
-    + friction + contact + topology + released + residual. Fixed nodes do not move, so their
-    supports do no work.
+    work_of_blade + work_of_loads + work_of_supports = change of elastic, kinetic, potential and
+    held + damping + cutting + breaking + friction + contact + topology + released + residual.
     """
 
     work_of_blade: float
     """Work that the blade did on the tissue."""
+    work_of_loads: float
+    """Work of the forces of `Tissue.push`."""
+    work_of_supports: float
+    """Work of the fixed nodes that `Tissue.move_supports` moves; 0 where they rest."""
     elastic: float
     """Change of the elastic energy of the tissue, and of that in the springs of Maxwell elements
     where stress relaxes."""
     kinetic: float
-    """Change of the kinetic energy of the tissue."""
+    """Change of the kinetic energy of the tissue, without that of fixed nodes."""
     potential: float
     """Change of the energy of the tissue in gravity."""
     held: float
@@ -112,8 +119,8 @@ class Energies(NamedTuple):
 
     @property
     def residual(self) -> float:
-        """Work of the blade less all other terms [J]: the error of time integration."""
-        return self.work_of_blade - sum(self[1:])
+        """Work done on the tissue less all other terms [J]: the error of time integration."""
+        return sum(self[:N_WORKS]) - sum(self[N_WORKS:])
 
 
 class StageTimes(NamedTuple):

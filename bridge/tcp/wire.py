@@ -17,7 +17,7 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 4
+PROTOCOL_VERSION = 5
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
 contacts and energies of a step."""
 

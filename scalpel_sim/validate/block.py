@@ -160,8 +160,8 @@ class StrokeRecord(NamedTuple):
     work: FloatArray
     """Work of the blade so far [J], shape (n,)."""
     energy_rows: FloatArray
-    """The energies so far [J], in the order of `Energies`, shape (n, 12); (n, 0) without an
-    audit."""
+    """The energies so far [J], in the order of `Energies`, shape (n, n_energies); (n, 0)
+    without an audit."""
     last: StepResult
     """Result of the last step."""
 

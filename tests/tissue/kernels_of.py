@@ -31,6 +31,7 @@ from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
 from tissue.integrators.stages import Stages, new_stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.substeps import damp
+from tissue.integrators.support_state import supports_at_rest
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
 from tissue.mesh.star import LARGEST_STAR, no_visits
@@ -138,6 +139,7 @@ class Network(NamedTuple):
             surroundings=self.surroundings,
             damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
+            supports=supports_at_rest(),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
             team=new_team(),

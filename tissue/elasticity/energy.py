@@ -10,9 +10,11 @@ from tissue.mesh.body import Body
 
 @kernel
 def kinetic_energy(body: Body) -> float:
-    """Return the kinetic energy of all nodes [J]."""
+    """Return the kinetic energy of the nodes that are not fixed [J]."""
     energy = 0.0
     for node in range(body.n_nodes):
+        if body.fixed[node]:  # its motion is that of its support
+            continue
         v = vec3(body.velocities, node)
         energy += 0.5 * body.masses[node] * dot(v, v)
     return energy
@@ -57,10 +59,9 @@ def dissipated_power(
     time = surroundings.retardation_time
     power = 0.0
     for node in range(body.n_nodes):
-        if body.fixed[node]:
-            continue
         v = vec3(velocities, node)
-        power += surroundings.drag * body.masses[node] * dot(v, v)
+        if not body.fixed[node]:
+            power += surroundings.drag * body.masses[node] * dot(v, v)
         if time > 0.0:
             force = viscous_force(elastic, node, positions, velocities, time)
             store_point(scratch, node, force)

@@ -31,7 +31,7 @@ STEPS_BETWEEN_PEAKS = 4
 
 
 def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
-    """Relax to equilibrium; return the steps that it took.
+    """Relax to equilibrium; return the steps that it took. Supports that move stop.
 
     Args:
         stepper: Moves all nodes.
@@ -41,6 +41,8 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
     body, elasticity = system.body, system.elasticity
     n, energy, n_quiet = body.n_nodes, 0.0, 0
     velocities, masses = body.velocities[:n], body.masses[:n, None]
+    velocities[body.fixed[:n]] = 0.0
+    system.supports.is_moving = 0
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         at_rest = elasticity.frequency_squared
         strained = elasticity.strained_frequency_squared(body, system.visits, at_rest)

@@ -23,7 +23,7 @@ def acceleration(
         return point_of(0.0, 0.0, 0.0)
     time = surroundings.retardation_time
     force = internal_force(context.elastic, node, positions, velocities, time)
-    force = force + point(context.stages.external, node)
+    force = force + point(context.stages.external, node) + point(context.stages.loads, node)
     fall = free_fall(body, node, surroundings.gravity)
     free = fall - times(surroundings.drag, point(velocities, node))
     total: Point = free + times(1.0 / body.masses[node], force)

@@ -36,6 +36,7 @@ from tissue.integrators.shared_loops import (
     run_loop,
 )
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.supports import add_support_work
 
 
 @kernel
@@ -53,19 +54,26 @@ def runge_kutta_nystroem(
     """
     body, stages = context.body, context.stages
     h = share * dt
+    is_moving = context.supports.is_moving == 1
     half, end = at + 0.5 * share, at + share
     apply_outer_forces(context, edge, body.positions, body.velocities, at, share / 6.0, dt)
     deform_shared(context, DISPLACEMENTS)
+    if is_moving:
+        add_support_work(context, body.positions, body.velocities, h / 6.0)
     run_loop(context, FIRST_STAGE, h)
     x2 = stages.positions
     apply_outer_forces(context, edge, x2, stages.velocities, half, share * 2.0 / 3.0, dt)
     deform_shared(context, DISPLACEMENTS_2)
+    if is_moving:
+        add_support_work(context, x2, stages.velocities, h * 2.0 / 3.0)
     run_loop(context, SECOND_STAGE, h)
     if context.surroundings.retardation_time > 0.0:
         run_loop(context, THIRD_STAGE, h)
     x4 = stages.positions_4
     apply_outer_forces(context, edge, x4, stages.velocities, end, share / 6.0, dt)
     deform_shared(context, DISPLACEMENTS_4)
+    if is_moving:
+        add_support_work(context, x4, stages.velocities, h / 6.0)
     run_loop(context, FOURTH_STAGE, h)
 
 

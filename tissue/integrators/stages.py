@@ -18,6 +18,8 @@ class Stages(Arrays):
     """Velocities of the third stage less those of the second [m/s]."""
     external: FloatArray
     """Forces of the blade on nodes [N]: zero everywhere but at those that it acts on."""
+    loads: FloatArray
+    """Loads on nodes [N], constant in a step."""
     a1: FloatArray
     """Accelerations of the first stage [m/s2]."""
     a2: FloatArray

@@ -11,6 +11,7 @@ from tissue.elasticity.internal_forces import Elastic, Surroundings
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stages import Stages
+from tissue.integrators.support_state import Supports
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
@@ -32,8 +33,10 @@ class StepContext(Arrays, two_precisions=True):
     """The damping that acts between steps."""
     contact_loss: ContactLoss
     """What contact takes from the energy, where that is counted."""
+    supports: Supports
+    """Whether fixed nodes move, and their work."""
     stages: Stages
-    """Scratch of a step, and the forces of the blade."""
+    """Scratch of a step, the forces of the blade, and loads."""
     visits: Visits
     """Scratch for searches."""
     team: Team

@@ -18,6 +18,7 @@ from tissue.integrators.stage_damping import (
 )
 from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.supports import add_support_damping
 from tissue.integrators.verlet import position_verlet
 from tissue.mesh.body import Body
 
@@ -168,6 +169,8 @@ def damp(context: StepContext, h: float) -> None:
     damping.owed = 0.5 * h
     if damping.retardation_time > 0.0 or damping.drag > 0.0:
         run_loop(context, DAMPING_CHANGES, seconds)
+        if context.supports.is_moving == 1:
+            add_support_damping(context, seconds)
         change_velocities(damping, context.body, context.stages)
 
 

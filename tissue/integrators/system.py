@@ -20,6 +20,7 @@ from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import StableStep
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.support_state import supports_at_rest
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import Change
@@ -74,6 +75,8 @@ class System:
         """The damping that acts between steps, and what it has dissipated."""
         self.contact_loss = ContactLoss(is_counted=0, dissipated=0.0)
         """What contact takes from the energy, where that is counted."""
+        self.supports = supports_at_rest()
+        """Whether fixed nodes move, and their work."""
         self._context: StepContext | None = None
 
     @property
@@ -96,6 +99,7 @@ class System:
                 surroundings=self._in_stages,
                 damping=self.damping,
                 contact_loss=self.contact_loss,
+                supports=self.supports,
                 stages=self.stages,
                 visits=self.visits,
                 team=new_team(),

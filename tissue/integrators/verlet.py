@@ -19,6 +19,7 @@ from tissue.integrators.shared_loops import (
     run_loop,
 )
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.supports import add_support_work
 
 
 @kernel
@@ -37,6 +38,8 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
     at_middle = at + 0.5 * share
     apply_outer_forces(context, edge, body.positions, body.velocities, at_middle, share, dt)
     deform_shared(context, DISPLACEMENTS)
+    if context.supports.is_moving == 1:
+        add_support_work(context, body.positions, body.velocities, h)
     run_loop(context, KICKING, h)
     # Only now: until here springs saw all nodes at the middle of the step.
     run_loop(context, DRIFTING, 0.5 * h)

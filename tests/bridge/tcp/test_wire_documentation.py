@@ -73,7 +73,7 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
     random, n = np.random.default_rng(0), 3
     contacts = BladeContacts(*(random.random(shape) for shape in ((n, 3), (n, 3), n, (n, 3), n)))
     result = (
-        block_tissue().step(None, 1e-3)._replace(contacts=contacts, energies=Energies(*range(12)))
+        block_tissue().step(None, 1e-3)._replace(contacts=contacts, energies=Energies(*range(14)))
     )
     payload = pack_result(result)
 
@@ -106,7 +106,7 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
         "lowest and highest corner of the body": result.bounds.ravel(),
         "force of the floor on the body": result.body_contacts.force_of_floor,
         "contacts of the blade": np.concatenate([array.ravel() for array in contacts]),
-        "energies where the server audits them": np.arange(12.0),
+        "energies where the server audits them": np.arange(14.0),
     }
     assert set(found) == set(expected)
     for name, numbers in expected.items():

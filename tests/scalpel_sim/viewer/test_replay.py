@@ -118,7 +118,9 @@ def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp
         contact_points=np.array([[0.0, 0.0, 0.08], [0.01, 0.0, 0.08]]),
         contact_forces=np.array([[0.0, -0.5, 0.0], [0.0, -0.5, 0.1]]),
         parts=ForceParts(np.array([0.0, -0.6, 0.8]), np.zeros(3), np.array([0.2, 0.0, 0.0])),
-        energies=Energies(*np.zeros(12))._replace(cutting=3e-3, friction=1e-3, elastic=-2e-3),
+        energies=Energies(*np.zeros(len(Energies._fields)))._replace(
+            cutting=3e-3, friction=1e-3, elastic=-2e-3
+        ),
     )
     replay = ReplayWriter(model, frame=FRAME)
     replay.add(0.0, cut_tissue()[0], body_poses(data), shown)

@@ -195,7 +195,7 @@ def _move(context: StepContext, trails: Trails, node: int, t1: float) -> None:
     x, v = point(body.positions, node), point(body.velocities, node)
     time, drag = surroundings.retardation_time, surroundings.drag
     per_mass = 1.0 / body.masses[node]
-    external = point(context.stages.external, node)
+    external = point(context.stages.external, node) + point(context.stages.loads, node)
     constant = point_of(*surroundings.gravity) + times(per_mass, external)
     net = (springs, trails, node)
     _look(body, *net)
