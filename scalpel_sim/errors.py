@@ -6,6 +6,7 @@ from collections.abc import Iterable
 EXIT_OK = 0
 EXIT_RUN_FAILED = 1
 EXIT_WRONG_USE = 2
+EXIT_CHECK_FAILED = 3
 
 
 class UsageError(ValueError):
@@ -14,6 +15,10 @@ class UsageError(ValueError):
 
 class RunError(RuntimeError):
     """What was asked for is possible, and failed: a port in use, a full disk. Exit code 1."""
+
+
+class CheckError(RunError):
+    """A validation ran to its end, and a check is out of its bounds. Exit code 3."""
 
 
 class Interrupted(RunError):
@@ -36,8 +41,10 @@ def exit_code(error: BaseException) -> int:
     """Return the exit code for an error that reached the command line.
 
     All parts of the project raise a `ValueError` for a wrong argument; every other error means that
-    the run failed.
+    the run failed, or a check of a validation.
     """
+    if isinstance(error, CheckError):
+        return EXIT_CHECK_FAILED
     return EXIT_WRONG_USE if isinstance(error, ValueError) else EXIT_RUN_FAILED
 
 

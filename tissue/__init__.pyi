@@ -34,6 +34,7 @@ from .mesh.faces import boundary_faces as boundary_faces
 from .mesh.pieces import pieces_of as pieces_of
 from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
+from .shapes.cylinder import cylinder as cylinder
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
@@ -97,6 +98,7 @@ __all__ = [
     "cache_directory",
     "calibrated",
     "components",
+    "cylinder",
     "fixed_nodes",
     "is_compiling",
     "kernel",

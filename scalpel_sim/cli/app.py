@@ -56,7 +56,8 @@ app = App(
     name=PROGRAM,
     version=version,
     help="A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it.\n\n"
-    "Exit codes: 0 done, 1 the run failed or was interrupted, 2 wrong use or bad input.",
+    "Exit codes: 0 done, 1 the run failed or was interrupted, 2 wrong use or bad input, 3 a "
+    "check of a validation failed.",
 )
 
 

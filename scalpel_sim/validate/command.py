@@ -1,5 +1,6 @@
 """The command `scalpel-sim validate`: run the scenes, print and write what they found."""
 
+import gc
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,39 +10,61 @@ from cyclopts import Parameter
 
 from scalpel_sim.cli.console import log_to_stderr, say
 from scalpel_sim.cli.options import PrintOptions
-from scalpel_sim.errors import RunError
+from scalpel_sim.errors import CheckError, RunError, UsageError
 
 if TYPE_CHECKING:  # `--help` should not wait for it
+    from scalpel_sim.cases.case_file import CaseFile
+    from scalpel_sim.cases.recording import CaseRecord
     from scalpel_sim.validate.findings import ValidationScene
     from scalpel_sim.validate.results import SceneRun
 
 JSON_FILE, PAGE_FILE = "validation.json", "validation.md"
+_FOLDER = Path("out/validate")
+_SECONDS_PER_LINE = 5.0
+"""How often a case says how far it is [s]."""
 
 
 def validate(
     *,
-    out: Path = Path("out/validate"),
+    case: Path | None = None,
+    out: Path | None = None,
     only: list[str] | None = None,
     quick: Annotated[bool, Parameter(negative="")] = False,
     printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Run scenes against theory and published figures; print a table, write a report with plots.
 
-    The exit code is 0 only if every check is within its bounds, or deviates from them by no more
-    than is known and explained in the report.
+    The exit code is 3 where a check is out of its bounds by more than is known and explained in
+    the report.
+
+    With `--case` an experiment of yours is run instead, and compared with what its file expects.
+    For example:
+
+    ```console
+    scalpel-sim validate --only steady --quick
+    scalpel-sim validate --case docs/examples/tension.toml
+    ```
 
     Args:
-        out: Folder for validation.json, validation.md and the plots.
+        case: Run the case in this FILE.toml (docs/cases.md) instead of the scenes.
+        out: Folder for the report, its data and the plots; out/validate by default, with a case
+            out/ and the name of its file.
         only: Only this scene; may be given several times. steady, symmetry, rate, slicing,
             puncture, reaction, audit, coupling, liver, gel.
         quick: A few checks of each scene, in about half a minute instead of five.
     """
+    if case is not None:
+        if only or quick:
+            raise UsageError("--case runs one experiment; --only and --quick are for the scenes")
+        _validate_case(case, out or Path("out") / case.stem, printing)
+        return
     from scalpel_sim.cli.run_setup import load_kernels
     from scalpel_sim.output.run_folder import check_folder
     from scalpel_sim.output.summary import versions
     from scalpel_sim.validate.results import count_verdicts, validation_as_json
     from scalpel_sim.validate.scenes import chosen_scenes
 
+    out = out or _FOLDER
     scenes = chosen_scenes(only or ())
     check_folder(out)
     with log_to_stderr(printing):
@@ -61,7 +84,61 @@ def validate(
     failed = count_verdicts(runs).failed
     if failed:
         checks = "1 check is" if failed == 1 else f"{failed} checks are"
-        raise RunError(f"{checks} out of bounds; see {out / PAGE_FILE}")
+        raise CheckError(f"{checks} out of bounds; see {out / PAGE_FILE}")
+
+
+def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
+    """Run the case in a file; print and write what it found.
+
+    Raises:
+        UsageError: the file, or a file that it names, is wrong.
+        RunError: the run failed, or a file cannot be written.
+        CheckError: what the case expects is missed.
+    """
+    from scalpel_sim.cases.case_file import read_case
+    from scalpel_sim.cases.expected import check_expected, curves_of
+    from scalpel_sim.cases.report import CaseFindings, case_as_json, print_case, write_case
+    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.summary import versions
+
+    case = read_case(path)
+    curves = curves_of(case)
+    check_folder(out)
+    with log_to_stderr(printing):
+        started = time.perf_counter()
+        record = _run_case(case, printing)
+        expected = zip(case.content.expected, curves, strict=True)
+        checks = [check_expected(each, curve, record) for each, curve in expected]
+        found = CaseFindings(case, record, checks, curves, time.perf_counter() - started)
+        files = write_case(out, found, versions())
+    if printing.json:
+        print(case_as_json(found, versions()))
+    elif not printing.quiet:
+        from rich.console import Console
+
+        print_case(found, Console())
+        print(f"files in {out}: {', '.join(files)}")
+    if not found.has_passed:
+        raise CheckError(f"{path}: what it expects is missed; see {out / files[0]}")
+
+
+def _run_case(case: "CaseFile", printing: PrintOptions) -> "CaseRecord":
+    """Run a case; say from time to time how far it is."""
+    from scalpel_sim.cases.assembly import assemble
+    from scalpel_sim.cases.recording import run_case
+
+    gc.enable()  # a start runs without it
+    said = time.monotonic()
+
+    def report(seconds: float) -> None:
+        nonlocal said
+        if not printing.quiet and time.monotonic() - said > _SECONDS_PER_LINE:
+            said = time.monotonic()
+            say(f"{seconds:.3g} of {case.content.run.seconds:.3g} s")
+
+    if not printing.quiet:
+        say(f"{case.content.title}: {case.content.run.seconds:g} s")
+    return run_case(case, assemble(case), report)
 
 
 def _run(

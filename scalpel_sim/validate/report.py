@@ -80,7 +80,7 @@ def validation_page(
         f"**{verdict_sentence(count_verdicts(runs))}**\n",
         "A check is `known` where its value is out of bounds by no more than the deviation that "
         "is measured and explained below the table; a check that is out by more has failed, and "
-        "the command then ends with exit code 1.\n",
+        "the command then ends with exit code 3.\n",
     ]
     for run in runs:
         parts += _section(run, pictures.get(run.scene.name, []))

@@ -89,7 +89,7 @@ def _triangles(model: mujoco.MjModel, geom: int) -> TriangleMesh | None:
         case kinds.mjGEOM_CAPSULE:
             return primitives.capsule(size[0], size[1])
         case kinds.mjGEOM_CYLINDER:
-            return primitives.cylinder(size[0], size[1])
+            return primitives.rounded_cylinder(size[0], size[1])
         case kinds.mjGEOM_BOX:
             return primitives.box(size)
         case kinds.mjGEOM_MESH | kinds.mjGEOM_SDF:

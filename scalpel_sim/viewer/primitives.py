@@ -54,7 +54,7 @@ def capsule(radius: float, half_length: float) -> TriangleMesh:
     return _smooth(unit, np.full(3, radius))
 
 
-def cylinder(radius: float, half_length: float) -> TriangleMesh:
+def rounded_cylinder(radius: float, half_length: float) -> TriangleMesh:
     """Return a cylinder along z with rounded rims, `radius` and `half_length` in [m]."""
     from trimesh import creation
 

@@ -20,12 +20,12 @@ def test_a_scene_is_run_and_reported(tmp_path, capsys):
     assert (tmp_path / "new" / "validation_rate.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_a_check_that_fails_ends_with_exit_code_1(tmp_path, capsys, monkeypatch):
+def test_a_check_that_fails_ends_with_exit_code_3(tmp_path, capsys, monkeypatch):
     failing = Check("it", 2.0, 0.0, 1.0)
     wrong = ValidationScene("wrong", "Wrong", "It is.", lambda quick: Findings([failing]))
     monkeypatch.setitem(scenes.VALIDATION_SCENES, "wrong", wrong)
     words = ["validate", "--only", "wrong", "--json", "-q", "--out", str(tmp_path)]
-    assert command_line(words) == 1
+    assert command_line(words) == 3
     out, err = capsys.readouterr()
     assert json.loads(out)["counts"]["failed"] == 1  # nothing else is on standard output
     assert "1 check is out of bounds" in err and "validation.md" in err
