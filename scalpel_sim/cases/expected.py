@@ -11,7 +11,7 @@ from scalpel_sim.cases.case_file import TIME, CaseFile
 from scalpel_sim.cases.recording import CaseRecord
 from scalpel_sim.cases.tables import ExpectedTable
 from scalpel_sim.errors import UsageError
-from scalpel_sim.validate.findings import Check
+from scalpel_sim.validate.findings import CASE, Check
 from tissue import BoolArray, FloatArray
 
 
@@ -78,10 +78,10 @@ def check_expected(
         assert expected.value is not None
         mean = float(y[rows].mean()) if rows.any() else math.nan
         low, high = sorted(expected.value * (1.0 + s * expected.tolerance) for s in (-1.0, 1.0))
-        return Check(f"{expected.record}: mean", mean, low, high, unit=unit)
+        return Check(f"{expected.record}: mean", mean, low, high, basis=CASE, unit=unit)
     name = f"{expected.record} against {expected.against}: largest deviation / largest expected"
     x = record.columns[expected.against][rows]
-    return Check(name, _deviation(x, y[rows], curve), 0.0, expected.tolerance)
+    return Check(name, _deviation(x, y[rows], curve), 0.0, expected.tolerance, basis=CASE)
 
 
 def _rows(expected: ExpectedTable, record: CaseRecord) -> BoolArray:

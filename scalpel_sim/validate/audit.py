@@ -16,7 +16,7 @@ from scalpel_sim.validate.block import (
     soft_material,
     straight_cut,
 )
-from scalpel_sim.validate.findings import Check, Curve, Findings, Plot, ValidationScene
+from scalpel_sim.validate.findings import THEORY, Check, Curve, Findings, Plot, ValidationScene
 from scalpel_sim.validate.puncturing import insertion_and_withdrawal
 from tissue import BladeSegment, BladeShape, Energies, FloatArray
 
@@ -84,7 +84,11 @@ def check_residual(name: str, energies: Energies) -> Check:
     """Return the check of the residual of an audit."""
     share = energies.residual / energies.work_of_blade
     return Check(
-        f"{name}: residual / work of the blade", share, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL
+        f"{name}: residual / work of the blade",
+        share,
+        -_LARGEST_RESIDUAL,
+        _LARGEST_RESIDUAL,
+        basis=THEORY,
     )
 
 

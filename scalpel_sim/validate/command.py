@@ -49,8 +49,8 @@ def validate(
         case: Run the case in this FILE.toml (docs/cases.md) instead of the scenes.
         out: Folder for the report, its data and the plots; out/validate by default, with a case
             out/ and the name of its file.
-        only: Only this scene; may be given several times. steady, symmetry, rate, slicing,
-            puncture, reaction, audit, coupling, liver, gel.
+        only: Only this scene; may be given several times. beam, stretch, steady,
+            symmetry, rate, slicing, puncture, reaction, audit, coupling, liver, gel.
         quick: A few checks of each scene, in about half a minute instead of five.
     """
     if case is not None:

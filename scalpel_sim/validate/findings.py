@@ -10,6 +10,16 @@ PASS, FAIL, KNOWN = "pass", "FAIL", "known"
 explained."""
 
 
+THEORY, PUBLISHED, REGRESSION, CASE = "theory", "published", "regression", "case"
+"""What a check compares with. `theory`: a formula or a law of conservation that is independent of
+how the engine computes the value. `published`: a figure of an experiment. `regression`: what was
+put in, as the engine's own law of it says: it shows that the engine does what it is told, and not
+that tissue does so. `case`: what the file of a case expects."""
+
+LARGEST_KNOWN = 0.02
+"""How far the second bounds of a known deviation may be from what was measured, as a share."""
+
+
 class Reference(NamedTuple):
     """A publication."""
 
@@ -21,12 +31,18 @@ class Reference(NamedTuple):
 
 
 class KnownDeviation(NamedTuple):
-    """A deviation from the bounds that is known and explained."""
+    """A deviation from the bounds that has a physical reason, which is explained.
 
-    low: float
-    high: float
-    """The value lies between `low` and `high` instead. Beyond that the check fails."""
+    What the mesh or a scheme does wrong is no such reason: it fails.
+    """
+
+    measured: float
+    """The value that was measured. Farther from it than `LARGEST_KNOWN` the check fails."""
     why: str
+
+    def explains(self, value: float) -> bool:
+        """Return whether a value is the one that was measured."""
+        return abs(value - self.measured) <= LARGEST_KNOWN * abs(self.measured)
 
 
 class Check(NamedTuple):
@@ -37,6 +53,8 @@ class Check(NamedTuple):
     value: float
     low: float
     high: float
+    basis: str
+    """`THEORY`, `PUBLISHED`, `REGRESSION` or `CASE`: what the bounds come from."""
     unit: str = ""
     known: KnownDeviation | None = None
 
@@ -45,7 +63,7 @@ class Check(NamedTuple):
         """`PASS`, `FAIL` or `KNOWN`. A value that is not a number fails."""
         if self.low <= self.value <= self.high:
             return PASS
-        if self.known and self.known.low <= self.value <= self.known.high:
+        if self.known and self.known.explains(self.value):
             return KNOWN
         return FAIL
 

@@ -12,6 +12,8 @@ from scalpel_sim.validate.block import (
     soft_material,
 )
 from scalpel_sim.validate.findings import (
+    REGRESSION,
+    THEORY,
     Check,
     Curve,
     Findings,
@@ -40,8 +42,7 @@ _LARGEST_DROP_SHARE = 0.7
 """Largest force 10 ms after the peak, as a share of the peak, where the skin is three times as
 tough as the tissue below."""
 _BREAKS_FROM_ENDS = KnownDeviation(
-    0.3,
-    0.9,
+    0.745,
     "an edge wider than an element breaks in from its ends, where the skin is bent most, and not "
     "all at once: the peak is then that of the unbroken part, and lower on a finer mesh",
 )
@@ -129,25 +130,28 @@ def check_insertion(
     """
     checks = [
         Check(f"{name}: peak / (toughness of the skin × edge)", found.peak / expected,
-              *within(_NEAR), known=known)
+              *within(_NEAR), basis=REGRESSION, known=known)
     ]  # fmt: skip
     if known is None:
         checks += [
-            Check(f"{name}: area cut before the peak", found.area_before * 1e6, 0.0, 0.0, "mm²"),
-            Check(f"{name}: plateau / peak", found.plateau / found.peak, 0.0, 0.95),
-        ]
+            Check(f"{name}: area cut before the peak", found.area_before * 1e6, 0.0, 0.0,
+                  basis=REGRESSION, unit="mm²"),
+            Check(f"{name}: plateau / peak", found.plateau / found.peak, 0.0, 0.95,
+                  basis=REGRESSION),
+        ]  # fmt: skip
     return checks
 
 
 def check_withdrawal(name: str, found: WithdrawalForces, plateau: float) -> list[Check]:
     """Return the checks of a withdrawal; `plateau` is the force of the insertion [N]."""
     return [
-        Check(f"{name}: force against the withdrawal", found.resistance, 1e-6, plateau, "N"),
-        Check(f"{name}: area cut during the withdrawal", found.area * 1e6, 0.0, 0.0, "mm²"),
-        Check(
-            f"{name}: work besides friction / friction, withdrawal", found.excess_work, -0.1, 0.1
-        ),
-    ]
+        Check(f"{name}: force against the withdrawal", found.resistance, 1e-6, plateau,
+              basis=REGRESSION, unit="N"),
+        Check(f"{name}: area cut during the withdrawal", found.area * 1e6, 0.0, 0.0, basis=THEORY,
+              unit="mm²"),
+        Check(f"{name}: work besides friction / friction, withdrawal", found.excess_work,
+              -0.1, 0.1, basis=THEORY),
+    ]  # fmt: skip
 
 
 def _measure(quick: bool) -> Findings:
@@ -161,8 +165,9 @@ def _measure(quick: bool) -> Findings:
         if skin == 3.0:
             drop = found.after_peak / found.peak
             checks.append(
-                Check(f"{name}: force 10 ms after the peak / peak", drop, 0.0, _LARGEST_DROP_SHARE)
-            )
+                Check(f"{name}: force 10 ms after the peak / peak", drop, 0.0,
+                      _LARGEST_DROP_SHARE, basis=REGRESSION)
+            )  # fmt: skip
         curves.append(_curve(name, found.record, _NARROW))
     name = f"edge of {_WIDE * 1e3:g} mm, skin × 1.5"
     record = _puncture(_WIDE, 1.5, COARSE_CELLS if quick else FINE_CELLS)
@@ -194,7 +199,8 @@ PUNCTURE_SCENE = ValidationScene(
         "while the force rises; where it reaches the toughness of the skin × the edge, the skin "
         "breaks and the force drops to that of the tissue below and the friction of the faces. In "
         "the withdrawal the force changes its sign, nothing is cut, and the work is that of "
-        "friction."
+        "friction. That nothing is cut then, and where the work goes, is theory; the other lines "
+        "are regressions of the law of skin and friction."
     ),
     measure=_measure,
     references=[

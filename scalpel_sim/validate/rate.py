@@ -10,6 +10,7 @@ from scalpel_sim.validate.block import (
     straight_cut,
 )
 from scalpel_sim.validate.findings import (
+    REGRESSION,
     Check,
     Curve,
     Findings,
@@ -69,11 +70,12 @@ def _measure(quick: bool) -> Findings:
     checks = []
     for v, force_per_depth in zip(speeds, fast, strict=True):
         name = f"{v * 1e3:g} mm/s: force / (toughness at that speed × depth)"
-        checks.append(Check(name, force_per_depth / _theory(v), *within(_NEAR)))
+        checks.append(Check(name, force_per_depth / _theory(v), *within(_NEAR), basis=REGRESSION))
     for radius in radii:
         theory = (_SLOW_TOUGHNESS + 2.0 * radius * _WORK_TO_RUPTURE) * THICKNESS
         name = f"edge of {radius * 1e6:g} µm: force / ((toughness + 2 r W) × depth)"
-        checks.append(Check(name, _force_of_edge(radius) / theory, *within(_NEAR)))
+        share = _force_of_edge(radius) / theory
+        checks.append(Check(name, share, *within(_NEAR), basis=REGRESSION))
     finely = np.linspace(0.0, speeds[-1], 100)
     curves = [
         Curve("measured", speeds * 1e3, fast),
@@ -89,7 +91,8 @@ RATE_SCENE = ValidationScene(
     about=(
         "The force of a steady cut against toughness × depth, where toughness rises with the speed "
         "of the edge, J0 (1 + (v / v0)^n); and where the edge has a radius r and tissue a work to "
-        "rupture W, which adds 2 r W."
+        "rupture W, which adds 2 r W. All lines are regressions: "
+        "the law of the engine comes back."
     ),
     measure=_measure,
     references=[

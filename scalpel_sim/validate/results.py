@@ -70,6 +70,7 @@ def _check_entry(check: Check) -> dict[str, Any]:
         "low": _finite(check.low),
         "high": _finite(check.high),
         "verdict": check.verdict,
+        "basis": check.basis,
         "why": check.known.why if check.known and check.verdict == KNOWN else "",
     }
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from scalpel_sim.errors import unknown
 from scalpel_sim.validate.audit import AUDIT_SCENE
+from scalpel_sim.validate.beam import BEAM_SCENE
 from scalpel_sim.validate.coupling import COUPLING_SCENE
 from scalpel_sim.validate.findings import ValidationScene
 from scalpel_sim.validate.gel import GEL_SCENE
@@ -13,11 +14,14 @@ from scalpel_sim.validate.rate import RATE_SCENE
 from scalpel_sim.validate.reaction import REACTION_SCENE
 from scalpel_sim.validate.slicing import SLICING_SCENE
 from scalpel_sim.validate.steady import STEADY_SCENE
+from scalpel_sim.validate.stretch import STRETCH_SCENE
 from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
 
 VALIDATION_SCENES: dict[str, ValidationScene] = {
     scene.name: scene
     for scene in (
+        BEAM_SCENE,
+        STRETCH_SCENE,
         STEADY_SCENE,
         SYMMETRY_SCENE,
         RATE_SCENE,

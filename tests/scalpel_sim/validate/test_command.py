@@ -4,7 +4,7 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.validate import scenes
-from scalpel_sim.validate.findings import Check, Findings, ValidationScene
+from scalpel_sim.validate.findings import THEORY, Check, Findings, ValidationScene
 
 
 def test_a_scene_is_run_and_reported(tmp_path, capsys):
@@ -21,13 +21,14 @@ def test_a_scene_is_run_and_reported(tmp_path, capsys):
 
 
 def test_a_check_that_fails_ends_with_exit_code_3(tmp_path, capsys, monkeypatch):
-    failing = Check("it", 2.0, 0.0, 1.0)
+    failing = Check("it", 2.0, 0.0, 1.0, basis=THEORY)
     wrong = ValidationScene("wrong", "Wrong", "It is.", lambda quick: Findings([failing]))
     monkeypatch.setitem(scenes.VALIDATION_SCENES, "wrong", wrong)
     words = ["validate", "--only", "wrong", "--json", "-q", "--out", str(tmp_path)]
     assert command_line(words) == 3
     out, err = capsys.readouterr()
-    assert json.loads(out)["counts"]["failed"] == 1  # nothing else is on standard output
+    content = json.loads(out)  # nothing else is on standard output
+    assert content["counts"]["failed"] == 1 and content["passed"] is False
     assert "1 check is out of bounds" in err and "validation.md" in err
 
 

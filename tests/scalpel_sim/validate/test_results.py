@@ -2,6 +2,9 @@ import json
 import math
 
 from scalpel_sim.validate.findings import (
+    PUBLISHED,
+    REGRESSION,
+    THEORY,
     Check,
     Findings,
     KnownDeviation,
@@ -17,9 +20,9 @@ from scalpel_sim.validate.report import (
 from scalpel_sim.validate.results import SceneRun, count_verdicts, validation_as_json
 
 CHECKS = [
-    Check("|a|: good", 1.0, 0.9, 1.1, "N"),
-    Check("bad", math.nan, 0.9, 1.1),
-    Check("odd", 2.0, 0.9, 1.1, known=KnownDeviation(1.5, 2.5, "it is a Tuesday")),
+    Check("|a|: good", 1.0, 0.9, 1.1, basis=THEORY, unit="N"),
+    Check("bad", math.nan, 0.9, 1.1, basis=REGRESSION),
+    Check("odd", 2.0, 0.9, 1.1, basis=PUBLISHED, known=KnownDeviation(2.0, "it is a Tuesday")),
 ]
 SCENE = ValidationScene(
     "small",
@@ -34,7 +37,7 @@ RUNS = [SceneRun(SCENE, Findings(CHECKS, notes=["a note"]), 1.25)]
 def test_checks_are_counted_by_verdict():
     assert count_verdicts(RUNS) == (1, 1, 1)
     assert verdict_sentence(count_verdicts(RUNS)) == (
-        "1 of 3 checks are within their bounds, 1 deviate as known and explained, 1 failed."
+        "1 of 3 checks are within their bounds, 1 known, 1 failed."
     )
 
 
@@ -45,13 +48,15 @@ def test_the_json_is_valid_and_complete():
     lines = content["scenes"][0]["lines"]
     assert [line["verdict"] for line in lines] == ["pass", "FAIL", "known"]
     assert lines[1]["figure"] is None  # not a number, which JSON cannot express
+    assert [line["basis"] for line in lines] == ["theory", "regression", "published"]
     assert lines[2]["why"] == "it is a Tuesday" and lines[0]["why"] == ""
 
 
 def test_the_page_has_every_check_reason_picture_and_source():
     page = validation_page(RUNS, {"small": ["small.png"]}, quick=False)
-    assert "| \\|a\\|: good | 1 N | 0.9 to 1.1 | pass |" in page
-    assert "| bad | nan | 0.9 to 1.1 | FAIL |" in page
+    assert "| \\|a\\|: good | 1 N | 0.9 to 1.1 | theory | pass |" in page
+    assert "| bad | nan | 0.9 to 1.1 | regression | FAIL |" in page
+    assert "theory: 1 of 1 pass; published: 0 of 1 pass; regression: 0 of 1 pass." in page
     assert "Known: it is a Tuesday." in page and "a note." in page
     assert "![A small scene](small.png)" in page
     assert "- Someone 1999: about 1\n" in page
@@ -59,8 +64,8 @@ def test_the_page_has_every_check_reason_picture_and_source():
 
 
 def test_bounds_read_as_words():
-    assert bounds_text(Check("", 0.0, 0.0, 0.0)) == "0"
-    assert bounds_text(Check("", 0.0, 0.0, 1e-9, "N")) == "at most 1e-09"
-    assert bounds_text(Check("", 0.0, -0.005, 0.005)) == "± 0.005"
-    assert bounds_text(Check("", 0.0, -1.0, math.inf)) == "at least -1"
-    assert value_text(Check("", 0.123456, 0.0, 1.0, "N m")) == "0.1235 N m"
+    assert bounds_text(Check("", 0.0, 0.0, 0.0, basis=THEORY)) == "0"
+    assert bounds_text(Check("", 0.0, 0.0, 1e-9, basis=THEORY, unit="N")) == "at most 1e-09"
+    assert bounds_text(Check("", 0.0, -0.005, 0.005, basis=THEORY)) == "± 0.005"
+    assert bounds_text(Check("", 0.0, -1.0, math.inf, basis=THEORY)) == "at least -1"
+    assert value_text(Check("", 0.123456, 0.0, 1.0, basis=THEORY, unit="N m")) == "0.1235 N m"

@@ -51,18 +51,18 @@ def steady_cut():
 
 
 def test_a_steady_cut_passes_with_its_own_toughness(steady_cut):
-    assert verdicts(check_steady_cuts("it", [steady_cut], "neo_hookean", TOUGHNESS)) == {PASS}
+    assert verdicts(check_steady_cuts("it", [steady_cut], TOUGHNESS)) == {PASS}
 
 
 @pytest.mark.parametrize("wrong", [0.9, 1.1])
 def test_a_steady_cut_fails_with_a_toughness_ten_percent_off(steady_cut, wrong):
-    force, ripple = check_steady_cuts("it", [steady_cut], "neo_hookean", wrong * TOUGHNESS)
+    force, ripple = check_steady_cuts("it", [steady_cut], wrong * TOUGHNESS)
     assert force.verdict == FAIL and ripple.verdict == PASS
 
 
 def test_a_force_that_ripples_fails(steady_cut):
     both = [steady_cut, steady_cut._replace(ripple=0.2)]  # the worst of them counts
-    assert check_steady_cuts("it", both, "neo_hookean", TOUGHNESS)[1].verdict == FAIL
+    assert check_steady_cuts("it", both, TOUGHNESS)[1].verdict == FAIL
 
 
 def test_slicing_at_45_degrees_passes_and_would_fail_as_pressing():
@@ -74,9 +74,11 @@ def test_slicing_at_45_degrees_passes_and_would_fail_as_pressing():
 def test_action_and_reaction_balance_and_a_force_from_nowhere_fails():
     found = cut_free_block("neo_hookean", 300)
     assert found.largest[0] > 0.01  # there is something to balance
-    assert FAIL not in verdicts(check_balance("it", found))
+    # Where a cut inserts nodes angular momentum is not kept: that line fails, and says so.
+    failed = [check.name for check in check_balance("it", found) if check.verdict == FAIL]
+    assert failed == ["it: torque + change of angular momentum, in steps that change the mesh"]
     pushed = found._replace(momentum=found.momentum + 1e-8)
-    assert FAIL in verdicts(check_balance("it", pushed))
+    assert [check.verdict for check in check_balance("it", pushed)].count(FAIL) == 2
 
 
 def test_an_account_that_misses_six_thousandths_of_the_work_fails():

@@ -1,0 +1,143 @@
+"""Scenes against theory that is not in the engine: beam, stretch, returned energy, insertions."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import splu
+
+from scalpel_sim.validate import beam, coupling, liver, stretch
+from scalpel_sim.validate.findings import FAIL, PASS, REGRESSION, THEORY
+from tissue import Material, block, fixed_nodes
+from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
+
+
+def verdicts(checks):
+    return [check.verdict for check in checks]
+
+
+# A clamped bar
+
+
+def test_the_period_of_a_slender_beam_is_eulers(monkeypatch):
+    monkeypatch.setattr(beam, "BAR_THICKNESS", 1e-3)
+    side, length = beam.BAR_THICKNESS, beam.BAR_LENGTH
+    bending, per_length = 1e6 * side**4 / 12.0, 1000.0 * side**2
+    euler = 2.0 * math.pi * length**2 / 1.8751041**2 * math.sqrt(per_length / bending)
+    assert beam.beam_theory(0.0).period == pytest.approx(euler, rel=1e-3)
+
+
+def test_the_sag_of_a_slender_beam_is_eulers(monkeypatch):
+    monkeypatch.setattr(beam, "BAR_THICKNESS", 1e-3)
+    side, length = beam.BAR_THICKNESS, beam.BAR_LENGTH
+    bending, weight = 1e6 * side**4 / 12.0, 9.81e3 * side**2 * length
+    theory = beam.beam_theory(0.3)
+    assert theory.sag_of_weight == pytest.approx(weight * length**3 / (8 * bending), rel=1e-3)
+    assert theory.sag_of_load == pytest.approx(weight * length**3 / (3 * bending), rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def coarse_bar():
+    return beam.swing(0.0, 3)
+
+
+def test_the_bar_sags_as_its_stiffness_matrix_says(coarse_bar):
+    material = Material(1e6, 1000.0, law="neo_hookean", poisson_ratio=0.0)
+    mesh = block((10, 3, 3), (0.1, 0.03, 0.03))
+    is_free = np.repeat(~fixed_nodes(mesh, "left"), 3)
+    matrix = stiffness_matrix(mesh, material, averaged=True)[is_free][:, is_free].tocsc()
+    weight = np.zeros((len(mesh.positions), 3))
+    weight[:, 2] = -9.81 * masses(mesh, material.density)
+    moved = np.zeros(is_free.size)
+    moved[is_free] = splu(matrix).solve(weight.ravel()[is_free])
+    sag = -moved.reshape(-1, 3)[fixed_nodes(mesh, "right"), 2].mean()
+    assert coarse_bar.sag_of_weight == pytest.approx(sag, rel=5e-3)
+
+
+def test_a_bar_swings_with_the_frequency_that_its_sag_implies(coarse_bar):
+    theory = beam.beam_theory(0.0)
+    stiffer = theory.sag_of_weight / coarse_bar.sag_of_weight
+    slower = coarse_bar.period / theory.period
+    assert slower == pytest.approx(math.sqrt(1.0 / stiffer), rel=0.02)
+
+
+def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_the_beam_passes(coarse_bar):
+    theory = beam.beam_theory(0.0)
+    assert verdicts(beam.check_bar("it", coarse_bar, theory)) == [FAIL] * 3
+    right = coarse_bar._replace(**theory._asdict())
+    assert verdicts(beam.check_bar("it", right, theory)) == [PASS] * 3
+    for name in theory._fields:
+        wrong = right._replace(**{name: 1.04 * getattr(theory, name)})
+        assert verdicts(beam.check_bar("it", wrong, theory)).count(FAIL) == 1
+
+
+# Large stretch
+
+
+@pytest.mark.parametrize("law", stretch.LAWS)
+def test_a_formula_begins_with_the_moduli_at_small_strain(law):
+    found = stretch.uniaxial(stretch.bar_material(law), np.array([0.999, 1.001]))
+    assert np.diff(found.stress)[0] / 0.002 == pytest.approx(10e3, rel=1e-4)
+    assert -np.diff(found.width)[0] / 0.002 == pytest.approx(0.45, rel=1e-3)
+
+
+def test_a_bar_passes_with_its_own_law_and_fails_with_another():
+    material = stretch.bar_material("yeoh")
+    found = stretch.stretched_bar(material)
+    theory = stretch.uniaxial(material, found.stretch)
+    assert found.stretch[-1] == 2.0 and theory.stress[-1] > 1.4 * 10e3
+    checks = stretch.check_stretch("it", found, theory)
+    assert verdicts(checks) == [PASS, PASS]
+    assert all(abs(check.value - 1.0) < 1e-3 for check in checks)
+    other = stretch.uniaxial(stretch.bar_material("neo_hookean"), found.stretch)
+    assert verdicts(stretch.check_stretch("it", found, other)) == [FAIL, FAIL]
+
+
+# Energy that comes back from a coupling
+
+
+def test_a_hand_that_gets_back_what_it_put_in_passes_and_one_that_gets_more_fails():
+    for most, verdict in ((0.02, PASS), (-0.2, FAIL)):
+        work = np.concatenate([np.linspace(0.0, 1.0, 50), np.linspace(1.0, most, 50)]) * 1e-3
+        check = coupling.check_returned("lets go", 10, work)
+        assert check.verdict == verdict and check.basis == THEORY
+        assert check.value == pytest.approx(1.0 - most)
+
+
+def test_energy_that_comes_back_before_it_is_put_in_fails():
+    work = np.array([0.0, 0.1, -0.2, 0.5, 1.0]) * 1e-3
+    assert coupling.check_returned("taps", 33, work).verdict == FAIL
+
+
+def test_a_hand_that_never_meets_the_tissue_fails():
+    assert coupling.check_returned("holds", 1, np.zeros(9)).verdict == FAIL
+
+
+def test_the_work_of_forces_and_torques_is_that_of_a_spring():
+    """A spring against translation, and one against turning about the edge."""
+    distance, angle = 1e-3 * np.sin(np.linspace(0.0, np.pi, 400)), 0.1 * np.linspace(0.0, 1.0, 400)
+    zero = np.zeros(400)
+    tip = np.column_stack([zero, distance, zero])
+    heel = tip + np.array([0.0, 0.0, 0.04])
+    forward = np.column_stack([-np.sin(angle), np.cos(angle), zero])
+    poses = np.stack([tip, heel, forward], axis=1)
+    forces, torques = -500.0 * tip, -2.0 * np.column_stack([zero, zero, angle])
+    work = coupling.work_on_tissue(forces, torques, poses)
+    stored = 0.5 * 500.0 * distance**2 + 0.5 * 2.0 * angle**2
+    np.testing.assert_allclose(work, stored[1:], atol=2e-2 * stored.max())
+
+
+# Two insertions
+
+
+def test_two_insertions_pass_with_the_toughness_put_in_and_fail_with_another():
+    found = liver.Insertions(None, None, force=164.0, toughness=164.0)
+    checks = liver.check_two_insertions(0.0, found)
+    assert verdicts(checks) == [PASS, PASS]
+    assert {check.basis for check in checks} == {REGRESSION}
+    low = found._replace(toughness=0.75 * 164.0, force=0.94 * 164.0)
+    assert verdicts(liver.check_two_insertions(0.0, low)) == [FAIL, FAIL]
+
+
+def test_the_observer_of_the_bridge_is_a_regression():
+    assert coupling.check_least_energy("holds", 1, 0.0).basis == REGRESSION
