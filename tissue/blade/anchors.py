@@ -11,6 +11,7 @@ import numpy as np
 
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
 from tissue.blade.toughness import ToughnessLaw, toughness_at
+from tissue.blade.walls import Walls, new_walls
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays
@@ -54,6 +55,8 @@ class Anchors(Arrays):
     """Whether the anchor has cut since it was set, shape (n,)."""
     at_skin: BoolArray
     """Whether the anchor is at the skin, which the edge has yet to break; shape (n,)."""
+    is_new: BoolArray
+    """Whether the anchor was set since the path was traced last; shape (n,)."""
     speed: FloatArray
     """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
     toughness. With the speed of the anchor itself, from one short step to the next, the anchor
@@ -66,6 +69,8 @@ class Anchors(Arrays):
     """Length of edge that the sample stands for [m], shape (n,)."""
     stiffness: FloatArray
     """Stiffness of the anchor's spring [N/m], shape (n,)."""
+    walls: Walls
+    """The wall that each sample holds, of its run of samples (`find_walls`)."""
 
 
 def anchor_stiffness(material: Material, toughness: float, node_size: float) -> float:
@@ -100,11 +105,13 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         weights=np.zeros((n, 4)),
         slipped=np.zeros(n, dtype=np.bool_),
         at_skin=np.zeros(n, dtype=np.bool_),
+        is_new=np.zeros(n, dtype=np.bool_),
         speed=np.zeros(n),
         slips=np.zeros(n, dtype=np.bool_),
         cut=np.zeros(n),
         length=length,
         stiffness=stiffness * length,
+        walls=new_walls(n),
     )
 
 

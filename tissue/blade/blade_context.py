@@ -137,7 +137,7 @@ def trace(context: BladeContext, edge: Edge, when: float) -> float:
     anchors, path = context.blade.anchors, context.path
     if not is_engaged(anchors):
         return NOT_ENGAGED
-    trace_path(anchors, context.body, edge, when, context.sheet_margin, path)
+    trace_path(context.blade, context.body, edge, when, context.sheet_margin, path)
     return path_travel(path)
 
 

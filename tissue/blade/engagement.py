@@ -15,8 +15,9 @@ from tissue.blade.anchors import (
 )
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_point
-from tissue.blade.material_frame import mean_rotation, rest_offset, to_material
+from tissue.blade.material_frame import find_walls, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
+from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, norm, sub, vec3
 from tissue.cutting.blade_path import Path, nearest_on_edge
@@ -94,10 +95,11 @@ def free_retracted(
         any_retracted = any_retracted or anchors.state[k] == RETRACTED
     if not any_retracted:
         return
-    rotation = mean_rotation(anchors, body)
+    find_walls(anchors, body, blade.reach)
     for k in range(n):
         if anchors.state[k] != RETRACTED:
             continue
+        rotation = rotation_of_wall(anchors.walls, k)
         a = anchor_position(anchors, body, body.positions, k)
         offset = apply_transposed(rotation, sub(sample_point(pose, k, n), a))
         p = add(vec3(anchors.rest, k), offset)
@@ -124,7 +126,7 @@ def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose
     """
     anchors = blade.anchors
     n = len(anchors.state)
-    rotation = mean_rotation(anchors, body)
+    find_walls(anchors, body, blade.reach)
     for direction in range(2):
         for i in range(n):
             k = i if direction == 0 else n - 1 - i
@@ -133,6 +135,7 @@ def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose
                 continue
             if anchors.state[beside] != ANCHORED:
                 continue
+            rotation = rotation_of_wall(anchors.walls, beside)
             offset = rest_offset(pose, rotation, n, k, beside)
             p = add(vec3(anchors.rest, beside), offset)
             location = locate(body, visits, p, anchors.tetrahedron[beside], blade.queue)
@@ -145,6 +148,7 @@ def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose
             if norm(stretch) > blade.reach:  # the tissue there is turned otherwise
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
+            join_wall(anchors.walls, k, beside)
             blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
@@ -192,6 +196,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     """Anchor sample `k`, which has not cut yet, at rest point `p` [m] of tetrahedron `t`."""
     set_anchor(anchors, body, k, t, p)
     anchors.slipped[k] = False
+    anchors.is_new[k] = True
     anchors.at_skin[k] = at_skin
 
 

@@ -2,9 +2,10 @@
 
 from tissue.blade.anchors import FREE, Anchors
 from tissue.blade.edge import BladePose, sample_point
+from tissue.blade.walls import write_rotation
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, norm, scale, sub
-from tissue.geometry.polar_decomposition import apply_transposed, nearest_rotation
+from tissue.core.vec3 import Vec3, norm, scale, sub, vec3
+from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
     Matrix3,
     apply,
@@ -39,25 +40,38 @@ def to_material(body: Body, t: int, direction: Vec3) -> Vec3:
 
 
 @kernel
-def mean_rotation(anchors: Anchors, body: Body) -> Matrix3:
-    """Return the rotation of the tissue along the edge, from the body at rest to the body now.
+def find_walls(anchors: Anchors, body: Body, apart: float) -> None:
+    """Find the walls that the samples hold, and how each is turned.
 
-    It is the rotation of the mean deformation gradient of the tetrahedra that hold anchors. A
-    single tetrahedron is dented and sheared by the blade, and says little of how the blade lies in
-    the body.
+    Samples that follow each other along the edge hold the same wall unless their material points
+    are far apart, or there is a long gap between them. A single sample may let go for an instant;
+    that does not part a wall.
+
+    Args:
+        anchors: The samples; `walls` is written.
+        body: The tissue.
+        apart: Length of a gap that parts two walls, and by how much more than their samples two
+            points of one wall may be apart at rest [m].
     """
-    c0 = Vec3(0.0, 0.0, 0.0)
-    c1 = Vec3(0.0, 0.0, 0.0)
-    c2 = Vec3(0.0, 0.0, 0.0)
-    for k in range(len(anchors.state)):
-        if anchors.state[k] != FREE:
-            t = anchors.tetrahedron[k]
-            now = edge_matrix(body.positions, body.tetrahedra, t)
-            rest = edge_matrix(body.rest, body.tetrahedra, t)
-            c0 = add(c0, apply(now, solve(rest, Vec3(1.0, 0.0, 0.0))))
-            c1 = add(c1, apply(now, solve(rest, Vec3(0.0, 1.0, 0.0))))
-            c2 = add(c2, apply(now, solve(rest, Vec3(0.0, 0.0, 1.0))))
-    return nearest_rotation(Matrix3(c0, c1, c2))
+    walls = anchors.walls
+    n = len(anchors.state)
+    spacing = 2.0 * anchors.length[0]  # the first sample stands for half
+    before = -1
+    for k in range(n):
+        walls.first[k] = -1
+        if anchors.state[k] == FREE:
+            continue
+        walls.first[k] = k
+        if before >= 0:
+            distance = norm(sub(vec3(anchors.rest, k), vec3(anchors.rest, before)))
+            between = spacing * (k - before)
+            if between - spacing <= apart and distance <= apart + between:
+                walls.first[k] = walls.first[before]
+            else:
+                write_rotation(walls, body, anchors.tetrahedron, walls.first[before], k)
+        before = k
+    if before >= 0:
+        write_rotation(walls, body, anchors.tetrahedron, walls.first[before], n)
 
 
 @kernel
@@ -66,7 +80,7 @@ def rest_offset(pose: BladePose, rotation: Matrix3, n: int, k: int, beside: int)
 
     Args:
         pose: Pose of the blade now.
-        rotation: Rotation of the tissue (see `mean_rotation`).
+        rotation: Rotation of the tissue there (see `find_walls`).
         n: Number of samples.
         k: Sample at which the vector ends.
         beside: Sample at which it begins.

@@ -7,13 +7,14 @@ blade.
 """
 
 from tissue.blade.anchors import FREE, LEFT, Anchors
+from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
-from tissue.blade.material_frame import mean_rotation, rest_offset
+from tissue.blade.material_frame import find_walls, rest_offset
+from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
+from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.geometry.polar_decomposition import apply_transposed
-from tissue.geometry.tetrahedron import Matrix3
 from tissue.mesh.body import OUTER, Body, walk
 
 OUTREACH = 6
@@ -23,6 +24,16 @@ or on coarse meshes with three, a corner of the skin between two samples can sta
 SMOOTHING = 6
 """Passes of smoothing along the edge; they reach over half a mean node size to either side."""
 
+LONGEST_LINK = 2.0
+"""How much longer than on the blade the sheet between two samples may be, per
+`BladeState.reach`. Beyond it they hold two walls: a sheet between them would cut where no blade
+was."""
+
+LONGEST_JUMP = 4.0
+"""How far from where it was a sample may take hold anew and its path go on, per `BladeState.reach`:
+about an edge of a tetrahedron, which is 3 to 4 node sizes. Further away it holds another wall,
+where its path begins. An anchor that slips may go further: all that it slips through is cut."""
+
 STEEPEST = 1.0
 """Displacement of the path sideways per displacement ahead, at most. Steeper steps leave tetrahedra
 uncut."""
@@ -30,65 +41,118 @@ uncut."""
 
 @kernel
 def trace_path(
-    anchors: Anchors, body: Body, edge: Edge, when: float, margin: float, path: Path
+    blade: BladeState, body: Body, edge: Edge, when: float, margin: float, path: Path
 ) -> None:
     """Write the path of the samples since the last call. Samples that left are freed.
 
+    Each wall is followed by itself: with its own rotation, and a beginning and an end of its own.
+
     Args:
-        anchors: The samples at the end of the step.
+        blade: The anchors at the end of the step.
         body: The tissue.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
         margin: How far outside the skin the sheet begins and ends [m].
         path: Written; its last end is the new start.
     """
+    anchors = blade.anchors
     n = len(anchors.state)
     pose = pose_at(edge, when)
-    rotation = mean_rotation(anchors, body)
-    ahead = apply_transposed(rotation, pose.forward)
-    sideways = apply_transposed(rotation, pose.normal)
-    store(path.sideways, 0, sideways)
-    gone = True
-    begun = False
+    find_walls(anchors, body, blade.reach)
+    _note_progress(anchors)
     for k in range(n):
         store(path.t0, k, vec3(path.t1, k))
         path.member[k] = anchors.state[k] != FREE
         path.seed[k] = -1
-        store(path.forward, k, ahead)
         if path.member[k]:
-            gone = gone and anchors.state[k] == LEFT
-            begun = begun or anchors.slipped[k]
-            path.seed[k] = anchors.tetrahedron[k]
-            # A blade that only presses has not cut yet: the path waits outside the skin.
-            if anchors.slipped[k]:
-                store(path.t1, k, vec3(anchors.rest, k))
-            elif not path.known[k]:
-                store(path.t1, k, _behind(body, vec3(anchors.rest, k), margin, ahead, path.seed[k]))
-            # Where the blade backs off, the sheet does not go on.
-            if (
-                anchors.state[k] == LEFT
-                and dot(sample_displacement(edge, k, n), pose.forward) > 0.0
-            ):
-                _extend_beyond_skin(body, k, axpy(margin, ahead, vec3(anchors.rest, k)), path)
+            _follow_anchor(blade, body, edge, pose, k, margin, path)
     for k in range(n):
         if anchors.state[k] == FREE:
-            _place_beside(anchors, pose, rotation, k, path)
-    _smooth(path, sideways)
+            _place_beside(blade, pose, k, path)
+    spacing = pose.length / (n - 1.0)
+    _link(path, spacing + LONGEST_LINK * blade.reach)
+    _smooth(path)
     for k in range(n):
         if path.member[k]:
-            if gone:
-                store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
-            if path.known[k]:
-                _limit_step(path, k, sideways)
-            elif begun:  # a new member begins outside the skin, behind where it is now
-                store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
-            else:
-                store(path.t0, k, vec3(path.t1, k))
+            _begin_or_go_on(blade, body, k, margin, path)
     for k in range(n):
         path.known[k] = path.member[k]
-        path.linked[k] = k + 1 < n and path.member[k] and path.member[k + 1]
         if anchors.state[k] == LEFT:
             anchors.state[k] = FREE
+
+
+@kernel
+def _note_progress(anchors: Anchors) -> None:
+    """Note of each wall whether an anchor in it has cut, and whether all have left it."""
+    walls = anchors.walls
+    for k in range(len(anchors.state)):
+        wall = walls.first[k]
+        if wall == k:
+            walls.has_begun[k] = False
+            walls.has_left[k] = True
+        if wall >= 0:
+            walls.has_begun[wall] = walls.has_begun[wall] or anchors.slipped[k]
+            walls.has_left[wall] = walls.has_left[wall] and anchors.state[k] == LEFT
+
+
+@kernel
+def _follow_anchor(
+    blade: BladeState,
+    body: Body,
+    edge: Edge,
+    pose: BladePose,
+    k: int,
+    margin: float,
+    path: Path,
+) -> None:
+    """Write where sample `k` is, which holds tissue, and how the blade lies there.
+
+    Args:
+        blade: The anchors.
+        body: The tissue.
+        edge: The cutting edge over the time step.
+        pose: Pose of the blade.
+        k: The sample.
+        margin: How far outside the skin the sheet begins and ends [m].
+        path: Written.
+    """
+    anchors = blade.anchors
+    rotation = rotation_of_wall(anchors.walls, k)
+    ahead = apply_transposed(rotation, pose.forward)
+    store(path.forward, k, ahead)
+    store(path.sideways, k, apply_transposed(rotation, pose.normal))
+    path.seed[k] = anchors.tetrahedron[k]
+    at = vec3(anchors.rest, k)
+    if anchors.is_new[k] and norm(sub(at, vec3(path.t0, k))) > LONGEST_JUMP * blade.reach:
+        path.known[k] = False
+    anchors.is_new[k] = False
+    # A blade that only presses has not cut yet: the path waits outside the skin.
+    if anchors.slipped[k]:
+        store(path.t1, k, at)
+    elif not path.known[k]:
+        store(path.t1, k, _behind(body, at, margin, ahead, path.seed[k]))
+    # Where the blade backs off, the sheet does not go on.
+    if (
+        anchors.state[k] == LEFT
+        and dot(sample_displacement(edge, k, len(anchors.state)), pose.forward) > 0.0
+    ):
+        _extend_beyond_skin(body, k, axpy(margin, ahead, at), path)
+
+
+@kernel
+def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: Path) -> None:
+    """Write where the step of sample `k` begins: where it was, or where it met a wall."""
+    walls = blade.anchors.walls
+    wall = walls.first[k]
+    ahead = vec3(path.forward, k)
+    if walls.has_left[wall]:
+        store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
+    if path.known[k]:
+        _limit_step(path, k)
+    elif walls.has_begun[wall]:  # a new member begins outside the skin, behind where it is now
+        store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
+    else:
+        store(path.t0, k, vec3(path.t1, k))
 
 
 @kernel
@@ -120,24 +184,71 @@ def _extend_beyond_skin(body: Body, k: int, p: Vec3, path: Path) -> None:
 
 
 @kernel
-def _place_beside(anchors: Anchors, pose: BladePose, rotation: Matrix3, k: int, path: Path) -> None:
-    """Place a free sample from the nearest samples that are, or just were, in the tissue."""
+def _place_beside(blade: BladeState, pose: BladePose, k: int, path: Path) -> None:
+    """Place a free sample from the nearest samples that are, or just were, in the tissue.
+
+    Between two walls it goes with one of them: the nearer one along the edge.
+    """
+    anchors, walls = blade.anchors, blade.anchors.walls
+    n = len(anchors.state)
     n_beside = 0
     p = Vec3(0.0, 0.0, 0.0)
     for distance in range(1, OUTREACH + 1):
         for beside in range(k - distance, k + distance + 1, 2 * distance):
-            if 0 <= beside < len(anchors.state) and anchors.state[beside] != FREE:
-                n_beside += 1
-                offset = rest_offset(pose, rotation, len(anchors.state), k, beside)
-                p = add(p, add(vec3(path.t1, beside), offset))
+            if not 0 <= beside < n or anchors.state[beside] == FREE:
+                continue
+            if n_beside == 1 and walls.first[beside] != walls.first[k]:
+                continue
+            n_beside += 1
+            join_wall(walls, k, beside)
+            offset = rest_offset(pose, rotation_of_wall(walls, beside), n, k, beside)
+            at = add(vec3(path.t1, beside), offset)
+            p = add(p, at)
+            if _is_elsewhere(path, k, beside, at, blade.reach):
+                path.known[k] = False
         if n_beside > 0:
             path.member[k] = True
             store(path.t1, k, scale(1.0 / n_beside, p))
+            store(path.forward, k, vec3(path.forward, walls.first[k]))
+            store(path.sideways, k, vec3(path.sideways, walls.first[k]))
             return
 
 
 @kernel
-def _smooth(path: Path, sideways: Vec3) -> None:
+def _is_elsewhere(path: Path, k: int, beside: int, p: Vec3, reach: float) -> bool:
+    """Return whether a free sample was with another wall than the one that it is placed with now.
+
+    It is where it was not near the sample that it is placed beside.
+
+    Args:
+        path: With the step of sample `beside`.
+        k: The sample that is placed.
+        beside: The sample that it is placed beside.
+        p: Where it is placed [m].
+        reach: `BladeState.reach` [m].
+    """
+    allowed = LONGEST_JUMP * reach
+    if not path.known[beside]:
+        return norm(sub(p, vec3(path.t0, k))) > allowed
+    before = norm(sub(vec3(path.t0, k), vec3(path.t0, beside)))
+    return before > norm(sub(p, vec3(path.t1, beside))) + allowed
+
+
+@kernel
+def _link(path: Path, longest: float) -> None:
+    """Link the samples beside each other that are so at rest too, to at most `longest` [m]."""
+    n = len(path.member)
+    for k in range(n):
+        path.linked[k] = (
+            k + 1 < n
+            and path.member[k]
+            and path.member[k + 1]
+            and norm(sub(vec3(path.t1, k + 1), vec3(path.t1, k))) <= longest
+        )
+
+
+@kernel
+def _smooth(path: Path) -> None:
     """Smooth how far samples beside each other lie sideways, over about a node size.
 
     Anchors in different tetrahedra are dragged sideways by different amounts. The mesh cannot hold
@@ -147,26 +258,22 @@ def _smooth(path: Path, sideways: Vec3) -> None:
     for _ in range(SMOOTHING):
         for parity in range(2):
             for k in range(parity, n, 2):
-                if not path.member[k]:
+                if k == 0 or not (path.linked[k - 1] and path.linked[k]):
                     continue
-                here = vec3(path.t1, k)
-                n_beside = 0
+                here, sideways = vec3(path.t1, k), vec3(path.sideways, k)
                 distance = 0.0
                 for beside in range(k - 1, k + 2, 2):
-                    if 0 <= beside < n and path.member[beside]:
-                        n_beside += 1
-                        distance += dot(sub(vec3(path.t1, beside), here), sideways)
-                if n_beside == 2:
-                    store(path.t1, k, axpy(0.5 * distance / n_beside, sideways, here))
+                    distance += dot(sub(vec3(path.t1, beside), here), sideways)
+                store(path.t1, k, axpy(0.5 * distance / 2, sideways, here))
 
 
 @kernel
-def _limit_step(path: Path, k: int, sideways: Vec3) -> None:
+def _limit_step(path: Path, k: int) -> None:
     """Hold a sample back that is not ahead of where it has been, or moves more sideways than ahead.
 
     The first is in its own cut; the second would fold the sheet.
     """
-    start = vec3(path.t0, k)
+    start, sideways = vec3(path.t0, k), vec3(path.sideways, k)
     step = sub(vec3(path.t1, k), start)
     ahead = dot(step, vec3(path.forward, k))
     if ahead <= 0.0:

@@ -44,8 +44,9 @@ def prescribe_path(
     n = len(path.member)
     along = sub(vec3(points, n - 1), vec3(points, 0))
     normal = cross(forward, along)
-    store(path.sideways, 0, scale(1.0 / norm(normal), normal))
+    sideways = scale(1.0 / norm(normal), normal)
     for k in range(n):
+        store(path.sideways, k, sideways)
         start = vec3(path.t1, k)
         p = vec3(points, k)
         store(path.t0, k, start)

@@ -30,7 +30,7 @@ class Path(Arrays):
     forward: FloatArray
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
     sideways: FloatArray
-    """Unit normal of the blade's flat, in the body at rest: the side +1; shape (1, 3)."""
+    """Unit normal of the blade's flat, in the body at rest: the side +1; shape (n, 3)."""
     seed: IntArray
     """Tetrahedron at or beside each sample, or -1; shape (n,)."""
     member: BoolArray
@@ -52,7 +52,7 @@ def new_path(n: int) -> Path:
         lattice_t0=np.zeros((n, 3), np.int64),
         lattice_t1=np.zeros((n, 3), np.int64),
         forward=np.zeros((n, 3)),
-        sideways=np.zeros((1, 3)),
+        sideways=np.zeros((n, 3)),
         seed=np.full(n, -1, np.int64),
         member=np.zeros(n, np.bool_),
         known=np.zeros(n, np.bool_),
@@ -77,7 +77,7 @@ def plane_at(path: Path, k: int, p: Vec3) -> Plane:
     along = sub(vec3(path.t1, k + 1), tip)
     normal = normalised(cross(vec3(path.forward, k), along))
     # Where samples have slipped past each other the normal of the path is of no use.
-    sideways = vec3(path.sideways, 0)
+    sideways = vec3(path.sideways, k)
     if dot(normal, sideways) < LEAST_ALIGNMENT:
         normal = sideways
     return Plane(nearest_on_segment(tip, vec3(path.t1, k + 1), p), normal)

@@ -8,7 +8,7 @@ import math
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
-from tissue.cutting.blade_path import LEAST_ALIGNMENT, plane_at
+from tissue.cutting.blade_path import LEAST_ALIGNMENT, nearest_on_edge, plane_at
 from tissue.cutting.cut_surface import note_side, on_sheet, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
@@ -48,7 +48,10 @@ def snap_distance(cut: Cut, node: int) -> float:
 def _is_on_parallel_cut(cut: Cut, node: int) -> bool:
     """Return whether a cut face at `node` is parallel to the sheet, or none is known."""
     body, around = cut.body, cut.scratch.around
-    sideways = vec3(cut.path.sideways, 0)
+    segment = nearest_on_edge(cut.path, vec3(body.rest, node)).segment
+    if segment < 0:
+        return True
+    sideways = vec3(cut.path.sideways, segment)
     n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
     any_face = False
     for i in range(n):

@@ -1,0 +1,93 @@
+"""The walls that the edge is in: runs of samples that hold the same part of the tissue.
+
+In a thin or hollow body the edge is in tissue in several places at once, and these may be turned
+against each other by a right angle. What is true of one says nothing of another.
+"""
+
+import numpy as np
+
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays
+from tissue.core.vec3 import Vec3, add
+from tissue.geometry.polar_decomposition import nearest_rotation
+from tissue.geometry.tetrahedron import Matrix3, apply, edge_matrix, solve
+from tissue.mesh.body import Body
+
+
+class Walls(Arrays):
+    """The wall that each of the n samples of the edge holds."""
+
+    first: IntArray
+    """First sample of the wall, the number of the wall; -1 where a sample holds none; (n,)."""
+    rotation: FloatArray
+    """Rotation of the wall from the body at rest to the body now, column by column; (n, 9)."""
+    has_begun: BoolArray
+    """Whether an anchor in the wall has cut, entry `first`; shape (n,)."""
+    has_left: BoolArray
+    """Whether all samples left the wall in this step, entry `first`; shape (n,)."""
+
+
+def new_walls(n: int) -> Walls:
+    """Return the walls of `n` samples that hold nothing."""
+    return Walls(
+        first=np.full(n, -1, np.int64),
+        rotation=np.zeros((n, 9)),
+        has_begun=np.zeros(n, np.bool_),
+        has_left=np.zeros(n, np.bool_),
+    )
+
+
+@kernel
+def rotation_of_wall(walls: Walls, k: int) -> Matrix3:
+    """Return the rotation of the wall that sample `k` holds."""
+    r = walls.rotation
+    return Matrix3(
+        Vec3(r[k, 0], r[k, 1], r[k, 2]),
+        Vec3(r[k, 3], r[k, 4], r[k, 5]),
+        Vec3(r[k, 6], r[k, 7], r[k, 8]),
+    )
+
+
+@kernel
+def join_wall(walls: Walls, k: int, beside: int) -> None:
+    """Note that sample `k` holds, or is placed with, the wall that sample `beside` holds."""
+    walls.first[k] = walls.first[beside]
+    for i in range(9):
+        walls.rotation[k, i] = walls.rotation[beside, i]
+
+
+@kernel
+def write_rotation(walls: Walls, body: Body, tetrahedra: IntArray, first: int, end: int) -> None:
+    """Write the rotation of the samples from `first` to before `end` that hold tissue.
+
+    It is that of the mean deformation gradient of the tetrahedra that hold them. A single
+    tetrahedron is dented and sheared by the blade, and says little of how the blade lies in the
+    body.
+
+    Args:
+        walls: `first` is read, `rotation` is written.
+        body: The tissue.
+        tetrahedra: Tetrahedron that holds each sample.
+        first: First sample of the wall.
+        end: One past the last sample.
+    """
+    c0 = Vec3(0.0, 0.0, 0.0)
+    c1 = Vec3(0.0, 0.0, 0.0)
+    c2 = Vec3(0.0, 0.0, 0.0)
+    for k in range(first, end):
+        if walls.first[k] == first:
+            t = tetrahedra[k]
+            now = edge_matrix(body.positions, body.tetrahedra, t)
+            rest = edge_matrix(body.rest, body.tetrahedra, t)
+            c0 = add(c0, apply(now, solve(rest, Vec3(1.0, 0.0, 0.0))))
+            c1 = add(c1, apply(now, solve(rest, Vec3(0.0, 1.0, 0.0))))
+            c2 = add(c2, apply(now, solve(rest, Vec3(0.0, 0.0, 1.0))))
+    r = nearest_rotation(Matrix3(c0, c1, c2))
+    for k in range(first, end):
+        if walls.first[k] == first:
+            for column in range(3):
+                c = r.c0 if column == 0 else (r.c1 if column == 1 else r.c2)
+                walls.rotation[k, 3 * column] = c.x
+                walls.rotation[k, 3 * column + 1] = c.y
+                walls.rotation[k, 3 * column + 2] = c.z
