@@ -17,6 +17,10 @@ STAGE_NAMES = {
 }
 """Names of the stages of the paper's Table 1, in its order."""
 
+LARGEST_GAP = 0.05
+"""Difference between the area that the blade paid for and that of the cut from which the table says
+so."""
+
 MOST_PIECES = 8
 """Number of pieces that the table shows, the largest; `summary.json` has them all."""
 
@@ -159,7 +163,9 @@ def _add_cut(rows: _Rows, summary: Summary) -> None:
     rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
     paid, cut = summary.cut_area_paid_m2, summary.cut_area_m2
     if paid is not None and cut > 0.0:
-        rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {paid / cut:.0%} of the cut")
+        off = f": more than {LARGEST_GAP:.0%} off" if abs(paid / cut - 1.0) > LARGEST_GAP else ""
+        share = f"{paid / cut:.0%} of the cut{off}"
+        rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}")
     rows.add("peak force", f"{summary.force_peak_n:.3f} N")
     rows.add("mean force", f"{summary.force_mean_n:.3f} N")
     for pair, frames in summary.touched.items():

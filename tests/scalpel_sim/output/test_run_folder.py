@@ -347,7 +347,9 @@ def test_the_table_tells_which_area_the_blade_paid_for(material, paid):
     assert summary.cut_area_paid_m2 == paid
     console = Console(record=True, width=100)
     print_summary(summary, console)
-    found = re.search("area paid for.* 200 mm², 80% of the cut", console.export_text())
+    found = re.search(
+        "area paid for.* 200 mm², 80% of the cut: more than 5% off", console.export_text()
+    )
     assert (found is not None) == (paid is not None)
 
 
