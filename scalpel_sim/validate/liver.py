@@ -3,7 +3,6 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from scalpel_sim.scenes import LIVER
 from scalpel_sim.validate.block import StrokeRecord, block_tissue, run_stroke
 from scalpel_sim.validate.findings import (
     REGRESSION,
@@ -17,8 +16,10 @@ from scalpel_sim.validate.findings import (
     within,
 )
 from scalpel_sim.validate.puncturing import insertion
-from tissue import BladeShape, Material, block
+from tissue import MATERIALS, BladeShape, Material, block
 
+_LIVER = MATERIALS["liver"].material
+"""As published, and stiffening."""
 _SIZE, _CELLS = (0.1, 0.08, 0.05), (10, 8, 5)
 """Sides of the piece of liver [m], and cells along them."""
 _EDGE = 0.02
@@ -54,14 +55,6 @@ class Insertions(NamedTuple):
     the length of the edge [J/m2]: the share of cutting, without friction and bending."""
 
 
-def _liver(friction: float) -> Material:
-    """Return the liver of the presets with the stiffness that it has where it is pressed hard."""
-    material = MATERIALS["liver"].material
-    unstiffened = replace(material, law="neo_hookean", stiffening=0.0)
-    return replace(unstiffened, young_modulus=_STIFFNESS, blade_friction=friction)
-
-
-def _insert_twice(material: Material) -> _Insertions:
 def _insert_twice(material: Material) -> Insertions:
     """Insert a blade, withdraw it, and insert it again at the same place."""
     mesh = block(_CELLS, _SIZE)
@@ -83,7 +76,7 @@ def _insert_twice(material: Material) -> Insertions:
 
 def check_two_insertions(friction: float, found: Insertions) -> list[Check]:
     """Return the checks of two insertions."""
-    name, toughness = f"friction {friction:g}", LIVER.toughness
+    name, toughness = f"friction {friction:g}", _LIVER.toughness
     checks = [
         Check(f"{name}: toughness by two insertions / toughness put in",
               found.toughness / toughness, *within(_NEAR_TOUGHNESS), basis=REGRESSION)
@@ -99,7 +92,7 @@ def _measure(quick: bool) -> Findings:
     """Insert twice, without friction and with some."""
     checks, curves = [], []
     for friction in _FRICTIONS[:1] if quick else _FRICTIONS:
-        found = _insert_twice(replace(LIVER, blade_friction=friction))
+        found = _insert_twice(replace(_LIVER, blade_friction=friction))
         checks += check_two_insertions(friction, found)
         for which, record in (("first", found.first), ("second", found.second)):
             depth = (_SIZE[2] - record.tip[:, 2]) * 1e3

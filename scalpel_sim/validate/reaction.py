@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.validate.block import CUT_X, block_tissue, edge_at, soft_material
-from scalpel_sim.validate.findings import Check, Findings, ValidationScene
 from scalpel_sim.validate.findings import THEORY, Check, Findings, ValidationScene
 from tissue import BladeSegment, BladeShape, BladeSweep, FloatArray, Law, Tissue
 
@@ -108,10 +107,6 @@ def check_balance(law: str, found: Balance) -> list[Check]:
         Check(f"{law}: force on blade + on tissue", float(found.forces.max()), 0.0, _LARGEST,
               basis=THEORY, unit="N"),
         Check(f"{law}: force on blade + change of momentum", float(found.momentum.max()), 0.0,
-              _LARGEST, "N"),
-        Check(angular, in_same_mesh, 0.0, _LARGEST, "N m"),
-        Check(f"{angular}, in steps that change the mesh", in_changed_mesh, 0.0, _LARGEST,
-              "N m"),
               _LARGEST, basis=THEORY, unit="N"),
         Check(angular, in_same_mesh, 0.0, _LARGEST, basis=THEORY, unit="N m"),
         Check(f"{angular}, in steps that change the mesh", in_changed_mesh, 0.0, _LARGEST,
@@ -143,9 +138,7 @@ REACTION_SCENE = ValidationScene(
         "A block that nothing holds is cut along a wavy line by a scalpel with friction. In each "
         "step of 0.1 ms the force and the torque on the blade are compared with the change of the "
         "momentum and the angular momentum of the block's nodes, which is computed without the "
-        "blade. If they differ, the arm does not feel what acts on the tissue. Where a cut inserts "
-        "nodes, mass moves between nodes: that keeps mass and momentum, but shifts the centre of "
-        "mass a little, and with it angular momentum, so that these steps fail."
+        "blade. If they differ, the arm does not feel what acts on the tissue."
     ),
     measure=_measure,
 )
