@@ -40,14 +40,16 @@ COUPLINGS = ("rigid", "virtual")
 _ARMS = ("auto", "touch", "premium")
 
 PHANTOM = Material(
+    law="springs",
+    poisson_ratio=0.25,
     young_modulus=10e3,
     density=1000.0,
     toughness=20.0,
     blade_friction=MATERIALS["gelatin"].blade_friction.value,
 )
-"""A soft gel phantom. toughness / young_modulus = 2 mm: the length by which the blade drags the
-tissue along before the tissue parts. It must be small against the body, or the blade drags the
-body along instead of cutting it."""
+"""A soft gel phantom of springs, as in the paper. toughness / young_modulus = 2 mm: the length by
+which the blade drags the tissue along before the tissue parts. It must be small against the body,
+or the blade drags the body along instead of cutting it."""
 
 GEL = replace(PHANTOM, law="neo_hookean", poisson_ratio=0.45)
 """The same gel as tetrahedra that hardly change their volume: what a mesh from a file is made of,

@@ -1,9 +1,12 @@
 """Contact of pieces, lips and the floor: nothing interpenetrates, and all comes to rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests import bodies, strokes
+from tests.materials import SPRINGS
 from tissue import Material, Snapshot, TetrahedralMesh, Tissue, block
 from tissue.contact.resolve import note_all_positions
 from tissue.contact.state import FACES_CHANGED
@@ -252,7 +255,9 @@ def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(clo
     first, second = block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3)
     mesh = joined(first, second, (0.007, 0.004, 0.032))
     tissue = Tissue(
-        mesh, Material(young, viscous_damping=0.0, retardation_time=0.0), gravity=NO_GRAVITY
+        mesh,
+        replace(SPRINGS, young_modulus=young, viscous_damping=0.0, retardation_time=0.0),
+        gravity=NO_GRAVITY,
     )
     n, m = len(first.positions), len(mesh.positions)
     tissue._body.velocities[n:m] = [0.1, 0.0, -closing]
@@ -394,7 +399,7 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
     """Cut a block in two at a slant, so that one lip slides down the other on to the floor."""
     mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
     fixed = mesh.positions[:, 0] == 0.0
-    tissue = Tissue(mesh, Material(toughness=0.5), fixed=fixed, floor=-0.01)
+    tissue = Tissue(mesh, replace(SPRINGS, toughness=0.5), fixed=fixed, floor=-0.01)
     strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
     results = [tissue.step(None, strokes.DT) for _ in range(n_steps)]
     assert tissue.n_pieces() == 2

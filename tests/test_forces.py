@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.bodies import sides
+from tests.materials import SPRINGS
 from tissue import (
     MATERIALS,
     BladeSegment,
@@ -310,7 +311,8 @@ def test_the_side_faces_of_the_blade_do_not_press_the_skin_that_the_edge_cuts():
 
 def test_an_audit_of_a_motion_that_cannot_be_accounted_for_is_refused():
     with pytest.raises(ValueError, match="audit"):
-        Tissue(block((2, 2, 2), SIZE), solver=SolverSettings(audit=True, relaxation="hierarchical"))
+        solver = SolverSettings(audit=True, relaxation="hierarchical")
+        Tissue(block((2, 2, 2), SIZE), SPRINGS, solver=solver)
 
 
 @pytest.mark.parametrize("relaxation", ["global", "verlet"])

@@ -14,8 +14,9 @@ from scipy.sparse.linalg import cg
 
 from benchmarks.mesh_study import MODES, Bar, Model
 from tests import bodies
+from tests.materials import SPRINGS
 from tests.tissue.kernels_of import cut_of
-from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.elasticity.energy_density import neo_hookean
 from tissue.elasticity.finite_elements import (
@@ -32,7 +33,7 @@ from tissue.mesh.star import LARGEST_STAR, no_visits
 from tissue.mesh.validation import signed_volumes
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
-UNDAMPED = Material(viscous_damping=0.0, retardation_time=0.0)
+UNDAMPED = replace(SPRINGS, viscous_damping=0.0, retardation_time=0.0)
 LAWS = {
     "springs": UNDAMPED,
     "springs and volume": replace(UNDAMPED, poisson_ratio=0.45),

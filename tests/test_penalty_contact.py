@@ -8,6 +8,7 @@ import pytest
 from scalpel_sim import SCENES
 from scalpel_sim.errors import UsageError
 from tests import bodies, strokes
+from tests.materials import SPRINGS
 from tests.test_contact import NO_GRAVITY, SLAB, frame_speed, joined, overlap_depth, speed
 from tissue import Material, SolverSettings, Tissue, block
 
@@ -266,7 +267,7 @@ def test_the_hierarchy_refuses_contact_as_forces():
     mesh = block((1, 1, 1), (0.01,) * 3)
     solver = SolverSettings(contact="penalty", relaxation="hierarchical")
     with pytest.raises(ValueError, match="penalty"):
-        Tissue(mesh, solver=solver)
+        Tissue(mesh, SPRINGS, solver=solver)
 
 
 @pytest.mark.parametrize("options", [{"contact": "soft"}, {"relaxation": "hierarchical"}])

@@ -1,9 +1,12 @@
 """Every relaxation gives the same equilibrium, cutting force and conservation of momentum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests import bodies, strokes
+from tests.materials import SPRINGS
 from tests.test_conservation import NO_GRAVITY, SLAB, momentum
 from tests.test_determinism import fingerprint
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block
@@ -11,8 +14,8 @@ from tissue import Hierarchical, Material, SolverSettings, Tissue, block
 HIERARCHICAL = Hierarchical(updates=16, rings=3)
 
 LAWS = {
-    "springs": Material(viscous_damping=60.0),
-    "springs and volumes": Material(viscous_damping=60.0, poisson_ratio=0.4),
+    "springs": replace(SPRINGS, viscous_damping=60.0),
+    "springs and volumes": Material(viscous_damping=60.0, law="springs", poisson_ratio=0.4),
     "tetrahedra": Material(viscous_damping=60.0, law="neo_hookean", poisson_ratio=0.4),
 }
 """Materials with strong drag, so that a body comes to rest within a second."""
@@ -50,6 +53,7 @@ def test_the_cutting_force_is_toughness_times_length(relaxation):
     mesh = block((6, 12, 3), SLAB)
     tissue = Tissue(
         mesh,
+        SPRINGS,
         fixed=bodies.sides(mesh),
         gravity=NO_GRAVITY,
         solver=SolverSettings(relaxation=relaxation),
@@ -93,7 +97,7 @@ def test_the_same_stroke_twice_gives_the_same_bits(relaxation):
     fingerprints = []
     for _ in range(2):
         tissue = Tissue(
-            mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
+            mesh, SPRINGS, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
         )
         results = strokes.make(tissue, strokes.slanted(mesh))
         assert results[-1].cut_area > 0.0
@@ -108,7 +112,7 @@ def test_arrays_that_grow_change_nothing(relaxation):
     fingerprints = []
     for n_doubled in (0, 2):
         tissue = Tissue(
-            mesh, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
+            mesh, SPRINGS, fixed=bodies.sides(mesh), solver=SolverSettings(relaxation=relaxation)
         )
         for _ in range(n_doubled):
             n_nodes, n_tetrahedra = tissue._body.n_nodes, tissue._body.n_tetrahedra

@@ -75,9 +75,9 @@ class Material:
     """Coulomb's coefficient of friction where cut faces, pieces and the floor touch. Fresh muscle
     on bone was measured at 0.29 to 0.36 (Shacham, Castel and Gefen 2010); a wet serous skin slips
     more easily."""
-    law: Law = "springs"
+    law: Law = "neo_hookean"
     """How forces follow from deformation."""
-    poisson_ratio: float = CENTRAL_FORCE_RATIO
+    poisson_ratio: float = 0.45
     """Transverse contraction over extension. Springs alone have 1/4; for more each tetrahedron also
     resists a change of its volume, and less is impossible with springs. Soft tissue is mostly water
     and hardly compressible: 0.45 to 0.49."""

@@ -39,7 +39,7 @@ _STEP = 2.5e-4
 """Displacement of the blade in a step [m]: 0.25 m/s at 1 kHz, fast for a hand."""
 _DT = 1e-3
 """Time step [s]."""
-_MATERIAL = Material(toughness=1.0)
+_MATERIAL = Material(law="springs", poisson_ratio=0.25, toughness=1.0)
 """Material of so little toughness that the blade hardly drags it along and cuts where it passes."""
 
 _US_PER_S = 1e6

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.materials import SPRINGS
 from tissue import Material, Tissue, block
 
 
@@ -13,7 +14,10 @@ from tissue import Material, Tissue, block
     [
         ({"law": "spring"}, "no law is called 'spring'. Known: springs, neo_hookean"),
         ({"poisson_ratio": np.nan}, "poisson_ratio is nan"),
-        ({"poisson_ratio": 0.2}, "springs act along the lines .* Use law neo_hookean"),
+        (
+            {"poisson_ratio": 0.2, "law": "springs"},
+            "springs act along the lines .* Use law neo_hookean",
+        ),
         ({"poisson_ratio": 0.5}, "below 0.5, where no force changes the volume"),
         ({"poisson_ratio": -0.1, "law": "neo_hookean"}, "poisson_ratio is -0.1"),
         ({"spring_calibration": 0.0}, "spring_calibration is 0"),
@@ -21,7 +25,10 @@ from tissue import Material, Tissue, block
         ({"law": "yeoh"}, "yeoh_second or yeoh_third must be positive"),
         ({"law": "neo_hookean", "stiffening": 15.0}, "leave it at 0, or choose law exponential"),
         ({"spring_calibration": 1.1, "law": "neo_hookean"}, "exact on any mesh"),
-        ({"prony": [(0.3, 0.1)]}, "prony is given with law springs.* choose law neo_hookean"),
+        (
+            {"prony": [(0.3, 0.1)], "law": "springs"},
+            "prony is given with law springs.* choose law neo_hookean",
+        ),
         ({"prony": [(0.6, 0.1), (0.4, 1.0)], "law": "neo_hookean"}, "sum is 1; it must be below 1"),
         ({"prony": [(0.3, 0.005)], "law": "neo_hookean"}, "tau of 0.005 s; .* at least 0.01 s"),
         ({"prony": [(0.3, np.inf)], "law": "neo_hookean"}, "tau of inf s; it must be finite"),
@@ -83,7 +90,7 @@ def test_the_damping_ratio_holds_at_both_ends_of_the_band_and_is_less_between(nu
 
 
 def test_without_a_band_damping_is_by_retardation_alone():
-    material = Material().with_damping(0.05, 10.0)
+    material = SPRINGS.with_damping(0.05, 10.0)
     assert material.viscous_damping == 0.0
     assert material.retardation_time == pytest.approx(2.0 * 0.05 / (2.0 * math.pi * 10.0))
     assert material.damping_ratio(20.0) == pytest.approx(0.1)

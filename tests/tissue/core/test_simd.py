@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tests.materials import SPRINGS
 from tissue import SolverSettings, Tissue, block
 from tissue.core import simd
 from tissue.core.jit import kernel
@@ -76,7 +77,9 @@ def test_eight_points_are_gathered_and_summed_up():
 
 def test_all_arrays_whose_rows_are_gathered_have_padding_after_the_last():
     tissue = Tissue(
-        block((1, 1, 1), (0.01, 0.01, 0.01)), solver=SolverSettings(relaxation="hierarchical")
+        block((1, 1, 1), (0.01, 0.01, 0.01)),
+        SPRINGS,
+        solver=SolverSettings(relaxation="hierarchical"),
     )
     body, stages = tissue._body, tissue._system.stages
     arrays = [body.rest, body.positions, body.velocities, new_trails(5).origins]

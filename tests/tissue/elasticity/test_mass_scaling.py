@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, incisions
+from tests.materials import SPRINGS
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LEAST_MASS, LIMIT_STEP
@@ -100,7 +101,7 @@ def test_an_uncut_body_gets_no_mass_however_low_the_limit():
 
 
 def test_springs_get_no_mass():
-    tissue = Tissue(MESH, solver=SolverSettings(mass_scaling=LOW))
+    tissue = Tissue(MESH, SPRINGS, solver=SolverSettings(mass_scaling=LOW))
     tissue.incise(*incisions.incision(MESH, next(iter(incisions.KINDS)), 0))
     assert not tissue._body.added_masses.any()
 

@@ -1,13 +1,16 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests import bodies
+from tests.materials import SPRINGS
 from tissue import Material, block
 from tissue.elasticity.spring_calibration import calibrated, on_surface, spring_error
 
 CELLS = block((4, 4, 4), (0.04, 0.04, 0.04))
 RANDOM = bodies.jittered(8, seed=1)
-UNIT = Material(young_modulus=1.0)
+UNIT = replace(SPRINGS, young_modulus=1.0)
 
 
 def test_moduli_of_springs_on_a_grid_of_cells_are_those_of_theory():
@@ -43,7 +46,7 @@ def test_tetrahedra_have_no_error_on_any_mesh(mesh):
 @pytest.mark.parametrize("nu", [0.3, 0.45])
 def test_a_volume_term_gives_springs_the_requested_bulk_modulus(nu):
     """Springs have a bulk modulus of 2/3 of Young's on any mesh; the volume term adds the rest."""
-    material = Material(young_modulus=1.0, poisson_ratio=nu)
+    material = replace(UNIT, poisson_ratio=nu)
     found = spring_error(RANDOM, material).affine
     bulk = found.young_modulus / (3.0 * (1.0 - 2.0 * found.poisson_ratio))
     assert bulk == pytest.approx(1.0 / (3.0 * (1.0 - 2.0 * nu)), rel=1e-9)
@@ -52,7 +55,7 @@ def test_a_volume_term_gives_springs_the_requested_bulk_modulus(nu):
 @pytest.mark.parametrize("mesh", [CELLS, RANDOM], ids=["cells", "random"])
 @pytest.mark.parametrize("nu", [0.25, 0.45])
 def test_calibrated_springs_have_the_requested_modulus(mesh, nu):
-    material = calibrated(mesh, Material(young_modulus=12e3, poisson_ratio=nu))
+    material = calibrated(mesh, replace(SPRINGS, young_modulus=12e3, poisson_ratio=nu))
     assert material.young_modulus == 12e3
     assert spring_error(mesh, material).relaxed.young_modulus == pytest.approx(12e3, rel=1e-4)
     assert 0.7 < material.spring_calibration < 1.3

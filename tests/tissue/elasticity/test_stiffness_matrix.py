@@ -1,14 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests import bodies, naive
+from tests.materials import SPRINGS
 from tissue import Material, block
 from tissue.elasticity.stiffness_matrix import edge_springs, masses, stiffness_matrix
 
 MESH = bodies.jittered(3, seed=1)
 LAWS = {
-    "springs": Material(),
-    "springs and volume": Material(poisson_ratio=0.45),
+    "springs": SPRINGS,
+    "springs and volume": replace(SPRINGS, poisson_ratio=0.45),
     "neo-Hookean": Material(law="neo_hookean", poisson_ratio=0.45),
 }
 

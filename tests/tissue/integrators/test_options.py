@@ -1,7 +1,10 @@
 """Options of the relaxation, and the messages that refuse impossible ones."""
 
+from dataclasses import replace
+
 import pytest
 
+from tests.materials import SPRINGS
 from tissue import Hierarchical, Material, Verlet
 from tissue.integrators.options import Global, checked_relaxation
 
@@ -11,12 +14,12 @@ from tissue.integrators.options import Global, checked_relaxation
     [("global", Global()), ("verlet", Verlet()), ("hierarchical", Hierarchical())],
 )
 def test_a_name_stands_for_the_default_settings(name, settings):
-    assert checked_relaxation(name, Material()) == settings
+    assert checked_relaxation(name, SPRINGS) == settings
 
 
 def test_settings_are_used_unchanged():
     chosen = Hierarchical(updates=16, rings=2, far="frozen")
-    assert checked_relaxation(chosen, Material()) is chosen
+    assert checked_relaxation(chosen, SPRINGS) is chosen
 
 
 @pytest.mark.parametrize(
@@ -39,7 +42,7 @@ def test_verlet_is_not_for_tissue_that_stiffens(stiffening):
 
 
 @pytest.mark.parametrize(
-    "material", [Material(law="neo_hookean", poisson_ratio=0.4), Material(poisson_ratio=0.4)]
+    "material", [Material(poisson_ratio=0.4), replace(SPRINGS, poisson_ratio=0.4)]
 )
 def test_the_hierarchy_is_for_springs_alone(material):
     with pytest.raises(ValueError, match="on its springs alone"):

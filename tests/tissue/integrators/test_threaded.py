@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
+from tests.materials import SPRINGS
 from tissue import Global, Material, SolverSettings, Tissue
 from tissue.integrators import threaded
 
 needs_two_cores = pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="one core")
 
 MESH = bodies.jittered(4, 2)
-SPRINGS, SOLID = Material(), Material(law="neo_hookean", poisson_ratio=0.45)
+SOLID = Material()
 CASES = {
     "springs": (SPRINGS, {}, 1000),
     "springs, account": (SPRINGS, {"audit": True}, 100),
@@ -152,4 +153,4 @@ def test_an_impossible_number_of_threads_is_refused(threads):
 @needs_two_cores
 def test_the_hierarchy_runs_on_one_thread():
     with pytest.raises(ValueError, match="runs on one"):
-        Tissue(MESH, solver=SolverSettings(threads=2, relaxation="hierarchical"))
+        Tissue(MESH, SPRINGS, solver=SolverSettings(threads=2, relaxation="hierarchical"))

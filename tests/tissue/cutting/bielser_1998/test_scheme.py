@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, soundness, strokes
+from tests.materials import SPRINGS
 from tests.tissue.kernels_of import row, springs_of
 from tissue import Material, SolverSettings, Tissue, block
 
@@ -203,7 +204,7 @@ def test_a_tetrahedron_is_split_once_the_blade_has_left_it():
 def test_springs_and_masses_are_those_of_the_split_mesh():
     """Each existing edge has a spring; an uncut neighbour keeps its long edges."""
     mesh = block_of(2, 2, 2)
-    tissue = uncut(mesh)
+    tissue = uncut(mesh, material=SPRINGS)
     tissue.incise(upright(mesh, depth=0.5), Y)
     body, n = tissue._body, tissue.n_nodes
     kept = [row(tissue._system.elasticity.arrays.springs, i) for i in range(n)]
