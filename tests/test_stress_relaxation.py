@@ -46,6 +46,7 @@ def held(material=SOFT, mesh=None, **solver):
     )
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("law", "relaxation"), [*((law, "global") for law in LAWS), ("neo_hookean", "verlet")]
 )

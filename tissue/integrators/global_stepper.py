@@ -151,7 +151,7 @@ class GlobalStepper:
         body, visits = system.body, system.visits
         strained = elasticity.strained_frequency_squared(body, visits, allowed)
         step = self.method.stable_step(elasticity, max(least, strained + added), surroundings)
-        if not elasticity.stiffens:
+        if not elasticity.stiffens or math.isinf(step):  # infinite: every node is held
             return step
         duration = STEPS_BETWEEN_STRAIN_BOUNDS * step
         ahead = elasticity.frequency_squared_ahead(body, visits, allowed, duration)
