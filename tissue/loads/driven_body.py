@@ -49,6 +49,7 @@ class DrivenBody(BodyQueries):
         """Push material points with a force, until `release`; return the load.
 
         Its force can be changed between steps (`Load.force`). Its work is in the account of energy.
+        Nodes that `Hierarchical(far="frozen")` freezes do not feel it.
 
         Args:
             where: Material points, or what `material_points` takes. On a region the force is a
