@@ -8,6 +8,7 @@ from scipy.spatial import Delaunay
 
 from tissue import BoolArray, FloatArray, TetrahedralMesh, block, read_mesh
 from tissue.mesh.validation import checked, quality
+from tissue.shapes.isosurface_stuffing import stuff
 
 FLAT = 1e-9
 """Highest quality of a tetrahedron that Delaunay makes of four points on one side of a box."""
@@ -69,6 +70,18 @@ def positively_oriented(positions: FloatArray, tetrahedra: np.ndarray) -> np.nda
     oriented = tetrahedra.copy()
     oriented[inverted, 2], oriented[inverted, 3] = tetrahedra[inverted, 3], tetrahedra[inverted, 2]
     return oriented
+
+
+def half_shell(wall: float, spacing: float, diameter: float = 0.06) -> TetrahedralMesh:
+    """Return a bowl, open above, with that thickness of its wall and size of its elements [m]."""
+    outer = 0.5 * diameter
+
+    def inside(points: FloatArray) -> FloatArray:
+        radius = np.linalg.norm(points, axis=1)
+        return np.minimum(np.minimum(outer - radius, radius - (outer - wall)), -points[:, 2])
+
+    reach = outer + 2.0 * spacing
+    return checked(stuff(inside, [[-reach] * 3, [reach] * 3], spacing)).mesh
 
 
 def sides(mesh: TetrahedralMesh, axis: int = 0, share: float = 0.0) -> BoolArray:

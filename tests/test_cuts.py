@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scalpel_sim.arm.scalpel import SCALPEL
+from scalpel_sim.scenes import GEL
 from scalpel_sim.strokes.planning import plan_stroke
 from tests import bodies, soundness, strokes
 from tissue import Material, TetrahedralMesh, Tissue, block, liver_lobe, read_mesh
@@ -83,6 +85,22 @@ def test_a_third_party_mesh_falls_into_two_sound_pieces(file, stroke):
     poses = [planned.pose(t) for t in np.arange(0.0, planned.duration + strokes.DT, strokes.DT)]
     strokes.make(tissue, poses)
     expect_sound(before, tissue, pieces=whole + 1)
+
+
+@pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])
+@pytest.mark.parametrize("wall", [5.8e-3, 7e-3])
+def test_a_bowl_with_one_element_in_its_wall_falls_into_two_sound_pieces(wall, stroke):
+    mesh = bodies.half_shell(wall, wall)
+    tissue = at_rest(mesh, material=GEL, fixed=bodies.sides(mesh, share=0.05), blade=SCALPEL)
+    before = tissue.snapshot()
+    planned = plan_stroke(stroke, mesh, material=GEL)
+    poses = [planned.pose(t) for t in np.arange(0.0, planned.duration + strokes.DT, strokes.DT)]
+    results = strokes.make(tissue, poses)
+    expect_sound(before, tissue, pieces=2)
+    shares = [piece.rest_volume for piece in tissue.pieces()]
+    assert min(shares) > 0.3 * sum(shares)
+    last = results[-1]
+    assert last.finished_area <= 0.15 * (last.cut_area - last.finished_area)
 
 
 def test_the_paper_s_slab_grows_to_at_most_850_tetrahedra():

@@ -321,6 +321,7 @@ class Tissue(DrivenBody):
             active_point_tetrahedron=int(self._incision.path.seed[0]) if has_blade else -1,
             anchored_length=report.anchored_length,
             cut_area=self._incision.cut_area,
+            finished_area=self._incision.finished_area,
             work_of_blade=totals.work_of_blade,
             work_of_cutting=totals.work_of_cutting,
             n_substeps=n_substeps,

@@ -180,6 +180,9 @@ class StepResult(NamedTuple):
     """Length of the cutting edge that is in the tissue [m]."""
     cut_area: float
     """Area of the faces cut since the start, at rest, one side of each [m2]."""
+    finished_area: float
+    """The part of `cut_area` that no blade cut [m2]: small bridges that the blade passed over, and
+    that were parted where an incision ended. No work was done for them."""
     work_of_blade: float
     """Work that the blade has done on the tissue since the start [J]."""
     work_of_cutting: float

@@ -30,6 +30,6 @@ for frame in range(1, 1001):  # 1 ms each, at 60 mm/s along y
     before, y = pose, y + 60e-6
     pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
     result = ask(frame, STEP, struct.pack("<19d", 1e-3, *before, *pose))
-    force, area = struct.unpack_from("<3d", result, 136), struct.unpack_from("<d", result, 72)[0]
+    force, area = struct.unpack_from("<3d", result, 144), struct.unpack_from("<d", result, 72)[0]
     if frame % 100 == 0:
         print(f"{frame} ms: {force[1]:+.3f} N along y, {area * 1e6:.0f} mm2 cut")

@@ -64,6 +64,7 @@ def row_of(
         *frame.vectors_to_world(parts).ravel().tolist(),
         *UPPER(stiffness.ravel().tolist()),
         result.cut_area,
+        result.finished_area,
         result.n_tetrahedra,
         result.anchored_length,
         result.work_of_blade,

@@ -29,6 +29,7 @@ COLUMNS = (
     *_vector("friction_force", "n"),
     *(f"stiffness_{axes}_n_m" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")),
     "cut_area_m2",
+    "finished_area_m2",
     "tetrahedra",
     "anchored_length_m",
     "work_of_blade_j",

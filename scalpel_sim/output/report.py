@@ -161,6 +161,9 @@ def _add_springs(rows: _Rows, springs: dict[str, float]) -> None:
 def _add_cut(rows: _Rows, summary: Summary) -> None:
     """Add the area of the cut, the forces, the collisions and the work."""
     rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
+    if summary.finished_area_m2 > 0.0:
+        finished = f"{summary.finished_area_m2 * _MM2_PER_M2:,.1f} mm² of the cut, at no work"
+        rows.add("bridges finished", finished)
     paid, cut = summary.cut_area_paid_m2, summary.cut_area_m2
     if paid is not None and cut > 0.0:
         off = f": more than {LARGEST_GAP:.0%} off" if abs(paid / cut - 1.0) > LARGEST_GAP else ""

@@ -46,6 +46,8 @@ class Summary(NamedTuple):
     """How closely the cut follows the blade, and what it did to the mesh; None where the link was
     lost."""
     cut_area_m2: float
+    finished_area_m2: float
+    """The part of the cut area that no blade cut: small bridges that were finished."""
     cut_area_paid_m2: float | None
     """The area that the blade paid for: work of cutting over toughness. None without an audit, or
     where the toughness depends on speed, skin or sharpness."""
@@ -119,6 +121,7 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
         quality=None if facts.quality is None else quality_figures(facts.quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
+        finished_area_m2=float(recording.column("finished_area_m2")[-1]) if n else 0.0,
         cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,

@@ -77,6 +77,8 @@ def trace_path(
             _begin_or_go_on(blade, body, k, margin, path)
     for k in range(n):
         path.known[k] = path.member[k]
+        if anchors.walls.first[k] == k and anchors.walls.has_left[k]:
+            path.has_left = 1
         if anchors.state[k] == LEFT:
             anchors.state[k] = FREE
 
@@ -158,6 +160,7 @@ def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: 
 @kernel
 def forget_path(path: Path) -> None:
     """Forget where the edge has been: the next path begins at the next contact."""
+    path.has_left = 0
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False

@@ -6,7 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.exact_predicates import Lattice, nearest
 from tissue.geometry.tetrahedron import nearest_on_segment, normalised
@@ -40,6 +40,8 @@ class Path(Arrays):
     was then; shape (n,)."""
     linked: BoolArray
     """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
+    has_left: IntCell
+    """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
     boxes: IntArray
     """Lowest and highest lattice point of the quad from each sample to the next, shape (n, 6)."""
 
@@ -57,6 +59,7 @@ def new_path(n: int) -> Path:
         member=np.zeros(n, np.bool_),
         known=np.zeros(n, np.bool_),
         linked=np.zeros(n, np.bool_),
+        has_left=0,
         boxes=np.zeros((n, 6), np.int64),
     )
 

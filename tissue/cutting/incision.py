@@ -61,6 +61,11 @@ class Incision:
         """Area of the faces cut so far, at rest, one side of each [m2]."""
         return self.scheme.change.area
 
+    @property
+    def finished_area(self) -> float:
+        """The part of `cut_area` that no blade cut: bridges that were finished [m2]."""
+        return self.scheme.change.finished_area
+
     def n_increments(self, travel: float) -> int:
         """Return in how many increments the edge moves that far [m], little in each."""
         return max(1, math.ceil(travel / (INCREMENT * self._node_size)))
@@ -112,6 +117,8 @@ class Incision:
             self.open_to_edge(hooks)
         self._is_open = False
         self._cut_in_passes(self.scheme.end, hooks)
+        if self.path.has_left:
+            self._cut_in_passes(self.scheme.finish, hooks)
         self.scheme.forget()
         self.has_begun = False
 

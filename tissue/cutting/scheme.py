@@ -54,6 +54,10 @@ class Scheme(Protocol):
         """Cut what remains when the blade has left the incision, in one pass."""
         ...
 
+    def finish(self, body: Body, visits: Visits, path: Path) -> None:
+        """Part small bridges that the blade passed over, in one pass; nothing may be left to do."""
+        ...
+
     def forget(self) -> None:
         """Forget the incision: what is detected next belongs to another."""
         ...

@@ -30,6 +30,14 @@ def open_sheet(cut: Cut) -> None:
     """Cut the faces on the sheet, and double their nodes."""
     _mark_faces(cut)
     _keep_crumbs(cut)
+    open_faces(cut)
+    for i in range(cut.change.n_flagged):
+        _detach_fans(cut, cut.change.flagged[i])
+
+
+@kernel
+def open_faces(cut: Cut) -> None:
+    """Count the area of the faces whose links were cut in this pass, and double their nodes."""
     change = cut.change
     for i in range(change.n_faces):
         if change.faces[i, 1] >= 0:
@@ -37,8 +45,6 @@ def open_sheet(cut: Cut) -> None:
                 cut.body.rest, cut.body.tetrahedra, change.faces[i, 0], change.faces[i, 1]
             )
             _detach_along_face(cut, i)
-    for i in range(change.n_flagged):
-        _detach_fans(cut, change.flagged[i])
 
 
 @kernel
@@ -185,7 +191,7 @@ def _keep_crumbs(cut: Cut) -> None:
             start = change.faces[i, j]
             if change.faces[i, 1] < 0:
                 continue
-            n = _small_piece(cut, start, first)
+            n = small_piece(cut, start, first)
             if n == 0:
                 continue
             volume = 0.0
@@ -198,7 +204,7 @@ def _keep_crumbs(cut: Cut) -> None:
 
 
 @kernel
-def _small_piece(cut: Cut, start: int, first: int) -> int:
+def small_piece(cut: Cut, start: int, first: int) -> int:
     """Collect the connected piece of `start` in `scratch.around`; return its size, 0 if large.
 
     Tetrahedra that a search since visit `first` has stamped belong to a large piece.

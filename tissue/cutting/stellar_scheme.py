@@ -12,6 +12,8 @@ from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
 from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
+from tissue.cutting.finishing import finish_sheet
+from tissue.cutting.minimum_cut import new_flow_graph
 from tissue.cutting.separation import close_sheet, open_sheet
 from tissue.cutting.snapping import insert_crossings
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
@@ -37,6 +39,8 @@ class StellarScheme:
         self._limits = limits
         self._sheet = new_sheet(n_nodes, n_tetrahedra)
         self._scratch = new_cut_scratch(n_tetrahedra)
+        self._graph = new_flow_graph(n_tetrahedra)
+        self._area_before = 0.0
         self._cut: Cut | None = None
 
     @property
@@ -73,15 +77,23 @@ class StellarScheme:
         close_sheet(cut)
         remember_active(cut)
 
+    def finish(self, body: Body, visits: Visits, path: Path) -> None:
+        """Part small bridges that the blade passed over, in one pass."""
+        cut = self._arrays(body, visits, path)
+        clear_changes(cut.change)
+        finish_sheet(cut, self._graph, self.change.area - self._area_before)
+
     def forget(self) -> None:
         """Forget the incision: what is detected next belongs to another."""
         begin_sheet(self._sheet)
+        self._area_before = self.change.area
         self._scratch.n_previous = 0
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         self._sheet = grown_sheet(self._sheet, n_nodes, n_tetrahedra)
         self._scratch = self._scratch.replaced(place=np.zeros(n_tetrahedra, dtype=np.int64))
+        self._graph = new_flow_graph(n_tetrahedra)
         self._cut = None
 
     def statistics(self, body: Body) -> SchemeStatistics | None:

@@ -52,7 +52,7 @@ class Body(Arrays):
     """Whether each node is fixed, shape (capacity,)."""
     off_path: FloatArray
     """Distance of a cut's node from where the blade passed [m], the largest of several cuts; 0 for
-    other nodes; shape (capacity,)."""
+    other nodes, -1 where no blade passed but a bridge was finished; shape (capacity,)."""
     node_tetrahedron: IntArray
     """One tetrahedron around each node; links lead to the others. Shape (capacity,)."""
     twin: IntArray

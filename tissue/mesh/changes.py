@@ -39,6 +39,9 @@ class Change(Arrays):
     (3,)."""
     area: FloatCell
     """Area of the faces cut, at rest, one side of each, since the body was made [m2]."""
+    finished_area: FloatCell
+    """The part of `area` that no blade cut: bridges that were finished [m2]
+    (`tissue.cutting.finishing`)."""
 
 
 def new_change() -> Change:
@@ -55,6 +58,7 @@ def new_change() -> Change:
         is_full=0,
         lost_spin=np.zeros(3),
         area=0.0,
+        finished_area=0.0,
     )
 
 

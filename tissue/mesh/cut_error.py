@@ -39,7 +39,7 @@ def _path_error(body: Body, seen: BoolArray) -> tuple[int, float, float]:
                 continue
             for k in range(4):
                 node = body.tetrahedra[t, k]
-                if k == f or seen[node]:
+                if k == f or seen[node] or body.off_path[node] < 0.0:
                     continue
                 seen[node] = True
                 n += 1

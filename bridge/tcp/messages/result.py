@@ -11,7 +11,7 @@ from tissue import BladeContacts, BodyContacts, Energies, FloatArray, StageTimes
 MAX_CONTACTS = 1 << 16
 """Largest number of contacts of the blade: a thousand times that of a scalpel in an organ."""
 
-_HEAD = struct.Struct("<8q9d")
+_HEAD = struct.Struct("<8q10d")
 _N_FIXED = 9 + 9 + 36 + 3 + 6 + 3
 """Number of floats in the arrays of fixed length."""
 _N_PER_CONTACT = 3 + 3 + 1 + 3 + 1
@@ -38,6 +38,7 @@ def pack_result(result: StepResult) -> bytes:
         energies is not None,
         result.anchored_length,
         result.cut_area,
+        result.finished_area,
         result.work_of_blade,
         result.work_of_cutting,
         touch.penetration,
@@ -106,11 +107,12 @@ def unpack_result(payload: bytes) -> StepResult:
         active_point_tetrahedron=tip_tetrahedron,
         anchored_length=head[8],
         cut_area=head[9],
-        work_of_blade=head[10],
-        work_of_cutting=head[11],
+        finished_area=head[10],
+        work_of_blade=head[11],
+        work_of_cutting=head[12],
         n_substeps=n_substeps,
-        body_contacts=BodyContacts(n_touching, head[12], head[13], floats[63:66]),
-        stage_times=StageTimes(*head[14:]),
+        body_contacts=BodyContacts(n_touching, head[13], head[14], floats[63:66]),
+        stage_times=StageTimes(*head[15:]),
         energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
     )
 

@@ -84,6 +84,7 @@ class Wall:
             active_point_tetrahedron=-1,
             anchored_length=n / N_POINTS * float(np.linalg.norm(sweep.t1.heel - sweep.t1.tip)),
             cut_area=0.0,
+            finished_area=0.0,
             work_of_blade=self._work,
             work_of_cutting=0.0,
             n_substeps=1,

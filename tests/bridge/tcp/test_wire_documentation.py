@@ -91,6 +91,7 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
         "length of the edge in the tissue": (
             result.anchored_length,
             result.cut_area,
+            result.finished_area,
             result.work_of_blade,
             result.work_of_cutting,
         ),

@@ -254,7 +254,7 @@ def test_the_summary_has_every_documented_key(tmp_path, plotter):
     documented = (
         "scene simulated_seconds wall_seconds real_time_factor frame_rate_median "
         "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
-        "force_peak_n "
+        "finished_area_m2 force_peak_n "
         "force_mean_n work_of_blade_j share versions"
     )
     assert set(documented.split()) <= set(found)
@@ -333,6 +333,19 @@ def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
     print_summary(summary, console)
     assert summary.quality["added_mass"] == 1e-3
     assert re.search("mass added to slivers.* 0.1 %", console.export_text())
+
+
+@pytest.mark.parametrize(("area", "expected"), [(1.25e-5, "12.5 mm² of the cut"), (0.0, None)])
+def test_the_table_tells_the_area_of_the_bridges_that_were_finished(area, expected):
+    recording = zero_recording()
+    recording.column("cut_area_m2")[-1] = 2.5e-4
+    recording.column("finished_area_m2")[-1] = area
+    summary = summary_of(recording)
+    assert summary.finished_area_m2 == area
+    console = Console(record=True, width=100)
+    print_summary(summary, console)
+    found = re.search("bridges finished .*?([0-9.]+ mm² of the cut)", console.export_text())
+    assert (found and found[1]) == expected
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,11 @@ class PaperScheme:
         self._scratch.n_active = 0
         split_left(self._split(body), self._waiting, path, GONE)
 
+    def finish(self, body: Body, visits: Visits, path: Path) -> None:
+        """Do nothing: what the scheme cannot split it leaves whole, and counts."""
+        del body, visits, path
+        clear_changes(self.change)
+
     def forget(self) -> None:
         """Forget the incision. Its edges stay cut: each tetrahedron is processed once."""
         self._records.incision += 1

@@ -47,6 +47,7 @@ def results(draw):
         active_point_tetrahedron=draw(st.integers(-1, n_tetrahedra - 1)),
         anchored_length=draw(any_float),
         cut_area=draw(any_float),
+        finished_area=draw(any_float),
         work_of_blade=draw(any_float),
         work_of_cutting=draw(any_float),
         n_substeps=draw(counts),
@@ -83,7 +84,7 @@ def test_a_result_with_impossible_counts_is_refused(change, why):
     none = np.zeros((0, 3))
     contacts = BladeContacts(none, none, np.zeros(0), none, np.zeros(0))
     at_t1 = (wrench, np.zeros((6, 6)), contacts)
-    counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 1)
+    counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 1)
     good = StepResult(
         wrench, *at_t1, zeros, bounds, *counts_and_floats, body_contacts, stage_times, None
     )

@@ -1,0 +1,144 @@
+"""Finishing: where an incision ends, the small bridges that the blade passed over are parted.
+
+The path of the edge is known at its samples only, and ends at the last one that held tissue. At the
+ends of the sheet, and between two parts of it, tissue of less than an element can stay whole. The
+faces that part it are those of the minimum cut between the two lips (`tissue.cutting.minimum_cut`).
+They are cut where their area is a small share of the sheet. Where it is not, the blade left a
+bridge that is to stay. No blade pays for the work of these cuts: their area is reported by itself.
+"""
+
+from tissue.core.jit import kernel
+from tissue.cutting.cut_surface import decide_side, decided_side, on_sheet, past_offset
+from tissue.cutting.minimum_cut import FlowGraph, clear_lips, minimum_cut, put_on_lip
+from tissue.cutting.separation import open_faces, small_piece
+from tissue.cutting.workspace import Cut
+from tissue.mesh.body import CUT
+from tissue.mesh.star import star
+from tissue.mesh.workspace import PASS_NODES
+
+MOST_FINISHED = 0.15
+"""Area of the bridges that are finished, as a share of the sheet, at most. Of a stroke that ends
+where a sixth of the way is left, the bridge stays."""
+
+MOST_FACES = PASS_NODES
+"""Faces of the bridges that are finished, at most: the pass has room for their nodes."""
+
+MOST_TRIES = 16
+"""Minimum cuts that are looked for, where all but the last would part a crumb."""
+
+
+@kernel
+def finish_sheet(cut: Cut, graph: FlowGraph, sheet_area: float) -> None:
+    """Part the bridges between the lips of the current incision if they are small.
+
+    Args:
+        cut: The changes have been cleared; they are written.
+        graph: Without lips, before and after.
+        sheet_area: Area of the faces cut in this incision [m2].
+    """
+    limit = MOST_FINISHED * sheet_area
+    _collect_lips(cut, graph)
+    for _ in range(MOST_TRIES):
+        area = minimum_cut(graph, cut.body, cut.visits, limit)
+        if area == 0.0 or area > limit or not _cut_links(cut, graph):
+            break
+        if not _spare_crumbs(cut, graph):
+            _note_sides(cut)
+            area_before = cut.change.area
+            open_faces(cut)
+            cut.change.finished_area += cut.change.area - area_before
+            break
+        _restore_links(cut)
+    clear_lips(graph)
+
+
+@kernel
+def _collect_lips(cut: Cut, graph: FlowGraph) -> None:
+    """Find the tetrahedra of the lips: those with a face that this incision has cut."""
+    body, sheet, around = cut.body, cut.sheet, cut.scratch.around
+    for i in range(sheet.n_nodes):
+        node = sheet.nodes[i]
+        n = star(body, cut.visits, node, body.node_tetrahedron[node], around)
+        for j in range(n):
+            t = around[j]
+            side = decided_side(sheet, t)
+            if side == 0 or graph.lip[t] != 0:
+                continue
+            for f in range(4):
+                if body.links[t, f] == CUT:
+                    put_on_lip(graph, t, side)
+                    break
+
+
+@kernel
+def _cut_links(cut: Cut, graph: FlowGraph) -> bool:
+    """Cut the links across the minimum cut, and list its faces; return whether there was room."""
+    body, change, visits = cut.body, cut.change, cut.visits
+    change.n_faces = 0
+    for i in range(graph.n_queued):
+        t = graph.queue[i]
+        for f in range(4):
+            link = body.links[t, f]
+            if link < 0 or visits.tetrahedra[link // 4] == visits.epoch:
+                continue
+            if change.n_faces == MOST_FACES:
+                _restore_links(cut)
+                return False
+            row = change.n_faces
+            change.n_faces += 1
+            change.faces[row, 0] = t
+            change.faces[row, 1] = f
+            change.faces[row, 2] = link // 4
+            change.faces[row, 3] = link % 4
+            body.links[t, f] = CUT
+            body.links[link // 4, link % 4] = CUT
+    return True
+
+
+@kernel
+def _restore_links(cut: Cut) -> None:
+    """Undo `_cut_links`."""
+    change, links = cut.change, cut.body.links
+    for row in range(change.n_faces):
+        links[change.faces[row, 0], change.faces[row, 1]] = (
+            4 * change.faces[row, 2] + change.faces[row, 3]
+        )
+        links[change.faces[row, 2], change.faces[row, 3]] = (
+            4 * change.faces[row, 0] + change.faces[row, 1]
+        )
+    change.n_faces = 0
+
+
+@kernel
+def _spare_crumbs(cut: Cut, graph: FlowGraph) -> bool:
+    """Take crumbs that the cut would part off the lips; return whether there are any.
+
+    A crumb hangs on one lip and touches the other with a few faces. Parting these would make it
+    loose, and would not part the lips.
+    """
+    change, visits, piece = cut.change, cut.visits, cut.scratch.around
+    first = visits.epoch + 1
+    any_crumb = False
+    for row in range(change.n_faces):
+        for j in range(0, 4, 2):
+            n = small_piece(cut, change.faces[row, j], first)
+            any_crumb = any_crumb or n > 0
+            for i in range(n):
+                graph.lip[piece[i]] = 0
+                visits.tetrahedra[piece[i]] = 0  # a stamp of `first` or later: of a large piece
+    return any_crumb
+
+
+@kernel
+def _note_sides(cut: Cut) -> None:
+    """Note the sides of the tetrahedra at the new faces, and the nodes that no blade passed."""
+    body, change = cut.body, cut.change
+    for row in range(change.n_faces):
+        t = change.faces[row, 0]
+        decide_side(cut.sheet, t, 1)
+        decide_side(cut.sheet, change.faces[row, 2], -1)
+        for k in range(4):
+            node = body.tetrahedra[t, k]
+            is_new = not on_sheet(cut.sheet, node) and past_offset(cut.sheet, node) < 0.0
+            if k != change.faces[row, 1] and is_new:
+                body.off_path[node] = -1.0
