@@ -15,7 +15,6 @@ from scalpel_sim.strokes.planning import STROKES
 from scalpel_sim.strokes.stroke import Stroke, from_csv
 from tissue import (
     MATERIALS,
-    PARAMETERS_OF_LAWS,
     BladeShape,
     CutSettings,
     Material,
@@ -388,9 +387,8 @@ def changed(scene: Scene, **changes: Any) -> Scene:
     if "snap" in given:
         snap = given.pop("snap")
         parts["cut"] = replace(parts["cut"], snap=snap, floor=snap)
-    if given.get("law", parts["material"].law) != parts["material"].law:
-        given = dict.fromkeys(PARAMETERS_OF_LAWS, 0.0) | given
     for name, part in parts.items():
         properties = {field.name for field in fields(part)} - of_scene
-        parts[name] = replace(part, **{key: given.pop(key) for key in properties & given.keys()})
+        own = {key: given.pop(key) for key in properties & given.keys()}
+        parts[name] = part.changed(**own) if isinstance(part, Material) else replace(part, **own)
     return replace(scene, **given, **parts)

@@ -23,7 +23,6 @@ from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
-from .material import PARAMETERS_OF_LAWS as PARAMETERS_OF_LAWS
 from .material import Law as Law
 from .material import Material as Material
 from .material_presets import DAMPING_BAND as DAMPING_BAND
@@ -77,7 +76,6 @@ __all__ = [
     "MaterialPoints",
     "MeshError",
     "MeshMeasures",
-    "PARAMETERS_OF_LAWS",
     "Piece",
     "Preset",
     "SchemeStatistics",

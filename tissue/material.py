@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 Law = Literal["springs", "neo_hookean", "exponential", "yeoh"]
 """How forces follow from deformation: `springs` along edges, as in the paper, or tetrahedra under a
@@ -149,6 +149,19 @@ class Material:
                 f"law {self.law} without stiffening: {' or '.join(given)} must be positive. "
                 "Tissue that does not stiffen has law neo_hookean"
             )
+
+    def changed(self, **changes: Any) -> "Material":
+        """Return the material with some quantities replaced.
+
+        Another law drops the parameters that only the law before has.
+
+        Raises:
+            TypeError: there is no such quantity.
+            ValueError: as for a new material.
+        """
+        if changes.get("law", self.law) != self.law:
+            changes = dict.fromkeys(PARAMETERS_OF_LAWS, 0.0) | changes
+        return replace(self, **changes)
 
     @property
     def stiffens(self) -> bool:

@@ -1,7 +1,6 @@
 """The tissue, the loads, the supports and the blade of a case."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
@@ -147,7 +146,7 @@ def _material(table: CaseMaterialTable) -> Material:
     }
     preset = given.pop("preset", None)
     if preset is not None:
-        return replace(material_called(preset), **given)
+        return material_called(preset).changed(**given)
     if "law" not in given or "young_modulus" not in given:
         raise UsageError("it needs a preset, or a law and a young_modulus")
     return Material(**given)

@@ -54,6 +54,12 @@ def test_a_prony_series_is_kept_as_pairs_whatever_it_was_given_as():
         assert hash(material) == hash(replace(material, prony=pairs))
 
 
+def test_another_law_drops_the_parameters_of_the_law_before():
+    liver = Material(law="exponential", stiffening=15.0, toughness=164.0)
+    assert liver.changed(young_modulus=5e3).stiffening == 15.0
+    assert liver.changed(law="neo_hookean") == Material(toughness=164.0)
+
+
 def test_lames_constants_are_those_of_the_textbook():
     material = Material(young_modulus=3.0, poisson_ratio=0.45)
     bulk = material.lam + 2.0 / 3.0 * material.mu

@@ -74,11 +74,9 @@ def test_slicing_at_45_degrees_passes_and_would_fail_as_pressing():
 def test_action_and_reaction_balance_and_a_force_from_nowhere_fails():
     found = cut_free_block("neo_hookean", 300)
     assert found.largest[0] > 0.01  # there is something to balance
-    # Where a cut inserts nodes angular momentum is not kept: that line fails, and says so.
-    failed = [check.name for check in check_balance("it", found) if check.verdict == FAIL]
-    assert failed == ["it: torque + change of angular momentum, in steps that change the mesh"]
+    assert FAIL not in verdicts(check_balance("it", found))
     pushed = found._replace(momentum=found.momentum + 1e-8)
-    assert [check.verdict for check in check_balance("it", pushed)].count(FAIL) == 2
+    assert FAIL in verdicts(check_balance("it", pushed))
 
 
 def test_an_account_that_misses_six_thousandths_of_the_work_fails():
