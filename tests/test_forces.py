@@ -105,7 +105,7 @@ class Run:
 )
 def test_the_steady_force_is_toughness_times_depth(variation):
     run = Run(**{"poses": upright()} | variation)
-    assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
+    assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.03)
 
 
 LIVER = {"young_modulus": 4.74e3, "toughness": 164.0, "poisson_ratio": 0.45}

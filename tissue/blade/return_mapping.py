@@ -215,6 +215,8 @@ def _update_rest_share(
     """
     anchors = blade.anchors
     n = len(anchors.state)
+    if blade.pays_at_rest == 0:
+        return
     low, high = max(k - 1, 0), min(k + 1, n - 1)
     low = low if anchors.state[low] == ANCHORED else k
     high = high if anchors.state[high] == ANCHORED else k

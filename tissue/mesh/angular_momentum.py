@@ -51,7 +51,7 @@ def return_spin(body: Body, change: Change, density: float, nodes: IntArray, n: 
     x, y, z = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     for i in range(n):
         if not body.fixed[nodes[i]]:
-            mass = body.masses[nodes[i]]
+            mass = _own_mass(body, nodes[i])
             r = sub(vec3(body.positions, nodes[i]), centre)
             squared = dot(r, r)
             x = add(x, scale(mass, Vec3(squared - r.x * r.x, -r.x * r.y, -r.x * r.z)))
@@ -81,12 +81,19 @@ def _forget(spin: FloatArray) -> None:
 
 
 @kernel
+def _own_mass(body: Body, node: int) -> float:
+    """Return the mass of a node without what mass scaling added, whose momentum no one sees."""
+    mass: float = body.masses[node] - body.added_masses[node]
+    return mass
+
+
+@kernel
 def _centre(body: Body, nodes: IntArray, n: int) -> Vec3:
     """Return the centre of mass of those of the first `n` of `nodes` that can move [m]."""
     total, moment = 0.0, Vec3(0.0, 0.0, 0.0)
     for i in range(n):
         if not body.fixed[nodes[i]]:
-            mass = body.masses[nodes[i]]
+            mass = _own_mass(body, nodes[i])
             total += mass
             moment = add(moment, scale(mass, vec3(body.positions, nodes[i])))
     return scale(1.0 / total, moment) if total > 0.0 else moment

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests import bodies
+from tests.materials import SPRINGS
 from tissue import Hierarchical, Material, SolverSettings, Tissue, block, fixed_nodes
 
 SIZE = (0.04, 0.02, 0.02)
@@ -51,8 +52,8 @@ def test_a_push_gives_its_impulse_and_its_moment(place, relaxation):
 @pytest.mark.parametrize("relaxation", ["global", "verlet", Hierarchical(far="moved")])
 def test_a_body_whose_nodes_are_pushed_with_their_weight_moves_as_in_gravity(relaxation):
     solver, fixed = SolverSettings(relaxation=relaxation), fixed_nodes(MESH, "left")
-    falling = Tissue(MESH, fixed=fixed, solver=solver)
-    pushed = Tissue(MESH, fixed=fixed, gravity=NO_GRAVITY, solver=solver)
+    falling = Tissue(MESH, SPRINGS, fixed=fixed, solver=solver)
+    pushed = Tissue(MESH, SPRINGS, fixed=fixed, gravity=NO_GRAVITY, solver=solver)
     weights = pushed.snapshot().masses[:, None] * (0.0, 0.0, -9.81)
     pushed.push(np.arange(pushed.n_nodes), weights)
     for _ in range(20):

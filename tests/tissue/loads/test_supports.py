@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from tests.materials import SPRINGS
 from tissue import (
     BladeSegment,
     BladeSweep,
@@ -172,6 +173,6 @@ def test_a_motion_that_makes_no_sense_is_refused(where, velocity, expected):
 
 def test_the_hierarchical_relaxation_refuses_to_move_supports():
     solver = SolverSettings(relaxation=Hierarchical())
-    tissue = Tissue(MESH, fixed=fixed_nodes(MESH, "left"), solver=solver)
+    tissue = Tissue(MESH, SPRINGS, fixed=fixed_nodes(MESH, "left"), solver=solver)
     with pytest.raises(ValueError, match="'global' or 'verlet'"):
         tissue.move_supports("left", (0.0, 0.0, 0.01))
