@@ -9,7 +9,13 @@ from tissue.core.kernel_parts import in_parts
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-FLAGS = {"error_model": "numpy", "_nrt": False, "no_cfunc_wrapper": True, "nogil": True}
+FLAGS = {
+    "error_model": "numpy",
+    "_nrt": False,
+    "no_cfunc_wrapper": True,
+    "nogil": True,
+    "forceinline": False,
+}
 """Flags with which every kernel is compiled; `kernel` gives the reasons."""
 
 
@@ -24,7 +30,10 @@ def kernel(function: F) -> F:
     Kernels work on arrays and plain numbers. They never raise and never allocate, so they run
     without Numba's reference counting (`_nrt`): with it a cut step costs three times as much,
     because every call of a helper counts the references of every array it passes on.
-    `error_model="numpy"` makes 1/0 an inf instead of an exception.
+    `error_model="numpy"` makes 1/0 an inf instead of an exception. `forceinline` is given although
+    it is False: Numba would take it over from whichever caller compiles the function first, and
+    flags are a part of its name in the code. Parts of two processes that compile at once would then
+    not fit, and a call go nowhere.
     """
     return _compiled(function, FLAGS)
 

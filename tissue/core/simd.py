@@ -20,7 +20,7 @@ from numba.core import types
 from numba.extending import lower_builtin, models, register_model, type_callable
 
 from tissue.core.array_types import FloatArray, SlotArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined
 
 WIDTH = 8
 """Doubles in a vector: one cache line, and one AVX-512 register."""
@@ -32,7 +32,7 @@ Point = np.ndarray
 """A point as x, y, z and a 0: in Python an array, in a kernel one vector of four."""
 
 
-@kernel
+@inlined
 def filled(n: int) -> int:
     """Return the slots that a row of `n` entries takes: a multiple of `WIDTH`."""
     return (n + WIDTH - 1) // WIDTH * WIDTH

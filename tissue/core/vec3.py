@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined
 
 
 class Vec3(NamedTuple):
@@ -15,13 +15,13 @@ class Vec3(NamedTuple):
     z: float
 
 
-@kernel
+@inlined
 def vec3(array: FloatArray, i: int) -> Vec3:
     """Return row `i` of an array of shape (n, 3)."""
     return Vec3(array[i, 0], array[i, 1], array[i, 2])
 
 
-@kernel
+@inlined
 def store(array: FloatArray, i: int, a: Vec3) -> None:
     """Write `a` into row `i` of an array of shape (n, 3)."""
     array[i, 0] = a.x
@@ -29,49 +29,49 @@ def store(array: FloatArray, i: int, a: Vec3) -> None:
     array[i, 2] = a.z
 
 
-@kernel
+@inlined
 def add(a: Vec3, b: Vec3) -> Vec3:
     """Return a + b."""
     return Vec3(a.x + b.x, a.y + b.y, a.z + b.z)
 
 
-@kernel
+@inlined
 def sub(a: Vec3, b: Vec3) -> Vec3:
     """Return a - b."""
     return Vec3(a.x - b.x, a.y - b.y, a.z - b.z)
 
 
-@kernel
+@inlined
 def scale(s: float, a: Vec3) -> Vec3:
     """Return s a."""
     return Vec3(s * a.x, s * a.y, s * a.z)
 
 
-@kernel
+@inlined
 def axpy(s: float, a: Vec3, b: Vec3) -> Vec3:
     """Return s a + b."""
     return Vec3(s * a.x + b.x, s * a.y + b.y, s * a.z + b.z)
 
 
-@kernel
+@inlined
 def dot(a: Vec3, b: Vec3) -> float:
     """Return the scalar product."""
     return a.x * b.x + a.y * b.y + a.z * b.z
 
 
-@kernel
+@inlined
 def cross(a: Vec3, b: Vec3) -> Vec3:
     """Return the vector product."""
     return Vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 
 
-@kernel
+@inlined
 def norm(a: Vec3) -> float:
     """Return the length."""
     return math.sqrt(dot(a, a))
 
 
-@kernel
+@inlined
 def lerp(t: float, a: Vec3, b: Vec3) -> Vec3:
     """Return the point at fraction `t` of the way from a to b."""
     return Vec3(a.x + t * (b.x - a.x), a.y + t * (b.y - a.y), a.z + t * (b.z - a.z))

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, aligned, filled
 from tissue.core.simd_blocks import row_of_lane, width_of
 from tissue.core.structs import Arrays, IntCell
@@ -241,7 +241,7 @@ def n_blocks(solid: Solid, n_tetrahedra: int) -> int:
     return (n_tetrahedra + width - 1) // width
 
 
-@kernel
+@inlined
 def node_place(solid: Solid, t: int, k: int) -> int:
     """Return where node `k` of tetrahedron `t` is in `nodes`."""
     width = width_of(solid.shape)

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, store, vec3
 
 
@@ -26,7 +26,7 @@ def empty_box() -> Aabb:
     return Aabb(Vec3(math.inf, math.inf, math.inf), Vec3(-math.inf, -math.inf, -math.inf))
 
 
-@kernel
+@inlined
 def with_point(box: Aabb, p: Vec3) -> Aabb:
     """Return the smallest box that holds a box and a point."""
     low, high = box.low, box.high
@@ -36,7 +36,7 @@ def with_point(box: Aabb, p: Vec3) -> Aabb:
     )
 
 
-@kernel
+@inlined
 def widened(box: Aabb, margin: float) -> Aabb:
     """Return a box that is larger by `margin` on each side."""
     low, high = box.low, box.high
@@ -46,7 +46,7 @@ def widened(box: Aabb, margin: float) -> Aabb:
     )
 
 
-@kernel
+@inlined
 def overlap(one: Aabb, other: Aabb) -> bool:
     """Whether two boxes have a point in common, if only on their sides."""
     if one.low.x > other.high.x or one.high.x < other.low.x:

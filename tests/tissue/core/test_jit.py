@@ -6,11 +6,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba as nb
 import pytest
 
 import tissue
+from tissue.core import kernel_parts
 from tissue.core.cache_directory import cache_directory
-from tissue.core.jit import is_compiling, kernel
+from tissue.core.jit import inlined, is_compiling, kernel
 
 pytestmark = pytest.mark.kernel
 
@@ -157,3 +159,32 @@ def test_an_operator_is_typed_by_the_types_of_each_of_its_uses():
             [float, float, int, bool],
             [int, int, int, bool],
         ]
+
+
+def code_of(function, *arguments):
+    """Return the code of a kernel as a part, in LLVM's language."""
+    compiled = kernel_parts._part_of(function.py_func, arguments)
+    return str(compiled.library._get_module_for_linking())
+
+
+@kernel
+def _leaf(x):
+    return x + 1.0
+
+
+@inlined
+def _branch(x):
+    return _leaf(x)
+
+
+@kernel
+def _root(x):
+    return _branch(x)
+
+
+@pytest.mark.skipif(not is_compiling(), reason="nothing is compiled")
+def test_a_kernel_has_the_same_flags_whoever_calls_it_first():
+    """Its name in the code tells them: parts from two processes would not fit otherwise."""
+    assert _root(1.0) == 2.0
+    assert "alwaysinline" not in code_of(_leaf, nb.float64)
+    assert "alwaysinline" in code_of(_branch, nb.float64)

@@ -73,13 +73,13 @@ def _add_mass(s: Split, t: int, local: int, node: int, volume: float) -> None:
     momentum is kept.
     """
     body, mass = s.body, 0.25 * s.density * volume
-    total = body.masses[node] + mass
+    total = body.masses[node] - body.added_masses[node] + mass
     velocity = vec3(body.velocities, node) if local < 4 else _velocity_within(s, t, local)
     note_spin(s.change, -volume, _arm(s, t, node), velocity)
     if local >= 4 and not body.fixed[node]:
         before = vec3(body.velocities, node)
         store(body.velocities, node, axpy(mass / total, sub(velocity, before), before))
-    body.masses[node] = total
+    body.masses[node] += mass
 
 
 @kernel
