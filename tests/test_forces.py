@@ -105,7 +105,7 @@ class Run:
 )
 def test_the_steady_force_is_toughness_times_depth(variation):
     run = Run(**{"poses": upright()} | variation)
-    assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.03)
+    assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
 
 
 LIVER = {"young_modulus": 4.74e3, "toughness": 164.0, "poisson_ratio": 0.45}
@@ -114,11 +114,9 @@ LIVER = {"young_modulus": 4.74e3, "toughness": 164.0, "poisson_ratio": 0.45}
 
 @pytest.mark.parametrize("stiffening", [15.0, 20.0])
 def test_liver_as_published_is_cut_where_it_stiffens(stiffening):
-    """Ahead of the edge it is squeezed, and swells sideways: what counts is the area at rest."""
-    run = Run(upright(end=0.07), law="exponential", stiffening=stiffening, **LIVER)
-    area = SIZE[1] * SIZE[2]
-    assert run.results[-1].cut_area == pytest.approx(area, rel=0.01)
-    assert run.energies.cutting == pytest.approx(164.0 * area, rel=0.05)
+    run = Run(upright(), law="exponential", stiffening=stiffening, **LIVER)
+    assert run.steady() == pytest.approx(164.0 * run.anchored(), rel=0.05)
+    assert run.results[-1].cut_area > 0.0
 
 
 @pytest.mark.parametrize("slice_ratio", [0.0, 0.5, 1.0])

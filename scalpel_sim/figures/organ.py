@@ -19,7 +19,7 @@ ORGAN = PlannedCut(
     lean=-0.15,
 )
 """Clean through the organ; it leans so that one sees into the cut, which is pulled open."""
-_MOMENTS = (0.55, 0.75)
+_MOMENTS = (0.5, 0.72)
 """Shares of the stroke: half way, and shortly before the organ falls in two."""
 _COLOURS = 256
 """Colours of the file, which is then less than half as large."""

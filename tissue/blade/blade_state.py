@@ -8,7 +8,7 @@ from tissue.blade.side_contact import SideContacts, new_side_contacts
 from tissue.blade.toughness import ToughnessLaw, toughness_law_of
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import IntArray
-from tissue.core.structs import Arrays, IntCell
+from tissue.core.structs import Arrays
 from tissue.material import Material
 from tissue.mesh.star import LARGEST_STAR
 
@@ -34,9 +34,6 @@ class BladeState(Arrays):
     reach: float
     """Distance up to which a sample is anchored beside another one; and up to which a blade that
     backed off still belongs to its anchor [m]."""
-    pays_at_rest: IntCell
-    """1 if toughness is charged for area at rest, else 0. Under law springs it is for area as it
-    is: tetrahedra ahead of the edge collapse there, and do not tell their area at rest."""
     queue: IntArray
     """Scratch for searches, shape (LARGEST_STAR,)."""
 
@@ -63,6 +60,5 @@ def new_blade_state(
         toughness=toughness_law_of(material, shape),
         totals=new_totals(),
         reach=float(REACH * node_size),
-        pays_at_rest=int(material.law != "springs"),
         queue=np.zeros(max(LARGEST_STAR, SEARCH), dtype=np.int64),
     )

@@ -17,10 +17,10 @@ from tissue.blade.anchors import (
 )
 from tissue.blade.blade_state import SEARCH, BladeState
 from tissue.blade.edge import BladePose, sample_point
-from tissue.blade.material_frame import MOST_STRAIN, to_material
+from tissue.blade.material_frame import to_material
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
+from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import (
     Weights,
     barycentric_in,
@@ -174,14 +174,13 @@ def _slip_anchor(
     if surplus == 0.0:
         return
     before = stored_energy(anchors, k, stretch, pose, law)
-    share = anchors.rest_share[k]
     spent = held_toughness(anchors, k, law) * across * surplus
     anchors.at_skin[k] = False  # once broken, the skin is no tougher than the rest
     slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
     a = anchor_position(anchors, body, body.positions, k)
     _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
     if anchors.state[k] == LEFT:
-        anchors.cut[k] += share * surplus * across
+        anchors.cut[k] += surplus * across
         totals.work_of_cutting += spent
         totals.released += before - spent
         return
@@ -189,47 +188,10 @@ def _slip_anchor(
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area
-    anchors.cut[k] += share * area
+    anchors.cut[k] += area
     left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
     totals.work_of_cutting += cost
     totals.work_of_breaking += before - left - cost
-    _update_rest_share(blade, body, k, slipped, pose)
-    totals.released += left - stored_energy(anchors, k, sub(stretch, slipped), pose, law)
-
-
-@kernel
-def _update_rest_share(
-    blade: BladeState, body: Body, k: int, slipped: Vec3, pose: BladePose
-) -> None:
-    """Move the share of area at rest towards what it was on the way that anchor `k` slipped.
-
-    The length of edge at rest is that between the anchors on either side: a single tetrahedron says
-    less of it, and these draw the sheet that the cut opens.
-
-    Args:
-        blade: The share is written.
-        body: The tissue.
-        k: The anchor.
-        slipped: How far it slipped in the body as it is [m].
-        pose: Pose of the blade.
-    """
-    anchors = blade.anchors
-    n = len(anchors.state)
-    if blade.pays_at_rest == 0:
-        return
-    low, high = max(k - 1, 0), min(k + 1, n - 1)
-    low = low if anchors.state[low] == ANCHORED else k
-    high = high if anchors.state[high] == ANCHORED else k
-    swept = norm(cross(slipped, pose.along))
-    if low == high or swept == 0.0:
-        return
-    spacing = norm(sub(sample_point(pose, high, n), sample_point(pose, low, n)))
-    beside = sub(vec3(anchors.rest, high), vec3(anchors.rest, low))
-    way = to_material(body, anchors.tetrahedron[k], slipped)
-    share = norm(cross(way, beside)) / (swept * spacing)
-    share = min(max(share, 1.0 / MOST_STRAIN**2), MOST_STRAIN**2)
-    weight = min(norm(slipped) / blade.reach, 1.0)
-    anchors.rest_share[k] += weight * (share - anchors.rest_share[k])
 
 
 @kernel
