@@ -15,6 +15,7 @@ import itertools
 import sys
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
@@ -119,14 +120,14 @@ def variation(number: int, seed: int) -> Variation:
     mesh: Callable[[], TetrahedralMesh]
     if kind == "shell":
         name = f"shell, wall {1e3 * wall:.2f} mm, elements {1e3 * share * wall:.2f} mm"
-        mesh = lambda: bodies.half_shell(wall, share * wall, DIAMETER)  # noqa: E731
+        mesh = partial(bodies.half_shell, wall, share * wall, DIAMETER)
     elif kind == "sheet":
         layers = 1 + cells // 14
         name = f"sheet of {cells} x {cells} x {layers} cells"
-        mesh = lambda: block((cells, cells, layers), (DIAMETER, DIAMETER, SHEET))  # noqa: E731
+        mesh = partial(block, (cells, cells, layers), (DIAMETER, DIAMETER, SHEET))
     else:
         name = f"bar of {cells} x 1 x 1 cells, {1e3 * width:.1f} mm thick"
-        mesh = lambda: block((cells, 1, 1), (DIAMETER, width, width))  # noqa: E731
+        mesh = partial(block, (cells, 1, 1), (DIAMETER, width, width))
     return Variation(
         number=number,
         kind=kind,
