@@ -93,6 +93,8 @@ class Recording:
 def read_forces(path: Path) -> Recording:
     """Return the recording that a run wrote as `forces.csv`.
 
+    A last row without an end of line is left out: a run that was killed did not finish it.
+
     Raises:
         ValueError: the file is no such table.
         OSError: the file cannot be read.
@@ -103,7 +105,7 @@ def read_forces(path: Path) -> Recording:
             raise ValueError(
                 f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )
-        lines = file.readlines()
+        lines = [line for line in file if line.endswith("\n")]
     rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(COLUMNS)))
     recording = Recording(len(rows))
     for row in rows:

@@ -13,7 +13,7 @@ from scalpel_sim.output.energy_plot import OPACITY, plot_energies
 from scalpel_sim.output.energy_terms import TERMS
 from scalpel_sim.output.force_plot import LIMITED, PARTS, plot_forces
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS, Recording
+from scalpel_sim.output.recording import COLUMNS, Recording, read_forces
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.run_folder import (
     ENERGY_PLOT,
@@ -428,3 +428,15 @@ def test_a_run_that_ended_before_its_first_frame_has_a_summary_too():
     summary = summary_of(Recording(), wall_seconds=0.0)
     assert summary.simulated_seconds == summary.force_peak_n == summary.frame_rate_median == 0.0
     assert json.loads(json.dumps(summary._asdict(), allow_nan=False))["frames"] == 0
+
+
+def test_a_row_that_a_killed_run_did_not_finish_is_left_out(tmp_path):
+    """Also where the cut is within the last number, which could still be read."""
+    path, rows = tmp_path / "forces.csv", np.arange(2.0 * len(COLUMNS)).reshape(2, -1) + 0.25
+    lines = [",".join(COLUMNS), *(",".join(map(repr, row.tolist())) for row in rows)]
+    whole = "\n".join(lines) + "\n"
+    for n_lost in (1, 2, 40):
+        path.write_text(whole[:-n_lost])
+        np.testing.assert_array_equal(read_forces(path).rows, rows[:1])
+    path.write_text(whole)
+    np.testing.assert_array_equal(read_forces(path).rows, rows)
