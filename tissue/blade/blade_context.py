@@ -8,8 +8,13 @@ from typing import Final
 
 from tissue.blade.anchors import anchored_length, is_engaged
 from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import Edge
-from tissue.blade.engagement import anchor_entering, update_engagement
+from tissue.blade.edge import Edge, pose_at
+from tissue.blade.engagement import (
+    anchor_beside,
+    anchor_entering,
+    any_free_in_box,
+    free_retracted,
+)
 from tissue.blade.forces import clear_blade_forces
 from tissue.blade.path_tracing import trace_path
 from tissue.blade.side_search import blade_box, find_faces, release_faces
@@ -120,7 +125,10 @@ def update_anchors(
     low, high = vec3(context.bounds, 0), vec3(context.bounds, 1)
     if not is_again:
         clear_blade_forces(blade, body, external)
-        if not update_engagement(blade, body, context.visits, path, edge, when, low, high):
+        pose = pose_at(edge, when)
+        free_retracted(blade, body, context.visits, path, pose)
+        anchor_beside(blade, body, context.visits, pose, context.slit_reach)
+        if not any_free_in_box(blade.anchors, pose, low, high):
             return NOT_SEARCHED
     if not _list_tetrahedra(context, nodes, n):
         return GRID_IS_FULL

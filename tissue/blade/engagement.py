@@ -1,8 +1,8 @@
 """Which samples of the edge are anchored, and which are free.
 
-A free sample that enters the tissue is anchored where it is, unless it is in an existing slit,
-where nothing is left to cut. A free sample beside an anchored one is anchored as far behind the
-blade as its neighbour. A sample that backed off and then went elsewhere is freed.
+A free sample that enters the tissue is anchored where it is. A free sample beside an anchored one
+is anchored as far behind the blade as its neighbour. In an existing slit neither is: nothing is
+left to cut there. A sample that backed off and then went elsewhere is freed.
 """
 
 from tissue.blade.anchors import (
@@ -37,38 +37,6 @@ _BESIDE = 0.7
 """Cosine of the angle between the blade's normal and the direction to the nearest cut face, from
 which the point is beside that face, in the slit. Below, it is ahead of the rim, or under the
 bottom."""
-
-
-@kernel
-def update_engagement(
-    blade: BladeState,
-    body: Body,
-    visits: Visits,
-    path: Path,
-    edge: Edge,
-    when: float,
-    low: Vec3,
-    high: Vec3,
-) -> bool:
-    """Free samples that backed off and went elsewhere, and anchor samples beside anchored ones.
-
-    Returns whether a free sample is in the box of the tissue, so that `anchor_entering` is needed.
-    Three calls from Python would take longer than the work in them.
-
-    Args:
-        blade: The anchors are written.
-        body: The tissue.
-        visits: For searches.
-        path: Path of the edge through the material.
-        edge: The cutting edge over the time step.
-        when: Instant, as a fraction of the time step.
-        low: Lowest corner of the tissue's box [m].
-        high: Highest corner of the tissue's box [m].
-    """
-    pose = pose_at(edge, when)
-    free_retracted(blade, body, visits, path, pose)
-    anchor_beside(blade, body, visits, pose)
-    return any_free_in_box(blade.anchors, pose, low, high)
 
 
 @kernel
@@ -118,11 +86,20 @@ def _is_beside_anchored(anchors: Anchors, k: int) -> bool:
 
 
 @kernel
-def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose) -> None:
+def anchor_beside(
+    blade: BladeState, body: Body, visits: Visits, pose: BladePose, slit_reach: float
+) -> None:
     """Anchor the free samples beside an anchored one that are in the tissue too.
 
     The anchors trail behind the blade by the same distance along the edge: a sample is in the
     tissue if the point that far behind it is. Tissue beyond `BladeState.reach` is not taken.
+
+    Args:
+        blade: The anchors are written.
+        body: The tissue.
+        visits: For searches.
+        pose: Pose of the blade.
+        slit_reach: Distance from a cut face up to which a point is in the slit [m] (`is_in_slit`).
     """
     anchors = blade.anchors
     n = len(anchors.state)
@@ -146,6 +123,8 @@ def anchor_beside(blade: BladeState, body: Body, visits: Visits, pose: BladePose
             here = interpolate(w, body.positions, body.tetrahedra, t)
             stretch = sub(sample_point(pose, k, n), here)
             if norm(stretch) > blade.reach:  # the tissue there is turned otherwise
+                continue
+            if is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
             join_wall(anchors.walls, k, beside)

@@ -276,7 +276,7 @@ def test_the_work_of_the_blade_is_force_times_displacement(held):
 def test_free_neighbours_of_an_anchored_sample_inside_the_tissue_are_anchored(held):
     held.anchors.state[:] = FREE
     held.anchors.state[2] = ANCHORED
-    anchor_beside(held.blade, held.body, held.visits, pose_at(edge_at(0.0095), 1.0))
+    anchor_beside(held.blade, held.body, held.visits, pose_at(edge_at(0.0095), 1.0), 0.001)
     assert (held.anchors.state == ANCHORED).all()
     np.testing.assert_allclose(held.anchors.rest[:, 1], 0.009, atol=1e-12)
 

@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
+from tests.tissue.kernels_of import line_blade
 from tissue import Tissue, block
-from tissue.blade.engagement import is_behind_edge, is_in_slit
+from tissue.blade.anchors import ANCHORED, FREE, new_anchors
+from tissue.blade.edge import Edge, pose_at
+from tissue.blade.engagement import anchor_beside, is_behind_edge, is_in_slit
+from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.mesh.point_location import build_grid, tetrahedron_at
+from tissue.mesh.star import no_visits
 
 EDGE = 0.04
 REACH = 1e-3
@@ -51,6 +56,24 @@ def test_a_blade_below_the_bottom_is_in_whole_tissue(slit_body):
 
 def test_a_blade_that_crosses_the_slit_is_in_whole_tissue(slit_body):
     assert not in_slit(slit_body, 0.0195, 0.011, 0.033, forward=ACROSS)
+
+
+@pytest.mark.parametrize("x", [0.0195, 0.0205])
+def test_samples_beside_an_anchored_one_that_are_in_the_slit_stay_free(slit_body, x):
+    """The edge goes down along the slit; one sample holds the tissue below the slit's bottom."""
+    n, length = 11, 0.02
+    tip, heel = Vec3(x, 0.011, 0.013), Vec3(x, 0.011, 0.033)
+    blade = line_blade(new_anchors(n, length, 1e3)).replaced(reach=EDGE)
+    visits = no_visits(len(slit_body.positions), len(slit_body.tetrahedra))
+    grid = build_grid(slit_body, slit_body.rest, 0.0)
+    set_anchor(
+        blade.anchors, slit_body, 0, tetrahedron_at(slit_body, grid, slit_body.rest, tip), tip
+    )
+    pose = pose_at(Edge(tip, heel, AHEAD, tip, heel, AHEAD), 1.0)
+    anchor_beside(blade, slit_body, visits, pose, REACH)
+    height = tip.z + np.linspace(0.0, length, n)
+    assert (blade.anchors.state[height < 0.0195] == ANCHORED).all()
+    assert (blade.anchors.state[height > 0.0205] == FREE).all()
 
 
 def test_a_body_without_a_cut_has_no_slit():
