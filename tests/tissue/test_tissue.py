@@ -1,6 +1,8 @@
 """The interface of `Tissue`: arguments, refusals and results."""
 
+import copy
 import gc
+import pickle
 import weakref
 
 import numpy as np
@@ -130,6 +132,12 @@ def test_the_engine_copies_its_arguments(tissue):
         array[:] = 0
     np.testing.assert_array_equal(tissue.snapshot().positions, MESH.positions)
     assert tissue.snapshot().fixed.any()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
+def test_a_tissue_refuses_to_be_copied_and_says_what_to_do(tissue, copied):
+    with pytest.raises(TypeError, match=r"neither pickled nor copied; take Tissue.snapshot"):
+        copied(tissue)
 
 
 def test_a_snapshot_is_a_copy(tissue):

@@ -11,7 +11,7 @@ In Python, and with the JIT off, an `Arrays` is a plain object with its fields a
 import hashlib
 import inspect
 from array import array
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, NoReturn, Self
 
 import numpy as np
 from llvmlite import ir
@@ -164,6 +164,18 @@ class Arrays:
     def replaced(self, **fields: Any) -> Self:
         """Return a struct with these fields in place of its own; cells are copied."""
         return type(self)(**{name: getattr(self, name) for name in self.__annotations__} | fields)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to be pickled or copied: the table of the copy would hold these addresses.
+
+        Raises:
+            TypeError: always.
+        """
+        raise TypeError(
+            f"{type(self).__name__} holds addresses of memory, so that a Tissue can be neither "
+            "pickled nor copied; take Tissue.snapshot(), or make another Tissue and do the same "
+            "steps, which gives the same bits"
+        )
 
 
 def _word(number: float) -> int:
