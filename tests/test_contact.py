@@ -126,7 +126,7 @@ def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pa
         fixed=mesh.positions[:, 2] == 0.0,
         gravity=(0.0, 0.0, -weight),
     )
-    assert advance(tissue, 1.5) < ALLOWED
+    assert advance(tissue, 2.5) < ALLOWED
     last = tissue.step(None, strokes.DT)
     assert last.body_contacts.n_contacts > 10
     assert last.body_contacts.force == pytest.approx(
@@ -302,11 +302,14 @@ def test_crossed_beams_touch_edge_on_edge():
     low, ridge = mesh.positions[n:, 2].min(), mesh.positions[:n, 2].max()
     edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
     assert edge.sum() == 2 and low > ridge
+    most_contacts = 0
     for _ in range(300):
         contacts = tissue.step(None, strokes.DT).body_contacts
-        # The edge between the two nodes crosses an edge of the lower beam in its middle.
-        assert tissue.snapshot().positions[n:][edge, 2].mean() > ridge - ALLOWED
-    assert contacts.n_contacts > 0
+        most_contacts = max(most_contacts, contacts.n_contacts)
+        # The edge between the two nodes crosses the ridge of the lower beam, which is at y = 0.
+        (_, y0, z0), (_, y1, z1) = tissue.snapshot().positions[n:][edge]
+        assert z0 - y0 * (z1 - z0) / (y1 - y0) > ridge - ALLOWED
+    assert most_contacts > 0
 
 
 def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
@@ -354,7 +357,8 @@ def test_contact_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
 
 def resting_blocks(n_steps=300):
     """Return a small block at rest on a larger one."""
-    mesh = joined(block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.0301))
+    lower, upper = block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3)
+    mesh = joined(lower, upper, (1e-3, 2e-3, 0.0301))
     material = Material(viscous_damping=20.0)
     tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] == 0.0)
     for _ in range(n_steps):

@@ -67,7 +67,9 @@ class Material:
     blade_viscosity: float = 0.0
     """Shear stress per sliding speed on the faces of the blade, added to friction [Pa s/m]."""
     viscous_damping: float = 5.0
-    """Drag on every node, as the rate at which free motion decays [1/s]."""
+    """Drag, as the rate at which slow motion within the tissue decays [1/s]. A loose piece falls
+    and turns freely: drag acts on its motion less the rigid part, see
+    `tissue.integrators.rigid_motion`."""
     retardation_time: float = 5e-5
     """Viscosity per stiffness of dampers along the edges [s] (Kelvin-Voigt). As a continuum:
     viscosity in shear over the shear modulus `mu`, under either law."""

@@ -124,6 +124,7 @@ class Tissue(DrivenBody):
         checked_floor(floor, float(self.bounds[0, 2]))
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
         self._incision = Incision(scheme, self.node_size)
+        self._system.find_loose_pieces()
         self._loads = Loads()
         self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
@@ -265,8 +266,10 @@ class Tissue(DrivenBody):
         self._edge_now = (increment.edge, increment.end)
         if n == 0:
             return 0
-        self._system.relax_stress(increment.span)
+        system.relax_stress(increment.span)
         moving, body = self._integrator.moving, self._system.body
+        if moving is None:
+            system.find_new_loose_pieces()
         if moving is None or 2 * moving[1] > self.n_nodes:
             is_finite = write_bounds(body, self._bounds)
         else:
@@ -299,6 +302,7 @@ class Tissue(DrivenBody):
         if self._incision.has_begun:
             self._incision.end(self._hooks)
             self._system.contact.incision_ended(self._system.body)
+            self._system.find_loose_pieces()
             forget_path(self._incision.path)
 
     def _result(

@@ -39,7 +39,7 @@ MATERIAL_COMMENTS = {
     "blade_friction": "Coefficient of friction on the faces of the blade.",
     "blade_viscosity": "Shear stress per sliding speed on the faces of the blade [Pa s/m], in "
     "addition to friction.",
-    "viscous_damping": "Drag: the rate at which free motion dies away [1/s].",
+    "viscous_damping": "Drag: the rate at which slow motion within the tissue dies away [1/s].",
     "retardation_time": "Viscosity in shear over the shear modulus [s].",
     "spring_calibration": "Stiffness of the springs over that of van Gelder's formula. Keep it at "
     "1, unless the law is springs and they were measured on this mesh.",

@@ -34,6 +34,7 @@ from tissue.integrators.substeps import damp
 from tissue.integrators.support_state import supports_at_rest
 from tissue.mesh.body import Body, build_body, grown_body
 from tissue.mesh.changes import new_change
+from tissue.mesh.loose_pieces import no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, no_visits
 from tissue.mesh.workspace import SPARE_NODES
 from tissue.tissue import NOWHERE
@@ -140,6 +141,7 @@ class Network(NamedTuple):
             damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             supports=supports_at_rest(),
+            loose=no_loose_pieces(),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),
             team=new_team(),

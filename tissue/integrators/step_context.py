@@ -13,6 +13,7 @@ from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stages import Stages
 from tissue.integrators.support_state import Supports
 from tissue.mesh.body import Body
+from tissue.mesh.loose_pieces import LoosePieces
 from tissue.mesh.star import Visits
 
 
@@ -35,6 +36,8 @@ class StepContext(Arrays, two_precisions=True):
     """What contact takes from the energy, where that is counted."""
     supports: Supports
     """Whether fixed nodes move, and their work."""
+    loose: LoosePieces
+    """The pieces that are not held: drag does not act on their rigid motion."""
     stages: Stages
     """Scratch of a step, the forces of the blade, and loads."""
     visits: Visits

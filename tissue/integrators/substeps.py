@@ -9,6 +9,11 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
 from tissue.integrators.damping import change_velocities
+from tissue.integrators.rigid_motion import (
+    add_rigid_part,
+    note_loose_positions,
+    return_rigid_motion,
+)
 from tissue.integrators.runge_kutta import runge_kutta_nystroem
 from tissue.integrators.shared_loops import DAMPING_CHANGES, run_loop
 from tissue.integrators.stage_damping import (
@@ -169,6 +174,8 @@ def damp(context: StepContext, h: float) -> None:
     damping.owed = 0.5 * h
     if damping.retardation_time > 0.0 or damping.drag > 0.0:
         run_loop(context, DAMPING_CHANGES, seconds)
+        factor, change = seconds * damping.drag, context.stages.change
+        add_rigid_part(context.body, context.loose, context.body.velocities, factor, change)
         if context.supports.is_moving == 1:
             add_support_damping(context, seconds)
         change_velocities(damping, context.body, context.stages)
@@ -178,10 +185,15 @@ def damp(context: StepContext, h: float) -> None:
 def _runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, share: float) -> None:
     """Take one Runge-Kutta step; count the damping in its stages. See `runge_kutta_nystroem`."""
     is_counted = counts_stage_damping(context)
+    is_dragged = context.surroundings.drag > 0.0 and len(context.loose.node) > 0
     before = begin_damped_step(context) if is_counted else 0.0
+    if is_dragged:
+        note_loose_positions(context)
     runge_kutta_nystroem(context, edge, dt, at, share)
     if is_counted:
         end_damped_step(context, before, share * dt)
+    if is_dragged:
+        return_rigid_motion(context, share * dt)
 
 
 @kernel

@@ -25,7 +25,13 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import Change
 from tissue.mesh.cut_error import inverted_share, lowest_altitude
+from tissue.mesh.loose_pieces import loose_pieces_of, no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, Visits, mean_node_size, no_visits
+
+INCREMENTS_TO_PIECES = 50
+"""Increments of steps from a change of the mesh until loose pieces are found again: 50 ms in a
+usual run. Finding them costs as much as a step of the integrator. Until then a piece that came
+loose is taken as held, and drag slows its fall."""
 
 
 class System:
@@ -77,6 +83,9 @@ class System:
         """What contact takes from the energy, where that is counted."""
         self.supports = supports_at_rest()
         """Whether fixed nodes move, and their work."""
+        self.loose = no_loose_pieces()
+        """The pieces that are not held, as they were found last."""
+        self._increments_to_pieces = 0
         self._context: StepContext | None = None
 
     @property
@@ -90,6 +99,7 @@ class System:
             or context.blade is not self.interaction.state
             or context.contacts is not self.contact.forces
             or context.stages is not self.stages
+            or context.loose is not self.loose
         ):
             self._context = context = StepContext(
                 body=self.body,
@@ -100,6 +110,7 @@ class System:
                 damping=self.damping,
                 contact_loss=self.contact_loss,
                 supports=self.supports,
+                loose=self.loose,
                 stages=self.stages,
                 visits=self.visits,
                 team=new_team(),
@@ -126,8 +137,23 @@ class System:
         by_node, highest = elasticity.arrays.frequency_squared, elasticity.frequency_squared
         self.contact.prepare(self.body, by_node, highest, seconds)
 
+    def find_loose_pieces(self) -> None:
+        """Find the pieces that are not held."""
+        if self.surroundings.drag > 0.0:
+            self.loose = loose_pieces_of(self.body)
+        self._increments_to_pieces = 0
+
+    def find_new_loose_pieces(self) -> None:
+        """Find them again some increments after the mesh changed, as it may change in each."""
+        if self._increments_to_pieces > 0:
+            self._increments_to_pieces -= 1
+            if self._increments_to_pieces == 0:
+                self.find_loose_pieces()
+
     def mesh_changed(self, change: Change, nodes: IntArray) -> None:
         """Update what depends on the tetrahedra that a pass of a cut changed, and their nodes."""
+        if self._increments_to_pieces == 0:
+            self._increments_to_pieces = INCREMENTS_TO_PIECES
         self.elasticity.mesh_changed(self.body, self.visits, change, nodes, len(nodes))
         self.interaction.mesh_changed(self.body, self.visits, change)
         self.contact.mesh_changed(self.body, change)
