@@ -38,9 +38,16 @@ def filled(n, real, seed=0):
     return array
 
 
+def aligned_copy(array):
+    """Return a copy that is aligned as kernels ask of rows; an ordinary copy may not be."""
+    copied = aligned(array.size, array.dtype.type).reshape(array.shape)
+    copied[...] = array
+    return copied
+
+
 def both(function, *arguments, out):
     """Return what a function writes to `out` as a kernel, and as plain Python."""
-    compiled, plain = out.copy(), out.copy()
+    compiled, plain = aligned_copy(out), out.copy()
     kernel(function)(*arguments, compiled)
     function(*arguments, plain)
     return compiled, plain
