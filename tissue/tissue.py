@@ -145,7 +145,8 @@ class Tissue(DrivenBody):
             dt: Length of the step [s]. It is divided as stability and the speed of the blade need.
 
         Raises:
-            ValueError: the blade has no length, or a number is not finite.
+            ValueError: the blade has no length, or one that does not fit the mesh; or a number is
+                not finite.
             TissueError: the motion of the tissue became unstable.
         """
         has_blade = sweep is not None
@@ -381,6 +382,8 @@ class Tissue(DrivenBody):
         length = 0.0 if edge is None else edge.length
         interaction = self._system.interaction
         if interaction.is_other_edge(length):
+            if edge is not None:
+                interaction.expect_usable_edge(length)
             self._end_incision()
             interaction.replace_edge(length, self._system.body, *self._edge_now)
             self._incision.take_edge(interaction.n_samples)

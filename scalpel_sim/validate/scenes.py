@@ -13,6 +13,7 @@ from scalpel_sim.validate.puncture import PUNCTURE_SCENE
 from scalpel_sim.validate.rate import RATE_SCENE
 from scalpel_sim.validate.reaction import REACTION_SCENE
 from scalpel_sim.validate.slicing import SLICING_SCENE
+from scalpel_sim.validate.spine import SPINE_SCENE
 from scalpel_sim.validate.steady import STEADY_SCENE
 from scalpel_sim.validate.stretch import STRETCH_SCENE
 from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
@@ -27,6 +28,7 @@ VALIDATION_SCENES: dict[str, ValidationScene] = {
         RATE_SCENE,
         SLICING_SCENE,
         PUNCTURE_SCENE,
+        SPINE_SCENE,
         REACTION_SCENE,
         AUDIT_SCENE,
         COUPLING_SCENE,

@@ -37,6 +37,25 @@ def test_a_blade_of_another_shape_is_refused(tissue, wrong):
         tissue.step(sweep_to(tip=wrong), 1e-3)
 
 
+@pytest.mark.parametrize(("length", "why"), [(1e-4, "shorter than"), (200.0, "too long")])
+def test_an_edge_that_does_not_fit_the_mesh_is_refused_and_changes_nothing(tissue, length, why):
+    heel = POSE.tip + np.array([0.0, 0.0, length])
+    before = tissue.snapshot()
+    with pytest.raises(ValueError, match=rf"edge of the blade is .* mm long, {why}.*(Use|Pass)"):
+        tissue.step(BladeSweep(POSE._replace(heel=heel), POSE._replace(heel=heel)), 1e-3)
+    for one, other in zip(before, tissue.snapshot(), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_a_long_edge_has_as_many_samples_as_a_short_one_for_its_length(tissue):
+    def samples(length):
+        heel = POSE.tip + np.array([0.0, 0.0, length])
+        tissue.step(BladeSweep(POSE._replace(heel=heel), POSE._replace(heel=heel)), 1e-3)
+        return tissue._system.interaction.n_samples - 1
+
+    assert samples(3.0) == pytest.approx(10 * samples(0.3), rel=0.02)
+
+
 def test_a_blade_without_length_is_refused(tissue):
     with pytest.raises(ValueError, match="no length"):
         tissue.step(sweep_to(heel=POSE.tip), 1e-3)

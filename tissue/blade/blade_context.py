@@ -8,7 +8,8 @@ from typing import Final
 
 from tissue.blade.anchors import anchored_length, is_engaged
 from tissue.blade.blade_state import BladeState
-from tissue.blade.edge import Edge, pose_at
+from tissue.blade.blunt_search import release_blunt_sides, update_blunt_sides
+from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.blade.engagement import (
     anchor_beside,
     anchor_entering,
@@ -79,6 +80,13 @@ def _list_tetrahedra(context: BladeContext, nodes: IntArray, n: int) -> bool:
 
 
 @kernel
+def release_sides(blade: BladeState) -> None:
+    """End all contacts of the side faces, the back and the ends; count their energy as released."""
+    release_faces(blade)
+    release_blunt_sides(blade)
+
+
+@kernel
 def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray, n: int) -> int:
     """Find the faces of the tissue that the side faces of the blade may touch.
 
@@ -91,12 +99,13 @@ def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray
     """
     blade = context.blade
     if not overlap(blade_box(blade.sides, edge, when), box_between(context.bounds)):
-        release_faces(blade)
+        release_sides(blade)
         return NOT_SEARCHED
     if not _list_tetrahedra(context, nodes, n):
         return GRID_IS_FULL
     if not find_faces(blade, context.body, context.visits, context.grid, edge, when):
         return NO_ROOM_FOR_FACES
+    update_blunt_sides(blade, context.body, context.grid, motion_at(edge, when))
     return SEARCHED
 
 

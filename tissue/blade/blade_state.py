@@ -3,6 +3,7 @@
 import numpy as np
 
 from tissue.blade.anchors import Anchors
+from tissue.blade.blunt_contact import BluntContacts, no_blunt_contacts
 from tissue.blade.impulse_totals import ImpulseTotals, new_totals
 from tissue.blade.side_contact import SideContacts, new_side_contacts
 from tissue.blade.toughness import ToughnessLaw, toughness_law_of
@@ -27,6 +28,8 @@ class BladeState(Arrays):
     """Samples of the cutting edge."""
     sides: SideContacts
     """Faces of the tissue near the side faces of the blade."""
+    blunt: BluntContacts
+    """Samples of the back and the ends of the blade."""
     toughness: ToughnessLaw
     """Energy that cutting takes."""
     totals: ImpulseTotals
@@ -57,6 +60,7 @@ def new_blade_state(
     return BladeState(
         anchors=anchors,
         sides=new_side_contacts(shape, material, node_size, n_tetrahedra),
+        blunt=no_blunt_contacts(),
         toughness=toughness_law_of(material, shape),
         totals=new_totals(),
         reach=float(REACH * node_size),

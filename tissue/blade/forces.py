@@ -8,6 +8,14 @@ from tissue.blade.anchors import (
     measure_speeds,
 )
 from tissue.blade.blade_state import BladeState
+from tissue.blade.blunt_forces import (
+    add_blunt_stiffness,
+    apply_blunt_forces,
+    clear_blunt_forces,
+    highest_blunt_frequency,
+    slip_blunt_sides,
+)
+from tissue.blade.blunt_search import release_blunt_sides
 from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.blade.edge_forces import apply_edge_forces
 from tissue.blade.impulse_totals import clear_impulses
@@ -45,6 +53,7 @@ def clear_blade_forces(blade: BladeState, body: Body, external: FloatArray) -> N
     """Set the forces on the nodes that the blade acts on to zero: all others are zero."""
     clear_anchor_forces(blade.anchors, body, external)
     clear_side_forces(blade.sides, external)
+    clear_blunt_forces(blade.blunt, body, external)
 
 
 @kernel
@@ -74,6 +83,7 @@ def apply_blade_forces(
     motion = motion_at(edge, when)
     apply_edge_forces(blade, body, motion, positions, share, dt, external)
     apply_side_forces(blade, motion, positions, share, dt, external)
+    apply_blunt_forces(blade, body, motion, positions, share, dt, external)
 
 
 @kernel
@@ -101,6 +111,7 @@ def apply_slip(
     pose = pose_at(edge, when)
     slip_anchors(blade, body, visits, pose)
     apply_sliding(blade, pose, body.positions, seconds)
+    slip_blunt_sides(blade, body, visits, pose)
 
 
 @kernel
@@ -111,8 +122,9 @@ def edge_energy(blade: BladeState, body: Body, edge: Edge, when: float) -> float
 
 @kernel
 def release_edge(blade: BladeState, body: Body, edge: Edge, when: float) -> None:
-    """Count the energy of all anchors as released: the blade is taken away."""
+    """Count the energy of all anchors and blunt sides as released: the blade is taken away."""
     blade.totals.released += edge_energy(blade, body, edge, when)
+    release_blunt_sides(blade)
 
 
 @kernel
@@ -125,9 +137,11 @@ def frequency_with_blade(
     """
     add_anchor_stiffness(blade.anchors, body, scratch)
     add_side_stiffness(blade.sides, scratch)
+    add_blunt_stiffness(blade.blunt, body, scratch)
     worst = max(
         highest_anchor_frequency(blade.anchors, body, frequency_squared, scratch),
         highest_side_frequency(blade.sides, body, frequency_squared, scratch),
+        highest_blunt_frequency(blade.blunt, body, frequency_squared, scratch),
     )
     clear_blade_forces(blade, body, scratch)
     return worst

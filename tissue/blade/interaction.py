@@ -10,17 +10,20 @@ from tissue.blade.blade_context import (
     NO_ROOM_FOR_FACES,
     NOT_SEARCHED,
     BladeContext,
+    release_sides,
     report_step,
     trace,
     update_anchors,
     update_faces,
 )
 from tissue.blade.blade_state import new_blade_state
+from tissue.blade.blunt_contact import new_blunt_contacts
+from tissue.blade.blunt_search import relocate_blunt_sides
 from tissue.blade.edge import Edge
 from tissue.blade.forces import begin_blade_step, release_edge
 from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
-from tissue.blade.side_search import forget_cells, forget_changed_faces, release_faces
+from tissue.blade.side_search import forget_cells, forget_changed_faces
 from tissue.blade.toughness import toughness_law_of
 from tissue.blade.wrench import BladeReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
@@ -36,8 +39,11 @@ from tissue.mesh.star import Visits
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
 enters and leaves the skin; more cost time in every Runge-Kutta stage."""
-MOST_SAMPLES = 512
-"""Samples at most, for a long blade in a fine mesh."""
+FEWEST_SPACINGS = 1.0
+"""Length of an edge at least, per distance of samples. A shorter edge parts less than the cut of a
+mesh resolves."""
+MOST_SAMPLES = 4096
+"""Samples of an edge at most. To move as many takes a millisecond, however small the body is."""
 
 GRID_MARGIN = 0.5
 """Distance that a node moves before its tetrahedra are listed in the grid again, per mean node
@@ -70,7 +76,7 @@ class BladeInteraction:
         anchors = new_anchors(2, 1.0, self._stiffness)
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
-        self._has_sides = blade is not None
+        self._shape, self._material = blade, material
         self._report = new_report(self.state)
         self._edge_length = 0.0
         self._grid = no_grid()
@@ -91,6 +97,27 @@ class BladeInteraction:
         """Return whether an edge of that length [m] differs from the current one; 0 is no edge."""
         return abs(length - self._edge_length) > _SAME_LENGTH * length
 
+    def expect_usable_edge(self, length: float) -> None:
+        """Refuse an edge of a length [m] that does not fit the mesh.
+
+        Raises:
+            ValueError: it is too short or too long.
+        """
+        spacing = self._node_size / SAMPLES_PER_NODE_SIZE
+        shortest, longest = FEWEST_SPACINGS * spacing, MOST_SAMPLES * spacing
+        if shortest <= length <= longest:
+            return
+        why, advice = (
+            ("shorter than this mesh resolves", "Use a longer edge or a finer mesh")
+            if length < shortest
+            else ("too long for this mesh", "Pass only the part of the edge that meets the tissue")
+        )
+        raise ValueError(
+            f"the edge of the blade is {length * 1e3:.3g} mm long, {why}, whose mean node size is "
+            f"{self._node_size * 1e3:.3g} mm: it has {shortest * 1e3:.3g} to {longest * 1e3:.3g} "
+            f"mm. {advice}"
+        )
+
     def replace_edge(self, length: float, body: Body, edge: Edge, when: float) -> None:
         """Release the anchors of the current edge, and use an edge of another length.
 
@@ -102,8 +129,11 @@ class BladeInteraction:
         """
         release_edge(self.state, body, edge, when)
         n = math.ceil(length / self._node_size * SAMPLES_PER_NODE_SIZE) + 1
-        anchors = new_anchors(min(max(n, 2), MOST_SAMPLES), length, self._stiffness)
+        anchors = new_anchors(max(n, 2), length, self._stiffness)
         self.state = self.state.replaced(anchors=anchors)
+        if self._shape is not None and length > 0.0:
+            where = (self._shape, length, self._material, self._node_size)
+            self.state = self.state.replaced(blunt=new_blunt_contacts(*where))
         self._report = new_report(self.state)
         self._edge_length = length
 
@@ -114,7 +144,8 @@ class BladeInteraction:
     def mesh_changed(self, body: Body, visits: Visits, change: Change) -> None:
         """Find the tetrahedra of the anchors again after a pass of a cut."""
         relocate(self.state, body, visits)
-        if self._has_sides:
+        relocate_blunt_sides(self.state, body, visits)
+        if self._shape is not None:
             forget_changed_faces(self.state.sides, change.dirty, change.n_dirty)
 
     def begin_step(self, body: Body, edge: Edge, dt: float) -> None:
@@ -175,10 +206,10 @@ class BladeInteraction:
             edge: The cutting edge over the time step; None for no blade.
             when: Instant, as a fraction of the time step.
         """
-        if not self._has_sides:
+        if self._shape is None:
             return
         if edge is None:
-            release_faces(self.state)
+            release_sides(self.state)
             return
         while True:
             outcome = update_faces(context, edge, when, *self._to_list(context.body, moved))

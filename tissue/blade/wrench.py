@@ -11,6 +11,13 @@ import numpy as np
 
 from tissue.blade.anchors import ANCHORED, anchor_position, surplus_stretch
 from tissue.blade.blade_state import BladeState
+from tissue.blade.blunt_contact import (
+    PRESSING,
+    blunt_side,
+    press_force,
+    press_of,
+    touched_point,
+)
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at, sample_point
 from tissue.blade.impulse_totals import ImpulseTotals
 from tissue.blade.side_contact import POINTS, contact_forces, contact_point, penetration
@@ -57,7 +64,7 @@ class WrenchReport(Arrays):
 
 def new_report(blade: BladeState) -> WrenchReport:
     """Return a report without contacts, with room for as many as the blade may have."""
-    capacity = len(blade.anchors.state) + POINTS * len(blade.sides.face)
+    capacity = len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.blunt.state)
     numbers = np.zeros(_N_NUMBERS)
     return WrenchReport(
         n_contacts=0,
@@ -169,6 +176,7 @@ def write_report(report: WrenchReport, blade: BladeState, body: Body, edge: Edge
     pose = pose_at(edge, 1.0)
     _report_edge(report, blade, body, pose, edge.tip_t1)
     _report_sides(report, blade, body, pose, edge.tip_t1)
+    _report_blunt_sides(report, blade, body, pose, edge.tip_t1)
     for i in range(6):
         for j in range(i):
             mean = 0.5 * (report.stiffness[i, j] + report.stiffness[j, i])
@@ -223,6 +231,33 @@ def _report_sides(
             _add_force(report, lever, add(push, friction))
             _add_stiffness_along(report, lever, stiffness, normal)
             _add_contact(report, p, normal, size, friction, 0.0)
+
+
+@kernel
+def _report_blunt_sides(
+    report: WrenchReport, blade: BladeState, body: Body, pose: BladePose, about: Vec3
+) -> None:
+    """Add the contacts of the blunt sides to the report; torques are about a point [m]."""
+    blunt = blade.blunt
+    if blunt.n_pressing == 0:
+        return
+    for k in range(len(blunt.state)):
+        if blunt.state[k] < PRESSING:
+            continue
+        side = blunt_side(blunt, pose, k)
+        p = touched_point(blunt, body, body.positions, k)
+        press = press_of(blunt, k, side, pose.normal, p, blade.toughness)
+        if press.depth <= 0.0:
+            continue
+        force = press_force(blunt, k, side, pose.normal, press)
+        lever = sub(p, about)
+        push = dot(force, side.outward)
+        _add_force(report, lever, force)
+        # A sample that pierces presses no harder when it is pressed farther.
+        if press.surplus == 0.0:
+            _add_stiffness_along(report, lever, blunt.stiffness[k], side.outward)
+        friction = axpy(-push, side.outward, force)
+        _add_contact(report, p, side.outward, push, friction, 0.0)
 
 
 @kernel

@@ -1,0 +1,187 @@
+"""The back of a blade, pressed into skin, against a rigid strip of its size in a fine mesh."""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.validate.findings import (
+    THEORY,
+    Check,
+    Curve,
+    Findings,
+    Plot,
+    Reference,
+    ValidationScene,
+    within,
+)
+from tissue import (
+    BladeSegment,
+    BladeShape,
+    BladeSweep,
+    FloatArray,
+    Material,
+    TetrahedralMesh,
+    Tissue,
+    block,
+)
+
+_SIZE = (0.06, 0.06, 0.03)
+"""Sides of the block [m]; its bottom is held."""
+_MATERIAL = Material(10e3, toughness=20.0, viscous_damping=50.0)
+_EDGE, _THICKNESSES = 0.02, (0.4e-3, 1e-3)
+"""Length of the blade [m], and how thick blades are [m]."""
+_DEPTH, _SPEED, _DT = 2e-3, 0.05, 1e-3
+"""How deep the back is pressed [m], how fast [m/s], and a frame [s]."""
+_ABOVE = 0.5e-3
+"""Height of the back above the skin at the begin [m]."""
+_CELLS = ((12, 12, 6), (20, 20, 10))
+"""Cells along the sides of the block."""
+_BESIDE = (1.1e-3, 0.7e-3)
+"""Middle of the back from that of the block [m], so that it lies along no plane of the mesh."""
+_GROWTH, _CELLS_ALONG = 1.4, 48
+"""Growth of the cells of the reference from the strip on, and its cells along the strip."""
+_NEAR = 0.10
+"""Largest relative error of the force."""
+
+
+class Dent(NamedTuple):
+    """A back that is pressed into a block and held."""
+
+    depth: FloatArray
+    """How deep the back is [m]."""
+    force: FloatArray
+    """Force on the blade, upwards [N]."""
+    held: float
+    """Force at the end [N]."""
+    cut_area: float
+    """Area that was cut [m2]."""
+
+
+def dent(thickness: float, cells: tuple[int, int, int], frames_held: int = 100) -> Dent:
+    """Press the back of a blade of that thickness [m] into a block, and hold it.
+
+    Args:
+        thickness: Thickness of the blade [m].
+        cells: Cells along the sides of the block.
+        frames_held: Frames that it is held for at the end.
+    """
+    mesh, shape = block(cells, _SIZE), BladeShape(thickness=thickness)
+    held = mesh.positions[:, 2] == 0.0
+    tissue = Tissue(mesh, _MATERIAL, fixed=held, gravity=(0.0, 0.0, 0.0), blade=shape)
+    x, y = 0.5 * _SIZE[0] + _BESIDE[0], 0.5 * (_SIZE[1] - _EDGE) + _BESIDE[1]
+
+    def pose(depth: float) -> BladeSegment:
+        z = _SIZE[2] - depth + shape.height
+        return BladeSegment(
+            np.array([x, y, z]), np.array([x, y + _EDGE, z]), np.array([0.0, 0.0, 1.0])
+        )
+
+    n = round((_DEPTH + _ABOVE) / _SPEED / _DT)
+    depths = np.append(np.linspace(-_ABOVE, _DEPTH, n + 1), np.full(frames_held, _DEPTH))
+    results = [
+        tissue.step(BladeSweep(pose(before), pose(after)), _DT)
+        for before, after in itertools.pairwise(depths)
+    ]
+    force = np.array([result.wrench.force[2] for result in results])
+    return Dent(depths[1:], force, float(results[-1].wrench_t1.force[2]), results[-1].cut_area)
+
+
+def strip_force(thickness: float) -> float:
+    """Return the force of a rigid strip of that width [m], stuck to the skin, as deep as the back.
+
+    Its nodes are moved down as supports, in a mesh that is fine near the strip; no blade takes
+    part.
+    """
+    xs, zs = _places_around(0.5 * thickness), _SIZE[2] - _places_from(0.5 * thickness, _SIZE[2])
+    ys = np.linspace(0.0, _SIZE[1], _CELLS_ALONG + 1)
+    axes = (xs, ys, zs[::-1])
+    unit = block(tuple(len(axis) - 1 for axis in axes), (1.0, 1.0, 1.0))
+    positions = np.stack(
+        [
+            axis[np.rint(unit.positions[:, c] * (len(axis) - 1)).astype(int)]
+            for c, axis in enumerate(axes)
+        ],
+        axis=1,
+    )
+    near = 1e-3 * thickness
+    from_middle = np.abs(positions[:, :2] - 0.5 * np.array(_SIZE[:2]))
+    is_strip = (
+        (from_middle[:, 0] < 0.5 * thickness + near)
+        & (from_middle[:, 1] < 0.5 * _EDGE + near)
+        & (positions[:, 2] > _SIZE[2] - near)
+    )
+    tissue = Tissue(
+        TetrahedralMesh(positions, unit.tetrahedra),
+        _MATERIAL,
+        fixed=is_strip | (positions[:, 2] < near),
+        gravity=(0.0, 0.0, 0.0),
+    )
+    tissue.move_supports(is_strip, (0.0, 0.0, -_SPEED))
+    for _ in range(round(_DEPTH / _SPEED / _DT)):
+        tissue.step(None, _DT)
+    tissue.settle()
+    return float(-tissue.support_forces()[is_strip, 2].sum())
+
+
+def _places_from(cell: float, length: float) -> FloatArray:
+    """Return places from 0 to `length` [m], the first `cell` apart, then ever farther."""
+    n = 1
+    while cell * (_GROWTH**n - 1.0) / (_GROWTH - 1.0) < length:
+        n += 1
+    places = cell * (_GROWTH ** np.arange(n + 1) - 1.0) / (_GROWTH - 1.0)
+    places[2:] = cell + (places[2:] - cell) * (length - cell) / (places[-1] - cell)
+    return np.asarray(places)
+
+
+def _places_around(cell: float) -> FloatArray:
+    """Return places across the block, `cell` apart in its middle [m]."""
+    middle = 0.5 * _SIZE[0]
+    places = _places_from(cell, middle)
+    return np.concatenate([middle - places[:0:-1], middle + places])
+
+
+def check_dent(name: str, found: Dent, reference: float) -> list[Check]:
+    """Return the checks of a back that was pressed in."""
+    checks = [
+        Check(f"{name}: force on the back / force on a rigid strip", found.held / reference,
+              *within(_NEAR), basis=THEORY),
+        Check(f"{name}: area cut [mm²]", found.cut_area * 1e6, 0.0, 0.0, basis=THEORY),
+    ]  # fmt: skip
+    return checks
+
+
+def _measure(quick: bool) -> Findings:
+    """Press the backs of two blades into two meshes each."""
+    checks, curves = [], []
+    for thickness in _THICKNESSES[:1] if quick else _THICKNESSES:
+        reference = strip_force(thickness)
+        for cells in _CELLS[:1] if quick else _CELLS:
+            found = dent(thickness, cells)
+            name = f"{thickness * 1e3:g} mm thick, {' × '.join(map(str, cells))} cells"
+            checks += check_dent(name, found, reference)
+            curves.append(Curve(name, found.depth * 1e3, found.force))
+        ends = np.array([0.0, _DEPTH])
+        line = Curve("", ends * 1e3, reference * ends / _DEPTH, is_theory=True)
+        curves.append(line)
+    plot = Plot("Backs pressed into a block of 10 kPa", "depth [mm]", "force [N]", curves)
+    return Findings(checks, [plot])
+
+
+SPINE_SCENE = ValidationScene(
+    name="spine",
+    title="A blade led spine first",
+    about=(
+        "The back of a blade is pressed 2 mm into a block that lies on a held underside. It must "
+        "cut nothing, and meet the force of a rigid strip as wide as the blade is thick. That "
+        "force comes from a mesh whose cells at the strip are half as wide as the strip, where "
+        "the nodes under the strip are moved down as supports: no blade and no contact take part."
+    ),
+    measure=_measure,
+    references=[
+        Reference(
+            "Johnson 1985, Contact Mechanics, section 2.7",
+            "how far a strip sinks into a half-space, from which the stiffness of the back follows",
+        )
+    ],
+)

@@ -1,0 +1,269 @@
+"""Contact of the blade's blunt sides, its back and its two ends, with the skin: pressure, friction.
+
+These sides push and do not cut. They are as thin as the blade, and meet the skin along a line. Each
+is sampled at points b_k, each for a length l_k of it. A sample that has come through the skin from
+outside presses on the point a_k of the skin that is in its way: a spring of stiffness K pushes a_k
+along the outward direction d of that side,
+
+    U = 1/2 K (d . (b - a))^2      N = K d . (b - a)
+
+and friction, a spring of the same stiffness across d, yields at Coulomb's limit. A sample that
+comes into the tissue otherwise, through the mouth of a cut, touches nothing.
+
+The end at the tip is a point: where it presses harder than toughness times length it pierces, and
+the point that holds it slips forward through the material, as those of the cutting edge do
+(`tissue.blade.return_mapping`). It pays for the area; the mesh is opened where the edge follows.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from tissue.blade.edge import BladePose
+from tissue.blade.toughness import ToughnessLaw
+from tissue.blade_shape import BladeShape
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, IntCell
+from tissue.core.vec3 import Vec3, axpy, dot, scale, sub
+from tissue.geometry.tetrahedron import Weights, interpolate
+from tissue.material import Material
+from tissue.mesh.body import Body
+
+OUTSIDE, WITHIN, PRESSING, PIERCING = 0, 1, 2, 3
+"""State of a sample: OUTSIDE the tissue; WITHIN it without touching it, as in a cut; PRESSING on
+the skin; PIERCING, through the skin and held by tissue that it has yet to part."""
+
+BACK, HEEL_END, TIP_END = 0, 1, 2
+"""The blunt sides."""
+
+SAMPLES_PER_NODE_SIZE = 4.0
+"""Samples of a blunt side per mean node size."""
+
+RESOLVED = 0.96
+"""Half the width of a strip, per node size, that sinks in as far as a line load on the mesh. A load
+on nodes a cell apart sinks in as one at 0.2 cells from a line (Peaceman 1978, Soc. Pet. Eng. J. 18:
+183); between two nodes, on average over the places, at 0.2^(2/3) = 0.34 cells. A strip twice as far
+to each side does the same, and a cell of a block is 1.41 node sizes."""
+
+STIFFEST = 8.0
+"""Stiffness of a sample per Young's modulus and length, at most: of a blade that is as thick as the
+elements are large. Higher: shorter steps."""
+
+
+class BluntContacts(Arrays):
+    """The samples of the back and the two ends of the blade, and where they touch the skin."""
+
+    n_pressing: IntCell
+    """Number of samples that press or pierce."""
+    friction: float
+    """Coulomb's coefficient."""
+    state: IntArray
+    """OUTSIDE, WITHIN, PRESSING or PIERCING, shape (n,)."""
+    side: IntArray
+    """BACK, HEEL_END or TIP_END, shape (n,)."""
+    along: FloatArray
+    """Distance of each sample from the tip along the edge [m], shape (n,)."""
+    behind: FloatArray
+    """Distance of each sample behind the edge [m], shape (n,)."""
+    length: FloatArray
+    """Length of the side that the sample stands for [m], shape (n,)."""
+    stiffness: FloatArray
+    """Stiffness of the sample's spring [N/m], shape (n,)."""
+    tetrahedron: IntArray
+    """Tetrahedron of the point of the skin, shape (n,)."""
+    weights: FloatArray
+    """Barycentric weights of the point in it, shape (n, 4)."""
+    rest: FloatArray
+    """The point in the body at rest [m], shape (n, 3)."""
+    held: FloatArray
+    """Stretch of friction when the point was taken [m], in the plane of the blade and across it;
+    shape (n, 2)."""
+    energy: FloatArray
+    """Energy stored in the sample when slip was applied last [J], shape (n,)."""
+
+
+class BluntSide(NamedTuple):
+    """The axes of a sample."""
+
+    at: Vec3
+    """Position of the sample [m]."""
+    outward: Vec3
+    """Unit vector out of the blade."""
+    beside: Vec3
+    """Unit vector along the side, in the plane of the blade."""
+
+
+class Press(NamedTuple):
+    """How a sample presses on the point that is in its way."""
+
+    depth: float
+    """How far the point is behind the sample [m], up to where it pierces; negative: no contact."""
+    surplus: float
+    """How much farther it is [m]."""
+    beside: float
+    """Stretch of friction along the side, within its limit [m]."""
+    across: float
+    """Stretch of friction across the blade, within its limit [m]."""
+    slide: float
+    """Length of that stretch beyond the limit [m]."""
+
+
+def no_blunt_contacts() -> BluntContacts:
+    """Return that the blade has no blunt sides: it is a line."""
+    return _new_contacts(0.0, np.zeros((0, 5)))
+
+
+def new_blunt_contacts(
+    shape: BladeShape, edge_length: float, material: Material, node_size: float
+) -> BluntContacts:
+    """Return the samples of a blade that touches nothing.
+
+    Args:
+        shape: Shape of the blade.
+        edge_length: Length of its edge [m].
+        material: The tissue.
+        node_size: Mean node size of the body [m].
+    """
+    spacing = node_size / SAMPLES_PER_NODE_SIZE
+    per_length = blunt_stiffness(shape, material, node_size)
+    rows = []
+    for side, size in ((BACK, edge_length), (HEEL_END, shape.height), (TIP_END, shape.height)):
+        n = math.ceil(size / spacing)
+        for i in range(n):
+            place = (i + 0.5) / n * size
+            along = place if side == BACK else (edge_length if side == HEEL_END else 0.0)
+            behind = shape.height if side == BACK else place
+            rows.append((side, along, behind, size / n, per_length * size / n))
+    return _new_contacts(float(material.blade_friction), np.array(rows))
+
+
+def blunt_stiffness(shape: BladeShape, material: Material, node_size: float) -> float:
+    """Return the stiffness of a blunt side per length [Pa].
+
+    It stands for the tissue between the side and the nodes around it. A strip of half the width a
+    sinks into a half-space by 2 (1 - nu^2) / (pi E) ln(2 R / a) times the load per length, seen
+    from a distance R (Johnson 1985, Contact Mechanics, section 2.7). The mesh gives that of a strip
+    as wide as `RESOLVED` node sizes; this is the rest.
+    """
+    ratio = RESOLVED * node_size / (0.5 * shape.thickness)
+    unit = 0.5 * math.pi * material.young_modulus / (1.0 - material.poisson_ratio**2)
+    most = STIFFEST * material.young_modulus
+    if ratio <= 1.0:
+        return most
+    return min(unit / math.log(ratio), most)
+
+
+def _new_contacts(friction: float, rows: FloatArray) -> BluntContacts:
+    n = len(rows)
+    side, along, behind, length, stiffness = rows.T.copy()
+    return BluntContacts(
+        n_pressing=0,
+        friction=friction,
+        state=np.full(n, WITHIN),
+        side=side.astype(np.int64),
+        along=along,
+        behind=behind,
+        length=length,
+        stiffness=stiffness,
+        tetrahedron=np.zeros(n, np.int64),
+        weights=np.zeros((n, 4)),
+        rest=np.zeros((n, 3)),
+        held=np.zeros((n, 2)),
+        energy=np.zeros(n),
+    )
+
+
+@kernel
+def blunt_side(blunt: BluntContacts, pose: BladePose, k: int) -> BluntSide:
+    """Return where sample `k` is, and its axes."""
+    at = axpy(-blunt.behind[k], pose.forward, axpy(blunt.along[k], pose.along, pose.tip))
+    if blunt.side[k] == BACK:
+        return BluntSide(at, scale(-1.0, pose.forward), pose.along)
+    if blunt.side[k] == HEEL_END:
+        return BluntSide(at, pose.along, pose.forward)
+    return BluntSide(at, scale(-1.0, pose.along), pose.forward)
+
+
+@kernel
+def touched_point(blunt: BluntContacts, body: Body, positions: FloatArray, k: int) -> Vec3:
+    """Return the point that sample `k` touches, with the nodes at `positions` [m]."""
+    w = blunt.weights
+    weights = Weights(w[k, 0], w[k, 1], w[k, 2], w[k, 3])
+    return interpolate(weights, positions, body.tetrahedra, blunt.tetrahedron[k])
+
+
+@kernel
+def press_of(
+    blunt: BluntContacts,
+    k: int,
+    side: BluntSide,
+    normal: Vec3,
+    point: Vec3,
+    law: ToughnessLaw,
+) -> Press:
+    """Return how sample `k` presses.
+
+    Args:
+        blunt: The samples.
+        k: Which of them.
+        side: Its axes.
+        normal: Normal of the blade's plane.
+        point: The point that it touches [m].
+        law: Toughness of the tissue.
+    """
+    stretch = sub(side.at, point)
+    depth = dot(stretch, side.outward)
+    surplus = 0.0
+    if blunt.side[k] == TIP_END:
+        surplus = max(depth - piercing_depth(blunt, k, law), 0.0)
+    if blunt.state[k] == PIERCING or depth <= 0.0:
+        return Press(depth - surplus, surplus, 0.0, 0.0, 0.0)
+    beside = blunt.held[k, 0] + dot(stretch, side.beside)
+    across = blunt.held[k, 1] + dot(stretch, normal)
+    size = np.sqrt(beside * beside + across * across)
+    most = blunt.friction * (depth - surplus)
+    if size <= most:
+        return Press(depth - surplus, surplus, beside, across, 0.0)
+    return Press(depth - surplus, surplus, beside * most / size, across * most / size, size - most)
+
+
+@kernel
+def piercing_depth(blunt: BluntContacts, k: int, law: ToughnessLaw) -> float:
+    """Return the depth at which sample `k` of the tip's end pierces [m]."""
+    toughness = law.toughness if blunt.state[k] == PIERCING else law.skin_toughness
+    depth: float = toughness * blunt.length[k] / blunt.stiffness[k]
+    return depth
+
+
+@kernel
+def press_energy(blunt: BluntContacts, k: int, press: Press) -> float:
+    """Return the energy stored in sample `k` [J], with what a surplus is about to spend."""
+    if press.depth <= 0.0:
+        return 0.0
+    friction = np.sqrt(press.beside * press.beside + press.across * press.across)
+    squares = press.depth * press.depth + friction * friction
+    surplus = press.depth * press.surplus + friction * press.slide
+    energy: float = blunt.stiffness[k] * (0.5 * squares + surplus)
+    return energy
+
+
+@kernel
+def press_force(blunt: BluntContacts, k: int, side: BluntSide, normal: Vec3, press: Press) -> Vec3:
+    """Return the force of sample `k` on the tissue [N]."""
+    if press.depth <= 0.0:
+        return Vec3(0.0, 0.0, 0.0)
+    force = scale(press.depth, side.outward)
+    force = axpy(press.across, normal, axpy(press.beside, side.beside, force))
+    return scale(blunt.stiffness[k], force)
+
+
+@kernel
+def blunt_energy(blunt: BluntContacts) -> float:
+    """Return the energy stored in the blunt sides when slip was applied last [J]."""
+    energy = 0.0
+    if blunt.n_pressing > 0:
+        for k in range(len(blunt.state)):
+            energy += blunt.energy[k]
+    return energy
