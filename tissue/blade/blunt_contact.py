@@ -31,14 +31,14 @@ from tissue.geometry.tetrahedron import Weights, interpolate
 from tissue.material import Material
 from tissue.mesh.body import Body
 
-OUTSIDE, WITHIN, PRESSING, PIERCING = 0, 1, 2, 3
-"""State of a sample: OUTSIDE the tissue; WITHIN it without touching it, as in a cut; PRESSING on
+AWAY, WITHIN, PRESSING, PIERCING = 0, 1, 2, 3
+"""State of a sample: AWAY from the tissue; WITHIN it without touching it, as in a cut; PRESSING on
 the skin; PIERCING, through the skin and held by tissue that it has yet to part."""
 
 BACK, HEEL_END, TIP_END = 0, 1, 2
 """The blunt sides."""
 
-SAMPLES_PER_NODE_SIZE = 4.0
+BLUNT_SAMPLES_PER_NODE_SIZE = 4.0
 """Samples of a blunt side per mean node size."""
 
 RESOLVED = 0.96
@@ -60,7 +60,7 @@ class BluntContacts(Arrays):
     friction: float
     """Coulomb's coefficient."""
     state: IntArray
-    """OUTSIDE, WITHIN, PRESSING or PIERCING, shape (n,)."""
+    """AWAY, WITHIN, PRESSING or PIERCING, shape (n,)."""
     side: IntArray
     """BACK, HEEL_END or TIP_END, shape (n,)."""
     along: FloatArray
@@ -126,7 +126,7 @@ def new_blunt_contacts(
         material: The tissue.
         node_size: Mean node size of the body [m].
     """
-    spacing = node_size / SAMPLES_PER_NODE_SIZE
+    spacing = node_size / BLUNT_SAMPLES_PER_NODE_SIZE
     per_length = blunt_stiffness(shape, material, node_size)
     rows = []
     for side, size in ((BACK, edge_length), (HEEL_END, shape.height), (TIP_END, shape.height)):
@@ -251,7 +251,15 @@ def press_energy(blunt: BluntContacts, k: int, press: Press) -> float:
 
 @kernel
 def press_force(blunt: BluntContacts, k: int, side: BluntSide, normal: Vec3, press: Press) -> Vec3:
-    """Return the force of sample `k` on the tissue [N]."""
+    """Return the force of a sample on the tissue [N].
+
+    Args:
+        blunt: The samples.
+        k: Which of them.
+        side: Its axes.
+        normal: Normal of the blade's plane.
+        press: How it presses.
+    """
     if press.depth <= 0.0:
         return Vec3(0.0, 0.0, 0.0)
     force = scale(press.depth, side.outward)

@@ -14,7 +14,7 @@ import numpy as np
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import (
-    OUTSIDE,
+    AWAY,
     PIERCING,
     PRESSING,
     TIP_END,
@@ -79,9 +79,9 @@ def update_blunt_sides(
         if blunt.state[k] == PIERCING:
             continue
         if blunt.state[k] != PRESSING:
-            was_outside = blunt.state[k] == OUTSIDE
+            was_outside = blunt.state[k] == AWAY
             is_within = tetrahedron_at(body, grid, body.positions, side.at) >= 0
-            blunt.state[k] = WITHIN if is_within else OUTSIDE
+            blunt.state[k] = WITHIN if is_within else AWAY
             if not (was_outside and is_within and _may_enter(blunt, motion, k, side)):
                 continue
         skin = _skin_behind(blade, body, side, pose.normal)
@@ -186,13 +186,21 @@ def release_blunt_sides(blade: BladeState) -> None:
     for k in range(len(blunt.state)):
         blade.totals.released += blunt.energy[k]
         blunt.energy[k] = 0.0
-        blunt.state[k] = OUTSIDE
+        blunt.state[k] = AWAY
     blunt.n_pressing = 0
 
 
 @kernel
 def move_point(blade: BladeState, body: Body, visits: Visits, k: int, p: Vec3) -> bool:
-    """Let sample `k` touch the point `p` of the body at rest [m]; return whether it is inside."""
+    """Let a sample touch a point of the body at rest; return whether the point is inside.
+
+    Args:
+        blade: The sample is written.
+        body: The tissue.
+        visits: For searches.
+        k: The sample.
+        p: The point [m]; for one outside, a point of the tetrahedron nearby is taken.
+    """
     blunt = blade.blunt
     location = locate(body, visits, p, blunt.tetrahedron[k], blade.queue)
     t = location.tetrahedron
