@@ -175,7 +175,8 @@ SPINE_SCENE = ValidationScene(
         "The back of a blade is pressed 2 mm into a block that lies on a held underside. It must "
         "cut nothing, and meet the force of a rigid strip as wide as the blade is thick. That "
         "force comes from a mesh whose cells at the strip are half as wide as the strip, where "
-        "the nodes under the strip are moved down as supports: no blade and no contact take part."
+        "the nodes under the strip are moved down as supports: no blade and no contact take part. "
+        "In a mesh that is finer still that force falls by another 2 to 3 %."
     ),
     measure=_measure,
     references=[
