@@ -66,7 +66,7 @@ def on_floor(gravity=(0.0, 0.0, -9.81), solver=PENALTY, **material) -> Tissue:
 
 def test_the_floor_bears_the_weight_of_a_block():
     tissue = on_floor(viscous_damping=10.0)
-    for _ in range(1000):
+    for _ in range(2000):
         result = tissue.step(None, strokes.DT)
     assert result.body_contacts.force_of_floor[2] == pytest.approx(0.018 * 9.81, rel=1e-3)
     assert np.abs(result.body_contacts.force_of_floor[:2]).max() < 1e-3 * 0.018 * 9.81

@@ -1,6 +1,5 @@
 """`Audit`: the account of energy of a body: the work done on it, and where that went."""
 
-from tissue.blade.blunt_contact import blunt_energy
 from tissue.blade.edge import Edge
 from tissue.blade.forces import edge_energy
 from tissue.blade.impulse_totals import clear_works
@@ -77,11 +76,7 @@ class Audit:
             elastic=elastic - elastic_first,
             kinetic=kinetic - kinetic_first,
             potential=potential - potential_first,
-            held=held
-            + sides_energy(blade.sides)
-            + blunt_energy(blade.blunt)
-            + contacts.stored
-            - self._contacts_at_first[1],
+            held=held + sides_energy(blade.sides) + contacts.stored - self._contacts_at_first[1],
             damping=system.damping.dissipated,
             cutting=totals.work_of_cutting,
             breaking=totals.work_of_breaking,

@@ -268,10 +268,14 @@ def press_force(blunt: BluntContacts, k: int, side: BluntSide, normal: Vec3, pre
 
 
 @kernel
-def blunt_energy(blunt: BluntContacts) -> float:
-    """Return the energy stored in the blunt sides when slip was applied last [J]."""
+def blunt_energy(blunt: BluntContacts, body: Body, pose: BladePose, law: ToughnessLaw) -> float:
+    """Return the energy stored in the blunt sides with the body where it is [J]."""
     energy = 0.0
     if blunt.n_pressing > 0:
         for k in range(len(blunt.state)):
-            energy += blunt.energy[k]
+            if blunt.state[k] >= PRESSING:
+                side = blunt_side(blunt, pose, k)
+                point = touched_point(blunt, body, body.positions, k)
+                press = press_of(blunt, k, side, pose.normal, point, law)
+                energy += press_energy(blunt, k, press)
     return energy

@@ -4,8 +4,8 @@ A sample that was outside the tissue and is now within it has come through the s
 straight behind it, seen along the side's outward direction. While it presses, that point is looked
 for again, so that the sample slides over the skin from face to face.
 
-The end at the tip meets skin only where the tip leads, in a stab. Where the edge leads, it parts
-what would come to that end.
+A side meets skin only where it goes ahead of the edge. Where the edge goes ahead, it parts what
+would come to the other sides.
 """
 
 from typing import NamedTuple
@@ -17,28 +17,27 @@ from tissue.blade.blunt_contact import (
     AWAY,
     PIERCING,
     PRESSING,
-    TIP_END,
     WITHIN,
-    BluntContacts,
     BluntSide,
     blunt_side,
     press_energy,
     press_of,
     touched_point,
 )
-from tissue.blade.edge import BladeMotion, displacement_of
+from tissue.blade.edge import BladeMotion, BladePose, displacement_of
 from tissue.blade.return_mapping import locate
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, cross, dot, norm, store, sub, vec3
+from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, store, sub, vec3
 from tissue.geometry.tetrahedron import Weights, barycentric_in, interpolate
-from tissue.mesh.body import Body
+from tissue.mesh.body import CUT, Body
 from tissue.mesh.point_location import TetrahedronGrid, tetrahedron_at
 from tissue.mesh.star import Visits
 
-LEAST_FACING = 0.3
+LEAST_FACING, LEAST_FACING_OF_LIP = 0.3, 0.9
 """Cosine of the angle between a face's normal and the inward direction of a blunt side, from which
-the face is in the way of the side. The lips of a cut, along which the sides slide, are not."""
+skin, or a face that was cut, is in the way of the side. The lips of a cut that bends are tilted
+against a blade in it: with 0.3 they held back one that was withdrawn."""
 
 DEEPEST_ENTRY = 0.5
 """How deep below the skin a sample can be that has just come through it, per `BladeState.reach`.
@@ -72,59 +71,87 @@ def update_blunt_sides(
         grid: Grid that lists the tetrahedra.
         motion: Pose and motion of the blade.
     """
-    blunt, totals, law = blade.blunt, blade.totals, blade.toughness
-    pose, deepest = motion.pose, DEEPEST_ENTRY * blade.reach
+    blunt = blade.blunt
     for k in range(len(blunt.state)):
-        side = blunt_side(blunt, pose, k)
-        if blunt.state[k] == PIERCING:
-            continue
-        if blunt.state[k] != PRESSING:
-            was_outside = blunt.state[k] == AWAY
+        side = blunt_side(blunt, motion.pose, k)
+        if blunt.state[k] == PRESSING:
+            _slide(blade, body, motion.pose, side, k)
+        elif blunt.state[k] != PIERCING:
+            was_away = blunt.state[k] == AWAY
             is_within = tetrahedron_at(body, grid, body.positions, side.at) >= 0
             blunt.state[k] = WITHIN if is_within else AWAY
-            if not (was_outside and is_within and _may_enter(blunt, motion, k, side)):
-                continue
-        skin = _skin_behind(blade, body, side, pose.normal)
-        if skin.face < 0:
-            continue
-        if blunt.state[k] == PRESSING:
-            point = touched_point(blunt, body, body.positions, k)
-            press = press_of(blunt, k, side, pose.normal, point, law)
-            if skin.depth > press.depth + deepest:
-                continue  # other skin, beyond that which it touches
-            totals.released += press_energy(blunt, k, press)
-            blunt.held[k, 0], blunt.held[k, 1] = press.beside, press.across
-        elif skin.depth <= deepest:
-            blunt.held[k, 0] = blunt.held[k, 1] = 0.0
-            blunt.state[k] = PRESSING
-            blunt.n_pressing += 1
-        else:
-            continue
-        _take_point(blade, body, k, skin)
-        point = touched_point(blunt, body, body.positions, k)
-        press = press_of(blunt, k, side, pose.normal, point, law)
-        blunt.energy[k] = press_energy(blunt, k, press)
-        totals.released -= blunt.energy[k]
+            if was_away and is_within and _leads(motion, side):
+                _enter(blade, body, motion.pose, side, k)
 
 
 @kernel
-def _may_enter(blunt: BluntContacts, motion: BladeMotion, k: int, side: BluntSide) -> bool:
-    """Return whether sample `k` meets skin; at the tip's end, whether the tip leads."""
-    if blunt.side[k] != TIP_END:
-        return True
+def _leads(motion: BladeMotion, side: BluntSide) -> bool:
+    """Return whether a side goes ahead of the edge, or the blade stands still.
+
+    Where the edge goes ahead, it parts what would come to the other sides.
+    """
     moved = displacement_of(motion, side.at)
-    return bool(dot(moved, side.outward) > max(dot(moved, motion.pose.forward), 0.0))
+    return bool(dot(moved, side.outward) >= max(dot(moved, motion.pose.forward), 0.0))
 
 
 @kernel
-def _take_point(blade: BladeState, body: Body, k: int, skin: Skin) -> None:
-    """Let sample `k` touch a point of the skin."""
-    blunt, t = blade.blunt, skin.face // 4
+def _enter(blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int) -> None:
+    """Let sample `k`, which has come into the tissue, press on the skin that it came through."""
+    blunt = blade.blunt
+    skin = _skin_behind(blade, body, side, pose.normal)
+    if skin.face < 0 or skin.depth > DEEPEST_ENTRY * blade.reach:
+        return
+    blunt.held[k, 0] = blunt.held[k, 1] = 0.0
+    blunt.state[k] = PRESSING
+    blunt.n_pressing += 1
+    _take_point(blade, body, pose, side, k, skin)
+
+
+@kernel
+def _slide(blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int) -> None:
+    """Let sample `k` press on the skin where it is now; release it where there is none."""
+    blunt, farthest = blade.blunt, DEEPEST_ENTRY * blade.reach
+    point = touched_point(blunt, body, body.positions, k)
+    press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
+    skin = _skin_behind(blade, body, side, pose.normal)
+    if skin.face >= 0 and skin.depth <= press.depth + farthest:
+        blade.totals.released += press_energy(blunt, k, press)
+        blunt.held[k, 0], blunt.held[k, 1] = press.beside, press.across
+        _take_point(blade, body, pose, side, k, skin)
+        return
+    # There is no skin straight behind it, or other skin that lies beyond.
+    stretch = sub(side.at, point)
+    sideways = axpy(-dot(stretch, side.outward), side.outward, stretch)
+    if norm(sideways) > farthest:
+        blade.totals.released += press_energy(blunt, k, press)
+        blunt.energy[k] = 0.0
+        blunt.state[k] = WITHIN
+        blunt.n_pressing -= 1
+
+
+@kernel
+def _take_point(
+    blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int, skin: Skin
+) -> None:
+    """Let sample `k` touch a point of the skin from now on; count the energy that it begins with.
+
+    Args:
+        blade: The sample is written.
+        body: The tissue.
+        pose: Pose of the blade.
+        side: Axes of the sample.
+        k: The sample.
+        skin: The point.
+    """
+    blunt, t, w = blade.blunt, skin.face // 4, skin.weights
     blunt.tetrahedron[k] = t
-    w = skin.weights
     blunt.weights[k, 0], blunt.weights[k, 1] = w.a, w.b
     blunt.weights[k, 2], blunt.weights[k, 3] = w.c, w.d
     store(blunt.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    point = touched_point(blunt, body, body.positions, k)
+    press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
+    blunt.energy[k] = press_energy(blunt, k, press)
+    blade.totals.released -= blunt.energy[k]
 
 
 @kernel
@@ -163,7 +190,8 @@ def _face_behind(body: Body, face: int, outward: IntArray, side: BluntSide, norm
     if depth < 0.0:
         return none
     area = cross(sub(b, a), sub(c, a))
-    if dot(area, side.outward) > -LEAST_FACING * norm(area):
+    least = LEAST_FACING_OF_LIP if body.links[t, f] == CUT else LEAST_FACING
+    if dot(area, side.outward) > -least * norm(area):
         return none
     return Skin(face, depth, _in_tetrahedron(i, wa, j, wb, k, wc))
 

@@ -19,7 +19,7 @@ from tissue.blade.material_frame import find_walls, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
 from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, cross, dot, norm, sub, vec3
+from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, sub, vec3
 from tissue.cutting.blade_path import Path, nearest_on_edge
 from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
@@ -124,11 +124,44 @@ def anchor_beside(
             stretch = sub(sample_point(pose, k, n), here)
             if norm(stretch) > blade.reach:  # the tissue there is turned otherwise
                 continue
-            if is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
+            ahead = add(p, scale(slit_reach, apply_transposed(rotation, pose.forward)))
+            if _runs_in_slit(blade, body, visits, pose, t, (p, ahead), slit_reach):
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
             join_wall(anchors.walls, k, beside)
             blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
+
+
+@kernel
+def _runs_in_slit(
+    blade: BladeState,
+    body: Body,
+    visits: Visits,
+    pose: BladePose,
+    t: int,
+    way: tuple[Vec3, Vec3],
+    reach: float,
+) -> bool:
+    """Return whether a sample is in a slit that goes on ahead of it, one cut before.
+
+    Just ahead of a crack front is a slit too, the one that is being cut: it ends there.
+
+    Args:
+        blade: Scratch for searches.
+        body: The tissue.
+        visits: For searches.
+        pose: Pose of the blade.
+        t: The tetrahedron that holds the sample.
+        way: The sample, and a point ahead of it, in the body at rest [m].
+        reach: Distance from a cut face up to which a point is in the slit [m].
+    """
+    p, ahead = way
+    if not is_in_slit(body, t, p, pose.along, pose.forward, reach):
+        return False
+    location = locate(body, visits, ahead, t, blade.queue)
+    return location.inside and is_in_slit(
+        body, location.tetrahedron, ahead, pose.along, pose.forward, reach
+    )
 
 
 @kernel

@@ -8,6 +8,7 @@ from tissue.blade.anchors import (
     measure_speeds,
 )
 from tissue.blade.blade_state import BladeState
+from tissue.blade.blunt_contact import blunt_energy
 from tissue.blade.blunt_forces import (
     add_blunt_stiffness,
     apply_blunt_forces,
@@ -116,14 +117,18 @@ def apply_slip(
 
 @kernel
 def edge_energy(blade: BladeState, body: Body, edge: Edge, when: float) -> float:
-    """Return the energy stored in the anchors of the edge at an instant of the time step [J]."""
-    return anchors_energy(blade.anchors, body, pose_at(edge, when), blade.toughness)
+    """Return the energy stored in the edge and the blunt sides at an instant of a time step [J]."""
+    pose, law = pose_at(edge, when), blade.toughness
+    return anchors_energy(blade.anchors, body, pose, law) + blunt_energy(
+        blade.blunt, body, pose, law
+    )
 
 
 @kernel
 def release_edge(blade: BladeState, body: Body, edge: Edge, when: float) -> None:
     """Count the energy of all anchors and blunt sides as released: the blade is taken away."""
-    blade.totals.released += edge_energy(blade, body, edge, when)
+    pose, law = pose_at(edge, when), blade.toughness
+    blade.totals.released += anchors_energy(blade.anchors, body, pose, law)
     release_blunt_sides(blade)
 
 
