@@ -137,6 +137,24 @@ def test_freshly_cut_lips_under_no_load_have_no_contact_force():
     assert speed(tissue) < 1e-9
 
 
+def test_a_cut_body_at_rest_neither_creeps_nor_loses_energy():
+    mesh = block((4, 4, 4), (0.04,) * 3)
+    solver = replace(PENALTY, audit=True)
+    fixed = mesh.positions[:, 2] == 0.0
+    tissue = Tissue(mesh, Material(viscous_damping=20.0), fixed=fixed, solver=solver)
+    edges = [[(-0.01, y, 0.0213), (0.05, y, 0.0213)] for y in (-0.01, 0.03)]
+    assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
+    for _ in range(1000):
+        tissue.step(None, strokes.DT)
+    positions, before = tissue.snapshot().positions, tissue.step(None, strokes.DT)
+    for _ in range(1000):
+        after = tissue.step(None, strokes.DT)
+    assert after.body_contacts.n_contacts > 5
+    assert np.abs(tissue.snapshot().positions - positions).max() < 1e-6
+    fallen = before.energies.elastic
+    assert abs(after.energies.residual - before.energies.residual) < 1e-6 * fallen
+
+
 def test_lips_that_are_pressed_shut_do_not_overlap_and_come_to_rest():
     tissue = split_block()
     for _ in range(100):
