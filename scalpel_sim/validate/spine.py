@@ -1,10 +1,10 @@
 """The back of a blade, pressed into skin, against a rigid strip of its size in a fine mesh."""
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
 
+from scalpel_sim.validate.block import DT, block_tissue, edge_at, run_stroke
 from scalpel_sim.validate.findings import (
     THEORY,
     Check,
@@ -15,24 +15,15 @@ from scalpel_sim.validate.findings import (
     ValidationScene,
     within,
 )
-from tissue import (
-    BladeSegment,
-    BladeShape,
-    BladeSweep,
-    FloatArray,
-    Material,
-    TetrahedralMesh,
-    Tissue,
-    block,
-)
+from tissue import BladeShape, FloatArray, Material, TetrahedralMesh, Tissue, block
 
 _SIZE = (0.06, 0.06, 0.03)
 """Sides of the block [m]; its bottom is held."""
 _MATERIAL = Material(10e3, toughness=20.0, viscous_damping=50.0)
 _EDGE, _THICKNESSES = 0.02, (0.4e-3, 1e-3)
 """Length of the blade [m], and how thick blades are [m]."""
-_DEPTH, _SPEED, _DT = 2e-3, 0.05, 1e-3
-"""How deep the back is pressed [m], how fast [m/s], and a frame [s]."""
+_DEPTH, _SPEED = 2e-3, 0.05
+"""How deep the back is pressed [m], and how fast [m/s]."""
 _ABOVE = 0.5e-3
 """Height of the back above the skin at the begin [m]."""
 _CELLS = ((12, 12, 6), (20, 20, 10))
@@ -66,25 +57,18 @@ def dent(thickness: float, cells: tuple[int, int, int], frames_held: int = 100) 
         cells: Cells along the sides of the block.
         frames_held: Frames that it is held for at the end.
     """
-    mesh, shape = block(cells, _SIZE), BladeShape(thickness=thickness)
-    held = mesh.positions[:, 2] == 0.0
-    tissue = Tissue(mesh, _MATERIAL, fixed=held, gravity=(0.0, 0.0, 0.0), blade=shape)
+    shape = BladeShape(thickness=thickness)
+    tissue = block_tissue(_MATERIAL, mesh=block(cells, _SIZE), held="bottom", blade=shape)
     x, y = 0.5 * _SIZE[0] + _BESIDE[0], 0.5 * (_SIZE[1] - _EDGE) + _BESIDE[1]
-
-    def pose(depth: float) -> BladeSegment:
-        z = _SIZE[2] - depth + shape.height
-        return BladeSegment(
-            np.array([x, y, z]), np.array([x, y + _EDGE, z]), np.array([0.0, 0.0, 1.0])
-        )
-
-    n = round((_DEPTH + _ABOVE) / _SPEED / _DT)
+    n = round((_DEPTH + _ABOVE) / _SPEED / DT)
     depths = np.append(np.linspace(-_ABOVE, _DEPTH, n + 1), np.full(frames_held, _DEPTH))
-    results = [
-        tissue.step(BladeSweep(pose(before), pose(after)), _DT)
-        for before, after in itertools.pairwise(depths)
-    ]
-    force = np.array([result.wrench.force[2] for result in results])
-    return Dent(depths[1:], force, float(results[-1].wrench_t1.force[2]), results[-1].cut_area)
+    heights = _SIZE[2] - depths + shape.height
+    along, forward = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    stroke = run_stroke(
+        tissue, [edge_at((x, y, z), along=along, forward=forward, length=_EDGE) for z in heights]
+    )
+    held = float(stroke.last.wrench_t1.force[2])
+    return Dent(depths[1:], stroke.force[:, 2], held, stroke.last.cut_area)
 
 
 def strip_force(thickness: float) -> float:
@@ -118,8 +102,8 @@ def strip_force(thickness: float) -> float:
         gravity=(0.0, 0.0, 0.0),
     )
     tissue.move_supports(is_strip, (0.0, 0.0, -_SPEED))
-    for _ in range(round(_DEPTH / _SPEED / _DT)):
-        tissue.step(None, _DT)
+    for _ in range(round(_DEPTH / _SPEED / DT)):
+        tissue.step(None, DT)
     tissue.settle()
     return float(-tissue.support_forces()[is_strip, 2].sum())
 

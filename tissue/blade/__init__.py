@@ -1,4 +1,4 @@
-"""The blade in the tissue: its edge, which cuts, and its side faces, which press and rub.
+"""The blade in the tissue: its edge, which cuts, and its other sides, which press and rub.
 
 In reading order:
 
@@ -7,6 +7,7 @@ In reading order:
 - `impulse_totals`: impulses and works that blade and tissue exchanged.
 - `anchors`: the springs between edge and material, and their energy.
 - `side_contact`: the law of pressure and friction on the side faces.
+- `blunt_contact`: the law of pressure, friction and piercing at the back and the ends.
 - `blade_state`: all that blade and tissue remember of each other.
 - `edge_forces`: forces of the edge on the nodes.
 - `side_forces`: forces of the side faces on the nodes, and sliding.
@@ -14,6 +15,8 @@ In reading order:
 - `return_mapping`: plastic slip of the anchors.
 - `engagement`: which samples of the edge are anchored.
 - `side_search`: which faces of the tissue are near the blade.
+- `blunt_search`: which skin is in the way of the back and the ends.
+- `blunt_forces`: forces of the back and the ends on the nodes, sliding and piercing.
 - `forces`: what an integrator calls.
 - `path_tracing`: the path of the edge through the material, from the anchors.
 - `prescribed_path`: the path of an edge that is given.

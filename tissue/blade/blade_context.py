@@ -88,10 +88,10 @@ def release_sides(blade: BladeState) -> None:
 
 @kernel
 def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray, n: int) -> int:
-    """Find the faces of the tissue that the side faces of the blade may touch.
+    """Find the faces of the tissue that the side faces may touch, and skin before blunt sides.
 
     Args:
-        context: The side contacts and the grid are written.
+        context: The contacts of both and the grid are written.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
         nodes: Nodes, of which the first `n` are all that moved since the last search.

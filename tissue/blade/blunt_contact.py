@@ -31,9 +31,10 @@ from tissue.geometry.tetrahedron import Weights, interpolate
 from tissue.material import Material
 from tissue.mesh.body import Body
 
-AWAY, WITHIN, PRESSING, PIERCING = 0, 1, 2, 3
-"""State of a sample: AWAY from the tissue; WITHIN it without touching it, as in a cut; PRESSING on
-the skin; PIERCING, through the skin and held by tissue that it has yet to part."""
+IDLE, AWAY, PRESSING, PIERCING = 0, 1, 2, 3
+"""State of a sample: IDLE, of a side that does not go ahead, or in the tissue without touching it,
+as in a cut; AWAY from the tissue, so that it meets the skin next; PRESSING on the skin; PIERCING,
+through the skin and held by tissue that it has yet to part."""
 
 BACK, HEEL_END, TIP_END = 0, 1, 2
 """The blunt sides."""
@@ -60,7 +61,7 @@ class BluntContacts(Arrays):
     friction: float
     """Coulomb's coefficient."""
     state: IntArray
-    """AWAY, WITHIN, PRESSING or PIERCING, shape (n,)."""
+    """IDLE, AWAY, PRESSING or PIERCING, shape (n,)."""
     side: IntArray
     """BACK, HEEL_END or TIP_END, shape (n,)."""
     along: FloatArray
@@ -161,7 +162,7 @@ def _new_contacts(friction: float, rows: FloatArray) -> BluntContacts:
     return BluntContacts(
         n_pressing=0,
         friction=friction,
-        state=np.full(n, WITHIN),
+        state=np.full(n, IDLE),
         side=side.astype(np.int64),
         along=along,
         behind=behind,

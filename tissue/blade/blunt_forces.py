@@ -2,9 +2,9 @@
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import (
+    IDLE,
     PIERCING,
     PRESSING,
-    WITHIN,
     BluntContacts,
     BluntSide,
     blunt_side,
@@ -85,7 +85,7 @@ def slip_blunt_sides(blade: BladeState, body: Body, visits: Visits, pose: BladeP
         press = press_of(blunt, k, side, pose.normal, p, law)
         before = press_energy(blunt, k, press)
         if press.depth <= 0.0:
-            blunt.state[k] = WITHIN
+            blunt.state[k] = IDLE
             blunt.n_pressing -= 1
             blunt.energy[k] = 0.0
             continue
@@ -141,7 +141,7 @@ def _pierce(
         q = touched_point(blunt, body, body.positions, k)
         left = press_energy(blunt, k, press_of(blunt, k, side, normal, q, law))
     else:
-        blunt.state[k] = WITHIN
+        blunt.state[k] = IDLE
         blunt.n_pressing -= 1
     blunt.energy[k] = left
     totals.work_of_cutting += cost

@@ -1,6 +1,6 @@
 """The search for the skin that is in the way of the blade's blunt sides, in each part of a step.
 
-A sample that was outside the tissue and is now within it has come through the skin that lies
+A sample that was away from the tissue and is now within it has come through the skin that lies
 straight behind it, seen along the side's outward direction. While it presses, that point is looked
 for again, so that the sample slides over the skin from face to face.
 
@@ -15,9 +15,10 @@ import numpy as np
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import (
     AWAY,
+    IDLE,
     PIERCING,
     PRESSING,
-    WITHIN,
+    BluntContacts,
     BluntSide,
     blunt_side,
     press_energy,
@@ -26,10 +27,11 @@ from tissue.blade.blunt_contact import (
 )
 from tissue.blade.edge import BladeMotion, BladePose, displacement_of
 from tissue.blade.return_mapping import locate
+from tissue.blade.side_contact import SideContacts
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, store, sub, vec3
-from tissue.geometry.tetrahedron import Weights, barycentric_in, interpolate
+from tissue.geometry.tetrahedron import Weights, barycentric_in, clipped, interpolate
 from tissue.mesh.body import CUT, Body
 from tissue.mesh.point_location import TetrahedronGrid, tetrahedron_at
 from tissue.mesh.star import Visits
@@ -46,6 +48,11 @@ What is deeper has come in otherwise, through the mouth of a cut."""
 ON_FACE = 1e-9
 """Barycentric weight above which, less its sign, a line meets a face, so that no line passes
 between two faces for rounding."""
+
+ON_PLANE = 1e-9
+"""Distance from the blade's plane up to which a face still meets it [m]: above any rounding."""
+
+_NOT_LISTED = -1
 
 
 class Skin(NamedTuple):
@@ -71,17 +78,32 @@ def update_blunt_sides(
         grid: Grid that lists the tetrahedra.
         motion: Pose and motion of the blade.
     """
-    blunt = blade.blunt
+    blunt, pose = blade.blunt, motion.pose
+    n_faces = _NOT_LISTED
     for k in range(len(blunt.state)):
-        side = blunt_side(blunt, motion.pose, k)
-        if blunt.state[k] == PRESSING:
-            _slide(blade, body, motion.pose, side, k)
-        elif blunt.state[k] != PIERCING:
+        if blunt.state[k] == PIERCING:
+            continue
+        side = blunt_side(blunt, pose, k)
+        if blunt.state[k] != PRESSING:
             was_away = blunt.state[k] == AWAY
-            is_within = tetrahedron_at(body, grid, body.positions, side.at) >= 0
-            blunt.state[k] = WITHIN if is_within else AWAY
-            if was_away and is_within and _leads(motion, side):
-                _enter(blade, body, motion.pose, side, k)
+            blunt.state[k] = IDLE
+            if not _leads(motion, side):
+                continue
+            if tetrahedron_at(body, grid, body.positions, side.at) < 0:
+                blunt.state[k] = AWAY
+                continue
+            if not was_away:
+                continue
+        if n_faces == _NOT_LISTED:
+            n_faces = _list_faces_in_plane(blade.sides, body, pose)
+        skin = _skin_behind(blade.sides, body, side, pose.normal, n_faces)
+        if blunt.state[k] == PRESSING:
+            _slide(blade, body, pose, side, k, skin)
+        elif skin.face >= 0 and skin.depth <= DEEPEST_ENTRY * blade.reach:
+            blunt.held[k, 0] = blunt.held[k, 1] = 0.0
+            blunt.state[k] = PRESSING
+            blunt.n_pressing += 1
+            _take_point(blade, body, pose, side, k, skin)
 
 
 @kernel
@@ -95,25 +117,22 @@ def _leads(motion: BladeMotion, side: BluntSide) -> bool:
 
 
 @kernel
-def _enter(blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int) -> None:
-    """Let sample `k`, which has come into the tissue, press on the skin that it came through."""
-    blunt = blade.blunt
-    skin = _skin_behind(blade, body, side, pose.normal)
-    if skin.face < 0 or skin.depth > DEEPEST_ENTRY * blade.reach:
-        return
-    blunt.held[k, 0] = blunt.held[k, 1] = 0.0
-    blunt.state[k] = PRESSING
-    blunt.n_pressing += 1
-    _take_point(blade, body, pose, side, k, skin)
+def _slide(
+    blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int, skin: Skin
+) -> None:
+    """Let sample `k` press on the skin where it is now; release it where there is none.
 
-
-@kernel
-def _slide(blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: int) -> None:
-    """Let sample `k` press on the skin where it is now; release it where there is none."""
+    Args:
+        blade: The sample is written.
+        body: The tissue.
+        pose: Pose of the blade.
+        side: Axes of the sample.
+        k: The sample.
+        skin: The skin straight behind it.
+    """
     blunt, farthest = blade.blunt, DEEPEST_ENTRY * blade.reach
     point = touched_point(blunt, body, body.positions, k)
     press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
-    skin = _skin_behind(blade, body, side, pose.normal)
     if skin.face >= 0 and skin.depth <= press.depth + farthest:
         blade.totals.released += press_energy(blunt, k, press)
         blunt.held[k, 0], blunt.held[k, 1] = press.beside, press.across
@@ -125,7 +144,7 @@ def _slide(blade: BladeState, body: Body, pose: BladePose, side: BluntSide, k: i
     if norm(sideways) > farthest:
         blade.totals.released += press_energy(blunt, k, press)
         blunt.energy[k] = 0.0
-        blunt.state[k] = WITHIN
+        blunt.state[k] = IDLE
         blunt.n_pressing -= 1
 
 
@@ -143,11 +162,8 @@ def _take_point(
         k: The sample.
         skin: The point.
     """
-    blunt, t, w = blade.blunt, skin.face // 4, skin.weights
-    blunt.tetrahedron[k] = t
-    blunt.weights[k, 0], blunt.weights[k, 1] = w.a, w.b
-    blunt.weights[k, 2], blunt.weights[k, 3] = w.c, w.d
-    store(blunt.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    blunt = blade.blunt
+    _set_point(blunt, body, k, skin.face // 4, skin.weights)
     point = touched_point(blunt, body, body.positions, k)
     press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
     blunt.energy[k] = press_energy(blunt, k, press)
@@ -155,12 +171,49 @@ def _take_point(
 
 
 @kernel
-def _skin_behind(blade: BladeState, body: Body, side: BluntSide, normal: Vec3) -> Skin:
-    """Return the nearest open face that a line from a sample straight into the blade meets."""
-    sides = blade.sides
-    best = Skin(-1, np.inf, Weights(0.0, 0.0, 0.0, 0.0))
+def _set_point(blunt: BluntContacts, body: Body, k: int, t: int, w: Weights) -> None:
+    """Write the point that sample `k` touches, by its weights in tetrahedron `t`."""
+    blunt.tetrahedron[k] = t
+    blunt.weights[k, 0], blunt.weights[k, 1] = w.a, w.b
+    blunt.weights[k, 2], blunt.weights[k, 3] = w.c, w.d
+    store(blunt.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+
+
+@kernel
+def _list_faces_in_plane(sides: SideContacts, body: Body, pose: BladePose) -> int:
+    """Write the open faces around that the blade's plane meets to `sides.found`; return how many.
+
+    All samples are in that plane, and look for skin within it.
+    """
+    n = 0
+    plane = dot(pose.tip, pose.normal)
     for i in range(sides.n_around):
-        skin = _face_behind(body, sides.around[i], sides.outward, side, normal)
+        face = sides.around[i]
+        low, high = np.inf, -np.inf
+        for corner in range(3):
+            node = body.tetrahedra[face // 4, sides.outward[face % 4, corner]]
+            across = dot(vec3(body.positions, node), pose.normal) - plane
+            low, high = min(low, across), max(high, across)
+        if low <= ON_PLANE and high >= -ON_PLANE:
+            sides.found[n] = face
+            n += 1
+    return n
+
+
+@kernel
+def _skin_behind(sides: SideContacts, body: Body, side: BluntSide, normal: Vec3, n: int) -> Skin:
+    """Return the nearest open face that a line from a sample straight into the blade meets.
+
+    Args:
+        sides: The first `n` of `found` are the faces that the plane of the blade meets.
+        body: The tissue.
+        side: Axes of the sample.
+        normal: Normal of the blade's plane.
+        n: How many faces these are.
+    """
+    best = Skin(-1, np.inf, Weights(0.0, 0.0, 0.0, 0.0))
+    for i in range(n):
+        skin = _face_behind(body, sides.found[i], sides.outward, side, normal)
         if skin.face >= 0 and skin.depth < best.depth:
             best = skin
     return best
@@ -232,22 +285,8 @@ def move_point(blade: BladeState, body: Body, visits: Visits, k: int, p: Vec3) -
     blunt = blade.blunt
     location = locate(body, visits, p, blunt.tetrahedron[k], blade.queue)
     t = location.tetrahedron
-    w = barycentric_in(p, body.rest, body.tetrahedra, t)
-    if not location.inside:
-        w = _clipped(w)
-    blunt.tetrahedron[k] = t
-    blunt.weights[k, 0], blunt.weights[k, 1] = w.a, w.b
-    blunt.weights[k, 2], blunt.weights[k, 3] = w.c, w.d
-    store(blunt.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    _set_point(blunt, body, k, t, clipped(barycentric_in(p, body.rest, body.tetrahedra, t)))
     return location.inside
-
-
-@kernel
-def _clipped(w: Weights) -> Weights:
-    """Return the weights of a point of the tetrahedron near one that is outside it."""
-    a, b, c, d = max(w.a, 0.0), max(w.b, 0.0), max(w.c, 0.0), max(w.d, 0.0)
-    total = a + b + c + d
-    return Weights(a / total, b / total, c / total, d / total)
 
 
 @kernel

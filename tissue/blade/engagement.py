@@ -125,7 +125,7 @@ def anchor_beside(
             if norm(stretch) > blade.reach:  # the tissue there is turned otherwise
                 continue
             ahead = add(p, scale(slit_reach, apply_transposed(rotation, pose.forward)))
-            if _runs_in_slit(blade, body, visits, pose, t, (p, ahead), slit_reach):
+            if _runs_in_slit(blade, body, visits, pose, t, p, ahead, slit_reach):
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
             join_wall(anchors.walls, k, beside)
@@ -139,7 +139,8 @@ def _runs_in_slit(
     visits: Visits,
     pose: BladePose,
     t: int,
-    way: tuple[Vec3, Vec3],
+    p: Vec3,
+    ahead: Vec3,
     reach: float,
 ) -> bool:
     """Return whether a sample is in a slit that goes on ahead of it, one cut before.
@@ -152,10 +153,10 @@ def _runs_in_slit(
         visits: For searches.
         pose: Pose of the blade.
         t: The tetrahedron that holds the sample.
-        way: The sample, and a point ahead of it, in the body at rest [m].
+        p: The sample in the body at rest [m].
+        ahead: A point ahead of it [m].
         reach: Distance from a cut face up to which a point is in the slit [m].
     """
-    p, ahead = way
     if not is_in_slit(body, t, p, pose.along, pose.forward, reach):
         return False
     location = locate(body, visits, ahead, t, blade.queue)

@@ -39,9 +39,6 @@ from tissue.mesh.star import Visits
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
 enters and leaves the skin; more cost time in every Runge-Kutta stage."""
-FEWEST_SPACINGS = 1.0
-"""Length of an edge at least, per distance of samples. A shorter edge parts less than the cut of a
-mesh resolves."""
 MOST_SAMPLES = 4096
 """Samples of an edge at most. To move as many takes a millisecond, however small the body is."""
 
@@ -100,11 +97,13 @@ class BladeInteraction:
     def expect_usable_edge(self, length: float) -> None:
         """Refuse an edge of a length [m] that does not fit the mesh.
 
+        It is at least as long as two samples are apart.
+
         Raises:
             ValueError: it is too short or too long.
         """
-        spacing = self._node_size / SAMPLES_PER_NODE_SIZE
-        shortest, longest = FEWEST_SPACINGS * spacing, MOST_SAMPLES * spacing
+        shortest = self._node_size / SAMPLES_PER_NODE_SIZE
+        longest = MOST_SAMPLES * shortest
         if shortest <= length <= longest:
             return
         why, advice = (

@@ -22,8 +22,8 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import (
-    Weights,
     barycentric_in,
+    clipped,
     interpolate,
     smallest_weight,
 )
@@ -102,11 +102,7 @@ def set_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
         t: Tetrahedron that holds the point, or is near it.
         p: The point [m]; outside the tetrahedron, a point of the tetrahedron nearby is taken.
     """
-    w = barycentric_in(p, body.rest, body.tetrahedra, t)
-    total = max(w.a, 0.0) + max(w.b, 0.0) + max(w.c, 0.0) + max(w.d, 0.0)
-    w = Weights(
-        max(w.a, 0.0) / total, max(w.b, 0.0) / total, max(w.c, 0.0) / total, max(w.d, 0.0) / total
-    )
+    w = clipped(barycentric_in(p, body.rest, body.tetrahedra, t))
     anchors.tetrahedron[k] = t
     anchors.weights[k, 0] = w.a
     anchors.weights[k, 1] = w.b

@@ -132,6 +132,14 @@ def smallest_weight(w: Weights) -> float:
 
 
 @kernel
+def clipped(w: Weights) -> Weights:
+    """Return the weights of a point of the tetrahedron near one that may be outside it."""
+    a, b, c, d = max(w.a, 0.0), max(w.b, 0.0), max(w.c, 0.0), max(w.d, 0.0)
+    total = a + b + c + d
+    return Weights(a / total, b / total, c / total, d / total)
+
+
+@kernel
 def interpolate(w: Weights, values: FloatArray, tetrahedra: IntArray, t: int) -> Vec3:
     """Return the value at weights `w` of a field given at the nodes, shape (n_nodes, 3)."""
     a = tetrahedra[t, 0]
