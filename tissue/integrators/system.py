@@ -30,7 +30,7 @@ from tissue.mesh.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 
 INCREMENTS_TO_PIECES = 50
 """Increments of steps from a change of the mesh until loose pieces are found again: 50 ms in a
-usual run. Finding them costs as much as a step of the integrator. Until then a piece that came
+usual run. Finding them costs half a step of the integrator. Until then a piece that came
 loose is taken as held, and drag slows its fall."""
 
 
