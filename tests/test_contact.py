@@ -7,7 +7,7 @@ import pytest
 
 from tests import bodies, strokes
 from tests.materials import SPRINGS
-from tissue import Material, Snapshot, TetrahedralMesh, Tissue, block
+from tissue import Material, Snapshot, SolverSettings, TetrahedralMesh, Tissue, block
 from tissue.contact.resolve import note_all_positions
 from tissue.contact.state import FACES_CHANGED
 from tissue.elasticity.internal_forces import elastic_energy
@@ -286,7 +286,8 @@ def test_the_energy_of_a_block_that_bounces_never_exceeds_what_it_fell_with():
     assert energy(tissue, 9.81) < 0.8 * at_first
 
 
-def test_crossed_beams_touch_edge_on_edge():
+@pytest.mark.parametrize("contact", ["impulses", "penalty"])
+def test_crossed_beams_touch_edge_on_edge(contact):
     """Both beams stand on an edge, so that no node comes near a face of the other."""
     beam = block((6, 1, 1), (0.06, 0.01, 0.01))
     c = np.sqrt(0.5)
@@ -298,7 +299,13 @@ def test_crossed_beams_touch_edge_on_edge():
     mesh = joined(lower, upper, (0.005, 0.005, 0.0145))
     n = len(on_edge)
     fixed = np.arange(len(mesh.positions)) < n
-    tissue = Tissue(mesh, Material(viscous_damping=20.0), fixed=fixed, gravity=(0.0, 0.0, -2.0))
+    tissue = Tissue(
+        mesh,
+        Material(viscous_damping=20.0),
+        fixed=fixed,
+        gravity=(0.0, 0.0, -2.0),
+        solver=SolverSettings(contact=contact),
+    )
     low, ridge = mesh.positions[n:, 2].min(), mesh.positions[:n, 2].max()
     edge = (mesh.positions[n:, 2] < low + 1e-9) & (np.abs(mesh.positions[n:, 1]) < 0.006)
     assert edge.sum() == 2 and low > ridge

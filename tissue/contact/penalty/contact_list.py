@@ -7,22 +7,28 @@ near it has moved by as much as can matter; the others keep their contacts as th
 
 import math
 
-from tissue.contact.penalty.contact_forces import HANDED_ON, PenaltyForces, weighted_sum
-from tissue.contact.penalty.near_pairs import triangle_displacement, triangle_way
+from tissue.contact.penalty.contact_forces import PenaltyForces
+from tissue.contact.penalty.contact_rows import (
+    SAME_DIRECTION,
+    begin_contact,
+    copy_contact,
+    take_over,
+)
+from tissue.contact.penalty.near_pairs import (
+    CONTACT_REACH,
+    triangle_displacement,
+    triangle_way,
+)
 from tissue.contact.penalty.node_ways import is_stirred
-from tissue.contact.penalty.pair_update import CONTACT_REACH
+from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, axpy, dot, store, sub, vec3
+from tissue.core.vec3 import Vec3, dot, store, sub, vec3
 from tissue.mesh.body import Body
 
 DIRECTIONS = 3
 """Contacts of a node with faces at most: more than three directions do not hold it any firmer."""
-
-_SAME_DIRECTION = 0.7
-"""Cosine between normals above which contacts are one: 45 degrees. Larger: a node on a curved lip
-has several that share its stiffness; smaller: it is not held in a corner."""
 
 _STILL = 0.02
 """Motion of a node against a face after which their contact is sought again, per node size. Larger:
@@ -92,7 +98,8 @@ def floor_changes(search: SearchState, body: Body) -> bool:
 def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> None:
     """Seek the contacts of nodes that are due, and list all.
 
-    Room: DIRECTIONS for each node of a face, and one for each node that may be on the floor.
+    Room: DIRECTIONS for each node of a face, one for each node that may be on the floor, and one
+    for each pair of ridges that touch.
     """
     pairs, now = search.pairs, search.n_listings + 1
     to, n = len(forces.push) // 2 - forces.first, 0
@@ -103,15 +110,16 @@ def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> Non
         first, n_own = search.contact[node], n_before
         if search.is_due[node] == 1:
             n_own = _seek(search, forces, body, node, to + n)
-            _take_over(forces, body, (first, n_before), (to + n, n_own))
+            take_over(forces, body, (first, n_before), (to + n, n_own))
         else:
             for q in range(n_before):
-                _copy_contact(forces, first + q, to + n + q)
+                copy_contact(forces, first + q, to + n + q)
         search.listed_at[node] = now
         search.contact[node] = to + n
         search.n_contacts[node] = n_own
         n += n_own
-    forces.n_contacts = _list_floor_contacts(search, forces, body, to, n)
+    n = _list_floor_contacts(search, forces, body, to, n)
+    forces.n_contacts = list_ridge_contacts(search, forces, body, to, n)
     forces.first = to
     search.n_listings = now
 
@@ -166,7 +174,7 @@ def _place(
         n: How many it has so far.
     """
     q = 0
-    while q < n and dot(vec3(forces.normal, to + q), touch.normal) <= _SAME_DIRECTION:
+    while q < n and dot(vec3(forces.normal, to + q), touch.normal) <= SAME_DIRECTION:
         q += 1
     if q == DIRECTIONS or (q < n and search.distance[q] <= touch.distance_squared):
         return n
@@ -181,66 +189,8 @@ def _place(
     forces.weight[c, 2] = -b.y
     forces.weight[c, 3] = -b.z
     store(forces.normal, c, touch.normal)
-    _begin_contact(forces, c, 0.0)
+    begin_contact(forces, c, 0.0)
     return max(n, q + 1)
-
-
-@kernel
-def _begin_contact(forces: PenaltyForces, c: int, height: float) -> None:
-    """Let contact `c` begin without a force; `height`: that of the floor [m], else 0."""
-    forces.height[c] = height
-    forces.stiffness[c] = 0.0
-    forces.offset[c] = 0.0
-    forces.push[c] = 0.0
-    store(forces.anchor, c, Vec3(0.0, 0.0, 0.0))
-    store(forces.impulse, c, Vec3(0.0, 0.0, 0.0))
-
-
-@kernel
-def _take_over(
-    forces: PenaltyForces, body: Body, before: tuple[int, int], now: tuple[int, int]
-) -> None:
-    """Let the contacts of a node go on with the forces of those before, each by one heir at most.
-
-    `before` and `now`: first contact, and how many.
-    """
-    for c in range(now[0], now[0] + now[1]):
-        normal, heir, most = vec3(forces.normal, c), -1, _SAME_DIRECTION
-        for old in range(before[0], before[0] + before[1]):
-            cosine = dot(vec3(forces.normal, old), normal)
-            if cosine > most and forces.push[old] != HANDED_ON:
-                heir, most = old, cosine
-        if heir < 0:
-            continue
-        forces.push[c] = forces.push[heir]
-        forces.stiffness[c] = forces.stiffness[heir]
-        forces.offset[c] = forces.offset[heir]
-        forces.push[heir] = HANDED_ON
-        stretch = sub(_across(forces, body, heir), vec3(forces.anchor, heir))
-        stretch = axpy(-dot(stretch, normal), normal, stretch)
-        store(forces.anchor, c, sub(_across(forces, body, c), stretch))
-
-
-@kernel
-def _across(forces: PenaltyForces, body: Body, c: int) -> Vec3:
-    """Return what separates the sides of contact `c` across its normal [m]."""
-    d, normal = weighted_sum(forces, c, body.positions), vec3(forces.normal, c)
-    return axpy(-dot(d, normal), normal, d)
-
-
-@kernel
-def _copy_contact(forces: PenaltyForces, c: int, to: int) -> None:
-    """Copy a contact to another row."""
-    for q in range(4):
-        forces.node[to, q] = forces.node[c, q]
-        forces.weight[to, q] = forces.weight[c, q]
-    store(forces.normal, to, vec3(forces.normal, c))
-    store(forces.anchor, to, vec3(forces.anchor, c))
-    store(forces.impulse, to, Vec3(0.0, 0.0, 0.0))
-    forces.height[to] = forces.height[c]
-    forces.stiffness[to] = forces.stiffness[c]
-    forces.offset[to] = forces.offset[c]
-    forces.push[to] = forces.push[c]
 
 
 @kernel
@@ -257,13 +207,13 @@ def _list_floor_contacts(
             continue
         c = to + n
         if is_listed:
-            _copy_contact(forces, search.floor_contact[node], c)
+            copy_contact(forces, search.floor_contact[node], c)
         else:
             for q in range(4):
                 forces.node[c, q] = node
                 forces.weight[c, q] = 1.0 if q == 0 else 0.0
             store(forces.normal, c, Vec3(0.0, 0.0, 1.0))
-            _begin_contact(forces, c, search.floor)
+            begin_contact(forces, c, search.floor)
         search.floor_contact[node] = c
         search.floor_listed_at[node] = now
         n += 1

@@ -14,6 +14,10 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import grown
 
+CONTACT_REACH = 0.05
+"""Gap up to which a contact is kept ready, per node size: fast nodes touch within a time step.
+Larger: contacts that do not press take stiffness from those that do."""
+
 _OF_NODES = (
     "nodes",
     "seen_at",

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from tissue.contact.faces import NO_FACE, Faces, is_face_of_cut
-from tissue.contact.penalty.near_pairs import NearPairs
+from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.node_grid import (
     LONGEST,
     NodeGrid,
@@ -22,6 +22,7 @@ from tissue.contact.penalty.node_ways import (
     begin_ball,
     has_left_middle,
 )
+from tissue.contact.penalty.ridges import Ridges, find_changed_ridges
 from tissue.contact.piece_boxes import may_touch, update_piece_boxes
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
@@ -29,10 +30,6 @@ from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.geometry.aabb import Aabb, empty_box, overlap, widened, with_point
 from tissue.mesh.body import Body
 from tissue.mesh.faces import OUTWARD
-
-CONTACT_REACH = 0.05
-"""Gap up to which a contact is kept ready, per node size: fast nodes touch within a time step.
-Larger: contacts that do not press take stiffness from those that do."""
 
 DEEPEST = 0.25
 """Depth below a face up to which a node is paired with it, per node size. Larger: nodes on the far
@@ -68,13 +65,19 @@ class _Asking(NamedTuple):
 
 @kernel
 def update_pairs(
-    pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body, normal: FloatArray
+    pairs: NearPairs,
+    ways: NodeWays,
+    ridges: Ridges,
+    faces: Faces,
+    body: Body,
+    normal: FloatArray,
 ) -> bool:
     """Pair anew what left its ball or changed; return False if there is no room, to call again.
 
     Args:
         pairs: Written.
         ways: Balls of nodes that are paired anew are laid anew.
+        ridges: Those of faces that changed are found anew.
         faces: The faces that may touch.
         body: Where the nodes are.
         normal: Normal of each node, weighted by area [m2], shape (capacity, 3).
@@ -83,6 +86,7 @@ def update_pairs(
         return False
     pairs.n_updates += 1
     _take_faces(pairs, ways, faces, body)
+    find_changed_ridges(ridges, pairs, faces, body)
     _list_nodes(pairs, ways, faces, body)
     for at in range(faces.n_places):
         if pairs.is_active[at] == 1 and _has_moved_corner(pairs, at):

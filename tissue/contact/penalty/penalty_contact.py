@@ -24,6 +24,8 @@ from tissue.contact.penalty.contact_forces import (
 from tissue.contact.penalty.contact_list import DIRECTIONS
 from tissue.contact.penalty.near_pairs import grown_near_pairs, new_near_pairs
 from tissue.contact.penalty.node_ways import grown_node_ways, new_node_ways
+from tissue.contact.penalty.ridge_pairs import NOT_LISTED, new_ridge_pairs
+from tissue.contact.penalty.ridges import new_ridges
 from tissue.contact.penalty.search import (
     BEGIN,
     DONE,
@@ -92,6 +94,8 @@ class PenaltyContact:
             since_normals=SEARCHES_TO_NORMALS,
             faces=faces,
             pairs=new_near_pairs(n_nodes, len(faces.face), CAPACITY_OF_PAIRS),
+            ridges=new_ridges(len(faces.face), node_size),
+            ridge_pairs=new_ridge_pairs(CAPACITY_OF_PAIRS),
             ways=new_node_ways(n_nodes, node_size),
             limits=new_limits(node_size, added),
             normal=room_for_points(n_nodes),
@@ -222,13 +226,24 @@ class PenaltyContact:
         search = self._search
         room = len(search.pairs.wake)
         n_faces = max(len(search.faces.face), len(search.pairs.triangle))
-        self._search = search.replaced(pairs=new_near_pairs(len(search.share), n_faces, room))
+        n_ridges = len(search.ridges.is_one)
+        ridge_pairs = new_ridge_pairs(2 * len(search.ridge_pairs.wake))
+        ridge_pairs.first = search.ridge_pairs.first
+        ridge_pairs.n_contacts = search.ridge_pairs.n_contacts
+        self._search = search.replaced(
+            pairs=new_near_pairs(len(search.share), n_faces, room),
+            ridges=new_ridges(max(n_faces, 2 * n_ridges // 3), search.ways.node_size),
+            ridge_pairs=ridge_pairs,
+        )
 
     def _make_room_for_contacts(self, body: Body) -> None:
         """Make room for twice as many contacts as there may be."""
         search, first = self._search, self.forces.first
         on_floor = body.n_nodes if np.isfinite(search.floor) else 0
-        capacity = 2 * (DIRECTIONS * search.pairs.n_nodes + on_floor)
+        ridges = search.ridge_pairs
+        capacity = 2 * (DIRECTIONS * search.pairs.n_nodes + on_floor + ridges.n_touching)
         self.forces = grown_penalty_forces(self.forces, capacity)
         search.contact[:] -= first
         search.floor_contact[:] -= first
+        ridges.first -= first
+        ridges.contact[ridges.contact != NOT_LISTED] -= first

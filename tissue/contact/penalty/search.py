@@ -13,6 +13,8 @@ from tissue.contact.penalty.contact_list import (
 from tissue.contact.penalty.lost_nodes import look_for_lost_nodes
 from tissue.contact.penalty.node_ways import IN_BALL, LOST, measure_ways, note_places
 from tissue.contact.penalty.pair_update import SKIN_WAY, update_pairs
+from tissue.contact.penalty.ridge_contacts import find_touching_ridges
+from tissue.contact.penalty.ridge_pairs import pair_ridges
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.stiffness import recover, split_masses
 from tissue.core.array_types import FloatArray
@@ -65,14 +67,18 @@ def search_contacts(
         search.stage = _PAIRS
     if search.stage == _PAIRS:
         if search.is_anew == 1:
-            if not update_pairs(pairs, ways, search.faces, body, search.normal):
+            if not update_pairs(pairs, ways, search.ridges, search.faces, body, search.normal):
+                return NO_ROOM_FOR_PAIRS
+            if not pair_ridges(search.ridge_pairs, search.ridges, pairs, ways, search.faces):
                 return NO_ROOM_FOR_PAIRS
             search.since_pairing = 0
             search.is_pairing_due = search.has_new_faces = 0
             search.is_listing_due = 1
         search.stage = _LIST
     n_due = find_due(search, search.is_anew == 1)
-    if n_due > 0 or search.is_listing_due == 1 or floor_changes(search, body):
+    if find_touching_ridges(search, forces, body) or n_due > 0 or floor_changes(search, body):
+        search.is_listing_due = 1
+    if search.is_listing_due == 1:
         if _most_contacts(search, body) > len(forces.push) // 2:
             return NO_ROOM_FOR_CONTACTS
         list_contacts(search, forces, body)
@@ -110,4 +116,4 @@ def _renew_normals(search: SearchState, body: Body) -> None:
 def _most_contacts(search: SearchState, body: Body) -> int:
     """Return how many contacts there may be at most."""
     on_floor = 0 if search.floor == -math.inf else body.n_nodes
-    return int(DIRECTIONS * search.pairs.n_nodes + on_floor)
+    return int(DIRECTIONS * search.pairs.n_nodes + on_floor + search.ridge_pairs.n_touching)

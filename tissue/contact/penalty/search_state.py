@@ -3,6 +3,8 @@
 from tissue.contact.faces import Faces
 from tissue.contact.penalty.near_pairs import NearPairs
 from tissue.contact.penalty.node_ways import NodeWays
+from tissue.contact.penalty.ridge_pairs import RidgePairs
+from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.stiffness import Limits
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.structs import Arrays, IntCell
@@ -36,6 +38,8 @@ class SearchState(Arrays):
     """Number of searches since normals were computed."""
     faces: Faces
     pairs: NearPairs
+    ridges: Ridges
+    ridge_pairs: RidgePairs
     ways: NodeWays
     limits: Limits
     normal: FloatArray

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 from tissue.contact.node_normals import has_inverted
 from tissue.contact.penalty.contact_forces import PenaltyForces, weighted_sum
-from tissue.contact.penalty.near_pairs import NearPairs
-from tissue.contact.penalty.pair_update import CONTACT_REACH
+from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.search_state import SearchState
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -50,7 +49,7 @@ _SMOOTH, _STEEPNESS = 0.7, 4.0
 """Cosine between the normals of a corner and its face from which on the corner's counts, and how
 fast: it counts alone from 0.95 on. Without the blend nodes flutter at the switch."""
 
-_ENTRY = 0.01
+ENTRY = 0.01
 """Overlap before the time step up to which a node counts as outside, per node size."""
 
 _CAUGHT = 1.5
@@ -213,7 +212,7 @@ def _came_from_outside(
     gap_before = 0.0
     if length > 0.0:
         gap_before = dot(area, _apart(before, pairs, node, face, foot)) / length
-    deepest = _ENTRY * size + _CAUGHT * _depth_before(search, forces, node, normal)
+    deepest = ENTRY * size + _CAUGHT * _depth_before(search, forces, node, normal)
     if gap_before >= -deepest:
         return True
     if pairs.is_lost[node] == 0 and gap < -_RECAPTURED * size:

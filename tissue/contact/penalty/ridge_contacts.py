@@ -1,0 +1,104 @@
+"""Contacts of ridges: which are to be sought in a time step, and their rows in the list."""
+
+from tissue.contact.penalty.contact_forces import PenaltyForces
+from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
+from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs
+from tissue.contact.penalty.ridge_touch import ridge_touch_of
+from tissue.contact.penalty.ridges import Ridges
+from tissue.contact.penalty.search_state import SearchState
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.vec3 import store, vec3
+from tissue.mesh.body import Body
+
+
+@kernel
+def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body) -> bool:
+    """Look at the ridges that moved enough; return whether any touch, or did.
+
+    Args:
+        search: The pairs of ridges are written.
+        forces: The contacts as they are.
+        body: Where the nodes are.
+    """
+    found, has_changed = search.ridge_pairs, False
+    n_touching = 0
+    for k in range(found.n_pairs):
+        way = _way(found, search.ridges, search.ways.way, k)
+        if way > found.wake[k]:
+            if found.wake[k] < 0.0:
+                found.contact[k] = _contact_of(found, search.ridges, forces, k)
+            touch = ridge_touch_of(search, body, k)
+            has_changed = has_changed or touch.is_touching or found.is_touching[k] == 1
+            found.wake[k] = way + touch.slack
+            found.is_touching[k] = 1 if touch.is_touching else 0
+            found.is_sought[k] = 1
+            found.place[k, 0], found.place[k, 1] = touch.s, touch.t
+            store(found.normal, k, touch.normal)
+        n_touching += found.is_touching[k]
+    found.n_touching = n_touching
+    return has_changed or n_touching < found.n_contacts
+
+
+@kernel
+def _way(found: RidgePairs, ridges: Ridges, way: FloatArray, k: int) -> float:
+    """Return the sum of the ways of the nodes of a pair [m]."""
+    one, other = found.ridge[k, 0], found.ridge[k, 1]
+    first = way[ridges.node[one, 0]] + way[ridges.node[one, 1]]
+    return float(first + way[ridges.node[other, 0]] + way[ridges.node[other, 1]])
+
+
+@kernel
+def _contact_of(found: RidgePairs, ridges: Ridges, forces: PenaltyForces, k: int) -> int:
+    """Return the contact that a pair had before it was paired anew, or NOT_LISTED."""
+    one, other = found.ridge[k, 0], found.ridge[k, 1]
+    for c in range(found.first, found.first + found.n_contacts):
+        if (
+            forces.node[c, 0] == ridges.node[one, 0]
+            and forces.node[c, 1] == ridges.node[one, 1]
+            and forces.node[c, 2] == ridges.node[other, 0]
+            and forces.node[c, 3] == ridges.node[other, 1]
+        ):
+            return c
+    return NOT_LISTED
+
+
+@kernel
+def list_ridge_contacts(
+    search: SearchState, forces: PenaltyForces, body: Body, to: int, n: int
+) -> int:
+    """List the contacts of ridges behind the `n` others; return how many there are.
+
+    Args:
+        search: The pairs of ridges are written.
+        forces: Written. Room: one contact for each pair that touches.
+        body: Where the nodes are.
+        to: First row of the list.
+        n: How many contacts it has so far.
+    """
+    found, ridges = search.ridge_pairs, search.ridges
+    first = to + n
+    for k in range(found.n_pairs):
+        before = found.contact[k]
+        found.contact[k] = NOT_LISTED
+        if found.is_touching[k] == 0:
+            continue
+        c = to + n
+        if found.is_sought[k] == 0 and before != NOT_LISTED:
+            copy_contact(forces, before, c)
+        else:
+            s, t = found.place[k, 0], found.place[k, 1]
+            one, other = found.ridge[k, 0], found.ridge[k, 1]
+            forces.node[c, 0], forces.node[c, 1] = ridges.node[one, 0], ridges.node[one, 1]
+            forces.node[c, 2], forces.node[c, 3] = ridges.node[other, 0], ridges.node[other, 1]
+            forces.weight[c, 0], forces.weight[c, 1] = 1.0 - s, s
+            forces.weight[c, 2], forces.weight[c, 3] = t - 1.0, -t
+            store(forces.normal, c, vec3(found.normal, k))
+            begin_contact(forces, c, 0.0)
+            if before != NOT_LISTED:
+                take_over(forces, body, (before, 1), (c, 1))
+        found.contact[k] = c
+        found.is_sought[k] = 0
+        n += 1
+    found.first, found.n_contacts = first, to + n - first
+    return n

@@ -1,0 +1,192 @@
+"""`RidgePairs`: which ridge may come to cross which, kept true to motion and cuts.
+
+A pair is listed if two ridges would touch wherever in their balls their four nodes are, and holds
+until one of them leaves its ball or a face beside it changes (`pair_update`).
+"""
+
+import numpy as np
+
+from tissue.contact.distance import distance_of_edges
+from tissue.contact.edge_edge import Edges, face_the_same_side
+from tissue.contact.faces import Faces
+from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
+from tissue.contact.penalty.node_ways import NodeWays
+from tissue.contact.penalty.ridges import Ridges
+from tissue.contact.spatial_hash import find_overlaps, insert_box, remove_box
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, IntCell
+from tissue.core.vec3 import Vec3, add, cross, norm, scale, sub, vec3
+from tissue.geometry.aabb import box_at, segment_box, store_box, widened
+
+NOT_LISTED = -1
+
+
+class RidgePairs(Arrays):
+    """The pairs of ridges, and where those touch that do."""
+
+    n_pairs: IntCell
+    """Number of pairs."""
+    n_touching: IntCell
+    """Number of pairs that touch."""
+    first: IntCell
+    """First contact of ridges in the list in use."""
+    n_contacts: IntCell
+    """Number of contacts of ridges in the list in use."""
+    ridge: IntArray
+    """The ridges of each pair, shape (capacity, 2)."""
+    wake: FloatArray
+    """Sum of the ways of its four nodes up to which a pair needs no look [m]; below 0 for one that
+    is new; shape (capacity,)."""
+    is_touching: IntArray
+    """1 if a pair touches, else 0; shape (capacity,)."""
+    is_sought: IntArray
+    """1 if a pair was looked at since it was listed as a contact, else 0; shape (capacity,)."""
+    contact: IntArray
+    """Contact of each pair in the list in use, or NOT_LISTED; shape (capacity,)."""
+    place: FloatArray
+    """Where along its two ridges a pair touches, as fractions; shape (capacity, 2)."""
+    normal: FloatArray
+    """Unit vector in which the first ridge is pushed, shape (capacity, 3)."""
+
+
+def new_ridge_pairs(capacity: int) -> RidgePairs:
+    """Return no pairs, with room for that many."""
+    of_pairs = ("is_touching", "is_sought", "contact")
+    return RidgePairs(
+        n_pairs=0,
+        n_touching=0,
+        first=0,
+        n_contacts=0,
+        ridge=np.zeros((capacity, 2), np.int64),
+        wake=np.zeros(capacity),
+        **{name: np.zeros(capacity, np.int64) for name in of_pairs},
+        place=np.zeros((capacity, 2)),
+        normal=np.zeros((capacity, 3)),
+    )
+
+
+@kernel
+def pair_ridges(
+    found: RidgePairs, ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces
+) -> bool:
+    """Pair anew the ridges that changed or left their balls; return False if there is no room.
+
+    Args:
+        found: Written.
+        ridges: The ridges that changed are dirty in this update.
+        pairs: Which nodes were paired anew.
+        ways: The balls of the nodes.
+        faces: The piece that each face is of.
+    """
+    now = pairs.n_updates
+    _list_ridges(ridges, pairs, faces)
+    _keep_pairs(found, ridges, now)
+    for edge in range(3 * faces.n_places):
+        if ridges.dirty_at[edge] == now and ridges.is_in_grid[edge] == 1:
+            remove_box(ridges.grid, edge, box_at(ridges.low, ridges.high, edge))
+            ridges.is_in_grid[edge] = 0
+    for i in range(ridges.n_ridges):
+        edge = ridges.listed[i]
+        if ridges.dirty_at[edge] != now:
+            continue
+        a, b = ridges.node[edge, 0], ridges.node[edge, 1]
+        reach = max(ways.radius[a], ways.radius[b]) + 0.5 * CONTACT_REACH * ways.node_size
+        box = widened(segment_box(ways.reference, a, b), reach)
+        n = find_overlaps(ridges.grid, ridges.search, ridges.low, ridges.high, box)
+        for q in range(n):
+            other = ridges.search.found[q]
+            if not _may_cross(ridges, pairs, ways, faces, edge, other):
+                continue
+            if found.n_pairs == len(found.wake):
+                return False
+            _add_pair(found, ridges, edge, other)
+        store_box(ridges.low, ridges.high, edge, box)
+        if not insert_box(ridges.grid, edge, box):
+            return False
+        ridges.is_in_grid[edge] = 1
+    return True
+
+
+@kernel
+def _list_ridges(ridges: Ridges, pairs: NearPairs, faces: Faces) -> None:
+    """List the ridges; those with a node that is paired anew are dirty, too."""
+    now, n = pairs.n_updates, 0
+    for edge in range(3 * faces.n_places):
+        if ridges.is_one[edge] == 0:
+            continue
+        a, b = ridges.node[edge, 0], ridges.node[edge, 1]
+        if pairs.moved_at[a] == now or pairs.moved_at[b] == now:
+            ridges.dirty_at[edge] = now
+        ridges.listed[n] = edge
+        n += 1
+    ridges.n_ridges = n
+
+
+@kernel
+def _keep_pairs(found: RidgePairs, ridges: Ridges, now: int) -> None:
+    """Close up the pairs that hold."""
+    n = 0
+    for k in range(found.n_pairs):
+        if ridges.dirty_at[found.ridge[k, 0]] == now or ridges.dirty_at[found.ridge[k, 1]] == now:
+            continue
+        for side in range(2):
+            found.ridge[n, side] = found.ridge[k, side]
+            found.place[n, side] = found.place[k, side]
+        for x in range(3):
+            found.normal[n, x] = found.normal[k, x]
+        found.wake[n] = found.wake[k]
+        found.is_touching[n] = found.is_touching[k]
+        found.is_sought[n] = found.is_sought[k]
+        found.contact[n] = found.contact[k]
+        n += 1
+    found.n_pairs = n
+
+
+@kernel
+def _add_pair(found: RidgePairs, ridges: Ridges, edge: int, other: int) -> None:
+    """Add a pair; the ridge that begins with the lower node is its first."""
+    k = found.n_pairs
+    is_first = ridges.node[edge, 0] < ridges.node[other, 0]
+    found.ridge[k, 0] = edge if is_first else other
+    found.ridge[k, 1] = other if is_first else edge
+    found.wake[k] = -1.0
+    found.is_touching[k] = found.is_sought[k] = 0
+    found.contact[k] = NOT_LISTED
+    found.n_pairs += 1
+
+
+@kernel
+def _may_cross(
+    ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces, edge: int, other: int
+) -> bool:
+    """Whether two ridges may touch while their nodes stay in their balls."""
+    a, b = ridges.node[edge, 0], ridges.node[edge, 1]
+    c, d = ridges.node[other, 0], ridges.node[other, 1]
+    if a in (c, d) or b in (c, d):
+        return False
+    if ridges.is_of_cut[edge] == 0 or ridges.is_of_cut[other] == 0:
+        piece = faces.piece[pairs.tetrahedron[edge // 3]]
+        if piece >= 0 and piece == faces.piece[pairs.tetrahedron[other // 3]]:
+            return False
+    x, radius = ways.reference, ways.radius
+    if face_the_same_side(outward_at(ridges, x, edge), outward_at(ridges, x, other)):
+        return False
+    reach = max(radius[a], radius[b]) + max(radius[c], radius[d])
+    reach += CONTACT_REACH * ways.node_size
+    return bool(distance_of_edges(Edges(vec3(x, a), vec3(x, b), vec3(x, c), vec3(x, d))) <= reach)
+
+
+@kernel
+def outward_at(ridges: Ridges, x: FloatArray, edge: int) -> Vec3:
+    """Return a vector out of the body at a ridge: the sum of the unit normals of its two faces."""
+    a, b = vec3(x, ridges.node[edge, 0]), vec3(x, ridges.node[edge, 1])
+    along = sub(b, a)
+    own = cross(along, sub(vec3(x, ridges.tip[edge, 0]), a))
+    across = cross(sub(vec3(x, ridges.tip[edge, 1]), a), along)
+    size, other_size = norm(own), norm(across)
+    if not (size > 0.0 and other_size > 0.0):
+        return Vec3(0.0, 0.0, 0.0)
+    if ridges.tip[edge, 0] == ridges.tip[edge, 1]:
+        return scale(1.0 / size, own)
+    return add(scale(1.0 / size, own), scale(1.0 / other_size, across))
