@@ -110,7 +110,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=2000)
     parser.add_argument("--audit", action="store_true")
-    parser.add_argument("--contact", choices=("impulses", "penalty"), default="impulses")
+    parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     options = parser.parse_args()
     scene = replace(
         SCENES["grid2"],

@@ -49,11 +49,12 @@ def main() -> int:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
     relaxation = options.relaxation or scene.relaxation
-    contact = options.contact or scene.contact
+    contact = options.contact
     scene = replace(scene, material=material, relaxation=relaxation, contact=contact)
     tissue = make_tissue(replace(scene, floor=STROKE_FLOOR))
     random = np.random.default_rng(options.seed)
-    table = Table(title=f"organ, law {material.law}, relaxation {relaxation}, contact {contact}")
+    how = f"relaxation {relaxation}, contact {contact or 'by default'}"
+    table = Table(title=f"organ, law {material.law}, {how}")
     names = ("stroke", "tetrahedra", "pieces", "substeps/ms", "contacts")
     for name in (*names, "CPU ms/ms", "fastest [m/s]"):
         table.add_column(name, justify="right")

@@ -98,13 +98,13 @@ def check_relaxation(name: str, threads: int) -> None:
         )
 
 
-def check_contact(name: str, relaxation: str) -> None:
-    """Check that a contact exists, and that it goes with the relaxation.
+def check_contact(name: str | None, relaxation: str) -> None:
+    """Check that a contact exists, if one was chosen, and that it goes with the relaxation.
 
     Raises:
         UsageError: it does not; the message says why.
     """
-    if name not in CONTACTS:
+    if name is not None and name not in CONTACTS:
         raise unknown("contact", name, CONTACTS)
     if name == "penalty" and relaxation not in ("global", "verlet"):
         raise UsageError(f"--contact penalty needs --relaxation global or verlet, not {relaxation}")
@@ -139,8 +139,9 @@ class Scene:
     precision: str = "single"
     """Precision of the forces of tetrahedra: `single` or `double`. Positions and velocities are
     double."""
-    contact: str = "impulses"
-    """How the body is kept from passing through itself: `impulses`, or `penalty`."""
+    contact: str | None = None
+    """How the body is kept from passing through itself: `impulses`, or `penalty`; None: `penalty`
+    with the relaxation global or verlet."""
     threads: int = 1
     """Threads that share the loops over the body, with the relaxation global or verlet."""
     stretch: float = 0.05

@@ -57,7 +57,7 @@ class KernelSet(NamedTuple):
     has_sides: bool = True
     """Whether the blade has a thickness."""
     precision: str = "single"
-    contact: str = "impulses"
+    contact: str | None = None
     relaxes: bool = False
     """Whether the stress of the material relaxes."""
 

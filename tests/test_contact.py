@@ -17,6 +17,8 @@ from tissue.mesh.pieces import piece_of_tetrahedra, pieces_of
 ELEMENT = 0.01
 """Edge of a cell in all bodies of these tests [m]."""
 
+IMPULSES = SolverSettings(contact="impulses")
+
 ALLOWED = 0.01 * ELEMENT
 """Largest allowed penetration of one body into another [m]."""
 
@@ -91,7 +93,7 @@ def advance(tissue: Tissue, duration: float, every: int = 50) -> float:
 
 def incised(mesh: TetrahedralMesh, at: float, until: float, **options) -> Tissue:
     """Return a body cut along an upright plane, from its front to y = `until` [m]."""
-    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, **options)
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), gravity=NO_GRAVITY, **options, solver=IMPULSES)
     edges = [[(at, y, -0.01), (at, y, 0.05)] for y in (-0.01, until)]
     assert tissue.incise(edges, (0.0, 1.0, 0.0)) > 0.0
     return tissue
@@ -125,6 +127,7 @@ def test_two_blocks_pressed_together_with_1_n_do_not_overlap_and_come_to_rest(pa
         Material(viscous_damping=20.0),
         fixed=mesh.positions[:, 2] == 0.0,
         gravity=(0.0, 0.0, -weight),
+        solver=IMPULSES,
     )
     assert advance(tissue, 2.5) < ALLOWED
     last = tissue.step(None, strokes.DT)
@@ -143,7 +146,11 @@ def test_two_halves_pressed_together_across_a_cut_with_1_n_do_not_overlap_and_co
     mesh = block((6, 4, 4), (0.06, 0.04, 0.04))
     sides = bodies.sides(mesh)
     tissue = Tissue(
-        mesh, Material(toughness=2.0, viscous_damping=20.0), fixed=sides, gravity=NO_GRAVITY
+        mesh,
+        Material(toughness=2.0, viscous_damping=20.0),
+        fixed=sides,
+        gravity=NO_GRAVITY,
+        solver=IMPULSES,
     )
     strokes.make(tissue, strokes.slanted(mesh, lean=0.1, rake=0.2))
     assert tissue.n_pieces() == 2
@@ -201,7 +208,7 @@ def test_the_lips_of_a_slit_that_is_pressed_shut_do_not_interpenetrate():
 
 def test_before_the_first_cut_contact_has_nothing_to_test():
     mesh = block((4, 4, 4), (0.04,) * 3)
-    tissue = Tissue(mesh, fixed=bodies.sides(mesh))
+    tissue = Tissue(mesh, fixed=bodies.sides(mesh), solver=IMPULSES)
     assert not tissue._system.contact.is_awake
     tissue.step(None, strokes.DT)
     assert not tissue._system.contact.arrays.start.any()
@@ -213,7 +220,7 @@ def falling(height=0.02, material=None, gravity=(0.0, 0.0, -9.81), **options):
     """Return a loose block at `height` [m] above a floor at z = 0."""
     mesh = block((3, 3, 2), (0.03, 0.03, 0.02))
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, height]))
-    return Tissue(lifted, material, gravity=gravity, floor=0.0, **options)
+    return Tissue(lifted, material, gravity=gravity, floor=0.0, **options, solver=IMPULSES)
 
 
 def test_a_block_that_falls_on_the_floor_stays_on_it_and_comes_to_rest():
@@ -258,6 +265,7 @@ def test_two_free_blocks_that_collide_keep_their_momentum_and_gain_no_energy(clo
         mesh,
         replace(SPRINGS, young_modulus=young, viscous_damping=0.0, retardation_time=0.0),
         gravity=NO_GRAVITY,
+        solver=IMPULSES,
     )
     n, m = len(first.positions), len(mesh.positions)
     tissue._body.velocities[n:m] = [0.1, 0.0, -closing]
@@ -321,7 +329,13 @@ def test_crossed_beams_touch_edge_on_edge(contact):
 
 def test_a_piece_that_is_cut_off_lands_on_the_floor_and_pieces_fall_on_pieces():
     mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
-    tissue = Tissue(mesh, Material(toughness=0.5), fixed=mesh.positions[:, 0] <= 0.02, floor=-0.03)
+    tissue = Tissue(
+        mesh,
+        Material(toughness=0.5),
+        fixed=mesh.positions[:, 0] <= 0.02,
+        floor=-0.03,
+        solver=IMPULSES,
+    )
     strokes.make(tissue, strokes.straight(mesh, 0.75))
     for _ in range(1000):
         result = tissue.step(None, strokes.DT)
@@ -337,7 +351,7 @@ def test_contact_is_reproducible_to_the_bit():
         mesh = joined(
             block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
         )
-        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
+        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0, solver=IMPULSES)
         results = [tissue.step(None, strokes.DT) for _ in range(100)]
         assert results[-1].body_contacts.n_contacts > 0
         return tissue.snapshot()
@@ -351,7 +365,7 @@ def test_contact_arrays_that_grow_within_a_step_change_nothing(monkeypatch):
         mesh = joined(
             block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3), (0.01, 0, 0.031)
         )
-        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0)
+        tissue = Tissue(mesh, fixed=mesh.positions[:, 2] == 0.0, solver=IMPULSES)
         for _ in range(60):
             tissue.step(None, strokes.DT)
         return tissue.snapshot()
@@ -367,7 +381,7 @@ def resting_blocks(n_steps=300):
     lower, upper = block((3, 3, 3), (0.03,) * 3), block((2, 2, 2), (0.03,) * 3)
     mesh = joined(lower, upper, (1e-3, 2e-3, 0.0301))
     material = Material(viscous_damping=20.0)
-    tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] == 0.0)
+    tissue = Tissue(mesh, material, fixed=mesh.positions[:, 2] == 0.0, solver=IMPULSES)
     for _ in range(n_steps):
         tissue.step(None, strokes.DT)
     return tissue
@@ -410,7 +424,9 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
     """Cut a block in two at a slant, so that one lip slides down the other on to the floor."""
     mesh = block((4, 2, 2), (0.04, 0.02, 0.02))
     fixed = mesh.positions[:, 0] == 0.0
-    tissue = Tissue(mesh, replace(SPRINGS, toughness=0.5), fixed=fixed, floor=-0.01)
+    tissue = Tissue(
+        mesh, replace(SPRINGS, toughness=0.5), fixed=fixed, floor=-0.01, solver=IMPULSES
+    )
     strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
     results = [tissue.step(None, strokes.DT) for _ in range(n_steps)]
     assert tissue.n_pieces() == 2
@@ -433,4 +449,4 @@ def test_a_floor_that_is_not_finite_or_inside_the_body_is_refused(floor):
     mesh = block((1, 1, 1), (0.01,) * 3)
     lifted = mesh._replace(positions=mesh.positions + np.array([0.0, 0.0, 0.01]))
     with pytest.raises(ValueError, match="floor"):
-        Tissue(lifted, floor=floor)
+        Tissue(lifted, floor=floor, solver=IMPULSES)

@@ -233,23 +233,35 @@ def checked_time_step(dt: float) -> None:
         raise ValueError(f"dt is {dt} s; it must be finite and not negative")
 
 
-def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOptions:
-    """Return the settings of the integrator that was chosen, for a body of that material.
+def checked_contact(name: str | None, options: IntegratorOptions) -> str:
+    """Return the contact that was chosen, or the one that goes with an integrator.
 
     Raises:
-        ValueError: there is no such scheme, integrator, contact or number of threads, or the
-            integrator does not go with the material, the contact or an account of the energy.
+        ValueError: there is no such contact, or it does not go with the integrator.
     """
-    checked_scheme(solver.scheme)
-    checked_threads(solver.threads)
-    options = checked_relaxation(solver.relaxation, material)
-    if solver.contact not in _CONTACTS:
-        raise ValueError(f"no contact is called {solver.contact!r}. Known: {', '.join(_CONTACTS)}")
-    if solver.contact == "penalty" and not isinstance(options, Global | Verlet):
+    moves_all = isinstance(options, Global | Verlet)
+    if name is None:
+        return "penalty" if moves_all else "impulses"
+    if name not in _CONTACTS:
+        raise ValueError(f"no contact is called {name!r}. Known: {', '.join(_CONTACTS)}")
+    if name == "penalty" and not moves_all:
         raise ValueError(
             "contact='penalty' needs relaxation='global' or 'verlet': the others correct the "
             "motion after each substep. Omit one of the two"
         )
+    return name
+
+
+def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOptions:
+    """Return the settings of the integrator that was chosen, for a body of that material.
+
+    Raises:
+        ValueError: there is no such scheme, integrator or number of threads, or the integrator does
+            not go with the material or an account of the energy.
+    """
+    checked_scheme(solver.scheme)
+    checked_threads(solver.threads)
+    options = checked_relaxation(solver.relaxation, material)
     if solver.audit and not isinstance(options, Global | Verlet):
         raise ValueError(
             "an audit needs relaxation='global' or 'verlet': in the others nodes are at different "

@@ -20,6 +20,7 @@ from tissue.cutting.snapping import EXPLAINED
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.energy_audit import Audit
 from tissue.input_checks import (
+    checked_contact,
     checked_edge,
     checked_edges,
     checked_fixed,
@@ -116,7 +117,8 @@ class Tissue(DrivenBody):
             body = with_room_to_hang(body)
         method = method_of(options, self.material.law)
         single = solver.precision == "single"
-        how = Numerics(solver.contact, solver.mass_scaling, method.damps_between_steps, single)
+        contact = checked_contact(solver.contact, options)
+        how = Numerics(contact, solver.mass_scaling, method.damps_between_steps, single)
         self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)

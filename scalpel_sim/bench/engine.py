@@ -6,8 +6,8 @@ import numpy as np
 
 from scalpel_sim.bench.blocks import held_nodes, jittered_block
 from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
-from tissue.contact.resolve import note_all_positions, resolve
-from tissue.contact.state import REBUILD
+from tissue.contact.penalty.contact_forces import add_contact_forces, end_contact_substep
+from tissue.contact.penalty.penalty_contact import PenaltyContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes
 from tissue.elasticity.energy_density import neo_hookean
@@ -126,7 +126,7 @@ class EngineLoops:
 
 
 class TouchingBlocks:
-    """Two blocks, one of which lies on the other, and their contact detection and resolution."""
+    """Two blocks, one of which lies on the other: search for contacts, and their forces."""
 
     N_SETTLING = 100
     """Frames in which the upper block comes to rest."""
@@ -146,25 +146,41 @@ class TouchingBlocks:
             self._tissue.step(None, FRAME_DT)
 
     @property
+    def _contact(self) -> PenaltyContact:
+        contact = self._tissue._system.contact
+        assert isinstance(contact, PenaltyContact)
+        return contact
+
+    @property
     def n_contacts(self) -> int:
         """Number of contacts that press."""
-        return int(self._tissue._system.hard_contact.arrays.n_pressing)
+        return int(self._contact.forces.n_pressing)
+
+    def searches_anew(self, n: int) -> None:
+        """Find all pairs that may touch anew, as after all nodes have moved far, and contacts.
+
+        The searches of `searches` are part of it.
+        """
+        search = self._contact._search
+        for _ in range(n):
+            search.pairs.n_updates += 1  # all nodes count as new
+            search.is_pairing_due = 1
+            self.searches(1)
 
     def searches(self, n: int) -> None:
-        """Search all candidate pairs again, as after faces have moved by the margin, and resolve.
-
-        The steps of `checks` are part of it.
-        """
+        """Find the contacts, as in every time step."""
+        system = self._tissue._system
         for _ in range(n):
-            self._tissue._system.hard_contact.arrays.stale = REBUILD
-            self.checks(1)
+            system.contact.begin()
+            system.find_contacts(FRAME_DT)
 
-    def checks(self, n: int) -> None:
-        """Test the candidate pairs and resolve contacts, as in every Runge-Kutta step."""
-        contact, body = self._tissue._system.hard_contact.arrays, self._tissue._body
+    def forces(self, n: int) -> None:
+        """Evaluate the forces of the contacts, and let them slide, as in every Verlet step."""
+        system, body, contacts = self._tissue._system, self._tissue._body, self._contact.forces
+        x, v, external = body.positions, body.velocities, system.stages.external
         for _ in range(n):
-            note_all_positions(contact, body)
-            resolve(contact, body, FRAME_DT)
+            add_contact_forces(contacts, x, v, FRAME_DT, external)
+            end_contact_substep(contacts, x, v, external)
 
 
 @kernel

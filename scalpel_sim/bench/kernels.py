@@ -46,8 +46,9 @@ def measure_kernels(
     touching_size = min(TOUCHING_SIZE, sizes[-1])
     touching = TouchingBlocks(touching_size)
     for name, run in (
+        ("contact: search anew", touching.searches_anew),
         ("contact: search", touching.searches),
-        ("contact: check of a step", touching.checks),
+        ("contact: forces of a step", touching.forces),
     ):
         cases.append(Case(name, run))
         quantities.append(Quantity("kernels", name, 2 * touching_size, "time", "µs", CPU.name))

@@ -134,8 +134,9 @@ class SolverOptions:
     """Precision of the forces of tetrahedra: single [default], or double, which takes a third
     longer. Positions and velocities are double."""
     contact: str | None = None
-    """How the body is kept from passing through itself: impulses, which correct its motion in each
-    substep [default]; or penalty, springs found once a frame: for bodies of many cuts."""
+    """How the body is kept from passing through itself: penalty, springs, found once a frame
+    [default, with the relaxation global or verlet]; or impulses, which correct its motion in each
+    substep."""
     threads: int | None = None
     """Threads that share the loops over the body, to the same bits, with the relaxation global or
     verlet; give it no more than there are idle cores [default: 1]."""

@@ -46,8 +46,6 @@ class Elasticity:
         mass_scaling: Angular frequency [1/s] above which nodes get mass where tetrahedra carry the
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
             cut makes faster gets mass.
-        least_mass: With mass scaling, the mass that every node has at least, as a share of the mean
-            at first; or that of the lightest node of the uncut body, if that is less.
         is_single: Whether forces of tetrahedra are computed in single precision.
     """
 
@@ -58,7 +56,6 @@ class Elasticity:
         visits: Visits,
         *,
         mass_scaling: float | None = None,
-        least_mass: float = 0.0,
         is_single: bool = False,
     ) -> None:
         self._material = material
@@ -85,7 +82,6 @@ class Elasticity:
         self._ahead = room_for_points(n_nodes)
         self._solid_frequency_squared = 0.0
         self._allowed = math.inf
-        self._least_mass = 0.0
         self._added_mass = self._mass = 0.0
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
@@ -96,9 +92,7 @@ class Elasticity:
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law != "springs":
             self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
-            masses = body.masses[:n_nodes]
-            self._mass = float(masses.sum())
-            self._least_mass = min(least_mass * self._mass / n_nodes, float(masses.min()))
+            self._mass = float(body.masses[:n_nodes].sum())
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
@@ -186,9 +180,7 @@ class Elasticity:
             n = tighten(solid, body, visits, n, self._solid_frequency_squared)
             nodes = solid.listed[:n]
             if self._allowed < math.inf:
-                limits = (self._allowed, self._least_mass)
-                added = scale_masses(body, springs, solid, nodes, n, *limits)
-                self._added_mass += added
+                self._added_mass += scale_masses(body, springs, solid, nodes, n, self._allowed)
                 nodes = self._limit_added_mass(body, nodes)
                 n = len(nodes)
             forget_tests(solid, nodes, n)
@@ -209,10 +201,8 @@ class Elasticity:
         springs, solid, n = self.arrays.springs, self.arrays.solid, body.n_nodes
         while self._added_mass > LARGEST_ADDED_MASS * self._mass:
             self._allowed *= LIMIT_STEP**2
-            self._least_mass /= LIMIT_STEP**2
-            limits = (self._allowed, self._least_mass)
-            added = scale_masses(body, springs, solid, solid.every, n, *limits)
-            self._added_mass += added
+            more = scale_masses(body, springs, solid, solid.every, n, self._allowed)
+            self._added_mass += more
         return solid.every[:n]
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:

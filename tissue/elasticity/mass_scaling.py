@@ -19,16 +19,8 @@ LARGEST_ADDED_MASS = 0.02
 where a mesh is coarse a cut passes through most of its elements, and what it leaves of them is no
 sliver. At 0.02 the lowest frequencies of the body are at most 1 % lower."""
 
-LEAST_MASS = 0.03
-"""Share of the mean mass of a node that every node has at least where contact acts as forces. A
-corner of a sliver with a thousandth of the mass leaves the blade at several metres a second, and
-contact can press nothing aside with it. Larger: more mass is added than the frequencies ask for; 0:
-slivers fly, and sink in. Where contact corrects the motion it is 0: the momentum of added mass is
-in no report, and beside a blade in a soft block it was a tenth of the force on the blade."""
-
 LIMIT_STEP = 1.1
-"""Factor by which the limit of frequencies is raised at once. The least mass is lowered by its
-square."""
+"""Factor by which the limit of frequencies is raised at once."""
 
 
 @kernel
@@ -39,11 +31,10 @@ def scale_masses(
     nodes: IntArray,
     n: int,
     allowed: float,
-    least: float,
 ) -> float:
     """Give the first `n` of `nodes` the mass with which their bound on w^2 is at most `allowed`.
 
-    Nodes get no more than that, or than the least mass, and none if their own mass suffices.
+    Nodes get no more than that, and none if their own mass suffices.
 
     Args:
         body: Masses are written.
@@ -52,7 +43,6 @@ def scale_masses(
         nodes: The nodes.
         n: How many of them.
         allowed: Bound on w^2 [1/s2].
-        least: Mass that every node has at least [kg].
 
     Returns:
         By how much the added mass has changed [kg].
@@ -65,7 +55,7 @@ def scale_masses(
         before = body.masses[node]
         own = before - body.added_masses[node]
         stiffness = solid.frequency_squared[node] * before  # [N/m]
-        after = max(own, max(stiffness / allowed, least))
+        after = max(own, stiffness / allowed)
         if after == before:
             continue
         change += after - before

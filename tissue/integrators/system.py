@@ -14,7 +14,7 @@ from tissue.core.thread_team import new_team
 from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.elasticity.mass_scaling import LEAST_MASS, added_mass_share
+from tissue.elasticity.mass_scaling import added_mass_share
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import StableStep
@@ -217,7 +217,6 @@ def assembled(
         body,
         visits,
         mass_scaling=numerics.mass_scaling,
-        least_mass=LEAST_MASS if numerics.contact == "penalty" else 0.0,
         is_single=numerics.is_single,
     )
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))

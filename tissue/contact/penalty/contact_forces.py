@@ -7,7 +7,8 @@ and the floor. With the weights w of its nodes, its gap is g = n . sum(w_i x_i),
     f = k max(d - tau n . v, 0)                         pressure, where d > 0; v = sum(w_i v_i)
     t = k (s + tau v_t), no longer than mu k d          friction, against the stretch s and sliding
 
-The weights of two sides add up to zero, so what one side gets the other gives. Friction is a spring
+The weights of two sides add up to zero, so what one side gets the other gives; the force acts with
+weights that put it and its reaction on one line (`line_of_action`). Friction is a spring
 that begins at an anchor; where it pulls with more than Coulomb's limit, the anchor follows at the
 end of the substep, so that within a substep forces depend on positions and velocities alone.
 
@@ -17,10 +18,12 @@ springs with friction.
 
 import numpy as np
 
+from tissue.contact.penalty.line_of_action import weights_on_line
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
+from tissue.geometry.tetrahedron import Weights
 
 HANDED_ON = -1.0
 """Value of `PenaltyForces.push` where another contact of the next list has taken over the force."""
@@ -69,10 +72,14 @@ class PenaltyForces(Arrays):
     anchor: FloatArray
     """Where the spring of friction is slack: sum(w_i x_i) without its part along the normal [m],
     shape (2 * capacity, 3)."""
+    spread: FloatArray
+    """Weights that the force of each contact last acted with: those that put it and its reaction on
+    one line (`line_of_action`); shape (2 * capacity, 4)."""
     impulse: FloatArray
     """Impulse of each contact since the last substep ended [N s], shape (2 * capacity, 3)."""
     velocity: FloatArray
-    """sum(w_i v_i) as a contact began to push in this substep [m/s], shape (2 * capacity, 3)."""
+    """sum(w_i v_i) as a contact began to push in this substep [m/s], with the weights `spread`;
+    shape (2 * capacity, 3)."""
     friction: float
     """Coefficient of friction."""
     retardation_time: float
@@ -94,6 +101,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         floor_impulse=np.zeros(3),
         node=np.zeros((rows, 4), np.int64),
         weight=np.zeros((rows, 4)),
+        spread=np.zeros((rows, 4)),
         normal=np.zeros((rows, 3)),
         **{name: np.zeros(rows) for name in of_floats},
         **{name: np.zeros((rows, 3)) for name in ("anchor", "impulse", "velocity")},
@@ -126,9 +134,15 @@ def clear_contact_totals(forces: PenaltyForces) -> None:
 @kernel
 def weighted_sum(forces: PenaltyForces, c: int, values: FloatArray) -> Vec3:
     """Return the weighted sum of nodal values at contact `c`: one side less the other."""
-    total = scale(forces.weight[c, 0], vec3(values, forces.node[c, 0]))
+    return _sum_with(forces.weight, forces.node, c, values)
+
+
+@kernel
+def _sum_with(weight: FloatArray, node: IntArray, c: int, values: FloatArray) -> Vec3:
+    """Return the sum of nodal values at contact `c` with these weights."""
+    total = scale(weight[c, 0], vec3(values, node[c, 0]))
     for q in range(1, 4):
-        total = axpy(forces.weight[c, q], vec3(values, forces.node[c, q]), total)
+        total = axpy(weight[c, q], vec3(values, node[c, q]), total)
     return total
 
 
@@ -183,14 +197,12 @@ def add_contact_forces(
         size, limit = k * norm(pull), forces.friction * k * depth
         share = limit / size if size > limit else 1.0
         total = axpy(force, normal, scale(-share * k, pull))
-        for q in range(4):
-            node, weight = forces.node[c, q], forces.weight[c, q]
-            external[node, 0] += weight * total.x
-            external[node, 1] += weight * total.y
-            external[node, 2] += weight * total.z
+        if not dot(total, total) > 0.0:
+            continue
+        _spread_force(forces, c, positions, total, external)
         before = vec3(forces.impulse, c)
         if not dot(before, before) > 0.0:
-            store(forces.velocity, c, velocity)
+            store(forces.velocity, c, _sum_with(forces.spread, forces.node, c, velocities))
         store(forces.impulse, c, axpy(seconds, total, before))
         if is_floor_contact(forces, c):
             forces.floor_impulse[0] += seconds * total.x
@@ -199,6 +211,32 @@ def add_contact_forces(
         else:
             pressure += force
     forces.pressure_impulse += seconds * pressure
+
+
+@kernel
+def _spread_force(
+    forces: PenaltyForces, c: int, positions: FloatArray, force: Vec3, external: FloatArray
+) -> None:
+    """Add the force of contact `c` to those on its nodes, so that it turns nothing.
+
+    Args:
+        forces: `spread` is written.
+        c: The contact.
+        positions: Positions of the nodes [m].
+        force: The force on the side of the positive weights [N].
+        external: Forces on the nodes [N]; written.
+    """
+    if is_floor_contact(forces, c):
+        w = Weights(1.0, 0.0, 0.0, 0.0)
+    else:
+        w = weights_on_line(forces.node, forces.weight, c, positions, force)
+    spread = forces.spread
+    spread[c, 0], spread[c, 1], spread[c, 2], spread[c, 3] = w.a, w.b, w.c, w.d
+    for q in range(4):
+        node, weight = forces.node[c, q], spread[c, q]
+        external[node, 0] += weight * force.x
+        external[node, 1] += weight * force.y
+        external[node, 2] += weight * force.z
 
 
 @kernel
@@ -251,7 +289,8 @@ def _work_since(forces: PenaltyForces, velocities: FloatArray) -> float:
     for c in range(forces.first, forces.first + forces.n_contacts):
         impulse = vec3(forces.impulse, c)
         if dot(impulse, impulse) > 0.0:
-            both = add(vec3(forces.velocity, c), weighted_sum(forces, c, velocities))
+            after = _sum_with(forces.spread, forces.node, c, velocities)
+            both = add(vec3(forces.velocity, c), after)
             work += 0.5 * dot(impulse, both)
             store(forces.impulse, c, Vec3(0.0, 0.0, 0.0))
     return work
