@@ -25,7 +25,7 @@ from tissue.elasticity.mass_scaling import (
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.stiffening import stiffens
-from tissue.elasticity.strained_frequency import forget_tests, strained_frequency
+from tissue.elasticity.strained_frequency import StepLimit, forget_tests, strained_frequency
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
@@ -121,7 +121,7 @@ class Elasticity:
         """Whether stiffness depends on how far the body is strained."""
         return self._has_solid
 
-    def strained_frequency_squared(self, body: Body, visits: Visits, allowed: float) -> float:
+    def strained_frequency_squared(self, body: Body, visits: Visits, limit: StepLimit) -> float:
         """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
 
         It takes a tenth of the time of a Runge-Kutta step. To test only a part of the tetrahedra in
@@ -130,11 +130,11 @@ class Elasticity:
         Args:
             body: Positions of the nodes.
             visits: For searches.
-            allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
+            limit: It need not be nearer to the truth than the number of steps asks for.
         """
         if not self._has_solid:
             return 0.0
-        return strained_frequency(self.arrays, body, body.positions, visits, allowed)
+        return strained_frequency(self.arrays, body, body.positions, visits, limit)
 
     @property
     def stiffens(self) -> bool:
@@ -142,7 +142,7 @@ class Elasticity:
         return self._has_solid and stiffens(self.arrays.solid.law)
 
     def frequency_squared_ahead(
-        self, body: Body, visits: Visits, allowed: float, duration: float
+        self, body: Body, visits: Visits, limit: StepLimit, duration: float
     ) -> float:
         """Return a bound on w^2 of the tetrahedra as they will be deformed [1/s2].
 
@@ -152,7 +152,7 @@ class Elasticity:
         n, ahead = body.n_nodes, self._ahead
         np.multiply(body.velocities[:n], duration, out=ahead[:n])
         ahead[:n] += body.positions[:n]
-        return strained_frequency(self.arrays, body, ahead, visits, allowed)
+        return strained_frequency(self.arrays, body, ahead, visits, limit)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""

@@ -134,6 +134,8 @@ class Solid(Arrays, two_precisions=True):
     """Test in which `strained_frequency_squared` was written, shape (nodes,)."""
     test: IntCell
     """Number of the test of strained frequencies."""
+    fastest: IntCell
+    """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
     pressure: FloatArray
     """Scratch: lam (J - 1) of each node [Pa], tension is positive; shape (nodes,)."""
     forces: FloatArray
@@ -209,6 +211,7 @@ def no_solid(
         dilatation_test=np.zeros(n_nodes, dtype=np.int64),
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
+        fastest=-1,
         pressure=np.zeros(n_nodes, real),
         forces=aligned(4 * 4 * room, real).reshape(-1, 4),
     )
@@ -220,7 +223,7 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     prony = list(zip(solid.relaxing_shares, solid.relaxation_times, strict=True))
     room = (n_nodes, n_tetrahedra, pool)
     larger = no_solid(solid.law, *room, prony=prony, is_single=is_single)
-    cells = {"used", "test"}
+    cells = {"used", "test", "fastest"}
     for name in cells:
         setattr(larger, name, getattr(solid, name))
     for name in set(Solid.__annotations__) - cells - {"law", "every"}:

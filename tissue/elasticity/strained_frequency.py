@@ -11,7 +11,12 @@ its area adds little to what its nodes resist. Where it is too high to be of use
 is evaluated at the nodes of the tetrahedron with its neighbours as they are deformed: in an organ
 after a cut that concerns 20 of 5,900 tetrahedra. What was found is kept, and is not evaluated again
 before the tetrahedron has grown further, or a lower bound is asked for.
+
+Too high means that it takes one more step. Where a tetrahedron takes one, others may take it too.
 """
+
+import math
+from typing import NamedTuple
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
@@ -42,9 +47,20 @@ far below the limit a bound must be for that. Nearer to 1: what moves is tested 
 larger: more of it is found too fast."""
 
 
+class StepLimit(NamedTuple):
+    """Up to which frequencies a number of steps is stable."""
+
+    allowed: float
+    """Bound on w^2 of the tetrahedra [1/s2] up to which it is."""
+    added: float
+    """What blade and contact add to that bound [1/s2]."""
+    n_steps: int
+    """The number of steps; 0 where a bound above `allowed` is to be near the truth in any case."""
+
+
 @kernel
 def strained_frequency(
-    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, allowed: float
+    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, limit: StepLimit
 ) -> float:
     """Return a bound on w^2 of the tetrahedra as they are deformed [1/s2].
 
@@ -53,10 +69,10 @@ def strained_frequency(
         body: Rest positions and masses.
         points: Where the nodes are [m].
         visits: For searches.
-        allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
+        limit: It need not be nearer to the truth than the number of steps asks for.
     """
     solid = elastic.solid
-    width, highest = width_of(solid.shape), 0.0
+    width, highest, allowed, fastest = width_of(solid.shape), 0.0, limit.allowed, -1
     solid.test += 1
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
     displacements(solid, body, points, solid.every, 0, body.n_nodes)
@@ -64,6 +80,9 @@ def strained_frequency(
         # Before any bound is evaluated at a node: that takes all tetrahedra around it.
         for block in range(blocks):
             _write_stiffness(solid, block, *gradient_of_displacement(solid, block))
+    if 0 <= solid.fastest < body.n_tetrahedra:
+        highest = _bound_at_nodes(elastic, body, points, visits, solid.fastest)
+        fastest, allowed = solid.fastest, _allowed_for(limit, highest)
     for block in range(blocks):
         growth = _growth(solid, block, *gradient_of_displacement(solid, block))
         at_rest = _highest_at_rest(elastic.frequency_squared, solid, block, growth)
@@ -86,8 +105,21 @@ def strained_frequency(
                 highest = max(highest, float(solid.growth[lane]))
             else:
                 t = width * block + lane
-                highest = max(highest, _tested_bound(elastic, body, points, visits, t))
+                found = _tested_bound(elastic, body, points, visits, t)
+                if found > highest:
+                    highest, fastest, allowed = found, t, _allowed_for(limit, found)
+    solid.fastest = fastest if highest > limit.allowed else -1
     return highest
+
+
+@kernel
+def _allowed_for(limit: StepLimit, found: float) -> float:
+    """Return up to which w^2 [1/s2] no more steps are taken than for the one that was found."""
+    if found <= limit.allowed or limit.n_steps == 0:
+        return limit.allowed
+    for_one = (limit.allowed + limit.added) / limit.n_steps**2
+    n = math.ceil(math.sqrt((found + limit.added) / for_one))
+    return max(for_one * n * n - limit.added, found)
 
 
 @inlined
@@ -117,6 +149,20 @@ def _highest_at_rest(values: FloatArray, solid: Solid, block: int, a: Lanes) -> 
 def _tested_bound(
     elastic: Elastic, body: Body, points: FloatArray, visits: Visits, t: int
 ) -> float:
+    """Return the bound at the nodes of a tetrahedron as they are deformed [1/s2], and keep it."""
+    solid = elastic.solid
+    highest = _bound_at_nodes(elastic, body, points, visits, t)
+    place = width_of(solid.shape) + t
+    solid.tested_growth[place] = solid.growth[place]
+    solid.tested_stiffness[place] = solid.stiffness[place]
+    solid.tested_bound[place] = highest
+    return highest
+
+
+@kernel
+def _bound_at_nodes(
+    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, t: int
+) -> float:
     """Return the bound on w^2 at the nodes of a tetrahedron as they are deformed [1/s2]."""
     solid = elastic.solid
     highest = 0.0
@@ -124,10 +170,6 @@ def _tested_bound(
         node = solid.nodes[node_place(solid, t, k)]
         if not body.fixed[node]:
             highest = max(highest, _strained_bound(elastic, body, points, visits, node))
-    place = width_of(solid.shape) + t
-    solid.tested_growth[place] = solid.growth[place]
-    solid.tested_stiffness[place] = solid.stiffness[place]
-    solid.tested_bound[place] = highest
     return highest
 
 

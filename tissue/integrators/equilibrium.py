@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from tissue.blade.edge import Edge
+from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.step_context import Increment
@@ -45,7 +46,8 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
     system.supports.is_moving = 0
     for done in range(0, LONGEST_SETTLING, STEPS_BETWEEN_PEAKS):
         at_rest = elasticity.frequency_squared
-        strained = elasticity.strained_frequency_squared(body, system.visits, at_rest)
+        limit = StepLimit(at_rest, 0.0, 0)
+        strained = elasticity.strained_frequency_squared(body, system.visits, limit)
         highest = max(at_rest, strained) + system.contact.added_frequency_squared
         step = stepper.method.stable_step(elasticity, highest, system.surroundings)
         dt = STEPS_BETWEEN_PEAKS * step

@@ -9,6 +9,7 @@ import numpy as np
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
+from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
@@ -106,8 +107,9 @@ class GlobalStepper:
         longest = self.method.stable_step(elasticity, least, system.surroundings)
         done = 0
         while True:
-            allowed = _without_another_step(least, longest, increment.span) - added
-            step = self._stable_step(system, least, added, allowed)
+            n, highest = _without_another_step(least, longest, increment.span)
+            limit = StepLimit(highest - added, added, n)
+            step = self._stable_step(system, least, limit)
             moved = largest_speed(system.body) * increment.span / system.node_size
             n = _number_of_steps(
                 max(increment.span / step, moved / LONGEST_MOTION),
@@ -135,7 +137,7 @@ class GlobalStepper:
         blade, scratch = system.interaction.state, system.stages.external
         return frequency_with_blade(blade, system.body, self._nothing, scratch)
 
-    def _stable_step(self, system: System, least: float, added: float, allowed: float) -> float:
+    def _stable_step(self, system: System, least: float, limit: StepLimit) -> float:
         """Return the largest stable step [s] until the next bound on the strained body.
 
         Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes
@@ -144,18 +146,17 @@ class GlobalStepper:
         Args:
             system: Body and forces.
             least: Bound on w^2 with the body at rest [1/s2].
-            added: What blade and contact add to that of the strained body [1/s2].
-            allowed: Bound on w^2 [1/s2] below which it need not be near the truth.
+            limit: The strained body is looked at no closer than the number of steps asks for.
         """
         elasticity, surroundings = system.elasticity, system.surroundings
         body, visits = system.body, system.visits
-        strained = elasticity.strained_frequency_squared(body, visits, allowed)
-        step = self.method.stable_step(elasticity, max(least, strained + added), surroundings)
+        strained = elasticity.strained_frequency_squared(body, visits, limit)
+        step = self.method.stable_step(elasticity, max(least, strained + limit.added), surroundings)
         if not elasticity.stiffens or math.isinf(step):  # infinite: every node is held
             return step
         duration = STEPS_BETWEEN_STRAIN_BOUNDS * step
-        ahead = elasticity.frequency_squared_ahead(body, visits, allowed, duration)
-        highest = max(least, max(strained, ahead) + added)
+        ahead = elasticity.frequency_squared_ahead(body, visits, limit, duration)
+        highest = max(least, max(strained, ahead) + limit.added)
         return self.method.stable_step(elasticity, highest, surroundings)
 
     def take_steps(self, system: System, increment: Increment, n: int) -> None:
@@ -201,8 +202,10 @@ def _number_of_steps(least: float, at_rest: float) -> int:
     return max(1, math.ceil(least))
 
 
-def _without_another_step(frequency_squared: float, longest: float, span: float) -> float:
-    """Return up to which w^2 [1/s2] no more steps are needed than for `frequency_squared`.
+def _without_another_step(
+    frequency_squared: float, longest: float, span: float
+) -> tuple[int, float]:
+    """Return how many steps a frequency takes, and up to which w^2 [1/s2] it is no more.
 
     Args:
         frequency_squared: A bound on w^2 [1/s2].
@@ -210,6 +213,6 @@ def _without_another_step(frequency_squared: float, longest: float, span: float)
         span: Time to advance by [s].
     """
     if math.isinf(longest):
-        return math.inf
+        return 1, math.inf
     n = max(1, math.ceil(span / longest))
-    return (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2
+    return n, (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2

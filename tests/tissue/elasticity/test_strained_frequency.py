@@ -10,6 +10,7 @@ from tissue.core.jit import is_compiling
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.springs import no_springs
 from tissue.elasticity.strained_frequency import (
+    StepLimit,
     forget_tests,
     strained_frequency,
 )
@@ -41,6 +42,11 @@ def elastic_of(solid):
     )
 
 
+def above(allowed):
+    """Ask for bounds near the truth wherever they are above `allowed` [1/s2]."""
+    return StepLimit(allowed, 0.0, 0)
+
+
 def bound(solid, positions, allowed=np.inf):
     """Return the bound on w [1/s] that sets the step: at rest or strained, whichever is higher.
 
@@ -50,7 +56,7 @@ def bound(solid, positions, allowed=np.inf):
     body.positions[: len(positions)] = positions
     forget_tests(solid.solid, solid.solid.every, body.n_nodes)
     visits = no_visits(len(body.rest), len(body.tetrahedra))
-    strained = strained_frequency(elastic_of(solid), body, body.positions, visits, allowed)
+    strained = strained_frequency(elastic_of(solid), body, body.positions, visits, above(allowed))
     return max(solid.frequency(), float(np.sqrt(strained)))
 
 
@@ -125,7 +131,7 @@ def test_what_was_found_slow_enough_is_found_again_when_it_is_strained_further()
     found = []
     for factor in (1.0, 1.0, 2.0):
         body.positions[: len(stretched)] = stretched * factor
-        found.append(strained_frequency(elastic, body, body.positions, visits, allowed))
+        found.append(strained_frequency(elastic, body, body.positions, visits, above(allowed)))
     assert found[1] <= found[0] <= allowed
     assert found[2] > allowed
 
@@ -143,8 +149,29 @@ def test_a_bound_holds_whatever_was_allowed_before(stretch, law):
     highest = highest_frequency(solid, x) ** 2
     for share in (4.0, 1.5, 1.0, 0.5):
         allowed = share * highest
-        found = strained_frequency(elastic, body, body.positions, visits, allowed)
+        found = strained_frequency(elastic, body, body.positions, visits, above(allowed))
         assert max(found, solid.frequency() ** 2) > highest
+
+
+@pytest.mark.parametrize("law", ["averaged", "exponential"])
+@pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
+def test_the_number_of_steps_is_that_of_the_bound_near_the_truth(stretch, law):
+    """Once more steps are needed, bounds that need no more than those stay wide."""
+    solid = solid_of(MESH, LAWS[law])
+    body, elastic = solid.body, elastic_of(solid)
+    visits = no_visits(len(body.rest), len(body.tetrahedra))
+    random = np.random.default_rng(1)
+    allowed, added = 1.1 * solid.frequency() ** 2, 0.3 * solid.frequency() ** 2
+    limit = StepLimit(allowed, added, 2)
+    per_step = np.sqrt(allowed + added) / limit.n_steps
+    for _ in range(5):
+        shake = 0.05 * np.ptp(MESH.positions) * random.normal(size=MESH.positions.shape)
+        body.positions[: len(shake)] = MESH.positions @ stretch.T + shake
+        steps = []
+        for asked in (limit, above(allowed)):
+            strained = strained_frequency(elastic, body, body.positions, visits, asked)
+            steps.append(np.ceil(np.sqrt(max(strained, allowed) + added) / per_step - 1e-9))
+        assert steps[0] == steps[1] >= limit.n_steps
 
 
 def test_the_bound_of_a_sheet_stretched_to_twice_its_edges_is_four_times_as_high():
