@@ -50,7 +50,7 @@ _ABOUT = (
 )
 
 
-class StepLimit(NamedTuple):
+class RooflineBound(NamedTuple):
     """The least time that a step could take."""
 
     bytes_seconds: float
@@ -66,9 +66,9 @@ class StepLimit(NamedTuple):
         return max(self.bytes_seconds, self.flops_seconds)
 
 
-def step_limit(
+def roofline_bound(
     traffic: StepTraffic, bandwidth: dict[str, float], flops_per_second: float, sizes: CacheSizes
-) -> StepLimit:
+) -> RooflineBound:
     """Return the limit of a step.
 
     Args:
@@ -78,7 +78,9 @@ def step_limit(
         sizes: Sizes of the caches.
     """
     level = memory_level(traffic.working_set, sizes)
-    return StepLimit(traffic.n_bytes / bandwidth[level], traffic.n_flops / flops_per_second, level)
+    return RooflineBound(
+        traffic.n_bytes / bandwidth[level], traffic.n_flops / flops_per_second, level
+    )
 
 
 def measure_roofline(
@@ -106,7 +108,7 @@ def measure_roofline(
     for (size, body), rounds in zip(bodies.items(), of_steps, strict=True):
         traffic = step_traffic(body.springs_per_node, is_damped=True)
         limits = [
-            step_limit(
+            roofline_bound(
                 traffic,
                 _bandwidths(triads, of_triads, r),
                 FLOPS_PER_CALL / _median(of_arithmetic[r]),
@@ -127,7 +129,7 @@ def _bandwidths(
 
 
 def _step_measurements(
-    size: int, traffic: StepTraffic, rounds: Sequence[FloatArray], limits: Sequence[StepLimit]
+    size: int, traffic: StepTraffic, rounds: Sequence[FloatArray], limits: Sequence[RooflineBound]
 ) -> list[Measurement]:
     """Return the measurements of a step in one body."""
     n = traffic.n_springs

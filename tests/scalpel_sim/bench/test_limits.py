@@ -12,7 +12,7 @@ from scalpel_sim.bench.limits import (
 )
 from scalpel_sim.bench.machine import CacheSizes, cache_sizes, describe_machine, memory_bytes
 from scalpel_sim.bench.memory import SHARE_OF_MEMORY, sizes_that_fit
-from scalpel_sim.bench.roofline import step_limit
+from scalpel_sim.bench.roofline import roofline_bound
 from scalpel_sim.bench.timing import CPU, time_turn
 from scalpel_sim.bench.traffic import StepTraffic, step_traffic
 
@@ -27,10 +27,10 @@ def test_the_level_is_the_smallest_cache_that_holds_the_body():
 
 def test_a_step_waits_for_bytes_or_for_operations_whichever_takes_longer():
     heavy = StepTraffic(n_springs=1, n_slots=2, n_bytes=5_000, n_flops=1_000, working_set=2_000_000)
-    by_bytes = step_limit(heavy, BANDWIDTH, 100e9, SIZES)
+    by_bytes = roofline_bound(heavy, BANDWIDTH, 100e9, SIZES)
     assert by_bytes.level == "L3"
     assert by_bytes.seconds == pytest.approx(100e-9)
-    by_flops = step_limit(
+    by_flops = roofline_bound(
         heavy._replace(working_set=20_000, n_flops=10_000), BANDWIDTH, 100e9, SIZES
     )
     assert by_flops.level == "L1"
