@@ -24,7 +24,7 @@ from numba.core.typed_passes import (
     NopythonTypeInference,
     PreLowerStripPhis,
 )
-from numba.core.types import Function, unliteral
+from numba.core.types import unliteral
 from numba.core.untyped_passes import (
     DeadBranchPrune,
     FixupArgs,
@@ -35,6 +35,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from tissue.core.compile_shortcuts import shortcuts
 from tissue.core.kernel_cache import KernelCache
 
 
@@ -189,39 +190,13 @@ _PASSES = (
 loops over tuples of several types, expressions of whole arrays."""
 
 
-class _Typing:
-    """Numba's typing, which remembers the types of operators and of Numba's own functions.
-
-    For each `a + b` Numba tries some eighty implementations one after the other, a quarter of the
-    time that it takes to compile the engine.
-
-    Args:
-        context: Numba's typing context.
-    """
-
-    def __init__(self, context: Any) -> None:
-        self._context = context
-
-    def __getattr__(self, name: str) -> Any:
-        """Return what is not remembered."""
-        return getattr(self._context, name)
-
-    def resolve_function_type(self, function: Any, args: Any, keywords: Any) -> Any:
-        """Return the signature of a call with arguments of these types."""
-        if keywords or type(function) is not Function:
-            return self._context.resolve_function_type(function, args, keywords)
-        call = function, tuple(args)
-        if call not in _SIGNATURES:
-            _SIGNATURES[call] = self._context.resolve_function_type(function, args, keywords)
-        return _SIGNATURES[call]
-
-
-_SIGNATURES: dict[tuple[Any, tuple[Any, ...]], Any] = {}
-"""Signatures that `_Typing` remembers, by function and types of the arguments."""
-
-
 class _PartCompiler(compiler.CompilerBase):
     """Numba's compiler, ending in a `_Part`."""
+
+    def compile_extra(self, function: Callable[..., Any]) -> Any:
+        """Return the part of a kernel."""
+        with shortcuts():
+            return super().compile_extra(function)
 
     def define_pipelines(self) -> Any:
         """Return the passes.
@@ -235,7 +210,6 @@ class _PartCompiler(compiler.CompilerBase):
             function.unique_id = function.firstlineno
             function.unique_name = f"{function.func_qualname}${function.firstlineno}"
         state.library = _Part(state.targetctx.codegen(), function.func_qualname, origin)
-        state.typingctx = _Typing(state.typingctx)
         passes = PassManager("part")
         for each in _PASSES:
             passes.add_pass(each, each.__name__)
@@ -252,23 +226,24 @@ class _ProgramCompiler(compiler.CompilerBase):
         part = _part_of(function, tuple(state.args))
         program = _Program(context.codegen(), part.library.name)
         program.add_linking_library(part.library)
-        with context.push_code_library(program):
-            context.create_cpython_wrapper(
-                program, part.fndesc, part.environment, None, release_gil=state.flags.release_gil
+        with shortcuts():
+            with context.push_code_library(program):
+                context.create_cpython_wrapper(
+                    program, part.fndesc, part.environment, None, state.flags.release_gil
+                )
+            return compiler.compile_result(
+                typing_context=state.typingctx,
+                target_context=context,
+                entry_point=context.get_executable(program, part.fndesc, part.environment),
+                signature=part.signature,
+                objectmode=False,
+                lifted=(),
+                fndesc=part.fndesc,
+                library=program,
+                environment=part.environment,
+                metadata={},
+                reload_init=part.reload_init,
             )
-        return compiler.compile_result(
-            typing_context=state.typingctx,
-            target_context=context,
-            entry_point=context.get_executable(program, part.fndesc, part.environment),
-            signature=part.signature,
-            objectmode=False,
-            lifted=(),
-            fndesc=part.fndesc,
-            library=program,
-            environment=part.environment,
-            metadata={},
-            reload_init=part.reload_init,
-        )
 
 
 _PARTS: dict[Callable[..., Any], Any] = {}

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba as nb
 import pytest
 
@@ -188,3 +189,15 @@ def test_a_kernel_has_the_same_flags_whoever_calls_it_first():
     assert _root(1.0) == 2.0
     assert "alwaysinline" not in code_of(_leaf, nb.float64)
     assert "alwaysinline" in code_of(_branch, nb.float64)
+
+
+@pytest.mark.skipif(not is_compiling(), reason="nothing is compiled")
+def test_compiling_a_kernel_leaves_numba_as_it_was():
+    before = nb.types.Function.get_call_type, list(llvm.ffi.lib._lock._cblist)
+
+    @kernel
+    def added(a, b):
+        return a + b
+
+    assert added(1, 2) == 3
+    assert before == (nb.types.Function.get_call_type, list(llvm.ffi.lib._lock._cblist))
