@@ -41,6 +41,7 @@ class Audit:
         system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
         clear_works(system.interaction.state.totals)
         system.supports.work = self.work_of_loads = 0.0
+        system.elasticity.arrays.scaling.lost = 0.0
         self._at_first = self._stored(system)
         contacts = system.contact.forces
         self._contacts_at_first = (contacts.work, contacts.stored)
@@ -82,7 +83,7 @@ class Audit:
             breaking=totals.work_of_breaking,
             friction=totals.work_of_friction,
             contact=system.contact_loss.dissipated + self._lost_in(contacts),
-            topology=self._topology,
+            topology=self._topology + system.elasticity.arrays.scaling.lost,
             released=totals.released,
         )
 

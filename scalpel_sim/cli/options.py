@@ -128,8 +128,9 @@ class SolverOptions:
     run]; verlet, the same by a method of second order, two to three times as fast [default of
     view]; or hierarchical, the paper's, for springs."""
     mass_scaling: float | None = None
-    """Nodes of slivers get mass until none is faster than this angular frequency [1/s; 0: off;
-    default: 6000]. The added mass has no weight, and the table tells how much it is."""
+    """Light nodes, of slivers or beside the blade, get mass until none is faster than this angular
+    frequency [1/s; 0: off; default: 5800]. The added mass has no weight, and the table tells how
+    much it is."""
     precision: str | None = None
     """Precision of the forces of tetrahedra: single [default], or double, which takes a third
     longer. Positions and velocities are double."""

@@ -18,6 +18,7 @@ from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.elasticity.energy_density import volume_term
 from tissue.elasticity.finite_elements import no_solid, room_for_stars
 from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import (
     SPRING_POOL_MARGIN,
     Springs,
@@ -101,15 +102,19 @@ def dense_modes(body: Body, springs: Springs) -> FloatArray:
     return weights[:, None] * stiffness.reshape(3 * n, 3 * n)[np.ix_(free, free)] * weights
 
 
-def elastic_of(springs: Springs) -> Elastic:
-    """Return the elastic arrays of a body with springs and no tetrahedra."""
-    solid = no_solid(volume_term(0.0), 0, 0, room_for_stars(0, 0))
+def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
+    """Return the elastic arrays of a body with springs and no tetrahedra.
+
+    `n_nodes`: nodes that there is room for beside the springs.
+    """
+    solid = no_solid(volume_term(0.0), n_nodes, 0, room_for_stars(n_nodes, 0))
     frequencies = np.zeros(len(springs.first))
     return Elastic(
         springs=springs,
         solid=solid,
         has_springs=1,
         has_tetrahedra=0,
+        scaling=no_mass_scaling(),
         frequency_squared=frequencies,
     )
 

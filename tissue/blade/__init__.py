@@ -18,6 +18,7 @@ In reading order:
 - `blunt_search`: which skin is in the way of the back and the ends.
 - `blunt_forces`: forces of the back and the ends on the nodes, sliding and piercing.
 - `forces`: what an integrator calls.
+- `blade_mass`: mass for light nodes on the edge.
 - `path_tracing`: the path of the edge through the material, from the anchors.
 - `prescribed_path`: the path of an edge that is given.
 - `wrench`: the wrench on the blade.

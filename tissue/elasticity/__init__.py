@@ -13,6 +13,8 @@ In the order in which they are best read:
     energy                  energies of the body, and the power of damping
     frequency_bound         a bound on the frequencies of tetrahedra at rest
     frequency_refinement    the same bound brought near the truth
+    mass_scaling            mass for the nodes of slivers
+    limited_frequency       mass for nodes that are made fast between cuts
     strained_frequency      a bound for tetrahedra as they are deformed now
     stiffness_matrix        the body at small strain as a matrix, for calibration and theory
     spring_calibration      springs that are as stiff as asked for on a given mesh

@@ -20,6 +20,7 @@ from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
     LIMIT_STEP,
+    no_mass_scaling,
     scale_masses,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
@@ -76,13 +77,12 @@ class Elasticity:
             ),
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
+            scaling=no_mass_scaling(),
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
         self._ahead = room_for_points(n_nodes)
         self._solid_frequency_squared = 0.0
-        self._allowed = math.inf
-        self._added_mass = self._mass = 0.0
         self.frequency_squared = 0.0
         """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
         self.damper_frequency_squared = 0.0
@@ -91,8 +91,9 @@ class Elasticity:
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law != "springs":
-            self._allowed = max(mass_scaling**2, self._solid_frequency_squared)
-            self._mass = float(body.masses[:n_nodes].sum())
+            scaling = self.arrays.scaling
+            scaling.allowed = max(mass_scaling**2, self._solid_frequency_squared)
+            scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
 
     def mesh_changed(
         self, body: Body, visits: Visits, change: Change, nodes: IntArray, n: int
@@ -170,7 +171,8 @@ class Elasticity:
         )
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
-        self._added_mass -= float(body.added_masses[nodes].sum())
+        scaling = self.arrays.scaling
+        scaling.added -= float(body.added_masses[nodes].sum())
         self._write_springs(body, visits, nodes)
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
@@ -179,8 +181,8 @@ class Elasticity:
             n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
             n = tighten(solid, body, visits, n, self._solid_frequency_squared)
             nodes = solid.listed[:n]
-            if self._allowed < math.inf:
-                self._added_mass += scale_masses(body, springs, solid, nodes, n, self._allowed)
+            if scaling.allowed < math.inf:
+                scaling.added += scale_masses(body, springs, solid, nodes, n, scaling.allowed)
                 nodes = self._limit_added_mass(body, nodes)
                 n = len(nodes)
             forget_tests(solid, nodes, n)
@@ -196,13 +198,13 @@ class Elasticity:
 
     def _limit_added_mass(self, body: Body, nodes: IntArray) -> IntArray:
         """Raise the limit of frequencies until the added mass is small; return the nodes scaled."""
-        if self._added_mass <= LARGEST_ADDED_MASS * self._mass:
+        springs, solid, scaling = self.arrays.springs, self.arrays.solid, self.arrays.scaling
+        if scaling.added <= scaling.most:
             return nodes
-        springs, solid, n = self.arrays.springs, self.arrays.solid, body.n_nodes
-        while self._added_mass > LARGEST_ADDED_MASS * self._mass:
-            self._allowed *= LIMIT_STEP**2
-            more = scale_masses(body, springs, solid, solid.every, n, self._allowed)
-            self._added_mass += more
+        n = body.n_nodes
+        while scaling.added > scaling.most:
+            scaling.allowed *= LIMIT_STEP**2
+            scaling.added += scale_masses(body, springs, solid, solid.every, n, scaling.allowed)
         return solid.every[:n]
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:

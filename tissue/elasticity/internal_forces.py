@@ -10,6 +10,7 @@ from tissue.core.simd import Point, point_of
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid, n_blocks
+from tissue.elasticity.mass_scaling import MassScaling
 from tissue.elasticity.neo_hookean import solid_force, solid_forces
 from tissue.elasticity.spring_forces import damping_force, elastic_and_damping_force, elastic_force
 from tissue.elasticity.springs import Springs, spring_energy
@@ -28,6 +29,8 @@ class Elastic(Arrays, two_precisions=True):
     """1 if springs along the edges pull, else 0."""
     has_tetrahedra: IntCell
     """1 if tetrahedra resist deformation, else 0."""
+    scaling: MassScaling
+    """Which nodes get mass where tetrahedra carry the shear."""
     frequency_squared: FloatArray
     """Bound on the square of the local angular frequency [1/s2], shape (nodes,)."""
 

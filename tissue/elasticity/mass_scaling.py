@@ -6,9 +6,12 @@ asked for (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite E
 added mass is moved and has no weight: equilibrium is the same.
 """
 
+import numpy as np
+
 from tissue.core.array_types import IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of, times
+from tissue.core.structs import Arrays, FloatCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.springs import Springs
@@ -21,6 +24,24 @@ sliver. At 0.02 the lowest frequencies of the body are at most 1 % lower."""
 
 LIMIT_STEP = 1.1
 """Factor by which the limit of frequencies is raised at once."""
+
+
+class MassScaling(Arrays):
+    """Up to which frequency nodes get mass, and what they got."""
+
+    allowed: FloatCell
+    """Bound on w^2 above which a node gets mass [1/s2]; infinite where none does."""
+    added: FloatCell
+    """Mass that all nodes have got [kg]."""
+    most: FloatCell
+    """The most that they may get [kg]."""
+    lost: FloatCell
+    """Kinetic energy that nodes lost where they got mass between two cuts [J]."""
+
+
+def no_mass_scaling() -> MassScaling:
+    """Return that no node gets mass."""
+    return MassScaling(allowed=np.inf, added=0.0, most=0.0, lost=0.0)
 
 
 @kernel

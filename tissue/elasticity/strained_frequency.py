@@ -27,6 +27,7 @@ from tissue.core.vec3 import Vec3, add, cross, dot
 from tissue.elasticity.finite_elements import Solid, n_blocks, node_place, tetrahedron_of_slot
 from tissue.elasticity.frequency_bound import bounds_of_node, dilatation_term
 from tissue.elasticity.internal_forces import Elastic
+from tissue.elasticity.limited_frequency import limited_frequency
 from tissue.elasticity.neo_hookean import (
     displacements,
     gradient_of_displacement,
@@ -195,6 +196,8 @@ def _strained_bound(
     bound = bounds_of_node(solid, body, points, dilatation, visits, node, True).whole
     if elastic.has_springs:
         bound += elastic.springs.frequency_squared[node]
+    if not stiffens(solid.law):
+        bound = limited_frequency(elastic, body, node, bound, elastic.scaling.allowed / FURTHER)
     solid.strained_frequency_squared[node] = bound
     solid.frequency_test[node] = solid.test
     return bound

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.blade.blade_mass import limit_frequency_at_blade
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
@@ -98,8 +99,9 @@ class GlobalStepper:
         """Advance the motion by an increment; return the steps taken."""
         system.find_contacts(increment.span)
         elasticity, blade = system.elasticity, system.interaction.state
-        by_node = elasticity.arrays.frequency_squared
-        near = frequency_with_blade(blade, system.body, by_node, system.stages.external)
+        near = limit_frequency_at_blade(
+            blade, elasticity.arrays, system.body, system.stages.external
+        )
         added = system.contact.added_frequency_squared
         least = max(elasticity.frequency_squared, near) + added
         if elasticity.stiffens:

@@ -332,7 +332,7 @@ def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
     summary = summary_of(recorded(10))
     print_summary(summary, console)
     assert summary.quality["added_mass"] == 1e-3
-    assert re.search("mass added to slivers.* 0.1 %", console.export_text())
+    assert re.search("mass added to light nodes.* 0.1 %", console.export_text())
 
 
 @pytest.mark.parametrize(("area", "expected"), [(1.25e-5, "12.5 mm² of the cut"), (0.0, None)])

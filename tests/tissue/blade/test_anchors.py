@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.tissue.kernels_of import line_blade, springs_of
+from tests.tissue.kernels_of import elastic_of, line_blade, springs_of
 from tissue import Material, block
 from tissue.blade.anchors import (
     ANCHORED,
@@ -18,6 +18,7 @@ from tissue.blade.anchors import (
     measure_speeds,
     new_anchors,
 )
+from tissue.blade.blade_mass import limit_frequency_at_blade
 from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.blade.edge_forces import apply_edge_forces
 from tissue.blade.engagement import (
@@ -32,6 +33,7 @@ from tissue.blade.return_mapping import locate, set_anchor, slip_anchors
 from tissue.blade.toughness import toughness_law_of
 from tissue.core.vec3 import Vec3, vec3
 from tissue.cutting.blade_path import new_path
+from tissue.elasticity.springs import no_springs
 from tissue.mesh.body import CUT, OUTER, build_body, walk
 from tissue.mesh.point_location import build_grid
 from tissue.mesh.star import no_visits
@@ -289,6 +291,20 @@ def test_anchors_raise_the_bound_on_frequency_by_their_stiffness(held):
     assert bound > 4.0 * STIFF * held.anchors.length[0] / held.body.masses.sum()
     held.anchors.state[:] = FREE
     assert frequency_with_blade(held.blade, held.body, none, scratch) == 0.0
+
+
+def test_nodes_that_the_edge_makes_faster_than_the_limit_get_mass(held):
+    scratch, body, n = np.zeros_like(held.body.rest), held.body, held.body.n_nodes
+    elastic, masses = elastic_of(no_springs(n, 0), n), held.body.masses[:n].copy()
+    highest = frequency_with_blade(held.blade, body, elastic.frequency_squared, scratch)
+    elastic.scaling.allowed, elastic.scaling.most = 0.5 * highest, np.inf
+    bound = limit_frequency_at_blade(held.blade, elastic, body, scratch)
+    assert bound == pytest.approx(0.5 * highest, rel=1e-12)
+    assert frequency_with_blade(held.blade, body, elastic.frequency_squared, scratch) == bound
+    heavier = body.masses[:n] > masses
+    assert 0 < heavier.sum() < n
+    np.testing.assert_allclose(body.added_masses[:n], body.masses[:n] - masses, atol=1e-18)
+    assert not scratch.any()
 
 
 def test_anchored_length_is_that_of_the_anchored_samples(held):

@@ -7,7 +7,9 @@ from tests import bodies, incisions
 from tests.materials import SPRINGS
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue.elasticity.limited_frequency import limited_frequency
 from tissue.elasticity.mass_scaling import LARGEST_ADDED_MASS, LIMIT_STEP
+from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.runge_kutta import accelerations
 
 MESH = block((6, 6, 3), (0.06, 0.06, 0.03))
@@ -17,6 +19,11 @@ STRETCH = np.array([1.1, 1.0, 1.0])
 
 LOW = 4000.0
 """Angular frequency that many nodes of the cut body exceed [1/s]: the uncut one has less."""
+
+
+def solid_of(tissue):
+    """Return the elements of a body."""
+    return tissue._system.elasticity.arrays.solid
 
 
 def body_of(mass_scaling, relaxation="global", is_held=True, **damping):
@@ -46,7 +53,7 @@ def test_after_cuts_no_bound_is_above_the_limit(seed):
     Where the added mass would become large it is raised.
     """
     tissue = cut_body(LOW, seed)
-    solid = tissue._system.elasticity.arrays.solid
+    solid = solid_of(tissue)
     limit = max(LOW, tissue.cut_report().initial.frequency)
     while tissue.cut_report().now.frequency > limit * (1.0 + 1e-9):
         limit *= LIMIT_STEP
@@ -149,3 +156,82 @@ def test_a_free_body_gains_the_momentum_of_its_own_weight(relaxation):
 def test_a_frequency_that_is_none_is_refused(frequency):
     with pytest.raises(ValueError, match="mass_scaling is"):
         Tissue(MESH, solver=SolverSettings(mass_scaling=frequency))
+
+
+LEAST = 1.0
+"""Below the bound of any body [1/s]: the limit is that of the uncut body."""
+
+STRETCHED = 1.6
+"""Length over that at rest: the bound on w^2 of the body more than doubles."""
+
+
+def pulled_body(mass_scaling, part=slice(None), **material):
+    """Return a block whose nodes in a part are drawn out along x."""
+    at = MESH.positions.copy()
+    at[part, 0] *= STRETCHED
+    return Tissue(
+        MESH,
+        Material(young_modulus=10e3, poisson_ratio=0.45, **{"law": "neo_hookean", **material}),
+        fixed=bodies.sides(MESH),
+        positions=at,
+        solver=SolverSettings(mass_scaling=mass_scaling),
+    )
+
+
+def node_inside():
+    """Return the node nearest to the middle of the block."""
+    middle = np.array([0.03, 0.03, 0.015])
+    return int(np.argmin(np.linalg.norm(MESH.positions - middle, axis=1)))
+
+
+def strained_bound(tissue):
+    """Return a bound on the frequencies of a body as it is deformed, near the truth [1/s]."""
+    system, anything = tissue._system, StepLimit(allowed=0.0, added=0.0, n_steps=0)
+    squared = system.elasticity.strained_frequency_squared(system.body, system.visits, anything)
+    return np.sqrt(squared)
+
+
+def test_what_is_stretched_in_one_place_is_no_faster_than_the_limit():
+    one = [node_inside()]
+    scaled, exact = pulled_body(LEAST, one), pulled_body(None, one)
+    limit = scaled.cut_report().initial.frequency
+    assert strained_bound(scaled) <= limit < 1.1 * limit < strained_bound(exact)
+    assert 0.0 < scaled.cut_report().now.added_mass <= LARGEST_ADDED_MASS
+    assert exact.cut_report().now.added_mass == 0.0
+
+
+def test_what_is_stretched_everywhere_is_faster():
+    """All nodes would need mass, and the body gets no more than a little."""
+    scaled = pulled_body(LEAST)
+    assert strained_bound(scaled) > 1.2 * scaled.cut_report().initial.frequency
+    assert 0.0 < scaled.cut_report().now.added_mass <= LARGEST_ADDED_MASS
+
+
+def test_tissue_that_stiffens_as_it_is_stretched_gets_no_mass_for_it():
+    tissue = pulled_body(LEAST, [node_inside()], law="exponential", stiffening=1.0)
+    strained_bound(tissue)
+    assert tissue.cut_report().now.added_mass == 0.0
+
+
+@pytest.mark.parametrize("room", [1.0, 0.0], ids=["some", "none"])
+def test_a_node_that_gets_mass_keeps_its_momentum_and_its_lost_energy_is_counted(room):
+    tissue = pulled_body(LEAST)
+    body, elastic, node = tissue._body, tissue._system.elasticity.arrays, node_inside()
+    body.velocities[node, :3] = 1.0, -2.0, 0.5
+    elastic.scaling.most *= room
+    mass, velocity = body.masses[node], body.velocities[node, :3].copy()
+    own, bound = elastic.frequency_squared[node], 3.0 * LOW**2
+    found = limited_frequency(elastic, body, node, bound, LOW**2)
+    if room == 0.0:
+        assert found == bound and body.masses[node] == mass and elastic.scaling.lost == 0.0
+        return
+    assert found == pytest.approx(LOW**2, rel=1e-12)
+    assert body.masses[node] == pytest.approx(3.0 * mass, rel=1e-12)
+    assert body.added_masses[node] == elastic.scaling.added == pytest.approx(2.0 * mass, rel=1e-12)
+    assert elastic.frequency_squared[node] == pytest.approx(own / 3.0, rel=1e-12)
+    np.testing.assert_allclose(
+        body.masses[node] * body.velocities[node, :3], mass * velocity, rtol=1e-12
+    )
+    before, after = mass * velocity @ velocity, mass * velocity @ velocity / 3.0
+    assert elastic.scaling.lost == pytest.approx(0.5 * (before - after), rel=1e-12)
+    assert limited_frequency(elastic, body, node, found, LOW**2) == found

@@ -8,6 +8,7 @@ from tests.tissue.solids import LAWS, SolidBody, highest_frequency, law_of, soli
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
 from tissue.elasticity.internal_forces import Elastic
+from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import no_springs
 from tissue.elasticity.strained_frequency import (
     StepLimit,
@@ -38,6 +39,7 @@ def elastic_of(solid):
         solid=solid.solid,
         has_springs=0,
         has_tetrahedra=1,
+        scaling=no_mass_scaling(),
         frequency_squared=solid.solid.frequency_squared.copy(),
     )
 
