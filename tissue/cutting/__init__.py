@@ -13,6 +13,7 @@ In the order in which they are best read:
     crack_front            the edges of the mesh along which the cut ends
     bridging               tetrahedra that still bridge the cut behind the blade
     separation             cut the faces on the sheet and double their nodes
+    cut_pass               the files above in one pass
     scheme_choice          the scheme that a user chose
     stellar_scheme         our scheme, made of the files above
     bielser_1998           the scheme of Bielser, Maiwald and Gross

@@ -8,14 +8,11 @@ cases, so that no case is missing: cuts may cross, turn back and join.
 import numpy as np
 
 from tissue.cutting.blade_path import Path
-from tissue.cutting.bridging import remember_active, resolve_bridges
 from tissue.cutting.collision_detection import detect_collisions
-from tissue.cutting.crack_front import bring_front_to_blade, extend_fronts
+from tissue.cutting.cut_pass import ALONG_PATH, TO_EDGE, TO_THE_END, cut_in_a_pass
 from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
 from tissue.cutting.finishing import finish_sheet
 from tissue.cutting.minimum_cut import new_flow_graph
-from tissue.cutting.separation import close_sheet, open_sheet
-from tissue.cutting.snapping import insert_crossings
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
 from tissue.mesh.body import Body
 from tissue.mesh.changes import clear_changes, new_change
@@ -54,28 +51,17 @@ class StellarScheme:
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut what was detected, in one pass."""
-        cut = self._arrays(body, visits, path)
-        self._insert(cut)
-        open_sheet(cut)
-        remember_active(cut)
+        cut_in_a_pass(self._arrays(body, visits, path), ALONG_PATH)
 
     def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut up to the edge itself, which rests, in one pass."""
-        cut = self._arrays(body, visits, path)
-        clear_changes(cut.change)
-        bring_front_to_blade(cut)
-        resolve_bridges(cut)
-        open_sheet(cut)
-        remember_active(cut)
+        cut_in_a_pass(self._arrays(body, visits, path), TO_EDGE)
 
     def end(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut what remains when the blade has left the incision, in one pass."""
         self._scratch.n_active = 0
         self._scratch.n_crossings = 0
-        cut = self._arrays(body, visits, path)
-        self._insert(cut)
-        close_sheet(cut)
-        remember_active(cut)
+        cut_in_a_pass(self._arrays(body, visits, path), TO_THE_END)
 
     def finish(self, body: Body, visits: Visits, path: Path) -> None:
         """Part small bridges that the blade passed over, in one pass."""
@@ -100,12 +86,6 @@ class StellarScheme:
         """Return None: there are no cases to count, and no nodes hang."""
         del body
         return None
-
-    def _insert(self, cut: Cut) -> None:
-        clear_changes(cut.change)
-        insert_crossings(cut)
-        extend_fronts(cut)
-        resolve_bridges(cut)
 
     def _arrays(self, body: Body, visits: Visits, path: Path) -> Cut:
         """Return all that a pass needs as one struct, made again only where a part is replaced."""
