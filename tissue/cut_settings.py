@@ -33,8 +33,9 @@ class CutSettings:
     case."""
     guard: float = 0.15
     """Least altitude of a new tetrahedron, as a share of the mean node size."""
-    crumb: float = 1.0
-    """Volume, as a share of the mean tetrahedron, below which a piece is not cut loose."""
+    crumb: float = 3.0
+    """Volume, in mean tetrahedra, below which a piece is not cut loose: by default half of a cube of
+    a mesh of blocks. In a body of few elements an eighth of it, if that is less."""
 
     def __post_init__(self) -> None:
         most = {"snap": MOST_SNAP, "floor": MOST_SNAP, "guard": MOST_GUARD, "crumb": math.inf}

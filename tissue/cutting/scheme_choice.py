@@ -6,6 +6,9 @@ from tissue.cutting.stellar_scheme import StellarScheme
 from tissue.cutting.workspace import SnapLimits
 from tissue.mesh.body import Body
 
+LARGEST_CRUMB = 0.125
+"""Volume of a crumb at most, as a share of the body's: half of a body of six tetrahedra is none."""
+
 
 def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size: float) -> Scheme:
     """Return the scheme of that name.
@@ -26,6 +29,6 @@ def scheme_of(name: str, cut: CutSettings, body: Body, density: float, node_size
         snap=float(cut.snap),
         floor=float(cut.floor * node_size),
         guard=float(cut.guard * node_size),
-        crumb=float(cut.crumb * volume / body.n_tetrahedra),
+        crumb=float(min(cut.crumb / body.n_tetrahedra, LARGEST_CRUMB) * volume),
     )
     return StellarScheme(lengths, len(body.rest), len(body.tetrahedra))
