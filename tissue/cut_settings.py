@@ -62,6 +62,8 @@ class MeshMeasures(NamedTuple):
     """Longest stable step of the body alone, without a blade [s]."""
     added_mass: float
     """Mass that mass scaling has added, as a share of the body's own."""
+    most_added_mass: float
+    """The most that it had added so far, as a share of the body's own."""
     inverted: float
     """Tetrahedra that are inside out, as a share of all: forces around them mean little."""
 

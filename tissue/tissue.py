@@ -304,8 +304,7 @@ class Tissue(DrivenBody):
         """Resolve what the blade left uncut; the next contact begins another incision."""
         if self._incision.has_begun:
             self._incision.end(self._hooks)
-            self._system.contact.incision_ended(self._system.body)
-            self._system.find_loose_pieces()
+            self._system.incision_ended()
             forget_path(self._incision.path)
 
     def _result(

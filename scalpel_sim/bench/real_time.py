@@ -81,7 +81,7 @@ class Frames(NamedTuple):
     """Wall time of each [s]."""
     substeps: FloatArray
     added_mass: float
-    """Mass added to nodes of small elements, as a share of the body's; None: not reported."""
+    """The most mass that was added to light nodes, as a share of the body's own."""
 
 
 def checked_materials(names: Sequence[str]) -> list[str]:
@@ -180,7 +180,7 @@ def _stroke_frames(case: TimedRun, seconds: float | None) -> Frames:
         simulation.dt,
         simulation.recording.column("frame_s").copy(),
         np.array(substeps, dtype=np.float64),
-        simulation.link.cut_report().now.added_mass,
+        simulation.link.cut_report().now.most_added_mass,
     )
 
 
@@ -227,7 +227,7 @@ def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:
         STROKE_DT,
         np.array(taken),
         np.array(substeps, dtype=np.float64),
-        tissue.cut_report().now.added_mass,
+        tissue.cut_report().now.most_added_mass,
     )
 
 

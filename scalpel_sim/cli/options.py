@@ -125,7 +125,7 @@ class SolverOptions:
     "How the mesh is cut: stellar [default], or paper: the paper's own scheme, with its limits."
     relaxation: str | None = None
     """How the motion is advanced: global, all nodes together by the Runge-Kutta method [default of
-    run]; verlet, the same by a method of second order, two to three times as fast [default of
+    run]; verlet, the same by a method of second order, up to 1.5 times as fast [default of
     view]; or hierarchical, the paper's, for springs."""
     mass_scaling: float | None = None
     """Light nodes, of slivers or beside the blade, get mass until none is faster than this angular

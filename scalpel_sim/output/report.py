@@ -143,6 +143,8 @@ def _add_quality(rows: _Rows, quality: dict[str, float]) -> None:
     rows.add("growth of the frequency bound", f"{quality['frequency_growth']:.2f}")
     rows.add("growth of substeps", f"{quality['substep_growth']:.2f}")
     rows.add("mass added to light nodes", f"{1e2 * quality['added_mass']:.2g} %")
+    if quality["most_added_mass"] > quality["added_mass"]:
+        rows.add("the most in the run", f"{1e2 * quality['most_added_mass']:.2g} %")
     if quality["inverted"] > 0.0:
         rows.add("tetrahedra inside out", f"{1e2 * quality['inverted']:.2g} %")
 

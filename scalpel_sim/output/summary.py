@@ -175,6 +175,7 @@ def quality_figures(report: CutReport) -> dict[str, float]:
         "frequency_growth": report.frequency_growth,
         "substep_growth": report.substep_growth,
         "added_mass": report.now.added_mass,
+        "most_added_mass": report.now.most_added_mass,
         "inverted": report.now.inverted,
     }
 

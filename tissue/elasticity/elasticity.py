@@ -24,6 +24,7 @@ from tissue.elasticity.mass_scaling import (
     scale_masses,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
+from tissue.elasticity.returned_mass import return_mass
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, forget_tests, strained_frequency
@@ -93,6 +94,7 @@ class Elasticity:
         if mass_scaling is not None and material.law != "springs":
             scaling = self.arrays.scaling
             scaling.allowed = max(mass_scaling**2, self._solid_frequency_squared)
+            scaling.allowed_between_cuts = scaling.allowed
             scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
 
     def mesh_changed(
@@ -111,6 +113,11 @@ class Elasticity:
             inherit_relaxed(self.arrays.solid, change.children, change.n_children)
         self._write(body, visits, change.dirty[: change.n_dirty], nodes[:n])
         return_spin(body, change, self._material.density, nodes, n)
+
+    def return_mass(self, body: Body) -> None:
+        """Take back mass that nodes got between cuts and do not need at rest."""
+        if self.arrays.scaling.allowed < math.inf:
+            return_mass(self.arrays, body, self.arrays.solid.every)
 
     @property
     def relaxes(self) -> bool:
@@ -184,6 +191,7 @@ class Elasticity:
             if scaling.allowed < math.inf:
                 scaling.added += scale_masses(body, springs, solid, nodes, n, scaling.allowed)
                 nodes = self._limit_added_mass(body, nodes)
+                scaling.largest = max(scaling.largest, scaling.added)
                 n = len(nodes)
             forget_tests(solid, nodes, n)
             highest = largest_frequency(body, solid.frequency_squared, nodes, n)

@@ -2,7 +2,8 @@
 
 Ahead of a blade tissue is stretched, and nodes of some milligrams hang on its stiff edge. A few
 such nodes would set the time step of the whole body, as slivers would
-(`tissue.elasticity.mass_scaling`). In a stroke through the organ it is 0.1 % of its mass more.
+(`tissue.elasticity.mass_scaling`). When the blade has left an incision they give that mass back
+(`tissue.elasticity.returned_mass`).
 """
 
 from tissue.core.jit import kernel
@@ -35,6 +36,7 @@ def limited_frequency(
         return bound
     v, share = vec3(body.velocities, node), mass / (mass + more)
     scaling.added += more
+    scaling.largest = max(scaling.largest, scaling.added)
     scaling.lost += 0.5 * mass * dot(v, v) * (1.0 - share)
     body.masses[node] += more
     body.added_masses[node] += more

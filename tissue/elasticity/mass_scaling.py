@@ -6,6 +6,8 @@ asked for (selective mass scaling; Belytschko, Liu and Moran, Nonlinear Finite E
 added mass is moved and has no weight: equilibrium is the same.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tissue.core.array_types import IntArray
@@ -31,17 +33,23 @@ class MassScaling(Arrays):
 
     allowed: FloatCell
     """Bound on w^2 above which a node gets mass [1/s2]; infinite where none does."""
+    allowed_between_cuts: FloatCell
+    """The same between two cuts: where a time step is one step without it, nodes get no mass."""
     added: FloatCell
     """Mass that all nodes have got [kg]."""
+    largest: FloatCell
+    """The most that they had so far [kg]."""
     most: FloatCell
     """The most that they may get [kg]."""
     lost: FloatCell
-    """Kinetic energy that nodes lost where they got mass between two cuts [J]."""
+    """Kinetic energy that nodes lost where their mass changed between two cuts [J]."""
 
 
 def no_mass_scaling() -> MassScaling:
     """Return that no node gets mass."""
-    return MassScaling(allowed=np.inf, added=0.0, most=0.0, lost=0.0)
+    return MassScaling(
+        allowed=np.inf, allowed_between_cuts=np.inf, added=0.0, largest=0.0, most=0.0, lost=0.0
+    )
 
 
 @kernel
@@ -96,7 +104,17 @@ def free_fall(body: Body, node: int, gravity: Vec3) -> Point:
     return fall
 
 
-def added_mass_share(body: Body) -> float:
-    """Return the mass that mass scaling has added, as a share of the body's own."""
+class AddedMassShares(NamedTuple):
+    """Mass that mass scaling has added, as a share of the body's own."""
+
+    now: float
+    """What nodes have."""
+    largest: float
+    """The most that they had so far."""
+
+
+def added_mass_shares(scaling: MassScaling, body: Body) -> AddedMassShares:
+    """Return the mass that nodes have got, as shares of the body's own."""
     added = float(body.added_masses[: body.n_nodes].sum())
-    return added / (float(body.masses[: body.n_nodes].sum()) - added)
+    own = float(body.masses[: body.n_nodes].sum()) - added
+    return AddedMassShares(added / own, max(added, scaling.largest) / own)

@@ -197,7 +197,9 @@ def _strained_bound(
     if elastic.has_springs:
         bound += elastic.springs.frequency_squared[node]
     if not stiffens(solid.law):
-        bound = limited_frequency(elastic, body, node, bound, elastic.scaling.allowed / FURTHER)
+        bound = limited_frequency(
+            elastic, body, node, bound, elastic.scaling.allowed_between_cuts / FURTHER
+        )
     solid.strained_frequency_squared[node] = bound
     solid.frequency_test[node] = solid.test
     return bound

@@ -16,12 +16,14 @@ from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.stability import (
     StableStep,
     damping_rate,
-    runge_kutta_step,
+    nystroem_step,
     stage_damped_step,
     verlet_step,
 )
 from tissue.integrators.step_context import Increment
 from tissue.integrators.substeps import (
+    nystroem_steps,
+    nystroem_steps_with_forces,
     runge_kutta_steps,
     runge_kutta_steps_with_forces,
     verlet_steps,
@@ -72,11 +74,10 @@ def method_of(options: IntegratorOptions, law: Law) -> Method:
     """
     if isinstance(options, Verlet):
         return Method(verlet_steps, verlet_steps_with_forces, verlet_step, True)
-    steps = (runge_kutta_steps, runge_kutta_steps_with_forces)
     usual = "stage" if law == "springs" else "step"
     if isinstance(options, Global) and (options.damping or usual) == "step":
-        return Method(*steps, runge_kutta_step, True)
-    return Method(*steps, stage_damped_step, False)
+        return Method(nystroem_steps, nystroem_steps_with_forces, nystroem_step, True)
+    return Method(runge_kutta_steps, runge_kutta_steps_with_forces, stage_damped_step, False)
 
 
 class GlobalStepper:
@@ -99,6 +100,7 @@ class GlobalStepper:
         """Advance the motion by an increment; return the steps taken."""
         system.find_contacts(increment.span)
         elasticity, blade = system.elasticity, system.interaction.state
+        self._limit_mass(system, increment.span)
         near = limit_frequency_at_blade(
             blade, elasticity.arrays, system.body, system.stages.external
         )
@@ -128,6 +130,15 @@ class GlobalStepper:
             self.take_steps(system, increment._replace(end=end), STEPS_BETWEEN_STRAIN_BOUNDS)
             increment = increment._replace(begin=end)
             done += STEPS_BETWEEN_STRAIN_BOUNDS
+
+    def _limit_mass(self, system: System, span: float) -> None:
+        """Let nodes get no mass between cuts where one step suffices for a span [s] without it."""
+        elasticity, scaling = system.elasticity, system.elasticity.arrays.scaling
+        at_rest = elasticity.frequency_squared + system.contact.added_frequency_squared
+        longest = self.method.stable_step(elasticity, at_rest, system.surroundings)
+        n, highest = _without_another_step(at_rest, longest, span)
+        suffices = max(scaling.allowed, highest) if n == 1 else scaling.allowed
+        scaling.allowed_between_cuts = suffices
 
     def _added_by_blade(self, system: System) -> float:
         """Return what the blade adds to w^2 [1/s2] at most.

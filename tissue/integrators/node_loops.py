@@ -1,4 +1,4 @@
-"""Loops over the nodes of a body: the stages of a Runge-Kutta step, drift and kick of Verlet.
+"""Loops over the nodes of a body: stages of Runge-Kutta steps, drift and kick of Verlet.
 
 Each writes rows of nodes from `begin` to `end` alone, so that threads may share it.
 """
@@ -82,7 +82,7 @@ def _positions_and_velocities(
     """Write the new positions, and the new velocities without the part of a4."""
     x, v, a1 = point(body.positions, i), point(body.velocities, i), point(stages.a1, i)
     moved = x + times(h, v)
-    store_point(stages.positions_4, i, moved + times(0.5 * h * h, a3))
+    store_point(stages.last_positions, i, moved + times(0.5 * h * h, a3))
     store_point(stages.velocities, i, v + times(h, a3))
     both = a2 + a3
     store_point(body.positions, i, moved + times(h * h / 6.0, a1 + both))
@@ -93,10 +93,53 @@ def _positions_and_velocities(
 def fourth_stage(context: StepContext, h: float, begin: int, end: int) -> None:
     """Find a4, and complete the velocities."""
     body, stages = context.body, context.stages
-    x4, v4 = stages.positions_4, stages.velocities
+    x4, v4 = stages.last_positions, stages.velocities
     for i in range(begin, end):
         a4 = acceleration(context, i, x4, v4)
         store_point(body.velocities, i, point(body.velocities, i) + times(h / 6.0, a4))
+
+
+@kernel
+def nystroem_first(context: StepContext, h: float, begin: int, end: int) -> None:
+    """Find a1 of the nodes from `begin` to `end`, and where the second stage has them."""
+    body, stages = context.body, context.stages
+    x, v = body.positions, body.velocities
+    for i in range(begin, end):
+        a1, now = acceleration(context, i, x, v), point(v, i)
+        store_point(stages.a1, i, a1)
+        x2 = point(x, i) + times(h / 3.0, now) + times(h * h / 18.0, a1)
+        store_point(stages.positions, i, x2)
+        store_point(stages.velocities, i, now + times(h / 3.0, a1))
+
+
+@kernel
+def nystroem_second(context: StepContext, h: float, begin: int, end: int) -> None:
+    """Find a2 of the nodes from `begin` to `end`, and where the third stage has them."""
+    body, stages = context.body, context.stages
+    x2, v2 = stages.positions, stages.velocities
+    for i in range(begin, end):
+        a2 = acceleration(context, i, x2, v2)
+        x, v, a1 = point(body.positions, i), point(body.velocities, i), point(stages.a1, i)
+        store_point(stages.a2, i, a2)
+        bend = times(5.0 / 144.0 * h * h, a1) + times(5.0 / 16.0 * h * h, a2)
+        store_point(stages.last_positions, i, x + times(5.0 / 6.0 * h, v) + bend)
+        v3 = v + times(1.25 * h, a2) - times(5.0 / 12.0 * h, a1)
+        store_point(stages.velocities, i, v3)
+
+
+@kernel
+def nystroem_third(context: StepContext, h: float, begin: int, end: int) -> None:
+    """Find a3 of the nodes from `begin` to `end`, and where they are after the step."""
+    body, stages = context.body, context.stages
+    x3, v3 = stages.last_positions, stages.velocities
+    for i in range(begin, end):
+        a3 = acceleration(context, i, x3, v3)
+        x, v = point(body.positions, i), point(body.velocities, i)
+        a1, a2 = point(stages.a1, i), point(stages.a2, i)
+        bend = times(0.1, a1) + times(1.0 / 3.0, a2) + times(1.0 / 15.0, a3)
+        store_point(body.positions, i, x + times(h, v) + times(h * h, bend))
+        turn = times(0.1, a1) + times(0.5, a2) + times(0.4, a3)
+        store_point(body.velocities, i, v + times(h, turn))
 
 
 @kernel

@@ -27,7 +27,7 @@ from tissue.integrators.node_loops import acceleration
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,
     DISPLACEMENTS_2,
-    DISPLACEMENTS_4,
+    DISPLACEMENTS_LAST,
     FIRST_STAGE,
     FOURTH_STAGE,
     SECOND_STAGE,
@@ -69,9 +69,9 @@ def runge_kutta_nystroem(
     run_loop(context, SECOND_STAGE, h)
     if context.surroundings.retardation_time > 0.0:
         run_loop(context, THIRD_STAGE, h)
-    x4 = stages.positions_4
+    x4 = stages.last_positions
     apply_outer_forces(context, edge, x4, stages.velocities, end, share / 6.0, dt)
-    deform_shared(context, DISPLACEMENTS_4)
+    deform_shared(context, DISPLACEMENTS_LAST)
     if is_moving:
         add_support_work(context, x4, stages.velocities, h / 6.0)
     run_loop(context, FOURTH_STAGE, h)

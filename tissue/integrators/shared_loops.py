@@ -29,6 +29,9 @@ from tissue.integrators.node_loops import (
     first_stage,
     fourth_stage,
     kick,
+    nystroem_first,
+    nystroem_second,
+    nystroem_third,
     second_stage,
     third_stage,
 )
@@ -36,13 +39,15 @@ from tissue.integrators.step_context import StepContext
 
 GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
 """Loops over blocks of tetrahedra."""
-DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_4, PRESSURES = 3, 4, 5, 6
-"""Loops over nodes; displacements of the body, of `Stages.positions` and of `positions_4`."""
+DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, PRESSURES = 3, 4, 5, 6
+"""Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
 FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
-"""Loops over nodes of the Runge-Kutta method."""
-DRIFTING, KICKING = 11, 12
+"""Loops over nodes of the Runge-Kutta method on two levels."""
+NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 11, 12, 13
+"""Loops over nodes of the method of three stages."""
+DRIFTING, KICKING = 14, 15
 """Loops over nodes of position Verlet."""
-DAMPING_CHANGES = 13
+DAMPING_CHANGES = 16
 """The loop over nodes of damping between steps."""
 
 BLOCKS_OF_A_CHUNK = 32
@@ -135,6 +140,12 @@ def _run_part(context: StepContext, loop: int, seconds: float, begin: int, end: 
         third_stage(context, seconds, begin, end)
     elif loop == FOURTH_STAGE:
         fourth_stage(context, seconds, begin, end)
+    elif loop == NYSTROEM_FIRST:
+        nystroem_first(context, seconds, begin, end)
+    elif loop == NYSTROEM_SECOND:
+        nystroem_second(context, seconds, begin, end)
+    elif loop == NYSTROEM_THIRD:
+        nystroem_third(context, seconds, begin, end)
     elif loop == DRIFTING:
         drift(context, seconds, begin, end)
     elif loop == KICKING:
@@ -161,6 +172,6 @@ def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
         positions = body.positions
         if loop == DISPLACEMENTS_2:
             positions = stages.positions
-        elif loop == DISPLACEMENTS_4:
-            positions = stages.positions_4
+        elif loop == DISPLACEMENTS_LAST:
+            positions = stages.last_positions
         displacements(solid, body, positions, solid.every, begin, end)

@@ -9,11 +9,11 @@ class Stages(Arrays):
     """Positions, velocities and accelerations within a step, each of shape (capacity, 3)."""
 
     positions: FloatArray
-    """Positions of the second and third stage [m]."""
-    positions_4: FloatArray
-    """Positions of the fourth stage [m]."""
+    """Positions of the second stage, and of the third where that is at the same instant [m]."""
+    last_positions: FloatArray
+    """Positions of the last stage [m]."""
     velocities: FloatArray
-    """Velocities of the second stage, then of the fourth [m/s]."""
+    """Velocities of the second stage, then of the last [m/s]."""
     change: FloatArray
     """Velocities of the third stage less those of the second [m/s]."""
     external: FloatArray

@@ -9,6 +9,7 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
 from tissue.integrators.damping import change_velocities
+from tissue.integrators.nystroem import three_stage_nystroem
 from tissue.integrators.rigid_motion import (
     add_rigid_part,
     note_loose_positions,
@@ -61,6 +62,42 @@ def runge_kutta_steps(
                 note_all_positions(contact, context.body)
             damp_if_due(context, i, n, share * dt)
             _runge_kutta_step(context, edge, dt, at, share)
+        if not end_substep(context, contact, edge, share * dt, at + share):
+            return i
+    return n
+
+
+@kernel
+def nystroem_steps(
+    context: StepContext,
+    contact: ContactState,
+    edge: Edge,
+    dt: float,
+    begin: float,
+    end: float,
+    first: int,
+    n: int,
+) -> int:
+    """Take steps of the Nystroem method of three stages; see `runge_kutta_steps`.
+
+    Args:
+        context: What takes part.
+        contact: What may touch; positions and velocities are corrected after every step.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        first: Step to begin with: 0, or where it stopped for want of room.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(first, n):
+        at = begin + i * share
+        if contact.is_pending == 0:
+            if contact.is_awake == 1:
+                note_all_positions(contact, context.body)
+            damp_if_due(context, i, n, share * dt)
+            three_stage_nystroem(context, edge, dt, at, share)
         if not end_substep(context, contact, edge, share * dt, at + share):
             return i
     return n
@@ -121,6 +158,28 @@ def runge_kutta_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         _runge_kutta_step(context, edge, dt, at, share)
+        _end_with_forces(context, edge, share * dt, at + share)
+
+
+@kernel
+def nystroem_steps_with_forces(
+    context: StepContext, edge: Edge, dt: float, begin: float, end: float, n: int
+) -> None:
+    """Take `n` Nystroem steps of three stages; see `runge_kutta_steps_with_forces`.
+
+    Args:
+        context: What takes part.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which to begin.
+        end: Fraction of the time step at which to end.
+        n: Number of steps from `begin` to `end`.
+    """
+    share = (end - begin) / n
+    for i in range(n):
+        at = begin + i * share
+        damp_if_due(context, i, n, share * dt)
+        three_stage_nystroem(context, edge, dt, at, share)
         _end_with_forces(context, edge, share * dt, at + share)
 
 

@@ -14,7 +14,7 @@ from tissue.core.thread_team import new_team
 from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
-from tissue.elasticity.mass_scaling import added_mass_share
+from tissue.elasticity.mass_scaling import added_mass_shares
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import StableStep
@@ -158,6 +158,12 @@ class System:
         self.interaction.mesh_changed(self.body, self.visits, change)
         self.contact.mesh_changed(self.body, change)
 
+    def incision_ended(self) -> None:
+        """Update what is looked at once the blade has left an incision."""
+        self.elasticity.return_mass(self.body)
+        self.contact.incision_ended(self.body)
+        self.find_loose_pieces()
+
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         self.body = grown_body(self.body, n_nodes, n_tetrahedra)
@@ -170,12 +176,14 @@ class System:
     def measures(self, stable_step: StableStep) -> MeshMeasures:
         """Return what bounds the time step of the body now, with a method of that stable step."""
         squared = self.elasticity.frequency_squared
+        shares = added_mass_shares(self.elasticity.arrays.scaling, self.body)
         return MeshMeasures(
             n_tetrahedra=self.body.n_tetrahedra,
             altitude=lowest_altitude(self.body),
             frequency=math.sqrt(squared),
             time_step=stable_step(self.elasticity, squared, self.surroundings),
-            added_mass=added_mass_share(self.body),
+            added_mass=shares.now,
+            most_added_mass=shares.largest,
             inverted=inverted_share(self.body),
         )
 

@@ -6,7 +6,7 @@ from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import CutReport, MeshMeasures
 
-_CUT_REPORT = struct.Struct("<14d3q")
+_CUT_REPORT = struct.Struct("<16d3q")
 CUT_REPORT_BYTES = _CUT_REPORT.size
 
 
@@ -34,18 +34,18 @@ def unpack_cut_report(payload: bytes) -> CutReport:
     if len(payload) != _CUT_REPORT.size:
         raise MessageError(f"a cut report of {len(payload)} bytes; wanted {_CUT_REPORT.size}")
     numbers = _CUT_REPORT.unpack(payload)
-    n_cut_nodes, n_initial, n_now = numbers[14:]
+    n_cut_nodes, n_initial, n_now = numbers[16:]
     check_counts(n_cut_nodes, min(n_initial, n_now) - 1)
     if not all(
-        number >= 0.0 for number in numbers[:14]
+        number >= 0.0 for number in numbers[:16]
     ):  # infinity is the time step of a body that cannot move
-        raise MessageError(f"a cut report of {numbers[:14]}; wanted numbers of 0 or more")
+        raise MessageError(f"a cut report of {numbers[:16]}; wanted numbers of 0 or more")
     return CutReport(
         n_cut_nodes,
         numbers[0],
         numbers[1],
         numbers[2],
         numbers[3],
-        MeshMeasures(n_initial, *numbers[4:9]),
-        MeshMeasures(n_now, *numbers[9:14]),
+        MeshMeasures(n_initial, *numbers[4:10]),
+        MeshMeasures(n_now, *numbers[10:16]),
     )

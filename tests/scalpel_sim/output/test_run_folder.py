@@ -35,8 +35,8 @@ CUT_REPORT = CutReport(
     path_error_largest=6e-4,
     node_size=2e-3,
     guard=3e-4,
-    initial=MeshMeasures(6, 2e-3, 1000.0, 2e-3, 0.0, 0.0),
-    now=MeshMeasures(9, 4e-4, 3000.0, 5e-4, 1e-3, 2 / 9),
+    initial=MeshMeasures(6, 2e-3, 1000.0, 2e-3, 0.0, 0.0, 0.0),
+    now=MeshMeasures(9, 4e-4, 3000.0, 5e-4, 1e-3, 2e-3, 2 / 9),
 )
 
 PIECES = pieces_of(
@@ -332,6 +332,7 @@ def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
     summary = summary_of(recorded(10))
     print_summary(summary, console)
     assert summary.quality["added_mass"] == 1e-3
+    assert summary.quality["most_added_mass"] == 2e-3
     assert re.search("mass added to light nodes.* 0.1 %", console.export_text())
 
 

@@ -18,7 +18,7 @@ from tissue.blade.anchors import (
     measure_speeds,
     new_anchors,
 )
-from tissue.blade.blade_mass import limit_frequency_at_blade
+from tissue.blade.blade_mass import LIMIT_AT_BLADE, limit_frequency_at_blade
 from tissue.blade.edge import Edge, motion_at, pose_at
 from tissue.blade.edge_forces import apply_edge_forces
 from tissue.blade.engagement import (
@@ -297,7 +297,8 @@ def test_nodes_that_the_edge_makes_faster_than_the_limit_get_mass(held):
     scratch, body, n = np.zeros_like(held.body.rest), held.body, held.body.n_nodes
     elastic, masses = elastic_of(no_springs(n, 0), n), held.body.masses[:n].copy()
     highest = frequency_with_blade(held.blade, body, elastic.frequency_squared, scratch)
-    elastic.scaling.allowed, elastic.scaling.most = 0.5 * highest, np.inf
+    allowed = 0.5 * highest / LIMIT_AT_BLADE
+    elastic.scaling.allowed_between_cuts, elastic.scaling.most = allowed, np.inf
     bound = limit_frequency_at_blade(held.blade, elastic, body, scratch)
     assert bound == pytest.approx(0.5 * highest, rel=1e-12)
     assert frequency_with_blade(held.blade, body, elastic.frequency_squared, scratch) == bound

@@ -11,9 +11,9 @@ from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 from tissue.integrators.stability import (
-    RUNGE_KUTTA_SAFETY,
+    NYSTROEM_SAFETY,
     SAFETY,
-    runge_kutta_step,
+    nystroem_step,
     stage_damped_step,
     verlet_step,
 )
@@ -43,9 +43,16 @@ def damping_matrix(c, h):
     return np.block([[one, zero], [zero, one - h * c]])
 
 
-def damped_once(k, c, h):
-    """Return a Runge-Kutta step with damping once a step."""
-    return runge_kutta_matrix(k, np.zeros_like(k), h) @ damping_matrix(c, h)
+def nystroem_matrix(k, c, h):
+    """Return a step of the Nystroem method of three stages with damping once a step."""
+    one, zero = np.eye(len(k)), np.zeros_like(k)
+    x, v = np.hstack([one, zero]), np.hstack([zero, one])  # as functions of the state (x, v)
+    a1 = -k @ x
+    a2 = -k @ (x + h / 3.0 * v + h * h / 18.0 * a1)
+    a3 = -k @ (x + h * 5.0 / 6.0 * v + h * h * (5.0 / 144.0 * a1 + 5.0 / 16.0 * a2))
+    moved = x + h * v + h * h * (a1 / 10.0 + a2 / 3.0 + a3 / 15.0)
+    step = np.vstack([moved, v + h * (a1 / 10.0 + a2 / 2.0 + a3 * 2.0 / 5.0)])
+    return step @ damping_matrix(c, h)
 
 
 def verlet_matrix(k, c, h):
@@ -58,7 +65,7 @@ def verlet_matrix(k, c, h):
 
 METHODS = {
     "Runge-Kutta, damping in stages": (runge_kutta_matrix, stage_damped_step, SAFETY),
-    "Runge-Kutta": (damped_once, runge_kutta_step, RUNGE_KUTTA_SAFETY),
+    "Nystroem": (nystroem_matrix, nystroem_step, NYSTROEM_SAFETY),
     "Verlet": (verlet_matrix, verlet_step, SAFETY),
 }
 

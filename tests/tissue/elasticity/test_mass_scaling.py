@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests import bodies, incisions
+from tests import bodies, incisions, strokes
 from tests.materials import SPRINGS
 from tests.tissue.solids import SolidBody, highest_frequency, moved
 from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
@@ -211,6 +211,46 @@ def test_tissue_that_stiffens_as_it_is_stretched_gets_no_mass_for_it():
     tissue = pulled_body(LEAST, [node_inside()], law="exponential", stiffening=1.0)
     strained_bound(tissue)
     assert tissue.cut_report().now.added_mass == 0.0
+
+
+def test_mass_that_a_node_got_between_cuts_and_does_not_need_at_rest_is_taken_back():
+    tissue = pulled_body(LEAST, [node_inside()])
+    body, elasticity = tissue._body, tissue._system.elasticity
+    n, scaling = tissue.n_nodes, elasticity.arrays.scaling
+    masses, bounds = body.masses[:n].copy(), elasticity.arrays.frequency_squared[:n].copy()
+    strained_bound(tissue)
+    assert (body.masses[:n] > 1.01 * masses).any()
+    body.velocities[:n, :3] = velocities = np.random.default_rng(0).normal(size=(n, 3))
+    heavier, scaling.lost = body.masses[:n].copy(), 0.0
+    elasticity.return_mass(body)
+    np.testing.assert_allclose(body.masses[:n], masses, rtol=1e-12)
+    np.testing.assert_allclose(elasticity.arrays.frequency_squared[:n], bounds, rtol=1e-12)
+    np.testing.assert_array_equal(body.velocities[:n, :3], velocities)
+    lost = 0.5 * ((heavier - masses) * (velocities**2).sum(axis=1)).sum()
+    assert scaling.lost == pytest.approx(lost, rel=1e-9)
+    assert scaling.added == pytest.approx(0.0, abs=1e-12 * masses.sum())
+    measures = tissue.cut_report().now
+    assert measures.added_mass == 0.0
+    assert measures.most_added_mass == pytest.approx((heavier - masses).sum() / masses.sum())
+
+
+def test_once_the_blade_has_left_no_node_has_mass_that_it_does_not_need_at_rest():
+    tissue = body_of(LEAST)
+    strokes.make(tissue, strokes.slanted(MESH))
+    body, elastic, n = tissue._body, tissue._system.elasticity.arrays, tissue.n_nodes
+    assert elastic.scaling.largest > elastic.scaling.added
+    got = body.added_masses[:n] > 0.0
+    needed = elastic.solid.frequency_squared[:n][got]
+    np.testing.assert_allclose(needed, elastic.scaling.allowed, rtol=1e-9)
+
+
+def test_where_a_time_step_is_one_step_nodes_get_no_mass_between_cuts():
+    """A hundredth of a millisecond is, ten are not."""
+    tissue = pulled_body(LEAST, [node_inside()])
+    assert tissue.step(None, 1e-5).n_substeps == 1
+    assert not tissue._body.added_masses.any()
+    tissue.step(None, 1e-2)
+    assert tissue._body.added_masses.any()
 
 
 @pytest.mark.parametrize("room", [1.0, 0.0], ids=["some", "none"])

@@ -45,7 +45,7 @@ ADDED_SHARE = 0.55
 """What contact may add to w^2 of a node, as a share of the bound of the body before any cut.
 Larger: stiffer contact and shorter steps; smaller: what is pressed sinks in."""
 
-LEAST_ADDED = 5e6
+LEAST_ADDED = 9e6
 """What contact may add at least [1/s2], to a body that is soft or coarse: its steps are long, two
 in a millisecond with contact. Smaller: what lies on such a body sinks into it by its weight."""
 

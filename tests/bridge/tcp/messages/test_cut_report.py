@@ -12,8 +12,8 @@ REPORT = CutReport(
     3e-5,
     3e-3,
     4e-4,
-    MeshMeasures(576, 3e-3, 900.0, 2e-3, 0.0, 0.0),
-    MeshMeasures(800, 5e-4, 3e3, np.inf, 5e-4, 0.25),
+    MeshMeasures(576, 3e-3, 900.0, 2e-3, 0.0, 0.0, 0.0),
+    MeshMeasures(800, 5e-4, 3e3, np.inf, 5e-4, 1e-3, 0.25),
 )
 
 
