@@ -34,8 +34,8 @@ class CutSettings:
     guard: float = 0.15
     """Least altitude of a new tetrahedron, as a share of the mean node size."""
     crumb: float = 3.0
-    """Volume, in mean tetrahedra, below which a piece is not cut loose: by default half of a cube of
-    a mesh of blocks. In a body of few elements an eighth of it, if that is less."""
+    """Volume, in mean tetrahedra, below which a piece is not cut loose. The default is half a cube
+    in a mesh of cubes. In a body of few elements it is an eighth of the body, if less."""
 
     def __post_init__(self) -> None:
         most = {"snap": MOST_SNAP, "floor": MOST_SNAP, "guard": MOST_GUARD, "crumb": math.inf}
