@@ -71,7 +71,7 @@ class BladeContext(Arrays):
 def _list_tetrahedra(context: BladeContext, nodes: IntArray, n: int) -> bool:
     """List in the grid where the tetrahedra are now; return whether there was room."""
     body, grid = context.body, context.grid
-    if len(grid.listed_at) != len(body.positions):
+    if len(grid.listed_at) != len(body.positions) or len(grid.cells) != len(body.tetrahedra):
         return False
     around = context.blade.queue
     if not list_moved(body, context.visits, grid, nodes, n, around):

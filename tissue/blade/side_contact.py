@@ -81,8 +81,6 @@ class SideContacts(Arrays):
     """Number of faces."""
     n_around: IntCell
     """Number of faces in `around`; -1 where they must be listed again."""
-    n_listed: IntCell
-    """`TetrahedronGrid.n_listed` when `around` was listed."""
     n_entries: IntCell
     """`TetrahedronGrid.n_entries` when `around` was listed."""
     half_thickness: float
@@ -129,7 +127,6 @@ def new_side_contacts(
     return SideContacts(
         n_faces=0,
         n_around=-1,
-        n_listed=-1,
         n_entries=-1,
         half_thickness=0.0 if shape is None else float(0.5 * shape.thickness),
         slope=1.0 if shape is None else float(shape.slope),

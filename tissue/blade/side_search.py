@@ -17,7 +17,7 @@ from tissue.blade.side_contact import (
     penetration,
 )
 from tissue.core.array_types import IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.mesh.body import Body, is_open
@@ -105,18 +105,31 @@ def find_faces(
     for i in range(sides.n_around):
         face = sides.around[i]
         if _is_near(sides, body, pose, face // 4, face % 4):
-            sides.found[n] = face
+            _insert_in_order(sides.found, n, face)
             n += 1
     _replace_faces(blade, body, pose, n)
     return True
 
 
 @kernel
-def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
-    """Write which cells `box` [m] overlaps; return whether that changed.
+def _insert_in_order(faces: IntArray, n: int, face: int) -> None:
+    """Insert a face among the first `n`, which rise.
 
-    Cells that list other tetrahedra than before count as changed. A blade often stays within the
-    same cells for many steps.
+    The order of faces is that of the sums of their forces. The grid lists tetrahedra in an order
+    that depends on when each was listed.
+    """
+    i = n
+    while i > 0 and faces[i - 1] > face:
+        faces[i] = faces[i - 1]
+        i -= 1
+    faces[i] = face
+
+
+@kernel
+def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
+    """Write which cells `box` [m] overlaps; return whether they or their lists changed.
+
+    A blade often stays within the same cells for many steps.
     """
     cells = sides.cells
     are_others = sides.n_around < 0
@@ -124,11 +137,22 @@ def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> b
         first, last = cell_along(grid, box.low[c], c), cell_along(grid, box.high[c], c)
         are_others = are_others or cells[c] != first or cells[3 + c] != last
         cells[c], cells[3 + c] = first, last
-    n_listed, n_entries = grid.n_listed, grid.n_entries
-    are_others = are_others or sides.n_listed != n_listed or sides.n_entries != n_entries
-    sides.n_listed = n_listed
-    sides.n_entries = n_entries
+    if not are_others:
+        are_others = _have_new_entries(sides, grid)
+    sides.n_entries = grid.n_entries
     return are_others
+
+
+@kernel
+def _have_new_entries(sides: SideContacts, grid: TetrahedronGrid) -> bool:
+    """Return whether tetrahedra were listed in the cells since `sides.n_entries` was written."""
+    cells, known = sides.cells, sides.n_entries
+    for i in range(cells[0], cells[3] + 1):
+        for j in range(cells[1], cells[4] + 1):
+            for k in range(cells[2], cells[5] + 1):
+                if grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k] >= known:
+                    return True
+    return False
 
 
 @kernel
@@ -159,24 +183,35 @@ def _list_open_faces(sides: SideContacts, body: Body, visits: Visits, grid: Tetr
 @kernel
 def _is_near(sides: SideContacts, body: Body, pose: BladePose, t: int, f: int) -> bool:
     """Return whether the box of a face, in the axes of the blade, meets the blade."""
-    low_a = low_s = low_z = np.inf
-    high_a = high_s = high_z = -np.inf
-    for k in range(3):
-        p = vec3(body.positions, body.tetrahedra[t, sides.outward[f, k]])
-        at = blade_coordinates(pose, p)
-        low_a, high_a = min(low_a, at.along), max(high_a, at.along)
-        low_s, high_s = min(low_s, at.behind), max(high_s, at.behind)
-        low_z, high_z = min(low_z, at.across), max(high_z, at.across)
+    a = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 0]]), pose.tip)
+    b = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 1]]), pose.tip)
+    c = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 2]]), pose.tip)
     margin = sides.margin
     reach = sides.half_thickness + margin
+    # A blade is thin: most faces are beside it.
     return (
-        low_a < pose.length + margin
-        and high_a > -margin
-        and low_s < sides.height + margin
-        and high_s > -margin
-        and low_z < reach
-        and high_z > -reach
+        _meets(dot(a, pose.normal), dot(b, pose.normal), dot(c, pose.normal), -reach, reach)
+        and _meets(
+            -dot(a, pose.forward),
+            -dot(b, pose.forward),
+            -dot(c, pose.forward),
+            -margin,
+            sides.height + margin,
+        )
+        and _meets(
+            dot(a, pose.along),
+            dot(b, pose.along),
+            dot(c, pose.along),
+            -margin,
+            pose.length + margin,
+        )
     )
+
+
+@inlined
+def _meets(a: float, b: float, c: float, low: float, high: float) -> bool:
+    """Return whether the interval of three numbers meets that from `low` to `high`."""
+    return min(a, min(b, c)) < high and max(a, max(b, c)) > low
 
 
 @kernel

@@ -1,14 +1,15 @@
 """Point location: which tetrahedron holds a point, by a grid of cells that list tetrahedra.
 
 Each tetrahedron is listed in the cells that its box overlaps, widened by a margin. Where a node has
-moved further than the margin, the tetrahedra around it are listed again where they are now. Stale
-entries cost a test, never a wrong answer. So the cost of a step is one pass over the nodes that
-moved, and listing the tetrahedra around those that moved far.
+moved further than the margin, the tetrahedra around it are listed again where they are now, in the
+cells in which they were not listed before. Stale entries cost a test, never a wrong answer. So the
+cost of a step is one pass over the nodes that moved, and listing the tetrahedra around those that
+moved far.
 """
 
 import numpy as np
 
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3
@@ -24,12 +25,16 @@ longer lists in each cell."""
 _MOST_CELLS = 1 << 20
 """Cells at most, for a body that fills little of its box."""
 
-ENTRIES_PER_TETRAHEDRON = 16
-"""Room for entries. A tetrahedron overlaps some eight cells; when the room is used up the grid is
-built again."""
+ENTRIES_PER_TETRAHEDRON = 24
+"""Room for entries. A tetrahedron of the organ overlaps 12 to 15 cells with its margin; when the
+room is used up the grid is built again, which takes a millisecond. Less: what moves uses it up
+within some frames; more: the lists become long with stale entries."""
 
 LEAST_ENTRIES = 1 << 14
 """Room for entries at least."""
+
+_NO_CELLS = np.array([0, 0, 0, -1, -1, -1], np.int32)
+"""`TetrahedronGrid.cells` of a tetrahedron that is not listed."""
 
 
 class TetrahedronGrid(Arrays):
@@ -43,14 +48,17 @@ class TetrahedronGrid(Arrays):
     """Number of cells along each axis, shape (3,). Cells on the rim reach to infinity."""
     head: IntArray
     """First entry of each cell's list, -1 if it is empty; shape (n_cells,)."""
-    following: IntArray
+    following: SlotArray
     """The next entry of the same list, -1 at its end; shape (room,)."""
-    entry: IntArray
+    entry: SlotArray
     """Tetrahedron of each entry, shape (room,)."""
     n_listed: IntCell
     """Number of tetrahedra listed: 0 to `n_listed` - 1."""
     n_entries: IntCell
     """Number of entries in all lists."""
+    cells: SlotArray
+    """First cell along each axis in which each tetrahedron was listed last, then the last one;
+    shape (tetrahedron capacity, 6). The last is before the first where it was not listed yet."""
     listed_at: FloatArray
     """Where each node was when its tetrahedra were listed last [m], shape (node capacity, 3)."""
     margin: float
@@ -64,10 +72,11 @@ def no_grid() -> TetrahedronGrid:
         spacing=1.0,
         shape=np.ones(3, np.int64),
         head=np.full(1, -1, np.int64),
-        following=np.zeros(0, np.int64),
-        entry=np.zeros(0, np.int64),
+        following=np.zeros(0, np.int32),
+        entry=np.zeros(0, np.int32),
         n_listed=0,
         n_entries=0,
+        cells=np.zeros((0, 6), np.int32),
         listed_at=np.zeros((0, 3)),
         margin=0.0,
     )
@@ -88,10 +97,11 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
             spacing=spacing,
             shape=shape,
             head=np.full(int(shape.prod()), -1, np.int64),
-            following=np.empty(room, np.int64),
-            entry=np.empty(room, np.int64),
+            following=np.empty(room, np.int32),
+            entry=np.empty(room, np.int32),
             n_listed=0,
             n_entries=0,
+            cells=np.tile(_NO_CELLS, (len(body.tetrahedra), 1)),
             listed_at=positions.copy(),
             margin=margin,
         )
@@ -154,6 +164,7 @@ def list_moved(
 
 @kernel
 def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, t: int) -> bool:
+    """List a tetrahedron where it is and was not listed last; return whether there was room."""
     box = widened(tetrahedron_box(positions, body.tetrahedra, t), grid.margin)
     x0, x1 = cell_along(grid, box.low.x, 0), cell_along(grid, box.high.x, 0)
     y0, y1 = cell_along(grid, box.low.y, 1), cell_along(grid, box.high.y, 1)
@@ -163,13 +174,28 @@ def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, 
     for i in range(x0, x1 + 1):
         for j in range(y0, y1 + 1):
             for k in range(z0, z1 + 1):
+                if _is_listed_in(grid, t, i, j, k):
+                    continue
                 cell = (i * grid.shape[1] + j) * grid.shape[2] + k
                 at = grid.n_entries
                 grid.n_entries += 1
                 grid.entry[at] = t
                 grid.following[at] = grid.head[cell]
                 grid.head[cell] = at
+    grid.cells[t, 0], grid.cells[t, 1], grid.cells[t, 2] = x0, y0, z0
+    grid.cells[t, 3], grid.cells[t, 4], grid.cells[t, 5] = x1, y1, z1
     return True
+
+
+@kernel
+def _is_listed_in(grid: TetrahedronGrid, t: int, i: int, j: int, k: int) -> bool:
+    """Return whether a tetrahedron was listed last in that cell, among others."""
+    cells = grid.cells
+    return bool(
+        cells[t, 0] <= i <= cells[t, 3]
+        and cells[t, 1] <= j <= cells[t, 4]
+        and cells[t, 2] <= k <= cells[t, 5]
+    )
 
 
 @kernel
