@@ -41,7 +41,7 @@ from tissue.loads.driven_body import DrivenBody
 from tissue.loads.load import Loads
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
-from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
+from tissue.mesh.bounding_boxes import write_bounds
 from tissue.mesh.changes import touched_nodes
 from tissue.mesh.cut_error import path_error
 from tissue.mesh.star import Visits
@@ -54,7 +54,6 @@ from tissue.types import (
     StageTimes,
     StepResult,
     TetrahedralMesh,
-    TissueError,
 )
 
 NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) * 2))
@@ -130,7 +129,7 @@ class Tissue(DrivenBody):
         self._loads = Loads()
         self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
-        self._at_first = self._system.measures(method.stable_step)
+        self._at_first = self._system.measures(method.limit)
         self._integrator = integrator_of(options, self._global_stepper, len(body.rest))
         self._bounds = self.bounds
         self._slit_reach = EXPLAINED * solver.cut.floor * self.node_size
@@ -161,10 +160,7 @@ class Tissue(DrivenBody):
         n_substeps = 0
         for increment in self._increments(edge, travel, dt):
             with clock.RX:  # relaxation: forces, contact, motion, slip of the blade
-                self._update_faces(increment, has_blade)
-                n_substeps += self._advance(increment)
-                if has_blade:
-                    self._update_anchors(increment)
+                n_substeps += self._relax(increment, has_blade)
             with clock.CD:  # collision detection: path, active tetrahedra, crossed edges
                 is_crossed = has_blade and self._detect(increment)
             with clock.GC:  # geometric changes: subdivision, separation
@@ -232,7 +228,7 @@ class Tissue(DrivenBody):
             node_size=self.node_size,
             guard=0.0 if solver.scheme == "paper" else solver.cut.guard * self.node_size,
             initial=self._at_first,
-            now=self._system.measures(self._global_stepper.method.stable_step),
+            now=self._system.measures(self._global_stepper.method.limit),
         )
 
     def scheme_statistics(self) -> SchemeStatistics | None:
@@ -253,43 +249,16 @@ class Tissue(DrivenBody):
         for i in range(n):
             yield Increment(edge, dt, i / n, (i + 1) / n)
 
-    def _update_faces(self, increment: Increment, has_blade: bool) -> None:
-        """Find the faces of the tissue that the faces of the blade may touch."""
-        edge, moved = increment.edge if has_blade else None, self._integrator.moved
-        self._system.interaction.update_faces(self._blade_context, moved, edge, increment.begin)
-
-    def _advance(self, increment: Increment) -> int:
-        """Advance the motion by an increment; return the substeps that it took."""
+    def _relax(self, increment: Increment, has_blade: bool) -> int:
+        """Relax by an increment; return the substeps that it took."""
         loads, system = self._loads, self._system
         loads.spread(system.body, system.stages.loads)
         before = loads.virtual_work(system.body)
-        n = self._integrator.advance(system, increment) if increment.span > 0.0 else 0
+        n = self._integrator.relax(system, self._blade_context, increment, has_blade)
         self._audit.work_of_loads += loads.virtual_work(system.body) - before
         self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
-        if n == 0:
-            return 0
-        system.relax_stress(increment.span)
-        moving, body = self._integrator.moving, self._system.body
-        if moving is None:
-            system.find_new_loose_pieces()
-        if moving is None or 2 * moving[1] > self.n_nodes:
-            is_finite = write_bounds(body, self._bounds)
-        else:
-            is_finite = widen_bounds(body, *moving, self._bounds)
-        if not is_finite:
-            raise TissueError(
-                "the motion of the tissue became unstable: the position of a node is not a finite "
-                "number. Use a shorter time step, or a material that is softer or heavier"
-            )
         return n
-
-    def _update_anchors(self, increment: Increment) -> None:
-        """Anchor the edge to tissue that it has entered; release what it has left."""
-        system, moved = self._system, self._integrator.moved
-        system.interaction.update_anchors(
-            self._blade_context, system.stages.external, moved, increment.edge, increment.end
-        )
 
     def _detect(self, increment: Increment) -> bool:
         """Trace the path of the edge through the material; return whether it crossed anything."""

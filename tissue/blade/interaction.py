@@ -86,6 +86,11 @@ class BladeInteraction:
         return len(self.state.anchors.state)
 
     @property
+    def has_faces(self) -> bool:
+        """Whether the blade has side faces; a line that cuts has none."""
+        return self._shape is not None
+
+    @property
     def is_engaged(self) -> bool:
         """Whether the edge is in the tissue."""
         return is_engaged(self.state.anchors)
@@ -188,7 +193,7 @@ class BladeInteraction:
             )
         return context
 
-    def _renewed(self, context: BladeContext) -> BladeContext:
+    def renewed(self, context: BladeContext) -> BladeContext:
         """Return the struct with the arrays that were replaced since."""
         return self.context(
             context.body, context.visits, context.path, context.bounds, context.slit_reach
@@ -205,7 +210,7 @@ class BladeInteraction:
             edge: The cutting edge over the time step; None for no blade.
             when: Instant, as a fraction of the time step.
         """
-        if self._shape is None:
+        if not self.has_faces:
             return
         if edge is None:
             release_sides(self.state)
@@ -213,14 +218,9 @@ class BladeInteraction:
         while True:
             outcome = update_faces(context, edge, when, *self._to_list(context.body, moved))
             self._note_search(outcome, moved)
-            if outcome == NO_ROOM_FOR_FACES:
-                self.state = self.state.replaced(sides=with_more_faces(self.state.sides))
-                self._report = new_report(self.state)
-            elif outcome != GRID_IS_FULL:
+            if outcome not in (GRID_IS_FULL, NO_ROOM_FOR_FACES):
                 return
-            else:
-                self._build_grid(context.body)
-            context = self._renewed(context)
+            context = self.with_room(outcome, context)
 
     def update_anchors(
         self,
@@ -246,8 +246,23 @@ class BladeInteraction:
             self._note_search(outcome, moved)
             if outcome != GRID_IS_FULL:
                 return
-            self._build_grid(body)
-            context, is_again = self._renewed(context), True
+            context, is_again = self.with_room(outcome, context), True
+
+    def with_room(self, outcome: int, context: BladeContext) -> BladeContext:
+        """Return the struct with room for what a search found full.
+
+        Args:
+            outcome: `GRID_IS_FULL` or `NO_ROOM_FOR_FACES`.
+            context: Body and blade.
+        """
+        if outcome == NO_ROOM_FOR_FACES:
+            self.state = self.state.replaced(sides=with_more_faces(self.state.sides))
+            self._report = new_report(self.state)
+        else:
+            body, margin = context.body, GRID_MARGIN * self._node_size
+            self._grid = build_grid(body, body.positions, margin)
+            forget_cells(self.state.sides)
+        return self.renewed(context)
 
     def trace(self, context: BladeContext, edge: Edge, when: float) -> float:
         """Trace the path of the edge; see `tissue.blade.blade_context.trace`."""
@@ -258,20 +273,19 @@ class BladeInteraction:
         report_step(context, edge, dt)
         return blade_report(self._report)
 
+    def all_nodes(self, body: Body) -> IntArray:
+        """Return 0, 1, 2, ... up to the room that the body has for nodes."""
+        if len(self._all_nodes) != len(body.positions):
+            self._all_nodes = np.arange(len(body.positions))
+        return self._all_nodes
+
     def _to_list(self, body: Body, moved: Moved | None) -> tuple[IntArray, int]:
         """Return the nodes whose tetrahedra may have to be listed again, and how many they are."""
         if moved is not None:
             return moved.nodes, moved.n_nodes
-        if len(self._all_nodes) != len(body.positions):
-            self._all_nodes = np.arange(len(body.positions))
-        return self._all_nodes, body.n_nodes
+        return self.all_nodes(body), body.n_nodes
 
     def _note_search(self, outcome: int, moved: Moved | None) -> None:
         """Forget the nodes that moved where a search has listed their tetrahedra."""
         if moved is not None and outcome != NOT_SEARCHED:
             forget_moved(moved)
-
-    def _build_grid(self, body: Body) -> None:
-        """List all tetrahedra in a new grid."""
-        self._grid = build_grid(body, body.positions, GRID_MARGIN * self._node_size)
-        forget_cells(self.state.sides)

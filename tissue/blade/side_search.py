@@ -4,8 +4,6 @@ The cost is that of the tetrahedra in the box of the blade. A face that was know
 face that is new and already within the blade begins where it is (see `tissue.blade.side_contact`).
 """
 
-import numpy as np
-
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
 from tissue.blade.side_contact import (

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.core.simd import room_for_points
 from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -26,7 +25,6 @@ from tissue.elasticity.mass_scaling import (
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.returned_mass import return_mass
 from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
-from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, forget_tests, strained_frequency
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
@@ -78,17 +76,13 @@ class Elasticity:
             ),
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
+            highest=0.0,
+            highest_of_dampers=0.0,
             scaling=no_mass_scaling(),
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
-        self._ahead = room_for_points(n_nodes)
         self._solid_frequency_squared = 0.0
-        self.frequency_squared = 0.0
-        """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
-        self.damper_frequency_squared = 0.0
-        """Bound on the square of the frequencies of springs alone so far [1/s2]. The dampers have
-        the stiffness of springs under either law."""
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law != "springs":
@@ -125,9 +119,9 @@ class Elasticity:
         return bool(self._material.prony)
 
     @property
-    def follows_strain(self) -> bool:
-        """Whether stiffness depends on how far the body is strained."""
-        return self._has_solid
+    def frequency_squared(self) -> float:
+        """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
+        return self.arrays.highest
 
     def strained_frequency_squared(self, body: Body, visits: Visits, limit: StepLimit) -> float:
         """Return a bound on w^2 of the tetrahedra as they are deformed now [1/s2].
@@ -144,31 +138,12 @@ class Elasticity:
             return 0.0
         return strained_frequency(self.arrays, body, body.positions, visits, limit)
 
-    @property
-    def stiffens(self) -> bool:
-        """Whether the shear part of the law stiffens as tissue is stretched."""
-        return self._has_solid and stiffens(self.arrays.solid.law)
-
-    def frequency_squared_ahead(
-        self, body: Body, visits: Visits, limit: StepLimit, duration: float
-    ) -> float:
-        """Return a bound on w^2 of the tetrahedra as they will be deformed [1/s2].
-
-        That is where the nodes are after `duration` [s] with the velocities that they have. Other
-        arguments are those of `strained_frequency_squared`.
-        """
-        n, ahead = body.n_nodes, self._ahead
-        np.multiply(body.velocities[:n], duration, out=ahead[:n])
-        ahead[:n] += body.positions[:n]
-        return strained_frequency(self.arrays, body, ahead, visits, limit)
-
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         arrays, solid = self.arrays, self.arrays.solid
         if self._has_solid:
             pool = max(len(solid.corner), room_for_stars(n_nodes, n_tetrahedra))
             solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
-        self._ahead = room_for_points(n_nodes)
         frequencies = np.zeros(n_nodes)
         frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
         self.arrays = arrays.replaced(
@@ -199,10 +174,11 @@ class Elasticity:
         bound_frequencies(body, self.arrays.springs, nodes, len(nodes))
         of_dampers = self.arrays.springs.frequency_squared
         highest = largest_frequency(body, of_dampers, nodes, len(nodes))
-        self.damper_frequency_squared = max(self.damper_frequency_squared, highest)
-        bound_both_frequencies(self.arrays, nodes, len(nodes))
-        largest = largest_frequency(body, self.arrays.frequency_squared, nodes, len(nodes))
-        self.frequency_squared = max(self.frequency_squared, largest)
+        arrays = self.arrays
+        arrays.highest_of_dampers = max(arrays.highest_of_dampers, highest)
+        bound_both_frequencies(arrays, nodes, len(nodes))
+        highest = largest_frequency(body, arrays.frequency_squared, nodes, len(nodes))
+        arrays.highest = max(arrays.highest, highest)
 
     def _limit_added_mass(self, body: Body, nodes: IntArray) -> IntArray:
         """Raise the limit of frequencies until the added mass is small; return the nodes scaled."""

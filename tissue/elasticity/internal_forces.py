@@ -7,7 +7,7 @@ or both are elastic. Dampers lie along the edges under either law.
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
-from tissue.core.structs import Arrays, IntCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
 from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.mass_scaling import MassScaling
@@ -29,6 +29,11 @@ class Elastic(Arrays, two_precisions=True):
     """1 if springs along the edges pull, else 0."""
     has_tetrahedra: IntCell
     """1 if tetrahedra resist deformation, else 0."""
+    highest: FloatCell
+    """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
+    highest_of_dampers: FloatCell
+    """Bound on the square of the frequencies of springs alone so far [1/s2]. The dampers have the
+    stiffness of springs under either law."""
     scaling: MassScaling
     """Which nodes get mass where tetrahedra carry the shear."""
     frequency_squared: FloatArray

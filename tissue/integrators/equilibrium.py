@@ -13,6 +13,7 @@ from tissue.blade.edge import Edge
 from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
+from tissue.integrators.stability import stable_step
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
 
@@ -49,7 +50,8 @@ def settle(stepper: GlobalStepper, system: System, edge: Edge) -> int:
         limit = StepLimit(at_rest, 0.0, 0)
         strained = elasticity.strained_frequency_squared(body, system.visits, limit)
         highest = max(at_rest, strained) + system.contact.added_frequency_squared
-        step = stepper.method.stable_step(elasticity, highest, system.surroundings)
+        arrays, around = elasticity.arrays, system.surroundings
+        step = stable_step(stepper.method.limit, arrays, highest, around)
         dt = STEPS_BETWEEN_PEAKS * step
         system.contact.begin()
         system.find_contacts(dt)

@@ -2,6 +2,7 @@
 
 from typing import Protocol
 
+from tissue.blade.blade_context import BladeContext
 from tissue.core.array_types import IntArray
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.options import Hierarchical, IntegratorOptions
@@ -22,6 +23,24 @@ class Integrator(Protocol):
     @property
     def moving(self) -> tuple[IntArray, int] | None:
         """Nodes that may have moved in the last `advance`, and how many; None where all may."""
+        ...
+
+    def relax(
+        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+    ) -> int:
+        """Relax (RX) by an increment; return how many steps the finest nodes took.
+
+        Faces of the blade, forces, contact and motion, slip and anchors of its edge.
+
+        Args:
+            system: Body, forces and contact.
+            blade: What searches of the blade work on.
+            increment: The part of a time step to advance by.
+            has_blade: Whether there is a blade.
+
+        Raises:
+            TissueError: the motion became unstable.
+        """
         ...
 
     def advance(self, system: System, increment: Increment) -> int:

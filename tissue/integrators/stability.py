@@ -1,13 +1,20 @@
 """The largest stable steps of the methods that move all nodes together."""
 
 import math
-from bisect import bisect_right
-from collections.abc import Callable
+from typing import Final
 
 import numpy as np
 
-from tissue.elasticity.elasticity import Elasticity
-from tissue.elasticity.internal_forces import Surroundings
+from tissue.core.jit import kernel
+from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.elasticity.stiffening import stiffens
+
+STAGE_DAMPED: Final = 0
+"""The Runge-Kutta method, with damping in every stage."""
+NYSTROEM: Final = 1
+"""The Nystroem method of three stages."""
+VERLET: Final = 2
+"""Position Verlet."""
 
 STABILITY_LIMIT = np.array(
     [
@@ -37,8 +44,9 @@ DAMPING_LIMIT = 2.0
 """Largest rate of damping times its interval where damping acts between steps, with either method:
 beyond it the damping turns a velocity round and makes it larger."""
 
-_RATIOS = STABILITY_LIMIT[:, 0].tolist()
-_INVERSES = (1.0 / STABILITY_LIMIT[:, 1]).tolist()
+_RATIOS: Final = tuple(STABILITY_LIMIT[:, 0].tolist())
+_LAST_LIMIT: Final = float(STABILITY_LIMIT[-1, 1])
+_INVERSES: Final = tuple((1.0 / STABILITY_LIMIT[:, 1]).tolist())
 """The limit falls nearly as 1 / ratio: a line between its entries would be above it."""
 
 SAFETY = 0.8
@@ -56,6 +64,29 @@ account needs no less than `NYSTROEM_SAFETY`: cuts in blocks of liver, fat and s
 left 0.16, 0.01 and 0.08 % of the work at 0.84, and 0.15, 0.01 and 0.12 % at 0.75."""
 
 
+@kernel
+def stable_step(
+    method: int, elastic: Elastic, frequency_squared: float, surroundings: Surroundings
+) -> float:
+    """Return a stable step [s] of a method; infinite where every node is fixed.
+
+    Args:
+        method: One of the constants above.
+        elastic: Its dampers, and whether its law stiffens.
+        frequency_squared: Bound on w^2 [1/s2].
+        surroundings: Gravity and all damping.
+    """
+    step: float
+    if method == STAGE_DAMPED:
+        step = stage_damped_step(elastic, frequency_squared, surroundings)
+    elif method == NYSTROEM:
+        step = nystroem_step(elastic, frequency_squared, surroundings)
+    else:
+        step = verlet_step(elastic, frequency_squared, surroundings)
+    return step
+
+
+@kernel
 def largest_stable_step(frequency: float, retardation_time: float, viscous_damping: float) -> float:
     """Return the largest stable step [s] for angular frequencies up to `frequency` [1/s].
 
@@ -63,25 +94,24 @@ def largest_stable_step(frequency: float, retardation_time: float, viscous_dampi
     drag adds viscous_damping / (2 w).
     """
     if frequency == 0.0:
-        return np.inf
+        return math.inf
     ratio = 0.5 * (frequency * retardation_time + viscous_damping / frequency)
-    table = STABILITY_LIMIT
-    limit: float
-    if ratio > table[-1, 0]:
-        limit = table[-1, 1] * table[-1, 0] / ratio
-    else:
-        i = max(bisect_right(_RATIOS, ratio, hi=len(_RATIOS) - 1) - 1, 0)
-        share = (ratio - _RATIOS[i]) / (_RATIOS[i + 1] - _RATIOS[i])
-        limit = 1.0 / (_INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i]))
+    last = len(_RATIOS) - 1
+    if ratio > _RATIOS[last]:
+        limit: float = _LAST_LIMIT * _RATIOS[last] / ratio
+        return limit / frequency
+    i = 0
+    while i < last - 1 and _RATIOS[i + 1] <= ratio:
+        i += 1
+    share = (ratio - _RATIOS[i]) / (_RATIOS[i + 1] - _RATIOS[i])
+    inverse = _INVERSES[i] + share * (_INVERSES[i + 1] - _INVERSES[i])
+    limit = 1.0 / inverse
     return limit / frequency
 
 
-StableStep = Callable[[Elasticity, float, Surroundings], float]
-"""Returns a stable step [s] for frequencies up to w^2 [1/s2]."""
-
-
+@kernel
 def stage_damped_step(
-    elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
+    elastic: Elastic, frequency_squared: float, surroundings: Surroundings
 ) -> float:
     """Return a stable Runge-Kutta step [s] where damping acts in every stage.
 
@@ -91,37 +121,40 @@ def stage_damped_step(
     from 0.5 on, braking times the largest step is 2.6 to 2.8 (`STABILITY_LIMIT`).
     """
     retardation_time = surroundings.retardation_time
-    if frequency_squared > elasticity.damper_frequency_squared:
-        retardation_time *= elasticity.damper_frequency_squared / frequency_squared
+    if frequency_squared > elastic.highest_of_dampers:
+        retardation_time *= elastic.highest_of_dampers / frequency_squared
     frequency = math.sqrt(frequency_squared)
-    return SAFETY * largest_stable_step(frequency, retardation_time, surroundings.drag)
+    largest: float = largest_stable_step(frequency, retardation_time, surroundings.drag)
+    return SAFETY * largest
 
 
-def nystroem_step(
-    elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
-) -> float:
+@kernel
+def nystroem_step(elastic: Elastic, frequency_squared: float, surroundings: Surroundings) -> float:
     """Return a stable step of the Nystroem method of three stages [s]."""
-    safety = NYSTROEM_SAFETY_STIFFENING if elasticity.stiffens else NYSTROEM_SAFETY
-    return safety / SAFETY * _step(NYSTROEM_LIMIT, elasticity, frequency_squared, surroundings)
+    safety = NYSTROEM_SAFETY_STIFFENING if stiffens(elastic.solid.law) else NYSTROEM_SAFETY
+    step: float = _step(NYSTROEM_LIMIT, elastic, frequency_squared, surroundings)
+    return safety / SAFETY * step
 
 
-def verlet_step(
-    elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
-) -> float:
+@kernel
+def verlet_step(elastic: Elastic, frequency_squared: float, surroundings: Surroundings) -> float:
     """Return a stable step of position Verlet [s]."""
-    return _step(VERLET_LIMIT, elasticity, frequency_squared, surroundings)
+    step: float = _step(VERLET_LIMIT, elastic, frequency_squared, surroundings)
+    return step
 
 
+@kernel
 def _step(
-    limit: float, elasticity: Elasticity, frequency_squared: float, surroundings: Surroundings
+    limit: float, elastic: Elastic, frequency_squared: float, surroundings: Surroundings
 ) -> float:
     """Return a stable step [s]; the elastic motion and the damping limit it each by itself."""
     if frequency_squared == 0.0:
         return math.inf  # every node is fixed
-    rate = damping_rate(elasticity, surroundings)
+    rate = damping_rate(elastic, surroundings)
     return SAFETY / max(math.sqrt(frequency_squared) / limit, rate / DAMPING_LIMIT)
 
 
-def damping_rate(elasticity: Elasticity, surroundings: Surroundings) -> float:
+@kernel
+def damping_rate(elastic: Elastic, surroundings: Surroundings) -> float:
     """Return the highest rate [1/s] at which damping stops a motion."""
-    return surroundings.retardation_time * elasticity.damper_frequency_squared + surroundings.drag
+    return surroundings.retardation_time * elastic.highest_of_dampers + surroundings.drag

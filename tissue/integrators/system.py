@@ -17,7 +17,7 @@ from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
-from tissue.integrators.stability import StableStep
+from tissue.integrators.stability import stable_step
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.support_state import supports_at_rest
@@ -173,15 +173,18 @@ class System:
         self.interaction.grow(n_tetrahedra)
         self.contact.grow(n_nodes, n_tetrahedra)
 
-    def measures(self, stable_step: StableStep) -> MeshMeasures:
-        """Return what bounds the time step of the body now, with a method of that stable step."""
+    def measures(self, method: int) -> MeshMeasures:
+        """Return what bounds the time step of the body now.
+
+        `method`: a constant of `tissue.integrators.stability`.
+        """
         squared = self.elasticity.frequency_squared
         shares = added_mass_shares(self.elasticity.arrays.scaling, self.body)
         return MeshMeasures(
             n_tetrahedra=self.body.n_tetrahedra,
             altitude=lowest_altitude(self.body),
             frequency=math.sqrt(squared),
-            time_step=stable_step(self.elasticity, squared, self.surroundings),
+            time_step=stable_step(method, self.elasticity.arrays, squared, self.surroundings),
             added_mass=shares.now,
             most_added_mass=shares.largest,
             inverted=inverted_share(self.body),

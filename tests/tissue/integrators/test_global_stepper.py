@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tissue import Material, SolverSettings, Tissue, TissueError, block
-from tissue.integrators.global_stepper import LONGEST_MOTION
+from tissue.integrators.step_choice import LONGEST_MOTION
 
 SOLID = Material(law="neo_hookean", poisson_ratio=0.45, retardation_time=0.0)
 FRAME = 1e-3

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tissue.blade.blade_context import BladeContext
 from tissue.blade.forces import frequency_with_blade
 from tissue.contact.resolve import note_all_positions
 from tissue.core.array_types import IntArray
@@ -19,6 +20,7 @@ from tissue.integrators.hierarchical.kernels import (
 from tissue.integrators.hierarchical.node_rings import grown_rings, new_rings
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.stability import SAFETY, largest_stable_step
+from tissue.integrators.staged_relaxation import relax_in_stages
 from tissue.integrators.step_context import Increment
 from tissue.integrators.step_end import end_step
 from tissue.integrators.system import System
@@ -61,6 +63,12 @@ class HierarchicalStepper:
     @property
     def _is_far_frozen(self) -> bool:
         return self._options.far == "frozen"
+
+    def relax(
+        self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
+    ) -> int:
+        """Relax by an increment, stage by stage; return how many steps the focus took."""
+        return relax_in_stages(self, system, blade, increment, has_blade)
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by one frame; return how many steps the nodes of the focus took."""

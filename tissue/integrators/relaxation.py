@@ -1,0 +1,154 @@
+"""Relaxation (RX) of an increment in one call: faces of the blade, motion, anchors of the edge.
+
+Each call from Python costs 1 to 4 us, more where the body has filled the cache since the last one:
+with a call for each stage an increment took 40 to 60 us beside what the body costs. Where a stage
+needs room, a call returns; after room was made the next call goes on with that stage.
+"""
+
+from typing import Final
+
+from tissue.blade.blade_context import (
+    GRID_IS_FULL,
+    NOT_SEARCHED,
+    SEARCHED,
+    BladeContext,
+    release_sides,
+    update_anchors,
+    update_faces,
+)
+from tissue.blade.edge import Edge
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, IntCell
+from tissue.elasticity.relaxed_stress import relaxes
+from tissue.integrators.advance import (
+    advance_by_nystroem,
+    advance_by_runge_kutta,
+    advance_by_verlet,
+)
+from tissue.integrators.step_choice import StepChoice, begin_increment
+from tissue.integrators.step_context import StepContext
+from tissue.integrators.stress_relaxation import relax_stress
+from tissue.mesh.bounding_boxes import write_bounds
+
+DONE: Final = 0
+"""The increment is done."""
+NOT_FINITE: Final = -1
+"""The increment is done, and the position of a node is not a finite number."""
+
+_FACES, _STEPS, _ANCHORS, _ANCHORS_AGAIN = 0, 1, 2, 3
+"""Stages of an increment; the last one where the grid was full, and is new now."""
+
+
+class Relaxation(Arrays, two_precisions=True):
+    """Everything that the relaxation of an increment reads and writes."""
+
+    stage: IntCell
+    """Where the next call goes on."""
+    has_faces: IntCell
+    """1 if the blade has side faces, 0 for a line that cuts."""
+    step: StepContext
+    """What the integrator works on."""
+    choice: StepChoice
+    """Into how many steps the increment is divided."""
+    blade: BladeContext
+    """What searches of the blade work on."""
+    nodes: IntArray
+    """0, 1, 2, ... up to the room for nodes."""
+
+
+@kernel
+def relax_by_nystroem(
+    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
+) -> int:
+    """Relax by the Nystroem method of three stages; see `relax_by_runge_kutta`."""
+    outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
+    if outcome != DONE:
+        return outcome
+    if relaxation.stage == _STEPS:
+        advance_by_nystroem(relaxation.choice, relaxation.step, edge)
+    return _end(relaxation, edge, has_blade, end)
+
+
+@kernel
+def relax_by_verlet(
+    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
+) -> int:
+    """Relax by position Verlet; see `relax_by_runge_kutta`."""
+    outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
+    if outcome != DONE:
+        return outcome
+    if relaxation.stage == _STEPS:
+        advance_by_verlet(relaxation.choice, relaxation.step, edge)
+    return _end(relaxation, edge, has_blade, end)
+
+
+@kernel
+def relax_by_runge_kutta(
+    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
+) -> int:
+    """Relax by the Runge-Kutta method; return DONE, or NOT_FINITE, or what needs room.
+
+    `relaxation.choice` says how many steps were taken, and whether the motion became unstable.
+
+    Args:
+        relaxation: Written. What contact adds to w^2 is in its choice of steps.
+        edge: The cutting edge over the time step.
+        has_blade: Whether there is one.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which the increment begins.
+        end: Fraction of the time step at which it ends.
+    """
+    outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
+    if outcome != DONE:
+        return outcome
+    if relaxation.stage == _STEPS:
+        advance_by_runge_kutta(relaxation.choice, relaxation.step, edge)
+    return _end(relaxation, edge, has_blade, end)
+
+
+@kernel
+def _begin(
+    relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
+) -> int:
+    """Find the faces that the blade may touch, and begin the steps; return what needs room."""
+    if relaxation.stage != _FACES:
+        return DONE
+    if relaxation.has_faces == 1:
+        if has_blade:
+            n_nodes = relaxation.step.body.n_nodes
+            outcome = update_faces(relaxation.blade, edge, begin, relaxation.nodes, n_nodes)
+            if outcome != NOT_SEARCHED and outcome != SEARCHED:
+                return outcome
+        else:
+            release_sides(relaxation.step.blade)
+    begin_increment(relaxation.choice, relaxation.step, dt, begin, end)
+    relaxation.stage = _STEPS
+    return DONE
+
+
+@kernel
+def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int:
+    """Do what follows the steps; return DONE, or NOT_FINITE, or what needs room."""
+    step, choice = relaxation.step, relaxation.choice
+    if relaxation.stage == _STEPS:
+        relaxation.stage = _FACES
+        if choice.is_unstable == 1:
+            return DONE
+        if choice.done > 0:
+            if relaxes(step.elastic.solid):
+                relax_stress(step, choice.span)
+            if not write_bounds(step.body, relaxation.blade.bounds):
+                return NOT_FINITE
+        relaxation.stage = _ANCHORS
+    if has_blade:
+        is_again = relaxation.stage == _ANCHORS_AGAIN
+        external, n_nodes = step.stages.external, step.body.n_nodes
+        outcome = update_anchors(
+            relaxation.blade, external, edge, end, relaxation.nodes, n_nodes, is_again
+        )
+        if outcome == GRID_IS_FULL:
+            relaxation.stage = _ANCHORS_AGAIN
+            return GRID_IS_FULL
+    relaxation.stage = _FACES
+    return DONE

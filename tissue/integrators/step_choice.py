@@ -1,0 +1,229 @@
+"""Into how many steps an increment is divided: as many as stability needs, and not more.
+
+Where stiffness depends on how far the body is strained, an increment is divided into parts of
+two steps, and the number of steps is chosen anew for each part.
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+
+from tissue.blade.blade_mass import limit_frequency_at_blade
+from tissue.blade.forces import frequency_with_blade
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
+from tissue.core.simd import point, store_point, times
+from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.stiffening import stiffens
+from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
+from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
+from tissue.integrators.stability import damping_rate, stable_step
+from tissue.integrators.step_context import StepContext
+from tissue.mesh.bounding_boxes import largest_speed
+
+STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2
+"""Steps between two bounds on the frequencies of the strained body. A lip that snaps back, or is
+pinched, is as much shorter within a frame of eight steps as an element is long."""
+
+LONGEST_MOTION: Final = 0.5
+"""How far the fastest node moves in a step, as a share of the node size, at most. A bound on
+frequencies holds where the body is; what moves farther may be stiffer before the next bound. With
+less, strokes take more steps; without it, a body far from rest can become unstable."""
+
+MOST_STEPS: Final = 10_000.0
+"""Steps of an increment at most, per step that the body at rest would take. In 160 blocks that
+recovered from random positions of their nodes it was 150. Without a limit, motion that has become
+unstable takes more and more steps and never ends."""
+
+_ROUNDING = 1e-9
+"""Share by which a frequency stays below that which would take another step."""
+
+
+class StepChoice(Arrays):
+    """The steps of one increment: what they depend on, and the part that is taken next."""
+
+    method: IntCell
+    """Whose steps they are: a constant of `tissue.integrators.stability`."""
+    done: IntCell
+    """Steps of the increment taken so far."""
+    n_steps: IntCell
+    """Steps of the part that is taken next."""
+    is_unstable: IntCell
+    """1 if the motion became unstable: it would take more steps than `MOST_STEPS` allows."""
+    dt: FloatCell
+    """Length of the time step [s]."""
+    begin: FloatCell
+    """Fraction of the time step at which the part begins."""
+    part_end: FloatCell
+    """Fraction of the time step at which the part ends."""
+    end: FloatCell
+    """Fraction of the time step at which the increment ends."""
+    span: FloatCell
+    """Length of the increment [s]."""
+    of_contact: FloatCell
+    """What contact adds to w^2 at most [1/s2]; written before an increment begins."""
+    least: FloatCell
+    """Bound on w^2 with the body at rest, the blade and contact [1/s2]."""
+    added: FloatCell
+    """What contact adds to w^2, and the blade where tissue stiffens [1/s2]."""
+    asked: FloatCell
+    """Steps that the motion asks for in the rest of the increment."""
+    at_rest: FloatCell
+    """Steps that the body at rest would take for it."""
+    node_size: float
+    """Mean node size of the body [m]."""
+    surroundings: Surroundings
+    """Gravity and all damping."""
+    no_frequency: FloatArray
+    """Zeros, shape (node capacity,)."""
+
+
+def new_step_choice(
+    method: int, node_size: float, surroundings: Surroundings, n_nodes: int
+) -> StepChoice:
+    """Return that no increment has begun, with room for that many nodes."""
+    return StepChoice(
+        method=method,
+        done=0,
+        n_steps=0,
+        is_unstable=0,
+        dt=0.0,
+        begin=0.0,
+        part_end=0.0,
+        end=0.0,
+        span=0.0,
+        of_contact=0.0,
+        least=0.0,
+        added=0.0,
+        asked=0.0,
+        at_rest=0.0,
+        node_size=node_size,
+        surroundings=surroundings,
+        no_frequency=np.zeros(n_nodes),
+    )
+
+
+@kernel
+def begin_increment(
+    choice: StepChoice, context: StepContext, dt: float, begin: float, end: float
+) -> None:
+    """Begin an increment; nodes that the blade makes too fast get mass.
+
+    Args:
+        choice: Written, but for what contact adds.
+        context: What takes part.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which the increment begins.
+        end: Fraction of the time step at which it ends.
+    """
+    elastic, body, external = context.elastic, context.body, context.stages.external
+    choice.done = 0
+    choice.is_unstable = 0
+    choice.dt = dt
+    choice.begin = choice.part_end = begin
+    choice.end = end
+    choice.span = dt * (end - begin)
+    if not choice.span > 0.0:
+        choice.end = begin  # no steps
+        return
+    _limit_mass(choice, context)
+    near = limit_frequency_at_blade(context.blade, elastic, body, external)
+    added = choice.of_contact
+    choice.least = max(elastic.highest, near) + added
+    if stiffens(elastic.solid.law):
+        # Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
+        added += frequency_with_blade(context.blade, body, choice.no_frequency, external)
+    choice.added = added
+
+
+@kernel
+def next_part(choice: StepChoice, context: StepContext) -> bool:
+    """Choose the steps of the next part of an increment; return whether there is one.
+
+    There is none at its end, and where the motion became unstable.
+    """
+    choice.begin = choice.part_end
+    if choice.begin >= choice.end:
+        return False
+    elastic, surroundings = context.elastic, choice.surroundings
+    span = choice.dt * (choice.end - choice.begin)
+    longest = stable_step(choice.method, elastic, choice.least, surroundings)
+    n, highest = _without_another_step(choice.least, longest, span)
+    step = _strained_step(choice, context, StepLimit(highest - choice.added, choice.added, n))
+    moved = largest_speed(context.body) * span / choice.node_size
+    choice.asked = max(span / step, moved / LONGEST_MOTION)
+    choice.at_rest = max(span / longest, 1.0)
+    # A comparison with nan is false.
+    if not choice.asked <= MOST_STEPS * choice.at_rest:
+        choice.is_unstable = 1
+        return False
+    n = max(1, math.ceil(choice.asked))
+    is_slow = damping_rate(elastic, surroundings) * LONGEST_INTERVAL * span / n <= SLOW_DAMPING
+    context.damping.interval = LONGEST_INTERVAL if is_slow else 1
+    choice.part_end = choice.end
+    if elastic.has_tetrahedra == 1 and n > STEPS_BETWEEN_STRAIN_BOUNDS:
+        share = STEPS_BETWEEN_STRAIN_BOUNDS / n
+        choice.part_end = choice.begin + share * (choice.end - choice.begin)
+        n = STEPS_BETWEEN_STRAIN_BOUNDS
+    choice.n_steps = n
+    choice.done += n
+    return True
+
+
+@kernel
+def _limit_mass(choice: StepChoice, context: StepContext) -> None:
+    """Let nodes get no mass between cuts where one step suffices for the increment without it."""
+    elastic, scaling = context.elastic, context.elastic.scaling
+    at_rest = elastic.highest + choice.of_contact
+    longest = stable_step(choice.method, elastic, at_rest, choice.surroundings)
+    n, highest = _without_another_step(at_rest, longest, choice.span)
+    scaling.allowed_between_cuts = max(scaling.allowed, highest) if n == 1 else scaling.allowed
+
+
+@kernel
+def _without_another_step(
+    frequency_squared: float, longest: float, span: float
+) -> tuple[int, float]:
+    """Return how many steps a frequency takes, and up to which w^2 [1/s2] it is no more.
+
+    Args:
+        frequency_squared: A bound on w^2 [1/s2].
+        longest: The longest step with it [s].
+        span: Time to advance by [s].
+    """
+    if math.isinf(longest):
+        return 1, math.inf
+    n = max(1, math.ceil(span / longest))
+    return n, (1.0 - _ROUNDING) * frequency_squared * (n * longest / span) ** 2
+
+
+@kernel
+def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -> float:
+    """Return the largest stable step [s] until the next bound on the strained body.
+
+    Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes will
+    be then: an exponential law can double its modulus in two steps.
+
+    Args:
+        choice: What the steps depend on.
+        context: Body and forces.
+        limit: The strained body is looked at no closer than the number of steps asks for.
+    """
+    elastic, body, visits = context.elastic, context.body, context.visits
+    method, surroundings = choice.method, choice.surroundings
+    strained = 0.0
+    if elastic.has_tetrahedra == 1:
+        strained = strained_frequency(elastic, body, body.positions, visits, limit)
+    highest = max(choice.least, strained + limit.added)
+    step: float = stable_step(method, elastic, highest, surroundings)
+    if not stiffens(elastic.solid.law) or math.isinf(step):  # infinite: every node is held
+        return step
+    ahead, v = context.stages.last_positions, body.velocities
+    seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
+    for i in range(body.n_nodes):
+        store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
+    strained = max(strained, strained_frequency(elastic, body, ahead, visits, limit))
+    step = stable_step(method, elastic, max(choice.least, strained + limit.added), surroundings)
+    return step
