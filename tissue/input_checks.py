@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tissue.blade.edge import LEAST_SINE, Edge, is_sound
+from tissue.blade.edge import LEAST_SINE, Edge
 from tissue.core.array_types import BoolArray, FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
@@ -29,6 +29,9 @@ HOW_LOW = {"springs": 20, "neo_hookean": 15}
 
 _CONTACTS = ("impulses", "penalty")
 """Names that `SolverSettings.contact` may have."""
+
+_LENGTHS = [3] * 6
+"""Numbers in each part of a sweep: tip, heel and forward at its start and at its end."""
 
 _log = logging.getLogger("tissue")
 
@@ -79,22 +82,30 @@ def checked_positions(positions: npt.ArrayLike | None, rest: FloatArray) -> Floa
     return array
 
 
-def checked_edge(sweep: BladeSweep) -> Edge:
-    """Return the cutting edge over a step.
+def edge_of(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step; `begin_blade_step` checks what it is.
 
     Raises:
-        ValueError: a number is not finite, the blade has no length, or it would cut along itself.
+        ValueError: tip, heel or forward are not three numbers each.
     """
     parts = (*sweep.t0, *sweep.t1)
-    if all(type(part) is np.ndarray and part.shape == (3,) for part in parts):
-        edge = Edge.of_numbers(np.concatenate(parts, dtype=np.float64).tobytes())
-        if is_sound(edge):
-            return edge
-    return _edge_or_error(sweep)
+    try:
+        are_points = [*map(len, parts)] == _LENGTHS
+        numbers = np.concatenate(parts, dtype=np.float64) if are_points else None
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or numbers.ndim != 1:
+        return edge_or_error(sweep)
+    return Edge.of_numbers(numbers.tobytes())
 
 
-def _edge_or_error(sweep: BladeSweep) -> Edge:
-    """Return what `checked_edge` does, of lists too, or say what is wrong."""
+def edge_or_error(sweep: BladeSweep) -> Edge:
+    """Return the cutting edge over a step, where a blade can move so.
+
+    Raises:
+        ValueError: a number is not finite, the blade has no length, it would cut along itself, or
+            it turns by more than a right angle.
+    """
     points, ways = [], []
     for when, segment in (("start", sweep.t0), ("end", sweep.t1)):
         tip, heel, forward = map(_three_numbers, segment)

@@ -21,7 +21,6 @@ from tissue.elasticity.internal_forces import Surroundings
 from tissue.energy_audit import Audit
 from tissue.input_checks import (
     checked_contact,
-    checked_edge,
     checked_edges,
     checked_fixed,
     checked_floor,
@@ -29,6 +28,8 @@ from tissue.input_checks import (
     checked_positions,
     checked_solver,
     checked_time_step,
+    edge_of,
+    edge_or_error,
     warn_of_ratio,
     warn_of_toughness,
 )
@@ -151,11 +152,10 @@ class Tissue(DrivenBody):
             TissueError: the motion of the tissue became unstable.
         """
         has_blade = sweep is not None
-        edge = NOWHERE if sweep is None else checked_edge(sweep)
+        edge = NOWHERE if sweep is None else edge_of(sweep)
         checked_time_step(dt)
         interaction, incision, clock = self._system.interaction, self._incision, StageClock()
-        self._take_edge(edge if has_blade else None)
-        self._begin_step(edge, dt)
+        self._begin_step(sweep, edge, dt)
         travel = edge.travel if has_blade else 0.0
         n_substeps = 0
         for increment in self._increments(edge, travel, dt):
@@ -237,11 +237,24 @@ class Tissue(DrivenBody):
 
     # stages of a step
 
-    def _begin_step(self, edge: Edge, dt: float) -> None:
-        """Start the totals of a step."""
+    def _begin_step(self, sweep: BladeSweep | None, edge: Edge, dt: float) -> None:
+        """Take the edge, and start the totals of a step.
+
+        Raises:
+            ValueError: no blade can move so, or it does not fit the mesh.
+        """
+        system = self._system
+        if sweep is None:
+            self._take_edge(None)
+        elif system.interaction.is_other_edge(edge.length):
+            edge_or_error(sweep)  # before the tissue is released
+            self._take_edge(edge)
+        if not system.interaction.begin_step(system.body, edge, dt, sweep is None):
+            assert sweep is not None
+            edge_or_error(sweep)  # it takes numbers whose squares are not finite
+            system.interaction.begin_step(system.body, edge, dt, True)
         self._edge_now = (edge, 0.0)
-        self._system.interaction.begin_step(self._system.body, edge, dt)
-        self._system.contact.begin()
+        system.contact.begin()
 
     def _increments(self, edge: Edge, travel: float, dt: float) -> Iterator[Increment]:
         """Divide a step in which the edge moves that far [m], so that it moves little in each."""
@@ -280,9 +293,8 @@ class Tissue(DrivenBody):
         self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, clock: StageClock
     ) -> StepResult:
         """Return what the step did."""
-        interaction = self._system.interaction
-        totals = interaction.state.totals
-        report = interaction.report(self._blade_context, edge, dt)
+        report = self._system.interaction.report(self._blade_context, edge, dt)
+        amounts = report.amounts
         return StepResult(
             wrench=report.mean_wrench,
             wrench_t1=report.wrench,
@@ -290,15 +302,15 @@ class Tissue(DrivenBody):
             contacts=report.contacts,
             force_on_tissue=report.mean_force_on_tissue,
             bounds=report.bounds,
-            n_tetrahedra=self.n_tetrahedra,
-            n_nodes=self.n_nodes,
+            n_tetrahedra=int(amounts.n_tetrahedra),
+            n_nodes=int(amounts.n_nodes),
             n_active=self._incision.scheme.n_active,
-            active_point_tetrahedron=int(self._incision.path.seed[0]) if has_blade else -1,
-            anchored_length=report.anchored_length,
+            active_point_tetrahedron=int(amounts.tip_tetrahedron) if has_blade else -1,
+            anchored_length=amounts.anchored_length,
             cut_area=self._incision.cut_area,
             finished_area=self._incision.finished_area,
-            work_of_blade=totals.work_of_blade,
-            work_of_cutting=totals.work_of_cutting,
+            work_of_blade=amounts.work_of_blade,
+            work_of_cutting=amounts.work_of_cutting,
             n_substeps=n_substeps,
             body_contacts=self._system.contact.report(dt),
             stage_times=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
@@ -326,6 +338,8 @@ class Tissue(DrivenBody):
     def _after_pass(self) -> None:
         """Update what depends on the tetrahedra that changed, and make room for another pass."""
         system, change = self._system, self._incision.scheme.change
+        if change.n_dirty == 0 and not change.is_full:
+            return
         n = touched_nodes(system.body, change, system.visits, self._touched)
         if n:
             self._chunks = None

@@ -161,10 +161,13 @@ def trace(context: BladeContext, edge: Edge, when: float) -> float:
 @kernel
 def report_step(context: BladeContext, edge: Edge, dt: float) -> None:
     """Write what a time step of `dt` [s] came to."""
-    report, blade = context.report, context.blade
-    write_report(report, blade, context.body, edge)
+    report, blade, body = context.report, context.blade, context.body
+    write_report(report, blade, body, edge)
     write_means(report, blade.totals, edge.tip_t1, dt)
-    report.anchored_length = anchored_length(blade.anchors)
+    amounts = report.amounts
+    amounts[0], amounts[1], amounts[2] = report.n_contacts, body.n_nodes, body.n_tetrahedra
+    amounts[3], amounts[4] = context.path.seed[0], anchored_length(blade.anchors)
+    amounts[5], amounts[6] = blade.totals.work_of_blade, blade.totals.work_of_cutting
     for corner in range(2):
         for axis in range(3):
             report.bounds[corner, axis] = context.bounds[corner, axis]

@@ -17,7 +17,7 @@ from tissue.blade.blunt_forces import (
     slip_blunt_sides,
 )
 from tissue.blade.blunt_search import release_blunt_sides
-from tissue.blade.edge import Edge, motion_at, pose_at
+from tissue.blade.edge import Edge, is_sound, motion_at, pose_at
 from tissue.blade.edge_forces import apply_edge_forces
 from tissue.blade.impulse_totals import clear_impulses
 from tissue.blade.return_mapping import slip_anchors
@@ -35,8 +35,23 @@ from tissue.mesh.star import Visits
 
 
 @kernel
-def begin_blade_step(blade: BladeState, body: Body, edge: Edge, dt: float) -> None:
-    """Begin to count impulse and area; measure how fast the edge moves in this step of `dt` [s]."""
+def begin_blade_step(
+    blade: BladeState, body: Body, edge: Edge, dt: float, is_checked: bool
+) -> bool:
+    """Begin to count impulse and area; measure how fast the edge moves in this step.
+
+    Args:
+        blade: Written.
+        body: The tissue.
+        edge: The cutting edge over the time step.
+        dt: Length of the time step [s].
+        is_checked: Whether it is known that a blade can move so.
+
+    Returns:
+        Whether one can (`tissue.blade.edge.is_sound`); if not, nothing changes.
+    """
+    if not is_checked and not is_sound(edge):
+        return False
     anchors = blade.anchors
     clear_impulses(blade.totals)
     for k in range(len(anchors.state)):
@@ -47,6 +62,7 @@ def begin_blade_step(blade: BladeState, body: Body, edge: Edge, dt: float) -> No
     # A slower edge has a lower yield limit: the energy beyond it is spent on the next slip.
     after = anchors_energy(anchors, body, pose, blade.toughness)
     blade.totals.work_of_breaking += before - after
+    return True
 
 
 @kernel

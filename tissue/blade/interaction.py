@@ -25,7 +25,7 @@ from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
 from tissue.blade.side_search import forget_cells, forget_changed_faces
 from tissue.blade.toughness import toughness_law_of
-from tissue.blade.wrench import BladeReport, blade_report, new_report
+from tissue.blade.wrench import BladeReport, blade_report, contacts_of, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.cutting.blade_path import Path
@@ -74,11 +74,16 @@ class BladeInteraction:
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
         self._shape, self._material = blade, material
-        self._report = new_report(self.state)
+        self._renew_report()
         self._edge_length = 0.0
         self._grid = no_grid()
         self._all_nodes = np.zeros(0, np.int64)
         self._context: BladeContext | None = None
+
+    def _renew_report(self) -> None:
+        """Make a report with room for all contacts that the blade may have."""
+        self._report = new_report(self.state)
+        self._contacts = contacts_of(self._report, 0)
 
     @property
     def n_samples(self) -> int:
@@ -138,7 +143,7 @@ class BladeInteraction:
         if self._shape is not None and length > 0.0:
             where = (self._shape, length, self._material, self._node_size)
             self.state = self.state.replaced(blunt=new_blunt_contacts(*where))
-        self._report = new_report(self.state)
+        self._renew_report()
         self._edge_length = length
 
     def grow(self, n_tetrahedra: int) -> None:
@@ -152,9 +157,9 @@ class BladeInteraction:
         if self._shape is not None:
             forget_changed_faces(self.state.sides, change.dirty, change.n_dirty)
 
-    def begin_step(self, body: Body, edge: Edge, dt: float) -> None:
-        """Begin a time step of `dt` [s]: impulses are counted from zero."""
-        begin_blade_step(self.state, body, edge, dt)
+    def begin_step(self, body: Body, edge: Edge, dt: float, is_checked: bool) -> bool:
+        """Begin a time step: impulses are counted from zero; see `begin_blade_step`."""
+        return begin_blade_step(self.state, body, edge, dt, is_checked)
 
     def context(
         self, body: Body, visits: Visits, path: Path, bounds: FloatArray, slit_reach: float
@@ -257,7 +262,7 @@ class BladeInteraction:
         """
         if outcome == NO_ROOM_FOR_FACES:
             self.state = self.state.replaced(sides=with_more_faces(self.state.sides))
-            self._report = new_report(self.state)
+            self._renew_report()
         else:
             body, margin = context.body, GRID_MARGIN * self._node_size
             self._grid = build_grid(body, body.positions, margin)
@@ -271,7 +276,9 @@ class BladeInteraction:
     def report(self, context: BladeContext, edge: Edge, dt: float) -> BladeReport:
         """Return what a time step of `dt` [s] came to."""
         report_step(context, edge, dt)
-        return blade_report(self._report)
+        report = blade_report(self._report, self._contacts)
+        self._contacts = report.contacts
+        return report
 
     def all_nodes(self, body: Body) -> IntArray:
         """Return 0, 1, 2, ... up to the room that the body has for nodes."""

@@ -23,7 +23,7 @@ from tissue.blade.impulse_totals import ImpulseTotals
 from tissue.blade.side_contact import POINTS, contact_forces, contact_point, penetration
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
 from tissue.types import BladeContacts, Wrench
@@ -34,8 +34,6 @@ class WrenchReport(Arrays):
 
     n_contacts: IntCell
     """Number of contacts."""
-    anchored_length: FloatCell
-    """Length of edge that pulls on the tissue [m]."""
     point: FloatArray
     """Where each contact acts [m], shape (capacity, 3)."""
     normal: FloatArray
@@ -58,8 +56,29 @@ class WrenchReport(Arrays):
     """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
     stiffness: FloatArray
     """Change of the wrench with a displacement and rotation of the blade, shape (6, 6)."""
+    amounts: FloatArray
+    """The numbers of `Amounts`."""
     numbers: FloatArray
-    """The arrays from `wrench` to `stiffness` one after the other, which are views of it."""
+    """The arrays from `wrench` to `amounts` one after the other, which are views of it."""
+
+
+class Amounts(NamedTuple):
+    """Single numbers of a report."""
+
+    n_contacts: float
+    """Number of contacts, as `WrenchReport.n_contacts`."""
+    n_nodes: float
+    """Number of nodes of the body."""
+    n_tetrahedra: float
+    """Number of its tetrahedra."""
+    tip_tetrahedron: float
+    """The tetrahedron in which the path of the tip ended, or -1."""
+    anchored_length: float
+    """Length of edge that pulls on the tissue [m]."""
+    work_of_blade: float
+    """Work of the blade on the tissue since the start [J]."""
+    work_of_cutting: float
+    """Toughness times area cut since the start [J]."""
 
 
 def new_report(blade: BladeState) -> WrenchReport:
@@ -68,7 +87,6 @@ def new_report(blade: BladeState) -> WrenchReport:
     numbers = np.zeros(_N_NUMBERS)
     return WrenchReport(
         n_contacts=0,
-        anchored_length=0.0,
         point=np.zeros((capacity, 3)),
         normal=np.zeros((capacity, 3)),
         normal_force=np.zeros(capacity),
@@ -88,9 +106,10 @@ class _Parts(NamedTuple):
     tip: FloatArray
     bounds: FloatArray
     stiffness: FloatArray
+    amounts: FloatArray
 
 
-_N_NUMBERS = 60
+_N_NUMBERS = 60 + len(Amounts._fields)
 """Numbers in them."""
 
 
@@ -103,6 +122,7 @@ def _parts_of(numbers: FloatArray) -> _Parts:
         numbers[15:18],
         numbers[18:24].reshape(2, 3),
         numbers[24:60].reshape(6, 6),
+        numbers[60:],
     )
 
 
@@ -121,27 +141,31 @@ class BladeReport(NamedTuple):
     """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
     bounds: FloatArray
     """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
-    anchored_length: float
-    """Length of edge that pulls on the tissue [m]."""
+    amounts: Amounts
+    """Single numbers."""
 
 
-def blade_report(report: WrenchReport) -> BladeReport:
-    """Return a copy of what was reported last; the contacts are views."""
-    now, mean, on_tissue, tip, bounds, stiffness = _parts_of(report.numbers.copy())
+def blade_report(report: WrenchReport, contacts: BladeContacts) -> BladeReport:
+    """Return a copy of what was reported last; the contacts are views.
+
+    `contacts`: those of the report before, which are taken again where they are as many.
+    """
+    now, mean, on_tissue, tip, bounds, stiffness, numbers = _parts_of(report.numbers.copy())
+    amounts = Amounts(*numbers.tolist())
+    n = int(amounts.n_contacts)
     return BladeReport(
         Wrench(mean[0], mean[1], tip),
         Wrench(now[:3], now[3:], tip),
         stiffness,
-        contacts_of(report),
+        contacts if len(contacts.normal_force) == n else contacts_of(report, n),
         on_tissue,
         bounds,
-        report.anchored_length,
+        amounts,
     )
 
 
-def contacts_of(report: WrenchReport) -> BladeContacts:
-    """Return views of the contacts that were reported last."""
-    n = report.n_contacts
+def contacts_of(report: WrenchReport, n: int) -> BladeContacts:
+    """Return views of the first `n` contacts of a report."""
     return BladeContacts(
         report.point[:n],
         report.normal[:n],
