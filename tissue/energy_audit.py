@@ -1,15 +1,85 @@
 """`Audit`: the account of energy of a body: the work done on it, and where that went."""
 
+from typing import NamedTuple
+
+import numpy as np
+
 from tissue.blade.edge import Edge
 from tissue.blade.forces import edge_energy
 from tissue.blade.impulse_totals import clear_works
 from tissue.blade.side_contact import sides_energy
-from tissue.contact.penalty.contact_forces import PenaltyForces
-from tissue.core.vec3 import Vec3
+from tissue.core.array_types import FloatArray
+from tissue.core.jit import kernel
 from tissue.elasticity.energy import kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
+from tissue.integrators.step_context import StepContext
 from tissue.integrators.system import System
 from tissue.types import Energies
+
+
+class _Amounts(NamedTuple):
+    """Energies, works and losses of a body since it was made, or since its account began [J]."""
+
+    elastic: float
+    """Elastic energy of the body."""
+    kinetic: float
+    """Its kinetic energy."""
+    potential: float
+    """Its energy in gravity."""
+    edge: float
+    """Energy in the anchors of the edge and the blunt sides of the blade."""
+    sides: float
+    """Energy between the side faces of the blade and the body."""
+    in_contacts: float
+    """Energy in contacts that act as springs."""
+    work_of_contacts: float
+    """Work of contacts that act as forces on the body."""
+    work_of_blade: float
+    """Work of the blade."""
+    work_of_supports: float
+    """Work of fixed nodes that are moved."""
+    damping: float
+    """Energy that damping took."""
+    cutting: float
+    """Energy that cutting took."""
+    breaking: float
+    """Energy that breaking the skin took."""
+    friction: float
+    """Energy that friction on the blade took."""
+    contact: float
+    """Energy that contact took which corrects motion."""
+    mass: float
+    """Energy that nodes lost when they got mass."""
+    released: float
+    """Energy of contacts with the blade that ended."""
+
+
+@kernel
+def _write_amounts(
+    context: StepContext, edge: Edge, when: float, is_known: bool, out: FloatArray
+) -> None:
+    """Write the numbers of `_Amounts`.
+
+    Args:
+        context: The body and all that acts on it.
+        edge: The cutting edge over a time step.
+        when: Instant of it, as a fraction.
+        is_known: Whether the energies of the body itself, the first three, are known.
+        out: Written, shape (16,).
+    """
+    body, elastic, blade = context.body, context.elastic, context.blade
+    if not is_known:
+        out[0] = elastic_energy(elastic, body)
+        out[1] = kinetic_energy(body)
+        out[2] = potential_energy(body, context.surroundings.gravity)
+    totals, contacts = blade.totals, context.contacts
+    out[3], out[4] = edge_energy(blade, body, edge, when), sides_energy(blade.sides)
+    out[5], out[6] = contacts.stored, contacts.work
+    out[7], out[8] = totals.work_of_blade, context.supports.work
+    out[9], out[10] = context.damping.dissipated, totals.work_of_cutting
+    out[11], out[12] = totals.work_of_breaking, totals.work_of_friction
+    out[13], out[14] = context.contact_loss.dissipated, elastic.scaling.lost
+    out[15] = totals.released
 
 
 class Audit:
@@ -19,21 +89,19 @@ class Audit:
     in each substep in which parts of the body touch.
 
     Args:
-        gravity: Acceleration of free fall [m/s2].
         is_kept: Whether an account is kept; if not, the methods do nothing.
     """
 
-    def __init__(self, gravity: Vec3, *, is_kept: bool) -> None:
+    def __init__(self, *, is_kept: bool) -> None:
         self._is_kept = is_kept
-        self._gravity = gravity
         self._topology = self._before_cut = 0.0
         self.work_of_loads = 0.0
         """Work of the loads since the account began [J]."""
-        self._now: tuple[float, float, float] | None = None
-        self._at_first = (0.0, 0.0, 0.0)
-        self._contacts_at_first = (0.0, 0.0)
+        self._is_known = False
+        self._numbers = np.zeros(len(_Amounts._fields))
+        self._at_first = _Amounts(*self._numbers)
 
-    def begin(self, system: System) -> None:
+    def begin(self, system: System, edge: Edge) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
         if not self._is_kept:
             return
@@ -42,13 +110,12 @@ class Audit:
         clear_works(system.interaction.state.totals)
         system.supports.work = self.work_of_loads = 0.0
         system.elasticity.arrays.scaling.lost = 0.0
-        self._at_first = self._stored(system)
-        contacts = system.contact.forces
-        self._contacts_at_first = (contacts.work, contacts.stored)
+        self.forget()
+        self._at_first = self._amounts(system, edge, 1.0)
 
     def forget(self) -> None:
         """Forget the energy: the body moved, or its mesh changed."""
-        self._now = None
+        self._is_known = False
 
     def before_cut(self, system: System, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
@@ -57,49 +124,41 @@ class Audit:
 
     def after_cut(self, system: System, edge: Edge, when: float) -> None:
         """Count the energy that the change of the mesh took; where it has not changed, none."""
-        if self._is_kept and self._now is None:
+        if self._is_kept and not self._is_known:
             self._topology += self._before_cut - self._all(system, edge, when)
 
     def energies(self, system: System, edge: Edge) -> Energies | None:
         """Return the account at the end of a step; None where none is kept."""
         if not self._is_kept:
             return None
-        blade = system.interaction.state
-        totals = blade.totals
-        elastic, kinetic, potential = self._now or self._stored(system)
-        elastic_first, kinetic_first, potential_first = self._at_first
-        held = edge_energy(blade, system.body, edge, 1.0)
-        contacts = system.contact.forces
+        now, first = self._amounts(system, edge, 1.0), self._at_first
+        in_contacts = now.in_contacts - first.in_contacts
+        # What the body gave to contacts, and their springs do not hold.
+        lost_in_contacts = (first.work_of_contacts - now.work_of_contacts) - in_contacts
         return Energies(
-            work_of_blade=totals.work_of_blade,
+            work_of_blade=now.work_of_blade,
             work_of_loads=self.work_of_loads,
-            work_of_supports=system.supports.work,
-            elastic=elastic - elastic_first,
-            kinetic=kinetic - kinetic_first,
-            potential=potential - potential_first,
-            held=held + sides_energy(blade.sides) + contacts.stored - self._contacts_at_first[1],
-            damping=system.damping.dissipated,
-            cutting=totals.work_of_cutting,
-            breaking=totals.work_of_breaking,
-            friction=totals.work_of_friction,
-            contact=system.contact_loss.dissipated + self._lost_in(contacts),
-            topology=self._topology + system.elasticity.arrays.scaling.lost,
-            released=totals.released,
+            work_of_supports=now.work_of_supports,
+            elastic=now.elastic - first.elastic,
+            kinetic=now.kinetic - first.kinetic,
+            potential=now.potential - first.potential,
+            held=now.edge + now.sides + now.in_contacts - first.in_contacts,
+            damping=now.damping,
+            cutting=now.cutting,
+            breaking=now.breaking,
+            friction=now.friction,
+            contact=now.contact + lost_in_contacts,
+            topology=self._topology + now.mass,
+            released=now.released,
         )
 
-    def _lost_in(self, contacts: PenaltyForces) -> float:
-        """Return what the body gave to contacts and their springs do not hold [J]."""
-        work, stored = self._contacts_at_first
-        return (work - contacts.work) - (contacts.stored - stored)
-
-    def _stored(self, system: System) -> tuple[float, float, float]:
-        """Return the elastic, kinetic and potential energy [J], and remember them."""
-        body, potential = system.body, potential_energy(system.body, self._gravity)
-        elastic = elastic_energy(system.elasticity.arrays, body)
-        self._now = (elastic, kinetic_energy(body), potential)
-        return self._now
+    def _amounts(self, system: System, edge: Edge, when: float) -> _Amounts:
+        """Return the amounts now; the energies of the body itself are remembered."""
+        _write_amounts(system.context, edge, when, self._is_known, self._numbers)
+        self._is_known = True
+        return _Amounts(*self._numbers.tolist())
 
     def _all(self, system: System, edge: Edge, when: float) -> float:
         """Return the energy of the body and of the anchors [J]."""
-        stored = sum(self._now or self._stored(system))
-        return stored + edge_energy(system.interaction.state, system.body, edge, when)
+        now = self._amounts(system, edge, when)
+        return now.elastic + now.kinetic + now.potential + now.edge

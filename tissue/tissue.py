@@ -128,7 +128,7 @@ class Tissue(DrivenBody):
         self._incision = Incision(scheme, self.node_size)
         self._system.find_loose_pieces()
         self._loads = Loads()
-        self._audit = Audit(surroundings.gravity, is_kept=solver.audit)
+        self._audit = Audit(is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.limit)
         self._integrator = integrator_of(options, self._global_stepper, len(body.rest))
@@ -137,7 +137,7 @@ class Tissue(DrivenBody):
         self._edge_now = (NOWHERE, 1.0)
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
-        self._audit.begin(self._system)
+        self._audit.begin(self._system, NOWHERE)
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.
@@ -215,7 +215,7 @@ class Tissue(DrivenBody):
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
         write_bounds(system.body, self._bounds)
-        self._audit.begin(self._system)
+        self._audit.begin(self._system, NOWHERE)
         return n_steps
 
     def cut_report(self) -> CutReport:

@@ -207,17 +207,6 @@ def _square_root(builder: Any, a: Any) -> Any:
     return builder.call(function, [a])
 
 
-def logarithm(a: Lanes) -> Lanes:
-    """Return the natural logarithms of eight numbers."""
-    return np.log(a)
-
-
-@_compiled(logarithm, LANES)
-def _logarithm(builder: Any, a: Any) -> Any:
-    function = _declared(builder.module, "llvm.log.v8f64", ir.FunctionType(_VECTOR, [_VECTOR]))
-    return builder.call(function, [a])
-
-
 def times(value: float, a: Point) -> Point:
     """Return a point times a number."""
     return value * a

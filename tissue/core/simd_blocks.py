@@ -31,7 +31,6 @@ from tissue.core.simd import (
     Point,
     _Array,
     _compiled,
-    _declared,
     _everywhere,
     _shuffled,
     _tuple_of,
@@ -255,14 +254,9 @@ for _kind in _BOTH:
 
 
 def _register_singles() -> None:
-    from tissue.core import simd, simd_gather
+    from tissue.core import simd_gather
 
     kind = LANES_OF_SINGLES
-
-    @_compiled(simd.logarithm, kind, result=kind)
-    def _logarithm(builder: Any, a: Any) -> Any:
-        function = _declared(builder.module, "llvm.log.v16f32", ir.FunctionType(a.type, [a.type]))
-        return builder.call(function, [a])
 
     _compiled(simd_gather.larger, kind, kind, result=kind)(simd_gather._larger)
     _compiled(simd_gather.where_larger, kind, kind, kind, kind, result=kind)(

@@ -15,6 +15,9 @@ LEAST_ALIGNMENT = 0.7
 """Cosine of the angle between the normal of the path and that of the blade's flat; below it the
 blade's is used."""
 
+_FARTHEST = 1 << 62
+"""Steps of the lattice beyond any of its points."""
+
 
 class Path(Arrays):
     """Displacements of the n samples of the edge through the body at rest in one step."""
@@ -43,7 +46,8 @@ class Path(Arrays):
     has_left: IntCell
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
     boxes: IntArray
-    """Lowest and highest lattice point of the quad from each sample to the next, shape (n, 6)."""
+    """Lowest and highest lattice point of the quad from each sample to the next, and last those of
+    all quads that are linked, shape (n, 6)."""
 
 
 def new_path(n: int) -> Path:
@@ -147,6 +151,19 @@ def put_on_lattice(path: Path, lattice: Lattice) -> None:
                 max(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
                 max(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
             )
+    _write_box_of_all(path.boxes, path.linked)
+
+
+@kernel
+def _write_box_of_all(boxes: IntArray, linked: BoolArray) -> None:
+    """Write the box of all quads that are linked; where none is, its lowest corner is above."""
+    last = len(linked) - 1
+    for c in range(3):
+        low, high = _FARTHEST, -_FARTHEST
+        for k in range(last):
+            if linked[k]:
+                low, high = min(low, boxes[k, c]), max(high, boxes[k, 3 + c])
+        boxes[last, c], boxes[last, 3 + c] = low, high
 
 
 @kernel

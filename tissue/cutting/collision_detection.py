@@ -123,7 +123,10 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
     box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
     first = -1
     last = -2
-    for k in range(len(path.linked) - 1):
+    n_segments = len(path.linked) - 1
+    if not overlap(_swept_box(path, n_segments), box):
+        n_segments = 0  # most tetrahedra around the active ones
+    for k in range(n_segments):
         if not path.linked[k] or not overlap(_swept_box(path, k), box):
             continue
         if first < 0:
@@ -136,7 +139,7 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
 
 @kernel
 def _swept_box(path: Path, k: int) -> Aabb:
-    """Return the box of the quad that segment `k` sweeps, on the lattice."""
+    """Return the box that segment `k` sweeps, on the lattice; the last one is that of all."""
     boxes = path.boxes
     return Aabb(
         Vec3(boxes[k, 0], boxes[k, 1], boxes[k, 2]), Vec3(boxes[k, 3], boxes[k, 4], boxes[k, 5])

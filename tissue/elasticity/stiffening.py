@@ -20,9 +20,10 @@ without any difference of large numbers. Under pure dilatation q is negative: th
 import math
 
 from tissue.core.jit import inlined
-from tissue.core.simd import Lanes, logarithm
+from tissue.core.simd import Lanes
 from tissue.core.simd_blocks import alike
 from tissue.core.simd_gather import larger, where_larger
+from tissue.core.simd_logarithm import logarithm
 from tissue.core.vec3 import Vec3, dot
 from tissue.elasticity.energy_density import EnergyDensity
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tissue.core.jit import kernel
-from tissue.core.simd import aligned, logarithm, point, store_point
+from tissue.core.simd import aligned, point, store_point
 from tissue.core.simd_blocks import (
     alike,
     gathered_alike,
@@ -72,14 +72,12 @@ def test_a_block_holds_eight_doubles_or_sixteen_singles(real):
 def folds(values, out):
     a = load_block(values, 0)
     out[0], out[1] = largest(a), sum_of_lanes(a)
-    out[2] = sum_of_lanes(logarithm(a))
 
 
 def test_a_block_is_folded_to_a_double(real):
     values = filled(16, real)
-    compiled, plain = both(folds, values, out=np.zeros(3))
-    np.testing.assert_array_equal(compiled[:2], plain[:2])
-    assert compiled[2] == pytest.approx(plain[2], abs=8 * float(np.finfo(real).eps))
+    compiled, plain = both(folds, values, out=np.zeros(2))
+    np.testing.assert_array_equal(compiled, plain)
     assert plain[0] == values[: 64 // values.itemsize].max()
 
 
