@@ -9,6 +9,7 @@ import pytest
 from tests import bodies, strokes
 from tests.tissue.solids import evaluate
 from tissue import MATERIALS, Material, SolverSettings, TetrahedralMesh, Tissue, block, liver_lobe
+from tissue.tissue import NOWHERE
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 PRONY = ((0.3, 0.1), (0.2, 2.0))
@@ -284,7 +285,7 @@ def test_a_body_pressed_flat_and_let_go_comes_to_rest():
         solver=SolverSettings(audit=True),
     )
     tissue._system.relax_stress(math.inf)
-    tissue._audit.begin(tissue._system)
+    tissue._audit.begin(tissue._system, NOWHERE)
     at_first = tissue._audit._at_first[0]
     for _ in range(500):
         energies = tissue.step(None, 1e-3).energies

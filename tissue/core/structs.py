@@ -8,6 +8,7 @@ Python does not unpack the arrays.
 In Python, and with the JIT off, an `Arrays` is a plain object with its fields as attributes.
 """
 
+import functools
 import hashlib
 import inspect
 from array import array
@@ -149,17 +150,17 @@ class Arrays:
                 if not value.flags.c_contiguous:
                     raise TypeError(f"{type(self).__name__}.{name} is not C-contiguous")
                 words += [value.ctypes.data, *value.shape]
-                dtype = numpy_support.from_dtype(value.dtype)
-                kinds.append((name, types.Array(dtype, value.ndim, "C")))
+                kinds.append((name, _array_type(value.dtype, value.ndim)))
         self._table = np.array(words, dtype=np.int64)
         self._float_cells = self._table.view(np.float64)
         self.address = self._table.ctypes.data
-        known, fields_now = self._types, tuple(kinds)
-        if fields_now not in known:
+        # Numba takes long to compare types; each of these is one object that stays.
+        known, key = self._types, tuple([id(kind) for _, kind in kinds])
+        if key not in known:
             if len(known) == self._most_types:
                 raise TypeError(f"{type(self).__name__} has fields of other types than before")
-            known[fields_now] = ArraysType(type(self).__name__, fields_now, len(self._cells))
-        self._numba_type_ = known[fields_now]
+            known[key] = ArraysType(type(self).__name__, tuple(kinds), len(self._cells))
+        self._numba_type_ = known[key]
 
     def replaced(self, **fields: Any) -> Self:
         """Return a struct with these fields in place of its own; cells are copied."""
@@ -176,6 +177,12 @@ class Arrays:
             "pickled nor copied; take Tissue.snapshot(), or make another Tissue and do the same "
             "steps, which gives the same bits"
         )
+
+
+@functools.cache
+def _array_type(dtype: np.dtype, n_dimensions: int) -> types.Type:
+    """Return Numba's type of a C-contiguous array, always the same object."""
+    return types.Array(numpy_support.from_dtype(dtype), n_dimensions, "C")
 
 
 def _word(number: float) -> int:
