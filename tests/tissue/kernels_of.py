@@ -115,6 +115,7 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
         has_springs=1,
         has_tetrahedra=0,
         highest=0.0,
+        highest_of_tetrahedra=0.0,
         highest_of_dampers=0.0,
         scaling=no_mass_scaling(),
         frequency_squared=frequencies,

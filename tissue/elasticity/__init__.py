@@ -13,6 +13,7 @@ In the order in which they are best read:
     energy                  energies of the body, and the power of damping
     frequency_bound         a bound on the frequencies of tetrahedra at rest
     frequency_refinement    the same bound brought near the truth
+    changed_frequencies     both, and the mass that nodes get, after a cut
     mass_scaling            mass for the nodes of slivers
     limited_frequency       mass for nodes that are made fast between cuts
     strained_frequency      a bound for tetrahedra as they are deformed now

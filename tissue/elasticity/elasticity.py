@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.elasticity.changed_frequencies import forget_added_mass, update_frequencies
 from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -13,23 +14,19 @@ from tissue.elasticity.finite_elements import (
     no_solid,
     room_for_stars,
 )
-from tissue.elasticity.frequency_bound import bound_solid_frequencies
-from tissue.elasticity.frequency_refinement import tighten
-from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
+from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import (
     LARGEST_ADDED_MASS,
-    LIMIT_STEP,
     no_mass_scaling,
-    scale_masses,
 )
 from tissue.elasticity.relaxed_stress import inherit_relaxed
 from tissue.elasticity.returned_mass import return_mass
-from tissue.elasticity.springs import bound_frequencies, build_rows, grown_springs, no_springs
-from tissue.elasticity.strained_frequency import StepLimit, forget_tests, strained_frequency
+from tissue.elasticity.springs import build_rows, grown_springs, no_springs
+from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.material import Material
 from tissue.mesh.angular_momentum import return_spin
 from tissue.mesh.body import Body
-from tissue.mesh.changes import Change, largest_frequency
+from tissue.mesh.changes import Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 ROOM_FOR_SPRINGS = 1 << 16
@@ -77,17 +74,17 @@ class Elasticity:
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
             highest=0.0,
+            highest_of_tetrahedra=0.0,
             highest_of_dampers=0.0,
             scaling=no_mass_scaling(),
             frequency_squared=np.zeros(n_nodes),
         )
         self._has_solid = law is not None
-        self._solid_frequency_squared = 0.0
         n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
         self._write(body, visits, np.arange(n_tetrahedra), np.arange(n_nodes))
         if mass_scaling is not None and material.law != "springs":
             scaling = self.arrays.scaling
-            scaling.allowed = max(mass_scaling**2, self._solid_frequency_squared)
+            scaling.allowed = max(mass_scaling**2, self.arrays.highest_of_tetrahedra)
             scaling.allowed_between_cuts = scaling.allowed
             scaling.most = LARGEST_ADDED_MASS * float(body.masses[:n_nodes].sum())
 
@@ -153,43 +150,13 @@ class Elasticity:
         )
 
     def _write(self, body: Body, visits: Visits, tetrahedra: IntArray, nodes: IntArray) -> None:
-        scaling = self.arrays.scaling
-        scaling.added -= float(body.added_masses[nodes].sum())
+        n = len(nodes)
+        forget_added_mass(self.arrays.scaling, body, nodes, n)
         self._write_springs(body, visits, nodes)
         if self._has_solid:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
-            springs, solid = self.arrays.springs, self.arrays.solid
-            n = bound_solid_frequencies(solid, body, visits, nodes, len(nodes))
-            n = tighten(solid, body, visits, n, self._solid_frequency_squared)
-            nodes = solid.listed[:n]
-            if scaling.allowed < math.inf:
-                scaling.added += scale_masses(body, springs, solid, nodes, n, scaling.allowed)
-                nodes = self._limit_added_mass(body, nodes)
-                scaling.largest = max(scaling.largest, scaling.added)
-                n = len(nodes)
-            forget_tests(solid, nodes, n)
-            highest = largest_frequency(body, solid.frequency_squared, nodes, n)
-            self._solid_frequency_squared = max(self._solid_frequency_squared, highest)
-        bound_frequencies(body, self.arrays.springs, nodes, len(nodes))
-        of_dampers = self.arrays.springs.frequency_squared
-        highest = largest_frequency(body, of_dampers, nodes, len(nodes))
-        arrays = self.arrays
-        arrays.highest_of_dampers = max(arrays.highest_of_dampers, highest)
-        bound_both_frequencies(arrays, nodes, len(nodes))
-        highest = largest_frequency(body, arrays.frequency_squared, nodes, len(nodes))
-        arrays.highest = max(arrays.highest, highest)
-
-    def _limit_added_mass(self, body: Body, nodes: IntArray) -> IntArray:
-        """Raise the limit of frequencies until the added mass is small; return the nodes scaled."""
-        springs, solid, scaling = self.arrays.springs, self.arrays.solid, self.arrays.scaling
-        if scaling.added <= scaling.most:
-            return nodes
-        n = body.n_nodes
-        while scaling.added > scaling.most:
-            scaling.allowed *= LIMIT_STEP**2
-            scaling.added += scale_masses(body, springs, solid, solid.every, n, scaling.allowed)
-        return solid.every[:n]
+        update_frequencies(self.arrays, body, visits, nodes, n)
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
         density, modulus = self._material.density, self._material.spring_modulus

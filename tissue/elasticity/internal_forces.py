@@ -31,6 +31,8 @@ class Elastic(Arrays, two_precisions=True):
     """1 if tetrahedra resist deformation, else 0."""
     highest: FloatCell
     """Bound on the square of every angular frequency so far [1/s2]: it never falls."""
+    highest_of_tetrahedra: FloatCell
+    """Bound on the square of the frequencies of tetrahedra alone so far [1/s2]."""
     highest_of_dampers: FloatCell
     """Bound on the square of the frequencies of springs alone so far [1/s2]. The dampers have the
     stiffness of springs under either law."""

@@ -40,6 +40,7 @@ def elastic_of(solid):
         has_springs=0,
         has_tetrahedra=1,
         highest=0.0,
+        highest_of_tetrahedra=0.0,
         highest_of_dampers=0.0,
         scaling=no_mass_scaling(),
         frequency_squared=solid.solid.frequency_squared.copy(),

@@ -1,0 +1,69 @@
+"""The bounds on the frequencies of nodes whose tetrahedra a cut changed, and the mass they get."""
+
+import math
+
+from tissue.core.array_types import IntArray
+from tissue.core.jit import kernel
+from tissue.elasticity.frequency_bound import bound_solid_frequencies
+from tissue.elasticity.frequency_refinement import tighten
+from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
+from tissue.elasticity.mass_scaling import LIMIT_STEP, MassScaling, scale_masses
+from tissue.elasticity.springs import bound_frequencies
+from tissue.elasticity.strained_frequency import forget_tests
+from tissue.mesh.body import Body
+from tissue.mesh.changes import largest_frequency
+from tissue.mesh.star import Visits
+
+
+@kernel
+def forget_added_mass(scaling: MassScaling, body: Body, nodes: IntArray, n: int) -> None:
+    """Take the mass that the first `n` of `nodes` got out of the sum: their rows are made anew."""
+    added = 0.0
+    for i in range(n):
+        added += body.added_masses[nodes[i]]
+    scaling.added -= added
+
+
+@kernel
+def update_frequencies(
+    elastic: Elastic, body: Body, visits: Visits, nodes: IntArray, n: int
+) -> None:
+    """Bound the frequencies around nodes, and give mass to those that are too fast.
+
+    Args:
+        elastic: The rows of the nodes are up to date; bounds are written.
+        body: Masses are written.
+        visits: For searches.
+        nodes: Nodes, of which the first `n` are those whose tetrahedra changed.
+        n: How many these are.
+    """
+    solid, springs, scaling, changed = elastic.solid, elastic.springs, elastic.scaling, nodes
+    if elastic.has_tetrahedra == 1:
+        n = bound_solid_frequencies(solid, body, visits, nodes, n)
+        n = tighten(solid, body, visits, n, elastic.highest_of_tetrahedra)
+        changed = solid.listed
+        if scaling.allowed < math.inf:
+            scaling.added += scale_masses(body, springs, solid, changed, n, scaling.allowed)
+            if scaling.added > scaling.most:
+                _raise_limit(elastic, body)
+                changed, n = solid.every, body.n_nodes
+            scaling.largest = max(scaling.largest, scaling.added)
+        forget_tests(solid, changed, n)
+        highest = largest_frequency(body, solid.frequency_squared, changed, n)
+        elastic.highest_of_tetrahedra = max(elastic.highest_of_tetrahedra, highest)
+    bound_frequencies(body, springs, changed, n)
+    highest = largest_frequency(body, springs.frequency_squared, changed, n)
+    elastic.highest_of_dampers = max(elastic.highest_of_dampers, highest)
+    bound_both_frequencies(elastic, changed, n)
+    highest = largest_frequency(body, elastic.frequency_squared, changed, n)
+    elastic.highest = max(elastic.highest, highest)
+
+
+@kernel
+def _raise_limit(elastic: Elastic, body: Body) -> None:
+    """Raise the limit of frequencies until the added mass is small."""
+    solid, scaling = elastic.solid, elastic.scaling
+    springs, every, n = elastic.springs, solid.every, body.n_nodes
+    while scaling.added > scaling.most:
+        scaling.allowed *= LIMIT_STEP**2
+        scaling.added += scale_masses(body, springs, solid, every, n, scaling.allowed)
