@@ -33,9 +33,6 @@ within some frames; more: the lists become long with stale entries."""
 LEAST_ENTRIES = 1 << 14
 """Room for entries at least."""
 
-_NO_CELLS = np.array([0, 0, 0, -1, -1, -1], np.int32)
-"""`TetrahedronGrid.cells` of a tetrahedron that is not listed."""
-
 
 class TetrahedronGrid(Arrays):
     """Linked lists of tetrahedra, one for each cell."""
@@ -101,13 +98,20 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
             entry=np.empty(room, np.int32),
             n_listed=0,
             n_entries=0,
-            cells=np.tile(_NO_CELLS, (len(body.tetrahedra), 1)),
+            cells=_no_cells(len(body.tetrahedra)),
             listed_at=positions.copy(),
             margin=margin,
         )
         if list_appended(body, positions, grid):
             return grid
         room *= 2
+
+
+def _no_cells(n: int) -> SlotArray:
+    """Return `TetrahedronGrid.cells` of that many tetrahedra that are not listed."""
+    cells = np.zeros((n, 6), np.int32)
+    cells[:, 3:] = -1
+    return cells
 
 
 @kernel
