@@ -73,6 +73,30 @@ def test_points_are_found_when_nodes_that_moved_far_are_listed_again(cut):
     expect_found(cut.body, cells, seed=2)
 
 
+def test_a_tetrahedron_is_listed_in_cells_that_are_new_to_it_alone(cut):
+    cells = build_grid(cut.body, cut.body.positions, MARGIN)
+    n, n_at_first = cut.body.n_nodes, cells.n_entries
+    cut.body.positions[:n] -= [0.2, 0.0, 0.0]
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
+    assert n_at_first < cells.n_entries < 1.5 * n_at_first
+    for t in range(cut.body.n_tetrahedra):
+        i, j, k = cells.cells[t, :3]
+        at, n_times = cells.head[(i * cells.shape[1] + j) * cells.shape[2] + k], 0
+        while at >= 0:
+            n_times += int(cells.entry[at] == t)
+            at = cells.following[at]
+        assert n_times == 1
+
+
+def test_points_are_found_after_nodes_went_to_and_fro(cut):
+    cells, random = build_grid(cut.body, cut.body.positions, MARGIN), np.random.default_rng(3)
+    n = cut.body.n_nodes
+    for seed in range(8):
+        cut.body.positions[:n] += random.uniform(-2.0, 2.0, 3) * MARGIN
+        assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
+        expect_found(cut.body, cells, seed)
+
+
 def test_points_are_found_in_tetrahedra_that_were_appended(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
     for t in range(0, 60, 5):
