@@ -99,7 +99,8 @@ class Audit:
         """Work of the loads since the account began [J]."""
         self._is_known = False
         self._numbers = np.zeros(len(_Amounts._fields))
-        self._at_first = _Amounts(*self._numbers)
+        self._now = self._at_first = _Amounts(*self._numbers)
+        self._of: tuple[Edge | None, float] = (None, 0.0)
 
     def begin(self, system: System, edge: Edge) -> None:
         """Begin the account with the body as it is; work and losses so far are forgotten."""
@@ -153,10 +154,12 @@ class Audit:
         )
 
     def _amounts(self, system: System, edge: Edge, when: float) -> _Amounts:
-        """Return the amounts now; the energies of the body itself are remembered."""
-        _write_amounts(system.context, edge, when, self._is_known, self._numbers)
-        self._is_known = True
-        return _Amounts(*self._numbers.tolist())
+        """Return the amounts now; they are remembered until the body moves or its mesh changes."""
+        if not (self._is_known and self._of == (edge, when)):
+            _write_amounts(system.context, edge, when, self._is_known, self._numbers)
+            self._now, self._of = _Amounts(*self._numbers.tolist()), (edge, when)
+            self._is_known = True
+        return self._now
 
     def _all(self, system: System, edge: Edge, when: float) -> float:
         """Return the energy of the body and of the anchors [J]."""
