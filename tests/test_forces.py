@@ -12,6 +12,7 @@ from tests.bodies import sides
 from tests.materials import SPRINGS
 from tissue import (
     MATERIALS,
+    BladeContacts,
     BladeSegment,
     BladeShape,
     BladeSweep,
@@ -55,6 +56,11 @@ def mirrored(cells):
     return TetrahedralMesh(points, place.ravel()[np.concatenate((half.tetrahedra, turned))])
 
 
+def with_own_contacts(result):
+    """Return a result whose contacts are copies: they are views until the next step."""
+    return result._replace(contacts=BladeContacts(*map(np.copy, result.contacts)))
+
+
 class Run:
     """A stroke through a block, with its energy balance."""
 
@@ -80,7 +86,8 @@ class Run:
         )
         self.poses = poses
         self.results = [
-            self.tissue.step(BladeSweep(a, b), dt) for a, b in itertools.pairwise(poses)
+            with_own_contacts(self.tissue.step(BladeSweep(a, b), dt))
+            for a, b in itertools.pairwise(poses)
         ]
         self.force = -np.array([r.wrench.force for r in self.results])
         self.y = np.array([pose.tip[1] for pose in poses[1:]])

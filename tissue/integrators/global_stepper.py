@@ -9,8 +9,8 @@ from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.relaxation import (
-    DONE,
     NOT_FINITE,
+    RELAXED,
     Relaxation,
     relax_by_nystroem,
     relax_by_runge_kutta,
@@ -101,7 +101,7 @@ class GlobalStepper:
         while True:
             arrays = self._arrays(system, blade, choice)
             outcome = self.method.relax(arrays, increment.edge, has_blade, *increment[1:])
-            if outcome == DONE:
+            if outcome == RELAXED:
                 break
             if outcome == NOT_FINITE:
                 raise not_finite()

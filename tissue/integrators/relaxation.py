@@ -31,7 +31,7 @@ from tissue.integrators.step_context import StepContext
 from tissue.integrators.stress_relaxation import relax_stress
 from tissue.mesh.bounding_boxes import write_bounds
 
-DONE: Final = 0
+RELAXED: Final = 0
 """The increment is done."""
 NOT_FINITE: Final = -1
 """The increment is done, and the position of a node is not a finite number."""
@@ -61,9 +61,18 @@ class Relaxation(Arrays, two_precisions=True):
 def relax_by_nystroem(
     relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
 ) -> int:
-    """Relax by the Nystroem method of three stages; see `relax_by_runge_kutta`."""
+    """Relax by the Nystroem method of three stages; see `relax_by_runge_kutta`.
+
+    Args:
+        relaxation: Written.
+        edge: The cutting edge over the time step.
+        has_blade: Whether there is one.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which the increment begins.
+        end: Fraction of the time step at which it ends.
+    """
     outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
-    if outcome != DONE:
+    if outcome != RELAXED:
         return outcome
     if relaxation.stage == _STEPS:
         advance_by_nystroem(relaxation.choice, relaxation.step, edge)
@@ -74,9 +83,18 @@ def relax_by_nystroem(
 def relax_by_verlet(
     relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
 ) -> int:
-    """Relax by position Verlet; see `relax_by_runge_kutta`."""
+    """Relax by position Verlet; see `relax_by_runge_kutta`.
+
+    Args:
+        relaxation: Written.
+        edge: The cutting edge over the time step.
+        has_blade: Whether there is one.
+        dt: Length of the time step [s].
+        begin: Fraction of the time step at which the increment begins.
+        end: Fraction of the time step at which it ends.
+    """
     outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
-    if outcome != DONE:
+    if outcome != RELAXED:
         return outcome
     if relaxation.stage == _STEPS:
         advance_by_verlet(relaxation.choice, relaxation.step, edge)
@@ -87,7 +105,7 @@ def relax_by_verlet(
 def relax_by_runge_kutta(
     relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
 ) -> int:
-    """Relax by the Runge-Kutta method; return DONE, or NOT_FINITE, or what needs room.
+    """Relax by the Runge-Kutta method; return RELAXED, or NOT_FINITE, or what needs room.
 
     `relaxation.choice` says how many steps were taken, and whether the motion became unstable.
 
@@ -100,7 +118,7 @@ def relax_by_runge_kutta(
         end: Fraction of the time step at which it ends.
     """
     outcome = _begin(relaxation, edge, has_blade, dt, begin, end)
-    if outcome != DONE:
+    if outcome != RELAXED:
         return outcome
     if relaxation.stage == _STEPS:
         advance_by_runge_kutta(relaxation.choice, relaxation.step, edge)
@@ -113,7 +131,7 @@ def _begin(
 ) -> int:
     """Find the faces that the blade may touch, and begin the steps; return what needs room."""
     if relaxation.stage != _FACES:
-        return DONE
+        return RELAXED
     if relaxation.has_faces == 1:
         if has_blade:
             n_nodes = relaxation.step.body.n_nodes
@@ -124,17 +142,17 @@ def _begin(
             release_sides(relaxation.step.blade)
     begin_increment(relaxation.choice, relaxation.step, dt, begin, end)
     relaxation.stage = _STEPS
-    return DONE
+    return RELAXED
 
 
 @kernel
 def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int:
-    """Do what follows the steps; return DONE, or NOT_FINITE, or what needs room."""
+    """Do what follows the steps; return RELAXED, or NOT_FINITE, or what needs room."""
     step, choice = relaxation.step, relaxation.choice
     if relaxation.stage == _STEPS:
         relaxation.stage = _FACES
         if choice.is_unstable == 1:
-            return DONE
+            return RELAXED
         if choice.done > 0:
             if relaxes(step.elastic.solid):
                 relax_stress(step, choice.span)
@@ -151,4 +169,4 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
             relaxation.stage = _ANCHORS_AGAIN
             return GRID_IS_FULL
     relaxation.stage = _FACES
-    return DONE
+    return RELAXED

@@ -19,7 +19,18 @@ def relax_in_stages(
     increment: Increment,
     has_blade: bool,
 ) -> int:
-    """Relax by an increment; return the steps taken. See `Integrator.relax`."""
+    """Relax by an increment; return the steps taken. See `Integrator.relax`.
+
+    Args:
+        integrator: Advances the motion.
+        system: Body, forces and contact.
+        blade: What searches of the blade work on.
+        increment: The part of a time step to advance by.
+        has_blade: Whether there is a blade.
+
+    Raises:
+        TissueError: the motion became unstable.
+    """
     interaction, edge = system.interaction, increment.edge
     faces_of = edge if has_blade else None
     interaction.update_faces(blade, integrator.moved, faces_of, increment.begin)
