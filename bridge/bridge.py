@@ -21,7 +21,7 @@ from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
 from bridge.link import TissueLink, link_to
-from bridge.poses import Axes, axes_of, check_pose, half_length, motion_of
+from bridge.poses import Pose, Six, checked_pose, motion_of, pose_of, six
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -92,11 +92,13 @@ class Bridge:
         self._tissue_every = tissue_every
         # With an answer in each frame the model has nothing to add to the answer itself.
         self._is_direct = waits and tissue_every == 1 and coupling is None
-        self._arm: tuple[BladeSegment, Axes] | None = None
-        self._asked_at: BladeSegment | None = None
-        self._path: list[tuple[BladeSegment, float]] = []
+        self._arm: Pose | None = None
+        self._asked_at: Pose | None = None
+        self._path: list[tuple[Pose, float]] = []
         self._result: StepResult | None = None
-        self._wrench_raw = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
+        self._raw: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._felt = frame.wrench_to_world(Wrench(np.zeros(3), np.zeros(3), np.zeros(3)))
+        self._raw_is_felt = True
         self._touching: tuple[str, ...] = ()
         self._answered = False
         self._holds_as_much = False
@@ -126,32 +128,31 @@ class Bridge:
         """
         if not (dt > 0.0 and math.isfinite(dt)):
             raise ValueError(f"the frame lasts {dt} s; it must be positive and finite")
-        check_pose(segment)
-        arm = self._frame.segment_to_tissue(segment)
-        axes = axes_of(arm)
-        before, axes_before = (arm, axes) if self._arm is None else self._arm
-        arm_motion = motion_of(before, axes_before, arm, axes)
-        self._arm = arm, axes
+        arm = checked_pose(self._frame.segment_to_tissue(segment), segment)
+        arm_motion = motion_of(self._arm or arm, arm)
+        self._arm = arm
         self._n_frames += 1
         balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
-        blade = arm if self._proxy is None else self._proxy.pose
+        blade = arm if self._proxy is None else pose_of(self._proxy.pose)
         self._path.append((blade, dt))
+        query = self._query
         is_due = self._asked_at is None or len(self._path) >= self._tissue_every
-        if is_due and not self._query.is_pending:
+        if is_due and not query.is_pending:
             self._ask()
-        answer = self._query.take_answer()
+        answer = query.take_answer()
         if answer is not None:
             self._process(answer)
         self._answered = answer is not None
-        self._silence = self._silence + dt if self._query.is_pending else 0.0
+        self._silence = self._silence + dt if query.is_pending else 0.0
         raw = self._wrench_on(arm, dt) if balanced is None else balanced
         if not self._is_direct:
-            self._impulse.record_felt(raw - self._correction, blade, dt)
-        self._wrench_raw = Wrench(raw[:3], raw[3:], arm.tip)
+            self._impulse.record_felt(np.array(raw) - self._correction, blade.segment, dt)
         work = 0.0 if self._result is None else self._result.work_of_blade
-        travel = Travel(arm_motion, half_length(arm), work)
+        travel = Travel(arm_motion, 0.5 * math.dist(arm.tip, arm.heel), work)
         felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
-        return self._frame.wrench_to_world(Wrench(felt[:3], felt[3:], arm.tip))
+        self._raw, self._raw_is_felt = raw, felt is raw
+        self._felt = self._frame.numbers_to_world(felt, arm.segment.tip)
+        return self._felt
 
     @property
     def result(self) -> StepResult | None:
@@ -174,7 +175,9 @@ class Bridge:
     @property
     def wrench_raw(self) -> Wrench:
         """The tissue's last wrench before any limit, in the world."""
-        return self._frame.wrench_to_world(self._wrench_raw)
+        if self._raw_is_felt or self._arm is None:
+            return self._felt
+        return self._frame.numbers_to_world(self._raw, self._arm.segment.tip)
 
     @property
     def touching(self) -> tuple[str, ...]:
@@ -200,13 +203,14 @@ class Bridge:
             self._impulse.written_off,
         )
 
-    def _follow(self, coupling: VirtualCoupling, arm: BladeSegment, dt: float) -> FloatArray:
-        """Let the proxy follow the arm, and return the tissue's wrench on both, shape (6,)."""
+    def _follow(self, coupling: VirtualCoupling, arm: Pose, dt: float) -> Six:
+        """Let the proxy follow the arm, and return the tissue's wrench on both."""
         if self._proxy is None:
-            self._proxy = Proxy(coupling, dt, arm)
-        wrench = self._model.wrench(self._proxy.pose)
-        self._correction = self._impulse.correction(wrench, self._proxy.pose, dt)
-        return self._proxy.follow(arm, wrench + self._correction, self._model.stiffness, dt)
+            self._proxy = Proxy(coupling, dt, arm.segment)
+        proxy, stiffness = self._proxy, self._model.stiffness
+        wrench = self._model.wrench(proxy.pose)
+        self._correction = self._impulse.correction(wrench, proxy.pose, dt)
+        return six(proxy.follow(arm.segment, wrench + self._correction, stiffness, dt))
 
     def _ask(self) -> None:
         """Ask the tissue to advance to the present, while the blade moves along its path.
@@ -218,25 +222,29 @@ class Bridge:
         """
         path = self._path
         blade, engaged = path[-1][0], self._engaged()
+        before = self._asked_at or blade
+        overlaps = self._broad_phase.overlaps
         if len(path) == 1:
-            sweep, seconds = BladeSweep(self._asked_at or blade, blade), path[0][1]
-            touches, self._touching = self._broad_phase.overlaps(sweep, seconds, engaged=engaged)
+            seconds = path[0][1]
+            touches, self._touching = overlaps(before, blade, seconds, engaged=engaged)
+            sweep = BladeSweep(before.segment, blade.segment) if touches else None
             parts = [TimedSweep(sweep, seconds)]
         else:
             seconds = sum(dt for _, dt in path)
             if self._holds_as_much and len(path) > 2:
                 path = [(path[-2][0], seconds - path[-1][1]), path[-1]]
-            ends = [self._asked_at or blade, *(pose for pose, _ in path)]
-            sweeps = [BladeSweep(*pair) for pair in pairwise(ends)]
-            overlaps = self._broad_phase.overlaps
-            found = [overlaps(sweep, seconds, engaged=engaged) for sweep in sweeps]
+            ways = list(pairwise([before, *(pose for pose, _ in path)]))
+            found = [overlaps(*way, seconds, engaged=engaged) for way in ways]
             self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
             touches = any(one.tissue for one in found)
-            parts = [TimedSweep(sweep, dt) for sweep, (_, dt) in zip(sweeps, path, strict=True)]
-        if not touches:
-            parts = [TimedSweep(None, seconds)]
-            self._n_rejected += 1
-        self._query.ask(parts, blade)
+            parts = [
+                TimedSweep(BladeSweep(t0.segment, t1.segment), dt)
+                for (t0, t1), (_, dt) in zip(ways, path, strict=True)
+            ]
+            if not touches:
+                parts = [TimedSweep(None, seconds)]
+        self._n_rejected += not touches
+        self._query.ask(parts, blade.segment)
         if not self._is_direct:
             self._impulse.end_period()
         self._asked_at, self._path = blade, []
@@ -247,7 +255,7 @@ class Bridge:
         low, high = result.bounds.tolist()
         if not math.isfinite(sum(low) + sum(high)):
             raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
-        self._broad_phase.update_bounds(result.bounds, answer.seconds)
+        self._broad_phase.update_bounds((low, high), answer.seconds)
         if not self._is_direct:
             self._model.update(result, answer.last_wrench, answer.middle_pose)
             in_contact = self._model.in_contact
@@ -257,14 +265,17 @@ class Bridge:
         self._result = result
         self._n_answers += 1
 
-    def _wrench_on(self, arm: BladeSegment, dt: float) -> FloatArray:
-        """Return the tissue's wrench on a blade without a proxy, about its tip, shape (6,)."""
+    def _wrench_on(self, arm: Pose, dt: float) -> Six:
+        """Return the tissue's wrench on a blade without a proxy, about its tip."""
         if self._is_direct and self._result is not None:
             # The wrench is zero, and about no particular point, when no blade is near.
-            return np.concatenate([self._result.wrench.force, self._result.wrench.torque])
-        wrench = self._model.wrench(arm)
-        self._correction = self._impulse.correction(wrench, arm, dt)
-        return wrench + self._correction
+            force, torque, _ = self._result.wrench
+            fx, fy, fz = force.tolist()
+            tx, ty, tz = torque.tolist()
+            return fx, fy, fz, tx, ty, tz
+        wrench = self._model.wrench(arm.segment)
+        self._correction = self._impulse.correction(wrench, arm.segment, dt)
+        return six(wrench + self._correction)
 
     def _engaged(self) -> bool:
         """Return whether the blade holds tissue, which it may drag out of any box."""

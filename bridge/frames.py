@@ -9,6 +9,7 @@ import numpy as np
 
 from bridge.collision.fixtures import Fixture, FixtureBox
 from bridge.input_checks import finite, rotation
+from bridge.poses import Six
 from tissue import BladeSegment, FloatArray, Wrench
 
 
@@ -24,14 +25,14 @@ class TissueFrame:
     """Axes of the tissue in the world as columns, shape (3, 3)."""
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
     """Origin of the tissue in the world [m], shape (3,)."""
-    _is_rotated: bool = field(init=False, repr=False, default=True)
+    is_rotated: bool = field(init=False, repr=False, default=True)
     """Whether the rotation differs from the identity. Mostly it does not, and the products are
     skipped."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotation(self.rotation, "the tissue's rotation"))
         object.__setattr__(self, "origin", finite(self.origin, (3,), "the tissue's origin"))
-        object.__setattr__(self, "_is_rotated", bool((self.rotation != np.eye(3)).any()))
+        object.__setattr__(self, "is_rotated", bool((self.rotation != np.eye(3)).any()))
         self.rotation.setflags(write=False)
         self.origin.setflags(write=False)
 
@@ -45,20 +46,20 @@ class TissueFrame:
 
     def vectors_to_tissue(self, vectors: FloatArray) -> FloatArray:
         """Return world vectors (direction, force, velocity) in the tissue frame, shape (..., 3)."""
-        return vectors @ self.rotation if self._is_rotated else vectors.copy()
+        return vectors @ self.rotation if self.is_rotated else vectors.copy()
 
     def vectors_to_world(self, vectors: FloatArray) -> FloatArray:
         """Return vectors of the tissue frame in the world, shape (..., 3)."""
-        return vectors @ self.rotation.T if self._is_rotated else vectors.copy()
+        return vectors @ self.rotation.T if self.is_rotated else vectors.copy()
 
     def matrix_to_world(self, matrix: FloatArray) -> FloatArray:
         """Return a matrix of the tissue frame, such as a stiffness, in the world, shape (3, 3)."""
-        return self.rotation @ matrix @ self.rotation.T if self._is_rotated else matrix.copy()
+        return self.rotation @ matrix @ self.rotation.T if self.is_rotated else matrix.copy()
 
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
         tip, heel, forward = segment
-        if not self._is_rotated:
+        if not self.is_rotated:
             return BladeSegment(tip - self.origin, heel - self.origin, forward.copy())
         return BladeSegment(
             self.points_to_tissue(tip),
@@ -69,7 +70,7 @@ class TissueFrame:
     def segment_to_world(self, segment: BladeSegment) -> BladeSegment:
         """Return a segment of the tissue frame in the world."""
         tip, heel, forward = segment
-        if not self._is_rotated:
+        if not self.is_rotated:
             return BladeSegment(tip + self.origin, heel + self.origin, forward.copy())
         return BladeSegment(
             self.points_to_world(tip),
@@ -80,13 +81,20 @@ class TissueFrame:
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
         """Return a wrench of the tissue frame in the world, about the same point."""
         force, torque, point = wrench
-        if not self._is_rotated:
+        if not self.is_rotated:
             return Wrench(force.copy(), torque.copy(), point + self.origin)
         return Wrench(
             self.vectors_to_world(force),
             self.vectors_to_world(torque),
             self.points_to_world(point),
         )
+
+    def numbers_to_world(self, wrench: Six, point: FloatArray) -> Wrench:
+        """Return force [N] and torque [N m] of the tissue frame about a point, in the world."""
+        force, torque = np.array(wrench[:3]), np.array(wrench[3:])
+        if not self.is_rotated:
+            return Wrench(force, torque, point + self.origin)
+        return self.wrench_to_world(Wrench(force, torque, point))
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture given in the world in the tissue frame."""

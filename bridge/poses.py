@@ -1,6 +1,8 @@
 """Poses of a blade: their check, the motion between two of them, and a pose moved by a motion."""
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,34 +19,65 @@ _UNIT_TOLERANCE = 1e-6
 """Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
 
-_Axis = tuple[float, float, float]
-Axes = tuple[_Axis, _Axis, _Axis]
-"""Unit vectors along the edge of a blade, forward across it, and normal to its flat."""
+Triple = Sequence[float]
+"""A vector in plain numbers. As arrays the few of a frame take several times as long."""
+Six = tuple[float, float, float, float, float, float]
+"""Force [N] and torque [N m]; or translation [m] and rotation vector [rad]."""
+Axes = tuple[float, float, float, float, float, float, float, float, float]
+"""Unit vectors along the edge from the tip, forward across it, and normal to the flat."""
 
 
-def check_pose(segment: BladeSegment) -> None:
-    """Check that a pose is finite and has a plane.
+def six(array: FloatArray) -> Six:
+    """Return the numbers of an array of shape (6,)."""
+    a, b, c, d, e, f = array.tolist()
+    return a, b, c, d, e, f
+
+
+class Pose(NamedTuple):
+    """The pose of a blade, and what the bridge needs of it, found once."""
+
+    segment: BladeSegment
+    """The pose as arrays."""
+    tip: Triple
+    """The tip [m]."""
+    heel: Triple
+    """The heel [m]."""
+    axes: Axes
+    """Axes of the blade."""
+
+
+def pose_of(segment: BladeSegment) -> Pose:
+    """Return the pose of a segment that is known to have a plane."""
+    tip, heel = segment.tip.tolist(), segment.heel.tolist()
+    return Pose(segment, tip, heel, _axes_of(tip, heel, segment.forward.tolist()))
+
+
+def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
+    """Return the pose of a segment, after a check that it is finite and has a plane.
+
+    Args:
+        segment: The pose.
+        given: The pose as the user of the bridge gave it, for the message.
 
     Raises:
         ValueError: the pose is not finite, or its edge and `forward` span no plane.
     """
-    tx, ty, tz = segment.tip.tolist()
-    hx, hy, hz = segment.heel.tolist()
-    fx, fy, fz = segment.forward.tolist()
-    ex, ey, ez = tx - hx, ty - hy, tz - hz
-    length, forward_length = math.hypot(ex, ey, ez), math.hypot(fx, fy, fz)
+    tip, heel, forward = segment.tip.tolist(), segment.heel.tolist(), segment.forward.tolist()
+    length, forward_length = math.dist(tip, heel), math.hypot(*forward)
     if not math.isfinite(length + forward_length):
-        raise ValueError(f"the blade's pose is not finite: {segment}")
+        raise ValueError(f"the blade's pose is not finite: {given}")
     if length < _SHORTEST_EDGE:
         raise ValueError(f"the cutting edge is {length} m long; at least {_SHORTEST_EDGE} m")
     if abs(forward_length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
-    cosine = abs(ex * fx + ey * fy + ez * fz) / length
+    (tx, ty, tz), (hx, hy, hz), (fx, fy, fz) = tip, heel, forward
+    cosine = abs((tx - hx) * fx + (ty - hy) * fy + (tz - hz) * fz) / length
     if cosine > _LARGEST_COSINE:
         raise ValueError(
             f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
             "degrees apart"
         )
+    return Pose(segment, tip, heel, _axes_of(tip, heel, forward))
 
 
 def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
@@ -53,15 +86,13 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
     The rotation carries edge and flat of the first pose to those of the second, by less than half
     a turn.
     """
-    return motion_of(before, axes_of(before), after, axes_of(after))
+    return np.array(motion_of(pose_of(before), pose_of(after)))
 
 
-def motion_of(
-    before: BladeSegment, axes_before: Axes, after: BladeSegment, axes_after: Axes
-) -> FloatArray:
-    """Return `motion` between two poses whose axes are known, shape (6,)."""
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = axes_before
-    (ux, uy, uz), (vx, vy, vz), (wx, wy, wz) = axes_after
+def motion_of(before: Pose, after: Pose) -> Six:
+    """Return `motion` in plain numbers."""
+    ax, ay, az, bx, by, bz, cx, cy, cz = before.axes
+    ux, uy, uz, vx, vy, vz, wx, wy, wz = after.axes
     # Over the three axes, the sum of a x u is the axis of rotation times twice the sine, and the
     # sum of a . u is one plus twice the cosine.
     sx = (ay * uz - az * uy) + (by * vz - bz * vy) + (cy * wz - cz * wy)
@@ -71,9 +102,8 @@ def motion_of(
     trace += cx * wx + cy * wy + cz * wz
     sine = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
     half = 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 0.0 else 0.5
-    x, y, z = before.tip.tolist()
-    u, v, w = after.tip.tolist()
-    return np.array((u - x, v - y, w - z, half * sx, half * sy, half * sz))
+    (x, y, z), (u, v, w) = before.tip, after.tip
+    return u - x, v - y, w - z, half * sx, half * sy, half * sz
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
@@ -110,16 +140,13 @@ def _rotation(vector: FloatArray, angle: float) -> FloatArray:
     )
 
 
-def axes_of(segment: BladeSegment) -> Axes:
-    """Return unit vectors along the edge, forward across it, and normal to the flat."""
-    tx, ty, tz = segment.tip.tolist()
-    hx, hy, hz = segment.heel.tolist()
+def _axes_of(tip: Triple, heel: Triple, forward: Triple) -> Axes:
+    (tx, ty, tz), (hx, hy, hz), (fx, fy, fz) = tip, heel, forward
     ex, ey, ez = hx - tx, hy - ty, hz - tz
     size = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
     ex, ey, ez = ex * size, ey * size, ez * size
-    fx, fy, fz = segment.forward.tolist()
     along = ex * fx + ey * fy + ez * fz
     fx, fy, fz = fx - along * ex, fy - along * ey, fz - along * ez
     size = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz)
     fx, fy, fz = fx * size, fy * size, fz * size
-    return (ex, ey, ez), (fx, fy, fz), (ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx)
+    return ex, ey, ez, fx, fy, fz, ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx

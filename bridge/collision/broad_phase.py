@@ -18,6 +18,8 @@ from bridge.collision.collision_objects import MovableBox, Obstacles, are_collid
 from bridge.collision.fixtures import Fixture
 from bridge.collision.separating_axis import SeparatingAxis
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
+from bridge.collision.witness_point import WitnessPoint
+from bridge.poses import Pose, Triple
 from tissue import BladeShape, BladeSweep, Chunks, FloatArray
 
 
@@ -43,8 +45,9 @@ class BroadPhase:
       around the body, that of its fastest side in the last step; for the chunks, that of the
       fastest node.
 
-    Where they were apart, and the axis that separated them still does (`SeparatingAxis`), they are
-    not compared by the collision library.
+    The collision library is asked only where the last answer may have changed: not where they were
+    apart and an axis still separates them (`SeparatingAxis`), nor where they overlapped and a point
+    of the blade is still near the tissue (`WitnessPoint`).
 
     Args:
         bounds: Lowest and highest corner of the tissue now [m], shape (2, 3).
@@ -67,7 +70,8 @@ class BroadPhase:
         blade: BladeShape | None = None,
         chunks: Callable[[], Chunks] | None = None,
     ) -> None:
-        self._bounds = _corners(bounds)
+        low, high = bounds.tolist()
+        self._bounds: tuple[Triple, Triple] = low, high
         self._sound_speed = sound_speed
         self._bounds_speed = 0.0
         self._blade_shape = blade
@@ -75,61 +79,85 @@ class BroadPhase:
         self._blade = MovableBox()
         self._chunk_boxes = ChunkBoxes()
         self._separating = SeparatingAxis(blade)
+        self._witness = WitnessPoint(blade)
         self._tissue = MovableBox()
         obstacles = fixture_objects(list(fixtures))
         self._has_fixtures = bool(obstacles)
         self._fixtures = Obstacles(obstacles)
 
-    def overlaps(self, sweep: BladeSweep, dt: float, *, engaged: bool = False) -> _Overlaps:
-        """Return what the blade can touch while it does `sweep`.
+    def overlaps(self, before: Pose, after: Pose, dt: float, *, engaged: bool = False) -> _Overlaps:
+        """Return what the blade can touch while it moves.
 
         Args:
-            sweep: Motion of the blade, in the tissue frame.
+            before: Pose of the blade at the start, in the tissue frame.
+            after: Pose of the blade at the end.
             dt: Duration of the motion [s].
             engaged: Whether the blade holds tissue already, which it may drag out of any box.
         """
-        if engaged and not self._has_fixtures:
-            return _ONLY_TISSUE
-        travel = (self._sound_speed + self._bounds_speed) * dt
-        if not self._has_fixtures and self._separating.separates(sweep, self._bounds, travel):
-            return _NOTHING
-        box = swept_blade(sweep, self._blade_shape)
-        self._blade.place(box)
-        fixtures = self._fixtures.colliding_with(self._blade.object)
-        return _Overlaps(engaged or self._reaches_tissue(box, dt), fixtures)
+        if self._has_fixtures:
+            self._blade.place(self._swept(before, after))
+            fixtures = self._fixtures.colliding_with(self._blade.object)
+            return _Overlaps(engaged or self._reaches_tissue(before, after, dt), fixtures)
+        touches = engaged or self._reaches_tissue(before, after, dt)
+        return _ONLY_TISSUE if touches else _NOTHING
 
-    def update_bounds(self, bounds: FloatArray, dt: float) -> None:
-        """Set the bounds of the tissue after a step of `dt` [s], shape (2, 3)."""
-        (ax, ay, az), (bx, by, bz) = self._bounds
-        self._bounds = _corners(bounds)
-        (ux, uy, uz), (vx, vy, vz) = self._bounds
+    def update_bounds(self, bounds: tuple[Triple, Triple], dt: float) -> None:
+        """Set lowest and highest corner of the tissue [m] after a step of `dt` [s]."""
+        ((ax, ay, az), (bx, by, bz)), ((ux, uy, uz), (vx, vy, vz)) = self._bounds, bounds
         moved = max(abs(ux - ax), abs(uy - ay), abs(uz - az))
-        self._bounds_speed = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz)) / dt
+        moved = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz))
+        self._bounds, self._bounds_speed = bounds, moved / dt
+        self._separating.tissue_moved(moved)
 
-    def _reaches_tissue(self, box: SweptBox, dt: float) -> bool:
-        low, high = np.array(self._bounds)
-        tissue = SweptBox(0.5 * (low + high), high - low + 2.0 * TOUCHING_MARGIN, _WORLD_AXES)
-        self._tissue.place(tissue)
-        self._blade.place(_inflated(box, (self._sound_speed + self._bounds_speed) * dt))
-        if not are_colliding(self._tissue.object, self._blade.object):
-            self._separating.find(box, tissue)
+    def _reaches_tissue(self, before: Pose, after: Pose, dt: float) -> bool:
+        """Return whether the blade can touch the tissue: its box, and then one of its chunks."""
+        travel = (self._sound_speed + self._bounds_speed) * dt
+        if self._separating.separates(before, after, self._bounds, travel):
+            return False
+        witness = self._witness
+        if not (
+            witness.is_within(travel, after, *self._bounds)
+            or self._collides_with_bounds(before, after, travel)
+        ):
             return False
         if self._chunks is None:
             return True
-        chunks = self._chunks()
-        box = _inflated(box, (self._sound_speed + chunks.fastest) * dt)
+        boxes, fastest = self._chunks()
+        travel = (self._sound_speed + fastest) * dt
+        last = self._chunk_boxes.last_of(boxes)
+        if last is not None and witness.is_within(travel, after, *last):
+            return True
+        box = _inflated(self._swept(before, after), travel)
         self._blade.place(box)
-        return self._chunk_boxes.collide_with(box, self._blade.object, chunks.boxes)
+        if not self._chunk_boxes.collide_with(box, self._blade.object, boxes):
+            return False
+        found = self._chunk_boxes.last_of(boxes)
+        if found is not None:
+            witness.find(after, *found)
+        return True
+
+    def _collides_with_bounds(self, before: Pose, after: Pose, travel: float) -> bool:
+        """Return whether the blade, larger by `travel` [m], overlaps the box around the tissue."""
+        low, high = np.array(self._bounds)
+        box = self._swept(before, after)
+        tissue = SweptBox(0.5 * (low + high), high - low + 2.0 * TOUCHING_MARGIN, _WORLD_AXES)
+        self._tissue.place(tissue)
+        self._blade.place(_inflated(box, travel))
+        if not are_colliding(self._tissue.object, self._blade.object):
+            self._separating.find(box, tissue)
+            return False
+        self._separating.forget()
+        if self._chunks is None:
+            self._witness.find(after, *self._bounds)
+        return True
+
+    def _swept(self, before: Pose, after: Pose) -> SweptBox:
+        """Return the box around the blade during its motion."""
+        return swept_blade(BladeSweep(before.segment, after.segment), self._blade_shape)
 
 
 _WORLD_AXES = np.eye(3)
 _ONLY_TISSUE, _NOTHING = _Overlaps(True, ()), _Overlaps(False, ())
-
-
-def _corners(bounds: FloatArray) -> tuple[list[float], list[float]]:
-    """Return lowest and highest corner in plain numbers."""
-    low, high = bounds.tolist()
-    return low, high
 
 
 def _inflated(box: SweptBox, distance: float) -> SweptBox:

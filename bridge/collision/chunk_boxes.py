@@ -5,6 +5,7 @@ import numpy as np
 
 from bridge.collision.collision_objects import MovableBox, are_colliding
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox
+from bridge.poses import Triple
 from tissue import FloatArray, IntArray
 
 _WORLD_AXES = np.eye(3)
@@ -54,6 +55,13 @@ class ChunkBoxes:
                 self._last = i
                 return True
         return False
+
+    def last_of(self, chunks: FloatArray) -> tuple[Triple, Triple] | None:
+        """Return the corners [m] of the chunk that overlapped last; None if it is not known."""
+        if not 0 <= self._last < len(chunks):
+            return None
+        low, high = chunks[self._last].tolist()
+        return low, high
 
     def _collides(self, fcl_box: fcl.CollisionObject, chunk: FloatArray) -> bool:
         """Return whether a box overlaps a chunk, of which the corners are given."""

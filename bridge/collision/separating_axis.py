@@ -3,15 +3,20 @@
 import math
 
 from bridge.collision.separation import largest_gap
-from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, axes_across
-from tissue import BladeSegment, BladeShape, BladeSweep
+from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox
+from bridge.poses import Pose, Triple
+from tissue import BladeShape
+
+_MOST_SIDES = math.sqrt(3.0)
+"""Largest sum of the cosines between an axis and the three axes of a box."""
 
 
 class SeparatingAxis:
     """Answers whether an axis still separates a blade from the box around the tissue.
 
     Where the projections of two bodies onto one line are apart, the bodies are. To project them
-    takes a tenth of the time of a query to the collision library.
+    takes a tenth of the time of a query to the collision library; and as long as both cannot have
+    moved as far as the gap that was found between them, they are not projected either.
 
     Args:
         shape: Shape of the blade behind the edge; None for the edge alone.
@@ -22,51 +27,62 @@ class SeparatingAxis:
         self._half_thickness = 0.0 if shape is None else 0.5 * shape.thickness
         self._reach = math.hypot(self._height, self._half_thickness)
         self._axis: tuple[float, float, float] | None = None
-        self._last: tuple[BladeSegment | None, tuple[float, ...]] = (None, ())
+        self._gap = 0.0
+        self._gap_at: Pose | None = None
 
     def find(self, blade: SweptBox, tissue: SweptBox) -> None:
         """Find the axis on which the gap between two boxes is largest; it points to the tissue."""
         gap, axis = largest_gap(blade, tissue)
         x, y, z = axis.tolist()
         self._axis = (x, y, z) if gap > 0.0 else None
+        self._gap_at = None
+
+    def forget(self) -> None:
+        """Take note that blade and tissue are no longer apart."""
+        self._axis = None
+
+    def tissue_moved(self, distance: float) -> None:
+        """Take note that no side of the box around the tissue has moved farther than this [m]."""
+        self._gap -= distance
 
     def separates(
-        self, sweep: BladeSweep, bounds: tuple[list[float], list[float]], travel: float
+        self, before: Pose, after: Pose, bounds: tuple[Triple, Triple], travel: float
     ) -> bool:
         """Return whether the axis separates the box around a sweep from that around the tissue.
 
         Args:
-            sweep: Motion of the blade.
-            bounds: Lowest and highest corner of the tissue at its start [m].
+            before: Pose of the blade at the start of the sweep.
+            after: Pose of the blade at its end.
+            bounds: Lowest and highest corner of the tissue at the start [m].
             travel: Distance that the tissue can travel beyond them meanwhile [m].
         """
         if self._axis is None:
             return False
-        x, y, z = self._axis
-        axes_t0, axes_t1 = self._axes_of(sweep.t0), self._axes_of(sweep.t1)
-        self._last = sweep.t1, axes_t1
-        fx, ex, nx, fy, ey, ny, fz, ez, nz = axes_t1
-        forward, along, across = (
-            x * fx + y * fy + z * fz,
-            x * ex + y * ey + z * ez,
-            x * nx + y * ny + z * nz,
-        )
-        tip: list[float] = sweep.t1.tip.tolist()
-        heel: list[float] = sweep.t1.heel.tolist()
-        # The box has the axes of t1, and reaches that far beyond the blade at t1 along each.
-        motion = max(math.dist(sweep.t0.tip.tolist(), tip), math.dist(sweep.t0.heel.tolist(), heel))
-        sides = motion + travel + 2.0 * TOUCHING_MARGIN
-        if self._reach > 0.0:
-            sides += self._reach * min(math.dist(axes_t0, axes_t1), 1.0)
-        blade = max(x * tip[0] + y * tip[1] + z * tip[2], x * heel[0] + y * heel[1] + z * heel[2])
-        blade += max(0.0, -self._height * forward) + self._half_thickness * abs(across)
-        blade += sides * (abs(forward) + abs(along) + abs(across))
-        low, high = bounds
-        tissue = min(x * low[0], x * high[0]) + min(y * low[1], y * high[1])
-        tissue += min(z * low[2], z * high[2]) - TOUCHING_MARGIN * (abs(x) + abs(y) + abs(z))
-        return blade < tissue
+        motion = max(math.dist(before.tip, after.tip), math.dist(before.heel, after.heel))
+        turning = math.dist(before.axes, after.axes)
+        # The box has the axes of the blade after the sweep, and reaches that far beyond it.
+        sides = motion + travel + 2.0 * TOUCHING_MARGIN + self._reach * min(turning, 1.0)
+        if before is self._gap_at:
+            self._gap -= motion + self._reach * turning
+            self._gap_at = after
+            if self._gap > _MOST_SIDES * sides:
+                return True
+        forward, along, across, gap = self._projected(self._axis, after, bounds)
+        self._gap, self._gap_at = gap, after
+        return sides * (abs(forward) + abs(along) + abs(across)) < gap
 
-    def _axes_of(self, segment: BladeSegment) -> tuple[float, ...]:
-        """Return the axes of a pose. The start of a sweep is the end of the last one."""
-        known, axes = self._last
-        return axes if known is segment else axes_across(segment)
+    def _projected(
+        self, axis: tuple[float, float, float], blade: Pose, bounds: tuple[Triple, Triple]
+    ) -> tuple[float, float, float, float]:
+        """Return the cosines of the blade's axes with the axis, and the gap on it [m]."""
+        x, y, z = axis
+        ex, ey, ez, fx, fy, fz, nx, ny, nz = blade.axes
+        along, forward = x * ex + y * ey + z * ez, x * fx + y * fy + z * fz
+        across = x * nx + y * ny + z * nz
+        (tx, ty, tz), (hx, hy, hz) = blade.tip, blade.heel
+        nearest = max(x * tx + y * ty + z * tz, x * hx + y * hy + z * hz)
+        nearest += max(0.0, -self._height * forward) + self._half_thickness * abs(across)
+        (lx, ly, lz), (ux, uy, uz) = bounds
+        tissue = min(x * lx, x * ux) + min(y * ly, y * uy) + min(z * lz, z * uz)
+        tissue -= TOUCHING_MARGIN * (abs(x) + abs(y) + abs(z))
+        return forward, along, across, tissue - nearest

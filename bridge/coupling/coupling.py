@@ -5,10 +5,11 @@ from typing import NoReturn
 
 import numpy as np
 
-from bridge.coupling.limits import DeviceLimits, factor_to_limit, magnitude
+from bridge.coupling.limits import DeviceLimits, factor_to_limit
 from bridge.coupling.passivity import Passivity, PassivityCounters, Travel
 from bridge.coupling.watchdog import Watchdog
-from tissue import FloatArray, Wrench
+from bridge.poses import Six, Triple, six
+from tissue import Wrench
 
 MAX_PLAUSIBLE_FORCE = 1e3
 """Largest plausible force [N]. Soft tissue under a scalpel exerts newtons; a kilonewton means that
@@ -22,7 +23,8 @@ MAX_IMPLAUSIBLE_FRAMES = 10
 """Frames in a row with an implausible wrench after which the run stops: 10 ms at 1 kHz. A single
 one may be a node that the blade has flicked and that comes to rest."""
 
-_AT_REST = Travel(np.zeros(6), 0.0, 0.0)
+_NO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_AT_REST = Travel((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 class CouplingError(RuntimeError):
@@ -52,7 +54,7 @@ class Coupling:
         self._limits = limits
         self._watchdog = Watchdog()
         self._passivity = Passivity(limits, acts=passivity)
-        self._felt = np.zeros(6)
+        self._felt = _NO_WRENCH
         self._n_implausible_in_a_row = 0
         self.n_force_limited = 0
         self.n_torque_limited = 0
@@ -74,37 +76,36 @@ class Coupling:
         Raises:
             CouplingError: the wrench is not finite, or was implausible for too long.
         """
-        six = np.concatenate([wrench.force, wrench.torque])
-        felt = self.felt(six, wrench.point, dt, travel, silence)
-        return Wrench(felt[:3], felt[3:], wrench.point)
+        fx, fy, fz = wrench.force.tolist()
+        tx, ty, tz = wrench.torque.tolist()
+        felt = self.felt((fx, fy, fz, tx, ty, tz), wrench.point.tolist(), dt, travel, silence)
+        return Wrench(np.array(felt[:3]), np.array(felt[3:]), wrench.point)
 
-    def felt(
-        self, wrench: FloatArray, point: FloatArray, dt: float, travel: Travel, silence: float
-    ) -> FloatArray:
-        """Return what `render` does for force [N] and torque [N m] about a point, shape (6,).
+    def felt(self, wrench: Six, point: Triple, dt: float, travel: Travel, silence: float) -> Six:
+        """Return what `render` does in plain numbers; the same object where nothing is changed.
 
         Args:
-            wrench: Wrench of the tissue on the blade, about the tip, shape (6,).
-            point: The tip [m], shape (3,).
+            wrench: Wrench of the tissue on the blade, about the tip: force [N] and torque [N m].
+            point: The tip [m].
             dt: Length of the frame [s].
             travel: Motion and work of the blade since the last frame, in the frame of the wrench.
             silence: How long the arm has waited for the tissue by now [s].
         """
-        fx, fy, fz, tx, ty, tz = wrench.tolist()
+        fx, fy, fz, tx, ty, tz = wrench
         force_size, torque_size = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
-        if not math.isfinite(force_size + torque_size + math.hypot(*point.tolist())):
+        if not math.isfinite(force_size + torque_size + math.hypot(*point)):
             self._refuse(wrench, point)
+        wanted = wrench
         if force_size <= MAX_PLAUSIBLE_FORCE and torque_size <= MAX_PLAUSIBLE_TORQUE:
             self._n_implausible_in_a_row = 0
-            wanted = wrench
         else:
             self._count_implausible(force_size, torque_size)
             force_size = torque_size = 0.0
-            wanted = np.zeros(6)
+            wanted = _NO_WRENCH
         gain = self._watchdog.gain(silence, dt)
         factor = self._factor_within_limits(gain, force_size, torque_size)
         if factor != 1.0:
-            wanted = factor * wanted
+            wanted = six(factor * np.array(wanted))
         passive = self._passivity.correct(wanted, travel)
         felt = self._within_slew(passive, dt)
         self._passivity.record(felt, wanted, travel)
@@ -126,12 +127,12 @@ class Coupling:
         """Frames in which the arm felt less than the full wrench, by silence or the ramp."""
         return self._watchdog.n_faded
 
-    def _refuse(self, wrench: FloatArray, point: FloatArray) -> NoReturn:
+    def _refuse(self, wrench: Six, point: Triple) -> NoReturn:
         """Raise the error of a wrench that is not finite."""
         self.n_not_finite += 1
         raise CouplingError(
-            f"the tissue answered with a force of {wrench[:3].tolist()} N and a torque of "
-            f"{wrench[3:].tolist()} N m at {point.tolist()} m, which is not finite: "
+            f"the tissue answered with a force of {list(wrench[:3])} N and a torque of "
+            f"{list(wrench[3:])} N m at {list(point)} m, which is not finite: "
             "its simulation has diverged. Try a smaller time step or a slower stroke"
         )
 
@@ -158,7 +159,7 @@ class Coupling:
             factor_to_limit(limits.force, force_size), factor_to_limit(limits.torque, torque_size)
         )
 
-    def _within_slew(self, wrench: FloatArray, dt: float) -> FloatArray:
+    def _within_slew(self, wrench: Six, dt: float) -> Six:
         """Return the wrench that can be reached in `dt` on a straight line from the one felt now.
 
         Both ends are within the other limits, so every wrench between them is too.
@@ -166,9 +167,9 @@ class Coupling:
         reach = self._limits.slew * dt
         if reach == math.inf:
             return wrench
-        change = magnitude(wrench[:3] - self._felt[:3])
+        change = math.dist(wrench[:3], self._felt[:3])
         if change <= reach:
             return wrench
-        factor = factor_to_limit(reach, change)
         self.n_slew_limited += 1
-        return self._felt + factor * (wrench - self._felt)
+        before = np.array(self._felt)
+        return six(before + factor_to_limit(reach, change) * (np.array(wrench) - before))

@@ -5,12 +5,13 @@ of freedom.
 """
 
 from collections.abc import Sequence
-from operator import add
+from operator import add, sub
 from typing import NamedTuple
 
 import numpy as np
 
 from bridge.coupling.limits import DeviceLimits
+from bridge.poses import Six, six
 from tissue import FloatArray
 
 ENERGY_TOLERANCE = 5e-7
@@ -18,14 +19,14 @@ ENERGY_TOLERANCE = 5e-7
 late, by which a blade that moves at v = 50 mm/s through tissue of K = 400 N/m gains this much in a
 frame: K v^2 dt^2 / 2. With zero the controller would correct rounding errors."""
 
-_ZERO_WRENCH = np.zeros(6)
+_ZERO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Travel(NamedTuple):
     """Motion and work of the blade since the last frame."""
 
-    motion: FloatArray
-    """Translation of the tip of the arm's blade [m] and rotation vector [rad], shape (6,)."""
+    motion: Six
+    """Translation of the tip of the arm's blade [m] and rotation vector [rad]."""
     lever: float
     """Half the length of the edge [m]: the lever at which a damper acts against rotation."""
     work_on_tissue: float
@@ -81,9 +82,8 @@ class Passivity:
     def __init__(self, limits: DeviceLimits = DeviceLimits(), acts: bool = True) -> None:
         self._limits = limits
         self._acts = acts
-        self._felt_numbers = [0.0] * 6
-        self._feels = False
-        self._taken = _ZERO_WRENCH
+        self._felt = _ZERO_WRENCH
+        self._taken: Sequence[float] = _ZERO_WRENCH
         self._energy = 0.0
         self._given = 0.0
         self._work_at_start = 0.0
@@ -91,20 +91,20 @@ class Passivity:
         self._injected = 0.0
         self._n_acted = 0
 
-    def correct(self, wanted: FloatArray, travel: Travel) -> FloatArray:
-        """Return the wrench that may be felt from now on, shape (6,). Call `record` afterwards.
+    def correct(self, wanted: Six, travel: Travel) -> Six:
+        """Return the wrench that may be felt from now on. Call `record` afterwards.
 
         Args:
             wanted: Force [N] and torque about the tip [N m], within the device's limits.
             travel: Motion and work of the blade since the last frame.
         """
-        numbers, motion = wanted.tolist(), travel.motion.tolist()
-        if not (self._feels or any(numbers)):
+        motion, felt = travel.motion, self._felt
+        if not (any(felt) or any(wanted)):
             self._energy, self._work_at_start = 0.0, travel.work_on_tissue
         self._given = min(0.0, travel.work_on_tissue - self._work_at_start)
         if not self._acts:
             return wanted
-        spent, power = _work(self._felt_numbers, motion), _work(numbers, motion)
+        spent, power = _work(felt, motion), _work(wanted, motion)
         left = self._energy - 0.5 * spent - self._given + ENERGY_TOLERANCE
         # While energy is left, both halves of the work are reserved. A deficit must be recovered in
         # the half that is being decided; reversing the last wrench is always enough, unless the
@@ -113,31 +113,44 @@ class Passivity:
         if power <= most:
             return wanted
         self._n_acted += 1
+        return six(self._damped(np.array(wanted), power, most, spent, travel))
+
+    def _damped(
+        self, wanted: FloatArray, power: float, most: float, spent: float, travel: Travel
+    ) -> FloatArray:
+        """Return a wrench of less power, shape (6,).
+
+        Args:
+            wanted: Wrench without the controller, shape (6,).
+            power: Its work on the motion of the last frame [J].
+            most: Work that is allowed [J].
+            spent: Work of the wrench that was felt before [J].
+            travel: Motion of the last frame.
+        """
         damped = wanted - (power - most) * _unit_damper(travel)
         if self._limits.allow(damped):
             return damped
         if most >= 0.0:
             return wanted * (most / power)
-        opposite = np.array(self._felt_numbers) if spent < 0.0 else -np.array(self._felt_numbers)
+        felt = np.array(self._felt)
         share = (power - most) / (power + abs(spent))
-        return (1.0 - share) * wanted + share * opposite
+        return (1.0 - share) * wanted + share * (felt if spent < 0.0 else -felt)
 
-    def record(self, wrench: FloatArray, wanted: FloatArray, travel: Travel) -> None:
+    def record(self, wrench: Six, wanted: Six, travel: Travel) -> None:
         """Count the energy of the wrench that is felt from now on.
 
         Args:
-            wrench: Force [N] and torque about the tip [N m], shape (6,).
-            wanted: Wrench without the controller, shape (6,).
+            wrench: Force [N] and torque about the tip [N m].
+            wanted: Wrench without the controller.
             travel: Motion and work of the blade as given to `correct`.
         """
-        felt, motion = wrench.tolist(), travel.motion.tolist()
-        both = list(map(add, self._felt_numbers, felt))
-        self._energy -= 0.5 * _work(both, motion)
+        both = tuple(map(add, self._felt, wrench))
+        self._energy -= 0.5 * _work(both, travel.motion)
         self._least = min(self._least, self._energy - self._given)
-        taken = _ZERO_WRENCH if wrench is wanted else wanted - wrench
+        taken = _ZERO_WRENCH if wrench is wanted else tuple(map(sub, wanted, wrench))
         if taken is not self._taken:
-            self._injected += 0.5 * _work((self._taken + taken).tolist(), motion)
-        self._felt_numbers, self._feels, self._taken = felt, any(felt), taken
+            self._injected += 0.5 * _work(tuple(map(add, self._taken, taken)), travel.motion)
+        self._felt, self._taken = wrench, taken
 
     @property
     def counters(self) -> PassivityCounters:
@@ -147,14 +160,14 @@ class Passivity:
         )
 
 
-def _work(wrench: Sequence[float], motion: Sequence[float]) -> float:
-    """Return the work of a wrench on a motion [J]. Plain floats: half the time of small arrays."""
+def _work(wrench: Sequence[float], motion: Six) -> float:
+    """Return the work of a wrench on a motion [J]."""
     (fx, fy, fz, tx, ty, tz), (x, y, z, u, v, w) = wrench, motion
     return fx * x + fy * y + fz * z + tx * u + ty * v + tz * w
 
 
 def _unit_damper(travel: Travel) -> FloatArray:
     """Return the wrench, shape (6,), of dampers at the ends of the edge that do 1 J on `travel`."""
-    motion, squared = travel.motion, travel.lever * travel.lever
+    motion, squared = np.array(travel.motion), travel.lever * travel.lever
     wrench = np.concatenate([motion[:3], squared * motion[3:]])
     return wrench / float(wrench @ motion)

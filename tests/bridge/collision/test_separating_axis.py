@@ -7,7 +7,8 @@ import pytest
 
 from bridge.collision import broad_phase
 from bridge.collision.broad_phase import BroadPhase
-from tissue import BladeSegment, BladeShape, BladeSweep
+from bridge.poses import pose_of
+from tissue import BladeSegment, BladeShape
 
 DT = 1e-3
 BOX = np.array([[-0.02, -0.02, -0.02], [0.02, 0.02, 0.02]])
@@ -32,7 +33,7 @@ def random_path(rng, n_frames):
         tip = tip + DT * velocity
         edge, forward = (turned(v, axis, DT * spin) for v in (edge, forward))
         forward = forward / np.linalg.norm(forward)
-        poses.append(BladeSegment(tip, tip + edge, forward))
+        poses.append(pose_of(BladeSegment(tip, tip + edge, forward)))
     return poses
 
 
@@ -57,9 +58,8 @@ def test_every_answer_is_the_one_of_a_comparison_in_every_frame(shape, seed):
         bounds = bounds + rng.choice([0.0, 1e-6, 1e-4]) * rng.normal(size=(2, 3))
         for phase in (fresh, kept):
             phase.update_bounds(bounds, DT)
-        sweep = BladeSweep(before, after)
-        answers.append(kept.overlaps(sweep, DT))
-        assert answers[-1] == fresh.overlaps(sweep, DT)
+        answers.append(kept.overlaps(before, after, DT))
+        assert answers[-1] == fresh.overlaps(before, after, DT)
     touches = [answer.tissue for answer in answers]
     assert 100 < sum(touches) < 1900
 
@@ -67,11 +67,11 @@ def test_every_answer_is_the_one_of_a_comparison_in_every_frame(shape, seed):
 def test_a_blade_that_stays_away_is_compared_rarely(n_compared):
     phase = BroadPhase(BOX, 3.0, blade=BladeShape())
     there = BladeSegment(np.array([0, 0, 0.1]), np.array([0, 0.04, 0.1]), np.array([0, 0, -1.0]))
-    before = there
+    before = pose_of(there)
     for i in range(1000):  # from 80 mm to 30 mm above the box
         down = np.array([0.0, 0.0, -5e-5 * i])
-        after = there._replace(tip=there.tip + down, heel=there.heel + down)
+        after = pose_of(there._replace(tip=there.tip + down, heel=there.heel + down))
         phase.update_bounds(BOX, DT)
-        assert not phase.overlaps(BladeSweep(before, after), DT).tissue
+        assert not phase.overlaps(before, after, DT).tissue
         before = after
     assert 1 <= n_compared() <= 5

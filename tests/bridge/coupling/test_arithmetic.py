@@ -6,7 +6,7 @@ import pytest
 from bridge import DeviceLimits
 from bridge.coupling.coupling import Coupling
 from bridge.coupling.passivity import Travel
-from bridge.poses import axes_of, motion, motion_of
+from bridge.poses import motion, motion_of, pose_of, six
 from tests.bridge.coupling.naive_coupling import NaiveCoupling, naive_motion
 from tissue import BladeSegment
 
@@ -31,8 +31,8 @@ def test_a_motion_is_that_of_the_rotation_matrix(seed):
     before, after = random_pose(rng), random_pose(rng)
     expected = naive_motion(before, after)
     assert motion(before, after) == pytest.approx(expected, abs=1e-9)
-    again = motion_of(before, axes_of(before), after, axes_of(after))
-    assert again.tobytes() == motion(before, after).tobytes()
+    again = motion_of(pose_of(before), pose_of(after))
+    assert np.array(again).tobytes() == motion(before, after).tobytes()
 
 
 @pytest.mark.parametrize("limits", LIMITS)
@@ -56,8 +56,9 @@ def test_a_coupling_renders_what_its_rules_say(limits, seed):
         silence = silence + 20.0 * DT if is_silent else 0.0
         work += 1e-5 * rng.normal() * (stiffness > 0.0)
         expected = naive.render(wrench, step, LEVER, work, silence)
-        tip = rng.normal(size=3)
-        felt = coupling.felt(wrench, tip, DT, Travel(step, LEVER, work), silence)
+        tip = rng.normal(size=3).tolist()
+        travel = Travel(six(step), LEVER, work)
+        felt = np.array(coupling.felt(six(wrench), tip, DT, travel, silence))
         assert felt == pytest.approx(expected, rel=1e-9, abs=1e-9)
         naive.felt = felt  # so that rounding does not add up
         n_felt += bool(felt.any())

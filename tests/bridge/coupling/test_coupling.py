@@ -13,6 +13,7 @@ from bridge.coupling.coupling import (
     DeviceLimits,
 )
 from bridge.coupling.passivity import Travel
+from bridge.poses import six
 from tissue import Wrench
 
 TOUCH = DeviceLimits(force=3.3)
@@ -173,7 +174,8 @@ def test_profiles_stay_within_limits_with_controller_slew_limit_and_a_silent_tis
     force, torque = profiles(kind, 100, 40, random)
     displacements = random.normal(scale=[1e-4] * 3 + [1e-2] * 3, size=(100, 40, 6))
     travels = [
-        [Travel(displacement, 0.02, 0.0) for displacement in profile] for profile in displacements
+        [Travel(six(displacement), 0.02, 0.0) for displacement in profile]
+        for profile in displacements
     ]
     silences = 1e-3 * np.concatenate([np.zeros(10), np.arange(40, 55), np.zeros(15)])
     felt_force, felt_torque = felt_of(limits, force, torque, travels, silences)

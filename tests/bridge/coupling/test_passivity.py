@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from bridge import DeviceLimits
 from bridge.coupling.passivity import ENERGY_TOLERANCE, Passivity, Travel
 from bridge.coupling.virtual_coupling import least_damping
+from bridge.poses import six
 
 DT = 1e-3
 LEVER = 0.02
@@ -38,10 +39,11 @@ class Mass:
 
 
 def corrected(passivity, wanted, displacement, given=0.0):
-    travel = Travel(displacement, LEVER, given)
-    felt = passivity.correct(wanted, travel)
-    passivity.record(felt, wanted, travel)
-    return felt
+    travel = Travel(six(displacement), LEVER, given)
+    numbers = six(wanted)
+    felt = passivity.correct(numbers, travel)
+    passivity.record(felt, numbers, travel)
+    return np.array(felt)
 
 
 @pytest.mark.parametrize("stiffness", [50.0, 5e3])
