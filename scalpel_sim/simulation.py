@@ -10,7 +10,8 @@ import numpy as np
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
-from scalpel_sim.output.frame_row import WallTimes, row_of
+from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.output.recording import Recording
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, StageTimes, StepResult, Wrench
@@ -55,9 +56,9 @@ class Simulation:
         passivity: bool = True,
     ) -> None:
         self.arm = arm
-        self.stroke = stroke
         self.link = link
         self.frame = frame
+        self.stroke = stroke
         self.bridge = Bridge(
             link,
             frame,
@@ -70,6 +71,7 @@ class Simulation:
         """Wrench on the blade in the last frame, world frame."""
         self.touching = CollisionMonitor(arm, fixtures)
         """Collisions of the arm with fixtures and with itself."""
+        self._rows = FrameRows(frame)
         self.recording = Recording()
         """What happened in each frame so far."""
         self.pictures: list[DrawFrame] = []
@@ -77,6 +79,16 @@ class Simulation:
         self.wall_seconds = 0.0
         """Wall time of frames, pictures and recording so far."""
         self.dt: float = arm.model.opt.timestep
+
+    @property
+    def stroke(self) -> Stroke:
+        """Where the hand leads the blade, tissue frame."""
+        return self._stroke
+
+    @stroke.setter
+    def stroke(self, stroke: Stroke) -> None:
+        self._stroke = stroke
+        self._follower = StrokeFollower(self.arm.hand, stroke, self.frame)
 
     @property
     def title(self) -> str:
@@ -105,14 +117,15 @@ class Simulation:
             LinkError: the tissue is elsewhere, and did not answer.
         """
         start = time.perf_counter()
-        self.arm.hand.follow(self.frame.segment_to_world(self.stroke.pose(self.time)))
-        self.arm.step1()
+        arm, blade = self.arm, self.arm.blade
+        self._follower.lead(self.time)
+        arm.step1()
         self.touching.check()
-        segment = self.arm.blade.segment()
+        segment = blade.segment()
         self.wrench = self._wrench_on(segment)
-        self.arm.blade.apply(self.wrench)
-        self.arm.step2()
-        self.arm.check()
+        blade.apply(self.wrench)
+        arm.step2()
+        arm.check()
         done = time.perf_counter()
         for draw in self.pictures:
             draw(self)
@@ -126,14 +139,14 @@ class Simulation:
     ) -> None:
         """Add the frame to the recording, and to its row how long that took."""
         start = time.perf_counter()
-        stages = self.result.stage_times if self.bridge.answered else _NO_STEP
-        row = row_of(
+        bridge, result = self.bridge, self.result
+        stages = result.stage_times if bridge.answered else _NO_STEP
+        row = self._rows.row_of(
             self.time,
             segment,
             self.wrench,
-            self.bridge.wrench_raw,
-            self.result,
-            self.frame,
+            bridge.wrench_raw,
+            result,
             WallTimes(*stages, picture_seconds, frame_seconds),
         )
         self.recording.append((*row, time.perf_counter() - start))

@@ -71,7 +71,7 @@ class Blade:
             )
         self.body_id = body_id
         """MuJoCo's number for the body that feels the wrench."""
-        self._forward = _across(edge / self.length, np.array(forward, np.float64))
+        self._forward = _across(edge / self.length, np.array(forward, np.float64)).tolist()
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._heel = data.site_xpos[heel_id]
         self._tip = data.site_xpos[tip_id]
@@ -81,7 +81,10 @@ class Blade:
 
     def segment(self) -> BladeSegment:
         """Return the edge as it is now, in the world frame. Copies."""
-        return BladeSegment(self._tip.copy(), self._heel.copy(), self._rotation @ self._forward)
+        (a, b, c), (d, e, f), (g, h, i) = self._rotation.tolist()
+        x, y, z = self._forward
+        forward = np.array((a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z))
+        return BladeSegment(self._tip.copy(), self._heel.copy(), forward)
 
     def apply(self, wrench: Wrench) -> None:
         """Apply a wrench to the blade until the next call.

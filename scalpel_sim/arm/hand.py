@@ -1,13 +1,21 @@
 """A virtual hand: a six-dimensional spring and damper that leads a blade along a path."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from tissue import BladeSegment, FloatArray
+from scalpel_sim.quaternions import (
+    Matrix,
+    Vector,
+    inverse,
+    quaternion_of,
+    rotated,
+    turn_between,
+)
+from tissue import BladeSegment, FloatArray, kernel
 
 HAND = "hand"
 """Name of the body that shows where the hand wants the middle of the edge, and of its site."""
@@ -71,8 +79,8 @@ def add_hand(
             there = ", ".join(f"'{site.name}'" for site in spec.sites) or "none"
             raise ValueError(f"the model has no site '{name}'. It has: {there}")
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, np.array(_axes((ends[1] - ends[0]).tolist(), (0.0, 0.0, -1.0))))
+    along = tuple((ends[1] - ends[0]).tolist())
+    quaternion = quaternion_of(_axes(along, (0.0, 0.0, -1.0)))
     spec.site(tip).parent.add_site(name=_EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=quaternion)
     hand = spec.worldbody.add_body(name=HAND, mocap=True)
     hand.add_site(name=HAND)
@@ -97,6 +105,20 @@ def add_hand(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
 
 
+class HandCommand(NamedTuple):
+    """What leads a hand: where it is, and how fast it moves."""
+
+    position: FloatArray
+    """Where the middle of the edge is to be [m], world frame, shape (3,)."""
+    quaternion: FloatArray
+    """Rotation of the hand (w, x, y, z), whose +y is along the edge and whose -z cuts."""
+    control: FloatArray
+    """Offsets that the dampers of the actuators need at this speed, in the frame of the hand:
+    motion [m] and turning [rad], shape (6,)."""
+    leads: FloatArray
+    """Damping over stiffness and length of a step, of motion and of turning, shape (2,)."""
+
+
 class Hand:
     """Moves a hand that `add_hand` put into the model.
 
@@ -116,16 +138,15 @@ class Hand:
         self._position = data.mocap_pos[mocap]
         self._quaternion = data.mocap_quat[mocap]
         self._control = data.ctrl[controls : controls + 6]
-        self._moving, self._turning = self._control[:3], self._control[3:]
         self._output = data.actuator_force[outputs : outputs + 6]
         self._edge = data.site_xpos[model.site(_EDGE).id]
         turn = model.actuator(ACTUATORS[3]).id
         bias, dt = model.actuator_biasprm, model.opt.timestep
-        self._lead = float(bias[first, 2] / bias[first, 1]) / dt
-        self._turning_lead = float(bias[turn, 2] / bias[turn, 1]) / dt
-        # Made once, because a frame has no time for small arrays.
-        self._axes, self._wanted, self._back = np.empty(9), np.empty(4), np.empty(4)
-        self._offset = np.empty(3)
+        of_motion, of_turning = (bias[i, 2] / bias[i, 1] / dt for i in (first, turn))
+        self.command = HandCommand(
+            self._position, self._quaternion, self._control, np.array((of_motion, of_turning))
+        )
+        """What leads the hand: views of MuJoCo's arrays."""
         self._is_held = False
 
     def hold(self, pose: BladeSegment) -> None:
@@ -145,26 +166,11 @@ class Hand:
         Raises:
             ValueError: the pose is not finite.
         """
-        tx, ty, tz = pose.tip.tolist()
-        hx, hy, hz = pose.heel.tolist()
-        x, y, z = (tx + hx) / 2.0, (ty + hy) / 2.0, (tz + hz) / 2.0
-        wanted = self._wanted
-        self._axes[:] = _axes((tx - hx, ty - hy, tz - hz), pose.forward.tolist())
-        mujoco.mju_mat2Quat(wanted, self._axes)
-        if not math.isfinite(x + y + z + sum(wanted.tolist())):
+        tip, heel, forward = map(_numbers, pose)
+        if not lead_to(tip, heel, forward, *self.command):
             raise ValueError(f"the hand cannot follow a pose that is not finite: {pose}")
-        if self._is_held:
-            px, py, pz = self._position.tolist()
-            lead = self._lead
-            self._offset[:] = ((x - px) * lead, (y - py) * lead, (z - pz) * lead)
-            mujoco.mju_negQuat(self._back, wanted)
-            mujoco.mju_rotVecQuat(self._moving, self._offset, self._back)
-            mujoco.mju_subQuat(self._turning, wanted, self._quaternion)
-            self._turning *= self._turning_lead
-        else:
+        if not self._is_held:
             self._control[:] = 0.0
-        self._position[:] = (x, y, z)
-        self._quaternion[:] = wanted
         self._is_held = True
 
     @property
@@ -187,15 +193,61 @@ def _actuator(spec: mujoco.MjSpec, name: str) -> "mujoco.MjsActuator":
     )
 
 
-def _axes(edge: Sequence[float], forward: Sequence[float]) -> tuple[float, ...]:
-    """Return a matrix, row by row, whose +y is along the edge and whose -z cuts.
+def _numbers(vector: FloatArray) -> Vector:
+    x, y, z = vector
+    return float(x), float(y), float(z)
 
-    Plain floats: a tenth of the time of small arrays.
+
+@kernel
+def lead_to(
+    tip: Vector,
+    heel: Vector,
+    forward: Vector,
+    position: FloatArray,
+    quaternion: FloatArray,
+    control: FloatArray,
+    leads: FloatArray,
+) -> bool:
+    """Do what `Hand.follow` does; return False, and do nothing, where the pose is not finite.
+
+    Args:
+        tip: Tip of the blade [m], world frame.
+        heel: Heel of the blade [m].
+        forward: Direction in which it cuts.
+        position: See `HandCommand`, as the rest.
+        quaternion: Rotation of the hand.
+        control: Offsets of the actuators.
+        leads: Their factors.
     """
+    tx, ty, tz = tip
+    hx, hy, hz = heel
+    x, y, z = (tx + hx) / 2.0, (ty + hy) / 2.0, (tz + hz) / 2.0
+    wanted = quaternion_of(_axes((tx - hx, ty - hy, tz - hz), forward))
+    w, qx, qy, qz = wanted
+    if not math.isfinite(x + y + z + (w + qx + qy + qz)):
+        return False
+    lead, turning_lead = leads[0], leads[1]
+    px, py, pz = position[0], position[1], position[2]
+    offset = ((x - px) * lead, (y - py) * lead, (z - pz) * lead)
+    moving = rotated(offset, inverse(wanted))
+    before = (quaternion[0], quaternion[1], quaternion[2], quaternion[3])
+    turning = turn_between(before, wanted)
+    control[0], control[1], control[2] = moving
+    control[3] = turning[0] * turning_lead
+    control[4] = turning[1] * turning_lead
+    control[5] = turning[2] * turning_lead
+    position[0], position[1], position[2] = x, y, z
+    quaternion[0], quaternion[1], quaternion[2], quaternion[3] = wanted
+    return True
+
+
+@kernel
+def _axes(edge: Vector, forward: Vector) -> Matrix:
+    """Return a matrix whose +y is along the edge and whose -z cuts: NaN without an edge."""
     ex, ey, ez = edge
     length = math.sqrt(ex * ex + ey * ey + ez * ez)
     if not length > 0.0:
-        return (math.nan,) * 9
+        length = math.nan
     ex, ey, ez = ex / length, ey / length, ez / length
     fx, fy, fz = forward
     along = fx * ex + fy * ey + fz * ez

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from operator import mul, sub
 
 import mujoco
 import numpy as np
@@ -40,10 +41,8 @@ class JointReach:
         """
         if not self._has_hinges_alone:
             return math.inf
-        total = 0.0
-        for reach, angle, start in zip(self._reach, self._qpos.tolist(), self._start, strict=True):
-            total += reach * abs(angle - start)
-        return total
+        turned = map(abs, map(sub, self._qpos.tolist(), self._start))
+        return math.fsum(map(mul, self._reach, turned))
 
 
 def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:

@@ -2,8 +2,8 @@
 
 import csv
 import math
-from bisect import bisect_right
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 
 import mujoco
@@ -61,19 +61,26 @@ class Stroke:
         _check(given, tips, heels, forwards)
         self.times = given - given[0]
         """Times of the poses [s], from 0; shape (n,)."""
-        self._instants: list[float] = self.times.tolist()
         edges = tips - heels
         lengths = np.linalg.norm(edges, axis=1)
         self.blade_length = float(lengths[0])
         """From heel to tip [m]."""
         middles = (tips + heels) / 2.0
-        self._middles: list[list[float]] = middles.tolist()
-        self._moves: list[list[float]] = np.diff(middles, axis=0).tolist()
-        self._rotations = _quaternions(edges / lengths[:, None], forwards)
-        self._spins = np.array(
-            [_turn(a, b) for a, b in zip(self._rotations, self._rotations[1:], strict=False)]
+        rotations = _quaternions(edges / lengths[:, None], forwards)
+        self.path = np.column_stack(
+            [
+                self.times[:-1],
+                self.times[1:],
+                np.full(len(given) - 1, 0.5 * self.blade_length),
+                rotations[:-1],
+                [_turn(*pair) for pair in pairwise(rotations)],
+                middles[:-1],
+                np.diff(middles, axis=0),
+            ]
         )
-        self._quaternion, self._axes = np.empty(4), np.empty(9)
+        """The way from each pose to the next: its first and last instant [s], half the length of
+        the edge [m], the rotation at its start (w, x, y, z), the rotation vector of its turn [rad]
+        in that frame, the middle of the edge at its start [m], and its move [m]; (n - 1, 16)."""
 
     @property
     def duration(self) -> float:
@@ -82,23 +89,11 @@ class Stroke:
 
     def pose(self, t: float) -> BladeSegment:
         """Return the blade's pose at time `t` [s]. It rests before the start and after the end."""
-        t = min(max(t, 0.0), self._instants[-1])
-        i = min(bisect_right(self._instants, t) - 1, len(self._spins) - 1)
-        s = (t - self._instants[i]) / (self._instants[i + 1] - self._instants[i])
-        self._quaternion[:] = self._rotations[i]
-        mujoco.mju_quatIntegrate(self._quaternion, self._spins[i], s)
-        mujoco.mju_quat2Mat(self._axes, self._quaternion)
-        # Plain floats: for each frame, and a third of the time of small arrays.
-        _, ex, fx, _, ey, fy, _, ez, fz = self._axes.tolist()
-        half = 0.5 * self.blade_length
-        ex, ey, ez = half * ex, half * ey, half * ez
-        (x, y, z), (dx, dy, dz) = self._middles[i], self._moves[i]
-        x, y, z = x + s * dx, y + s * dy, z + s * dz
-        return BladeSegment(
-            np.array((x + ex, y + ey, z + ez)),
-            np.array((x - ex, y - ey, z - ez)),
-            np.array((-fx, -fy, -fz)),
-        )
+        from scalpel_sim.strokes.path import (
+            pose_on_path,
+        )  # a list of scenes starts without its compiler
+
+        return BladeSegment(*map(np.array, pose_on_path(float(t), self.path)))
 
     def poses(self, count: int) -> list[BladeSegment]:
         """Return `count` poses, evenly in time, the first and the last included."""
