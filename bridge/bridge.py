@@ -149,8 +149,9 @@ class Bridge:
             self._impulse.record_felt(np.array(raw) - self._correction, blade.segment, dt)
         work = 0.0 if self._result is None else self._result.work_of_blade
         travel = Travel(arm_motion, 0.5 * math.dist(arm.tip, arm.heel), work)
+        self._raw, self._raw_is_felt = raw, False
         felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
-        self._raw, self._raw_is_felt = raw, felt is raw
+        self._raw_is_felt = felt is raw
         self._felt = self._frame.numbers_to_world(felt, arm.segment.tip)
         return self._felt
 
@@ -207,10 +208,10 @@ class Bridge:
         """Let the proxy follow the arm, and return the tissue's wrench on both."""
         if self._proxy is None:
             self._proxy = Proxy(coupling, dt, arm.segment)
-        proxy, stiffness = self._proxy, self._model.stiffness
-        wrench = self._model.wrench(proxy.pose)
+        proxy, model = self._proxy, self._model
+        wrench = model.wrench(proxy.pose)
         self._correction = self._impulse.correction(wrench, proxy.pose, dt)
-        return six(proxy.follow(arm.segment, wrench + self._correction, stiffness, dt))
+        return six(proxy.follow(arm.segment, wrench + self._correction, model.stiffness, dt))
 
     def _ask(self) -> None:
         """Ask the tissue to advance to the present, while the blade moves along its path.

@@ -117,8 +117,8 @@ class Simulation:
             LinkError: the tissue is elsewhere, and did not answer.
         """
         start = time.perf_counter()
-        arm, blade = self.arm, self.arm.blade
-        self._follower.lead(self.time)
+        arm, blade, now = self.arm, self.arm.blade, self.time
+        self._follower.lead(now)
         arm.step1()
         self.touching.check()
         segment = blade.segment()
@@ -130,26 +130,31 @@ class Simulation:
         for draw in self.pictures:
             draw(self)
         drawn = time.perf_counter()
-        self._record(segment, frame_seconds=done - start, picture_seconds=drawn - done)
+        self._record(now, segment, drawn - done, done - start)
         self.wall_seconds += time.perf_counter() - start
         return self.wrench
 
-    def _record(
-        self, segment: BladeSegment, *, frame_seconds: float, picture_seconds: float
-    ) -> None:
-        """Add the frame to the recording, and to its row how long that took."""
+    def _record(self, now: float, segment: BladeSegment, *wall_seconds: float) -> None:
+        """Add a frame to the recording, and to its row how long that took.
+
+        Args:
+            now: Simulated time at which the frame began [s].
+            segment: Where the blade is at its end.
+            wall_seconds: Wall times of its pictures, and of the frame without them [s].
+        """
         start = time.perf_counter()
         bridge, result = self.bridge, self.result
         stages = result.stage_times if bridge.answered else _NO_STEP
         row = self._rows.row_of(
-            self.time,
+            now,
             segment,
             self.wrench,
             bridge.wrench_raw,
             result,
-            WallTimes(*stages, picture_seconds, frame_seconds),
+            WallTimes(*stages, *wall_seconds),
         )
-        self.recording.append((*row, time.perf_counter() - start))
+        row.append(time.perf_counter() - start)
+        self.recording.append(row)
 
     def _wrench_on(self, segment: BladeSegment) -> Wrench:
         """Return the wrench of the tissue; where there is none, take the last one off the arm."""

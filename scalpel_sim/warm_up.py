@@ -18,8 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.output.force_parts import force_parts
+from bridge import TissueFrame
+from scalpel_sim.arm.arm import Arm
+from scalpel_sim.arm.collision_monitor import CollisionMonitor
+from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.scenes import PARENCHYMA, PHANTOM, Scene
+from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     BladeSegment,
     BladeShape,
@@ -111,7 +116,7 @@ def prepare_kernels(
     for kernels in sets:
         compile_ahead(kernels, on_progress)
         _cut(kernels)
-        _move_two_pieces(kernels)
+        _move(kernels)
 
 
 def compile_ahead(kernels: KernelSet, on_progress: Progress = lambda n, n_all: None) -> None:
@@ -174,7 +179,9 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
         after = _edge(fraction)
         result = tissue.step(BladeSweep(before, after), dt)
         before = after
-    force_parts(result.contacts, before.forward)
+    wall_times = WallTimes(*result.stage_times, 0.0, 0.0)
+    wrenches = (result.wrench, result.wrench)
+    FrameRows(TissueFrame()).row_of(0.0, before, *wrenches, result, wall_times)
     tissue.step(None, dt)
     tissue.surface()
     tissue.snapshot()
@@ -203,6 +210,20 @@ def _move_two_pieces(kernels: KernelSet) -> None:
     kernels.body(TetrahedralMesh(apart, both)).step(None, _DT)
 
 
+def _lead_an_arm() -> None:
+    """Let a hand lead an arm beside any tissue."""
+    arm = Arm()
+    pose = arm.blade.segment()
+    StrokeFollower(arm.hand, Stroke((0.0, 1.0), (pose, pose)), TissueFrame()).lead(0.0)
+    CollisionMonitor(arm).check()
+
+
+def _move(kernels: KernelSet) -> None:
+    """Move two pieces, and an arm."""
+    _move_two_pieces(kernels)
+    _lead_an_arm()
+
+
 def _edge(fraction: float) -> BladeSegment:
     """Return an upright edge in the block's middle, `fraction` of the way from front to back."""
     x, y = _SIDE / 2.0, fraction * _SIDE
@@ -213,7 +234,7 @@ def _edge(fraction: float) -> BladeSegment:
     )
 
 
-_JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move_two_pieces, "cut": _incise_and_cut}
+_JOBS: dict[str, Callable[[KernelSet], None]] = {"motion": _move, "cut": _incise_and_cut}
 """What the two processes do. Each takes half of the time."""
 
 

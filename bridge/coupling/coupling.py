@@ -103,11 +103,12 @@ class Coupling:
             force_size = torque_size = 0.0
             wanted = _NO_WRENCH
         gain = self._watchdog.gain(silence, dt)
-        factor = self._factor_within_limits(gain, force_size, torque_size)
-        if factor != 1.0:
+        limits = self._limits
+        if gain != 1.0 or force_size > limits.force or torque_size > limits.torque:
+            factor = self._factor_within_limits(gain, force_size, torque_size)
             wanted = six(factor * np.array(wanted))
         passive = self._passivity.correct(wanted, travel)
-        felt = self._within_slew(passive, dt)
+        felt = passive if limits.slew == math.inf else self._within_slew(passive, dt)
         self._passivity.record(felt, wanted, travel)
         self._felt = felt
         return felt
@@ -165,8 +166,6 @@ class Coupling:
         Both ends are within the other limits, so every wrench between them is too.
         """
         reach = self._limits.slew * dt
-        if reach == math.inf:
-            return wrench
         change = math.dist(wrench[:3], self._felt[:3])
         if change <= reach:
             return wrench

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
-from scalpel_sim.arm.joint_reach import JointReach
-from tissue import FloatArray
+from scalpel_sim.arm.joint_reach import JointReach, hinge_displacement
+from tissue import FloatArray, kernel
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
@@ -64,13 +64,25 @@ class ArmParts:
         self._positions, self._axes = data.geom_xpos, data.geom_xmat
         self._positions_before, self._axes_before = self._positions.copy(), self._axes.copy()
 
-    def remember(self) -> None:
-        """Keep where the parts are now, for `before`."""
-        self._positions_before[:] = self._positions
-        self._axes_before[:] = self._axes
+    def remain_within(self, distance: float) -> bool:
+        """Return whether no part can have moved that far since `reach.begin` [m].
+
+        If so, where the parts are now is kept for `before`.
+        """
+        reach = self.reach
+        return _remain_within(
+            distance,
+            reach.angles,
+            reach.start,
+            reach.reach,
+            self._positions,
+            self._axes,
+            self._positions_before,
+            self._axes_before,
+        )
 
     def before(self) -> tuple[FloatArray, FloatArray]:
-        """Return positions and axes of the parts when they were last remembered. Copies."""
+        """Return positions and axes of the parts when they last remained within. Copies."""
         axes = self._axes_before[self._geoms]
         return self._positions_before[self._geoms], axes.reshape(-1, 3, 3)
 
@@ -81,6 +93,28 @@ class ArmParts:
     def axes(self) -> FloatArray:
         """Return the axes of the parts as columns, shape (n, 3, 3). A copy."""
         return np.asarray(self._axes[self._geoms].reshape(-1, 3, 3))
+
+
+@kernel
+def _remain_within(
+    distance: float,
+    angles: FloatArray,
+    start: FloatArray,
+    reach: FloatArray,
+    positions: FloatArray,
+    axes: FloatArray,
+    positions_before: FloatArray,
+    axes_before: FloatArray,
+) -> bool:
+    """Do `ArmParts.remain_within`: the last two arrays become copies of the two before."""
+    if not hinge_displacement(angles, start, reach) < distance:
+        return False
+    for geom in range(len(positions)):
+        for i in range(3):
+            positions_before[geom, i] = positions[geom, i]
+        for i in range(9):
+            axes_before[geom, i] = axes[geom, i]
+    return True
 
 
 def instrument_body(model: mujoco.MjModel, blade: int) -> int:

@@ -61,8 +61,7 @@ class CollisionMonitor:
     def check(self) -> None:
         """Detect the collisions of the arm as it is now. The first one of each pair is logged."""
         parts, collisions = self._parts, self._collisions
-        if parts.reach.displacement() < self._free_way:
-            parts.remember()
+        if parts.remain_within(self._free_way):
             self._has_passed = True
             return
         if self._has_passed:

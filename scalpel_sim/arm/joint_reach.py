@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Sequence
-from operator import mul, sub
 
 import mujoco
 import numpy as np
+
+from tissue import FloatArray, kernel
 
 _HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
 
@@ -25,24 +26,37 @@ class JointReach:
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int]) -> None:
-        self._qpos = data.qpos
-        self._has_hinges_alone = set(model.jnt_type.tolist()) <= {_HINGE}
-        self._reach = [_reach(model, joint, geoms) for joint in range(model.njnt)]
-        self._start = [math.nan] * len(self._reach)
+        has_hinges_alone = set(model.jnt_type.tolist()) <= {_HINGE}
+        self.angles = data.qpos
+        """Angles of the joints now [rad]. MuJoCo's own array."""
+        self.start = np.full(model.nq, math.nan)
+        """Their angles at `begin` [rad]."""
+        self.reach = np.array(
+            [_reach(model, j, geoms) if has_hinges_alone else math.inf for j in range(model.njnt)]
+        )
+        """Distance of the farthest point from each joint [m]; infinite where nothing is known."""
 
     def begin(self) -> None:
         """Measure from the present configuration on."""
-        self._start = self._qpos.tolist()
+        self.start[:] = self.angles
 
     def displacement(self) -> float:
         """Return how far any point can be from where it was at `begin` [m].
 
-        NaN before the first call of `begin`; infinite where nothing is known.
+        NaN before the first call of `begin`, and infinite where nothing is known.
         """
-        if not self._has_hinges_alone:
+        return hinge_displacement(self.angles, self.start, self.reach)
+
+
+@kernel
+def hinge_displacement(angles: FloatArray, start: FloatArray, reach: FloatArray) -> float:
+    """Return the displacement by turns of hinges: see `JointReach`."""
+    total = 0.0
+    for joint in range(len(reach)):
+        if reach[joint] == math.inf:
             return math.inf
-        turned = map(abs, map(sub, self._qpos.tolist(), self._start))
-        return math.fsum(map(mul, self._reach, turned))
+        total += reach[joint] * abs(angles[joint] - start[joint])
+    return total
 
 
 def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:

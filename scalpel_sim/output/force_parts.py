@@ -31,27 +31,30 @@ def force_parts(contacts: BladeContacts, forward: FloatArray) -> ForceParts:
         forward: Unit vector in which the blade cuts at the end of the step, in the frame of the
             contacts; shape (3,).
     """
-    return ForceParts(*force_rows(contacts, forward))
-
-
-def force_rows(contacts: BladeContacts, forward: FloatArray) -> FloatArray:
-    """Return what `force_parts` does as rows of one array [N], shape (3, 3)."""
-    parts = np.empty((3, 3))
-    _add_up(contacts.normal, contacts.normal_force, contacts.friction, forward, parts)
-    return parts
+    parts = np.empty(9)
+    add_up(contacts.normal, contacts.normal_force, contacts.friction, forward, parts)
+    return ForceParts(*parts.reshape(3, 3))
 
 
 @kernel
-def _add_up(
+def add_up(
     normal: FloatArray,
     normal_force: FloatArray,
     friction: FloatArray,
     forward: FloatArray,
     parts: FloatArray,
 ) -> None:
-    """Write the rows of `ForceParts`, contact by contact."""
-    for axis in range(3):
-        parts[0, axis] = parts[1, axis] = parts[2, axis] = 0.0
+    """Write `ForceParts`, one vector after the other, contact by contact.
+
+    Args:
+        normal: See `BladeContacts`.
+        normal_force: See `BladeContacts`.
+        friction: See `BladeContacts`.
+        forward: Unit vector in which the blade cuts, shape (3,).
+        parts: The first nine numbers are written [N].
+    """
+    for i in range(9):
+        parts[i] = 0.0
     for i in range(len(normal_force)):
         cosine = 0.0
         for axis in range(3):
@@ -59,7 +62,7 @@ def _add_up(
         for axis in range(3):
             pressing = normal_force[i] * normal[i, axis]
             if cosine > EDGE_COSINE:
-                parts[0, axis] -= pressing + friction[i, axis]
+                parts[axis] -= pressing + friction[i, axis]
             else:
-                parts[1, axis] -= pressing
-                parts[2, axis] -= friction[i, axis]
+                parts[3 + axis] -= pressing
+                parts[6 + axis] -= friction[i, axis]

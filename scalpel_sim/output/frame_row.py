@@ -1,25 +1,17 @@
 """One frame as a row of `forces.csv`: see `scalpel_sim.output.recording.COLUMNS`."""
 
 import math
-from collections.abc import Callable, Sequence
-from operator import itemgetter
 from typing import NamedTuple
 
+import numpy as np
+
 from bridge import TissueFrame
-from scalpel_sim.output.force_parts import force_rows
+from scalpel_sim.output.force_parts import add_up, force_parts
 from scalpel_sim.output.recording import N_OF_ACCOUNT
-from tissue import BladeContacts, BladeSegment, Energies, FloatArray, StepResult, Wrench
-
-_UPPER: Callable[[list[float]], tuple[float, ...]] = itemgetter(0, 4, 8, 1, 2, 5)
-"""Takes the six different numbers of a symmetric 3 x 3 matrix, in the order of the columns."""
-
-_UPPER_OF_SIX: Callable[[list[float]], tuple[float, ...]] = itemgetter(0, 7, 14, 1, 2, 8)
-"""Takes the same of the first three rows and columns of a 6 x 6 matrix."""
+from tissue import BladeSegment, Energies, FloatArray, StepResult, Wrench, kernel
 
 NO_ACCOUNT = (math.nan,) * N_OF_ACCOUNT
 """The energies of a frame without an audit."""
-
-_NO_FORCES = (0.0,) * 9
 
 
 class WallTimes(NamedTuple):
@@ -46,6 +38,7 @@ class FrameRows:
 
     def __init__(self, frame: TissueFrame) -> None:
         self._frame = frame
+        self._at_blade = np.zeros(15)
 
     def row_of(
         self,
@@ -55,7 +48,7 @@ class FrameRows:
         raw: Wrench,
         result: StepResult,
         wall_times: WallTimes,
-    ) -> tuple[float, ...]:
+    ) -> list[float]:
         """Return the row of one frame: all columns but the last, the time that recording it takes.
 
         Args:
@@ -66,14 +59,13 @@ class FrameRows:
             result: Last result of the tissue, tissue frame.
             wall_times: Wall times of the frame and of its stages.
         """
-        six = (*felt.force.tolist(), *felt.torque.tolist())
-        return (
+        wrench = (*felt.force.tolist(), *felt.torque.tolist())
+        return [
             time,
             *blade.tip.tolist(),
-            *six,
-            *(six if raw is felt else (*raw.force.tolist(), *raw.torque.tolist())),
-            *self._parts(result.contacts, blade.forward),
-            *self._stiffness(result.stiffness),
+            *wrench,
+            *(wrench if raw is felt else (*raw.force.tolist(), *raw.torque.tolist())),
+            *self._columns_at_blade(result, blade.forward),
             result.cut_area,
             result.finished_area,
             result.n_tetrahedra,
@@ -81,25 +73,51 @@ class FrameRows:
             result.work_of_blade,
             *_account(result.energies),
             *wall_times,
-        )
+        ]
 
-    def _parts(self, contacts: BladeContacts, forward: FloatArray) -> Sequence[float]:
-        """Return the rows of `ForceParts`, in the world, one after the other [N]."""
-        if not len(contacts.normal_force):
-            return _NO_FORCES
-        frame = self._frame
-        if not frame.is_rotated:
-            return force_rows(contacts, forward).ravel().tolist()
-        parts = force_rows(contacts, frame.vectors_to_tissue(forward))
-        return frame.vectors_to_world(parts).ravel().tolist()
-
-    def _stiffness(self, stiffness: FloatArray) -> Sequence[float]:
-        """Return the different numbers of the stiffness against displacement, in the world."""
-        if not self._frame.is_rotated:
-            return _UPPER_OF_SIX(stiffness.ravel().tolist())
-        return _UPPER(self._frame.matrix_to_world(stiffness[:3, :3]).ravel().tolist())
+    def _columns_at_blade(self, result: StepResult, forward: FloatArray) -> list[float]:
+        """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
+        frame, contacts, columns = self._frame, result.contacts, self._at_blade
+        if frame.is_rotated:
+            parts = force_parts(contacts, frame.vectors_to_tissue(forward))
+            columns[:9] = frame.vectors_to_world(np.array(parts)).ravel()
+            _write_upper(frame.matrix_to_world(result.stiffness[:3, :3]), columns)
+        else:
+            _write_at_blade(
+                contacts.normal,
+                contacts.normal_force,
+                contacts.friction,
+                result.stiffness,
+                forward,
+                columns,
+            )
+        return columns.tolist()
 
 
 def _account(energies: Energies | None) -> tuple[float, ...]:
     """Return the terms of the energy account, and the residual [J]."""
     return NO_ACCOUNT if energies is None else (*energies[1:], energies.residual)
+
+
+@kernel
+def _write_at_blade(
+    normal: FloatArray,
+    normal_force: FloatArray,
+    friction: FloatArray,
+    stiffness: FloatArray,
+    forward: FloatArray,
+    columns: FloatArray,
+) -> None:
+    """Write `ForceParts` and stiffness of a step, whose frame is parallel to the world."""
+    add_up(normal, normal_force, friction, forward, columns)
+    _write_upper(stiffness, columns)
+
+
+@kernel
+def _write_upper(stiffness: FloatArray, columns: FloatArray) -> None:
+    """Write the six different numbers of the stiffness against displacement."""
+    for axis in range(3):
+        columns[9 + axis] = stiffness[axis, axis]
+    columns[12] = stiffness[0, 1]
+    columns[13] = stiffness[0, 2]
+    columns[14] = stiffness[1, 2]

@@ -89,9 +89,8 @@ class Stroke:
 
     def pose(self, t: float) -> BladeSegment:
         """Return the blade's pose at time `t` [s]. It rests before the start and after the end."""
-        from scalpel_sim.strokes.path import (
-            pose_on_path,
-        )  # a list of scenes starts without its compiler
+        # Not above: what only lists scenes starts without the compiler.
+        from scalpel_sim.strokes.path import pose_on_path
 
         return BladeSegment(*map(np.array, pose_on_path(float(t), self.path)))
 

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import FixtureBox, FixtureMesh, TissueFrame
+from bridge.poses import six
 from tissue import BladeSegment, Wrench
 
 QUARTER_TURN_ABOUT_Z = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -108,3 +109,11 @@ def test_an_origin_that_is_not_finite_is_refused():
 def test_a_frame_cannot_change_during_a_run():
     with pytest.raises(ValueError, match="read-only"):
         TURNED.origin[0] = 2.0
+
+
+@given(frames(), vectors, vectors, vectors)
+def test_a_wrench_in_plain_numbers_is_the_one_in_arrays(frame, force, torque, point):
+    numbers = six(np.concatenate([force, torque]))
+    expected = frame.wrench_to_world(Wrench(force, torque, point))
+    for found, wanted in zip(frame.numbers_to_world(numbers, point), expected, strict=True):
+        assert found.tobytes() == wanted.tobytes()

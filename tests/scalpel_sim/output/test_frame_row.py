@@ -1,0 +1,67 @@
+"""The columns of a row that a kernel writes, against NumPy."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bridge import TissueFrame
+from scalpel_sim.output.force_parts import force_parts
+from scalpel_sim.output.frame_row import FrameRows, WallTimes
+from scalpel_sim.output.recording import COLUMNS
+from tissue import BladeContacts, BladeSegment, Wrench
+
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+FRAMES = {
+    "parallel": TissueFrame(origin=np.array([0.1, 0.2, 0.3])),
+    "turned": TissueFrame(QUARTER, np.array([0.1, 0.2, 0.3])),
+}
+AXES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def result_of(rng, n):
+    """Return what a row takes of a step with `n` contacts."""
+    normal = rng.normal(size=(n, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    contacts = BladeContacts(
+        np.zeros((n, 3)), normal, rng.normal(size=n), rng.normal(size=(n, 3)), np.zeros(n)
+    )
+    half = rng.normal(size=(6, 6))
+    return SimpleNamespace(
+        contacts=contacts,
+        stiffness=half @ half.T,
+        cut_area=1.0,
+        finished_area=2.0,
+        n_tetrahedra=3,
+        anchored_length=4.0,
+        work_of_blade=5.0,
+        energies=None,
+    )
+
+
+@pytest.mark.kernel
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("n", [0, 1, 40])
+def test_a_row_has_forces_and_stiffness_in_the_world(frame, n):
+    rng, there = np.random.default_rng(n), FRAMES[frame]
+    result, blade = result_of(rng, n), BladeSegment(*np.linalg.qr(rng.normal(size=(3, 3)))[0])
+    felt, raw = (Wrench(*rng.normal(size=(3, 3))) for _ in range(2))
+    times = WallTimes(*range(5))
+    row = FrameRows(there).row_of(0.5, blade, felt, raw, result, times)
+    assert len(row) == len(COLUMNS) - 1
+    assert row[:4] == [0.5, *blade.tip]
+    assert row[4:16] == [*felt.force, *felt.torque, *raw.force, *raw.torque]
+    parts = force_parts(result.contacts, there.vectors_to_tissue(blade.forward))
+    assert row[16:25] == there.vectors_to_world(np.array(parts)).ravel().tolist()
+    stiffness = there.matrix_to_world(result.stiffness[:3, :3])
+    assert row[25:31] == [stiffness[at] for at in AXES]
+    assert row[31:36] == [1.0, 2.0, 3, 4.0, 5.0]
+    assert row[-5:] == list(times) and np.isnan(row[36:-5]).all()
+
+
+def test_a_wrench_that_no_limit_changed_is_written_twice():
+    rng = np.random.default_rng(0)
+    wrench, blade = Wrench(*rng.normal(size=(3, 3))), BladeSegment(*np.eye(3))
+    times = WallTimes(*range(5))
+    row = FrameRows(TissueFrame()).row_of(0.0, blade, wrench, wrench, result_of(rng, 2), times)
+    assert row[4:10] == row[10:16] == [*wrench.force, *wrench.torque]
