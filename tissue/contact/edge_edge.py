@@ -12,7 +12,7 @@ nodes meet the triangles beside them instead."""
 EDGE_END = 1e-3
 """Share of an edge at each end that is left to the node there, which meets triangles."""
 
-_SAME_SIDE = 0.5
+SAME_SIDE = 0.5
 """Cosine between the normals of two edges above which they cannot face each other. Contact needs
 a direction within a right angle of one normal and of the other's opposite: between edges of one lip
 that is one along the lip."""
@@ -93,10 +93,10 @@ def lines_overlap(at: Edges, outward: Vec3, other_outward: Vec3) -> bool:
 
 @kernel
 def face_the_same_side(outward: Vec3, other_outward: Vec3) -> bool:
-    """Whether the normals of two edges show that they cannot face each other, see `_SAME_SIDE`."""
+    """Whether the normals of two edges show that they cannot face each other, see `SAME_SIDE`."""
     same = dot(outward, other_outward)
     squares = dot(outward, outward) * dot(other_outward, other_outward)
-    return same > 0.0 and same * same > _SAME_SIDE * _SAME_SIDE * squares
+    return same > 0.0 and same * same > SAME_SIDE * SAME_SIDE * squares
 
 
 @kernel

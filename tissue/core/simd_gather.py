@@ -65,6 +65,17 @@ def _largest(builder: Any, a: Any) -> Any:
     return _tree(values, lambda b, c: builder.select(builder.fcmp_ordered(">", b, c), b, c))
 
 
+def larger_bits(a: Lanes, b: Lanes) -> int:
+    """Return a number whose bit k is 1 where `a` is larger than `b` in lane k."""
+    return int(np.packbits(a > b, bitorder="little")[0])
+
+
+@_compiled(larger_bits, LANES, LANES, result=types.int64)
+def _larger_bits(builder: Any, a: Any, b: Any) -> Any:
+    bits = builder.bitcast(builder.fcmp_ordered(">", a, b), ir.IntType(WIDTH))
+    return builder.zext(bits, ir.IntType(64))
+
+
 def _tree(terms: list[Any], add: Any = operator.add) -> Any:
     """Return the sum of eight, or another fold: neighbours first, so that no operation waits."""
     while len(terms) > 1:

@@ -5,7 +5,7 @@ import pytest
 
 from tissue.core.jit import kernel
 from tissue.core.simd import load_lanes, store_lanes
-from tissue.core.simd_gather import larger, largest, sum_of_eight
+from tissue.core.simd_gather import larger, larger_bits, largest, sum_of_eight
 
 pytestmark = pytest.mark.kernel
 
@@ -37,3 +37,15 @@ def test_the_larger_of_two_and_the_largest_of_eight():
     np.testing.assert_array_equal(out, expected)
     np.testing.assert_array_equal(out[:8], np.maximum(VALUES[:8], VALUES[8:16]))
     assert out[8] == VALUES[16:24].max()
+
+
+def compare_bits(values, out):
+    out[0] = larger_bits(load_lanes(values, 0), load_lanes(values, 8))
+
+
+def test_bits_say_in_which_lanes_a_number_is_larger():
+    out, expected = np.zeros((2, 1), np.int64)
+    kernel(compare_bits)(VALUES, out)
+    compare_bits(VALUES, expected)
+    assert out[0] == expected[0]
+    assert expected[0] == sum(1 << k for k in range(8) if VALUES[k] > VALUES[8 + k])

@@ -18,6 +18,6 @@ In the order in which they are best read:
     near_pairs         the pairs of node and face
     ridge_pairs        the pairs of ridges
     ridges             the edges that can touch other edges
-    node_grid          nodes by the cells of a grid
+    block_tree         nodes, or ridges, by blocks that are near each other and face alike
     node_ways          how far nodes have moved
 """

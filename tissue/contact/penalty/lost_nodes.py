@@ -8,12 +8,12 @@ it is not behind in the body at rest; it comes out as slowly as any overlap that
 
 import math
 
-from tissue.contact.penalty.node_grid import bucket_of, cells_of_box
+from tissue.contact.penalty.block_tree import find_near
 from tissue.contact.penalty.node_ways import BALL
 from tissue.contact.penalty.search_state import SearchState
 from tissue.core.jit import kernel
-from tissue.core.vec3 import cross, dot, sub, vec3
-from tissue.geometry.aabb import Aabb, widened, with_point
+from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
+from tissue.geometry.aabb import Aabb, overlap, widened, with_point
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body, local_index
 
@@ -54,7 +54,7 @@ def _forget_others(search: SearchState) -> None:
 @kernel
 def _look_into(search: SearchState, body: Body, t: int) -> None:
     """Find the nodes of faces that are lost in tetrahedron `t`."""
-    x, ways, grid = body.positions, search.ways, search.pairs.grid
+    x, ways, tree = body.positions, search.ways, search.pairs.tree
     a, b = vec3(x, body.tetrahedra[t, 0]), vec3(x, body.tetrahedra[t, 1])
     c, d = vec3(x, body.tetrahedra[t, 2]), vec3(x, body.tetrahedra[t, 3])
     box = with_point(with_point(with_point(Aabb(a, a), b), c), d)
@@ -65,15 +65,13 @@ def _look_into(search: SearchState, body: Body, t: int) -> None:
     # Of numbers that are not finite this is not true, either.
     if not (extent.x < largest and extent.y < largest and extent.z < largest):
         return
-    cells = cells_of_box(ways, widened(box, BALL * ways.node_size))
-    for i in range(cells.i, cells.i_last + 1):
-        for j in range(cells.j, cells.j_last + 1):
-            for k in range(cells.k, cells.k_last + 1):
-                bucket = bucket_of(grid, i, j, k)
-                for e in range(grid.begin[bucket], grid.begin[bucket + 1]):
-                    node = grid.entry[e]
-                    if _is_lost_in(search, body, node, t):
-                        _note_lost(search, node)
+    reach = widened(box, BALL * ways.node_size)
+    n = find_near(tree, reach, Vec3(0.0, 0.0, 0.0), math.inf, False)
+    for i in range(n):
+        node = tree.found[i]
+        p = vec3(x, node)
+        if overlap(box, Aabb(p, p)) and _is_lost_in(search, body, node, t):
+            _note_lost(search, node)
 
 
 @kernel

@@ -7,7 +7,7 @@ anew (`pair_update`). Faces go by their places in `Faces`.
 
 import numpy as np
 
-from tissue.contact.penalty.node_grid import NodeGrid, new_node_grid
+from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
@@ -27,7 +27,6 @@ _OF_NODES = (
     "is_lost",
     "found_in",
     "moved",
-    "asked_at",
     "begin",
     "end",
 )
@@ -52,8 +51,6 @@ class NearPairs(Arrays):
     """Number of the last update, from 1."""
     n_found: IntCell
     """Number of pairs that hold or were found in this update; there may be no room for all."""
-    n_asked: IntCell
-    """Number of boxes that have asked a grid so far."""
     nodes: IntArray
     """Nodes of faces, shape (node capacity,)."""
     seen_at: IntArray
@@ -72,8 +69,6 @@ class NearPairs(Arrays):
     capacity,)."""
     moved: IntArray
     """Nodes that were paired anew in the last update, shape (node capacity,)."""
-    asked_at: IntArray
-    """Scratch: last box that found each node, by `n_asked`; shape (node capacity,)."""
     begin: IntArray
     """First pair of each node, counted from `first`; shape (node capacity,)."""
     end: IntArray
@@ -90,6 +85,10 @@ class NearPairs(Arrays):
     """Generation in `Faces` of each face when it was last looked at; shape (face capacity,)."""
     dirty_at: IntArray
     """Update in which each face was last paired anew, shape (face capacity,)."""
+    low: FloatArray
+    """Lowest corner of the box in which each face asks for nodes [m], shape (face capacity, 3)."""
+    high: FloatArray
+    """Highest corner of that box [m], shape (face capacity, 3)."""
     node: IntArray
     """Node of each pair, shape (2 * capacity,)."""
     face: IntArray
@@ -103,10 +102,9 @@ class NearPairs(Arrays):
     relative: FloatArray
     """Displacement of the node against the face as a near pair was last looked at [m], shape
     (2 * capacity, 3)."""
-    grid: NodeGrid
-    """All nodes of faces."""
-    moved_grid: NodeGrid
-    """Nodes that are paired anew."""
+    tree: BlockTree
+    """All nodes of faces, with the part of their balls by which these are larger than those of slow
+    nodes; those that are paired anew are marked."""
 
 
 def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
@@ -125,24 +123,23 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_moved=0,
         n_updates=1,
         n_found=0,
-        n_asked=0,
         **{name: np.zeros(n_nodes, np.int64) for name in _OF_NODES},
         triangle=np.zeros((n_faces, 3), np.int64),
         **{name: np.zeros(n_faces, np.int64) for name in of_faces},
         seen_generation=np.full(n_faces, -1, np.int64),
+        low=np.zeros((n_faces, 3)),
+        high=np.zeros((n_faces, 3)),
         **{name: np.zeros(2 * capacity, np.int64) for name in ("node", "face", "is_near")},
         wake=np.zeros(2 * capacity),
         relative=np.zeros((2 * capacity, 3)),
-        grid=new_node_grid(4 * n_nodes),
-        moved_grid=new_node_grid(4 * n_nodes),
+        tree=new_block_tree(n_nodes),
     )
 
 
 def grown_near_pairs(pairs: NearPairs, n_nodes: int) -> NearPairs:
     """Return the pairs with room for `n_nodes` of the body."""
     larger = {name: grown(getattr(pairs, name), n_nodes) for name in _OF_NODES}
-    room = max(4 * n_nodes, len(pairs.grid.entry))
-    return pairs.replaced(**larger, grid=new_node_grid(room), moved_grid=new_node_grid(room))
+    return pairs.replaced(**larger, tree=new_block_tree(n_nodes))
 
 
 @kernel

@@ -7,14 +7,8 @@ import math
 from typing import NamedTuple
 
 from tissue.contact.faces import NO_FACE, Faces, is_face_of_cut
+from tissue.contact.penalty.block_tree import arrange, enter, find_near
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
-from tissue.contact.penalty.node_grid import (
-    LONGEST,
-    NodeGrid,
-    bucket_of,
-    cells_of_box,
-    fill_node_grid,
-)
 from tissue.contact.penalty.node_ways import (
     BALL,
     LARGEST_BALL,
@@ -25,9 +19,17 @@ from tissue.contact.penalty.node_ways import (
 from tissue.contact.penalty.ridges import Ridges, find_changed_ridges
 from tissue.contact.piece_boxes import may_touch, update_piece_boxes
 from tissue.core.array_types import FloatArray
-from tissue.core.jit import inlined, kernel
+from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
-from tissue.geometry.aabb import Aabb, empty_box, overlap, widened, with_point
+from tissue.geometry.aabb import (
+    Aabb,
+    box_at,
+    empty_box,
+    overlap,
+    store_box,
+    widened,
+    with_point,
+)
 from tissue.mesh.body import Body
 from tissue.mesh.faces import OUTWARD
 
@@ -93,19 +95,17 @@ def update_pairs(
             pairs.dirty_at[at] = pairs.n_updates
     first = len(pairs.wake) // 2 - pairs.first
     _keep_pairs(pairs, first)
-    if not fill_node_grid(pairs.grid, ways, pairs.nodes, pairs.n_nodes):
-        return False
-    if not fill_node_grid(pairs.moved_grid, ways, pairs.moved, pairs.n_moved):
-        return False
+    _enter_nodes(pairs, ways, normal)
     box = _box_of_moved(pairs, ways)
     for at in range(faces.n_places):
         if pairs.is_active[at] == 0:
             continue
-        asking = _asking(pairs, ways, at)
         if pairs.dirty_at[at] == pairs.n_updates:
-            _ask(pairs, pairs.grid, ways, faces, body, normal, asking)
-        elif overlap(asking.box, box):
-            _ask(pairs, pairs.moved_grid, ways, faces, body, normal, asking)
+            asking = _asking(pairs, ways, at)
+            store_box(pairs.low, pairs.high, at, asking.box)
+            _ask(pairs, ways, faces, body, normal, asking, False)
+        elif overlap(box_at(pairs.low, pairs.high, at), box):
+            _ask(pairs, ways, faces, body, normal, _asking(pairs, ways, at), True)
     if pairs.n_found > len(pairs.wake) // 2:
         return False
     _sort(pairs, first)
@@ -232,60 +232,42 @@ def _asking(pairs: NearPairs, ways: NodeWays, at: int) -> _Asking:
 
 
 @kernel
+def _enter_nodes(pairs: NearPairs, ways: NodeWays, normal: FloatArray) -> None:
+    """Put the nodes of faces into the tree."""
+    tree, now = pairs.tree, pairs.n_updates
+    tree.n_items = 0
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        p, more = vec3(ways.reference, node), ways.radius[node] - BALL * ways.node_size
+        box = widened(Aabb(p, p), max(more, 0.0))
+        enter(tree, node, box, vec3(normal, node), pairs.moved_at[node] == now)
+    arrange(tree, _SAME_SHEET)
+
+
+@kernel
 def _ask(
     pairs: NearPairs,
-    grid: NodeGrid,
     ways: NodeWays,
     faces: Faces,
     body: Body,
     normal: FloatArray,
     face: _Asking,
+    only_moved: bool,
 ) -> None:
-    """Pair a face with the nodes of a grid that may touch it; see `update_pairs`."""
-    pairs.n_asked += 1
-    cells = cells_of_box(ways, face.box)
-    if (
-        cells.i_last - cells.i >= LONGEST
-        or cells.j_last - cells.j >= LONGEST
-        or cells.k_last - cells.k >= LONGEST
-    ):
-        for e in range(grid.n_entries):
-            _try_pair(pairs, ways, faces, body, normal, face, grid.entry[e])
-        return
-    for i in range(cells.i, cells.i_last + 1):
-        for j in range(cells.j, cells.j_last + 1):
-            for k in range(cells.k, cells.k_last + 1):
-                bucket = bucket_of(grid, i, j, k)
-                for e in range(grid.begin[bucket], grid.begin[bucket + 1]):
-                    _try_pair(pairs, ways, faces, body, normal, face, grid.entry[e])
-
-
-@inlined
-def _try_pair(
-    pairs: NearPairs,
-    ways: NodeWays,
-    faces: Faces,
-    body: Body,
-    normal: FloatArray,
-    face: _Asking,
-    node: int,
-) -> None:
-    """Pair a face with a node that may touch it, unless it has met that node before."""
-    p = vec3(ways.reference, node)
-    more = ways.radius[node] - BALL * ways.node_size
-    if not overlap(Aabb(p, p), widened(face.box, more)) or pairs.asked_at[node] == pairs.n_asked:
-        return
-    pairs.asked_at[node] = pairs.n_asked
-    if not _may_meet(pairs, ways, faces, body, normal, face, node):
-        return
+    """Pair a face with the nodes that may touch it; see `update_pairs`."""
+    n = find_near(pairs.tree, face.box, face.area, face.length, only_moved)
     room = len(pairs.wake) // 2
-    if pairs.n_found < room:
-        k = room - pairs.first + pairs.n_found
-        pairs.node[k] = node
-        pairs.face[k] = face.at
-        pairs.is_near[k] = 0
-        pairs.wake[k] = -1.0
-    pairs.n_found += 1
+    for i in range(n):
+        node = pairs.tree.found[i]
+        if not _may_meet(pairs, ways, faces, body, normal, face, node):
+            continue
+        if pairs.n_found < room:
+            k = room - pairs.first + pairs.n_found
+            pairs.node[k] = node
+            pairs.face[k] = face.at
+            pairs.is_near[k] = 0
+            pairs.wake[k] = -1.0
+        pairs.n_found += 1
 
 
 @kernel

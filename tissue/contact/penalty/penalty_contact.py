@@ -94,7 +94,7 @@ class PenaltyContact:
             since_normals=SEARCHES_TO_NORMALS,
             faces=faces,
             pairs=new_near_pairs(n_nodes, len(faces.face), CAPACITY_OF_PAIRS),
-            ridges=new_ridges(len(faces.face), node_size),
+            ridges=new_ridges(len(faces.face)),
             ridge_pairs=new_ridge_pairs(CAPACITY_OF_PAIRS),
             ways=new_node_ways(n_nodes, node_size),
             limits=new_limits(node_size, added),
@@ -232,7 +232,7 @@ class PenaltyContact:
         ridge_pairs.n_contacts = search.ridge_pairs.n_contacts
         self._search = search.replaced(
             pairs=new_near_pairs(len(search.share), n_faces, room),
-            ridges=new_ridges(max(n_faces, 2 * n_ridges // 3), search.ways.node_size),
+            ridges=new_ridges(max(n_faces, n_ridges // 3)),
             ridge_pairs=ridge_pairs,
         )
 

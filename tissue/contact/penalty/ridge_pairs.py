@@ -7,16 +7,16 @@ until one of them leaves its ball or a face beside it changes (`pair_update`).
 import numpy as np
 
 from tissue.contact.distance import distance_of_edges
-from tissue.contact.edge_edge import Edges, face_the_same_side
+from tissue.contact.edge_edge import SAME_SIDE, Edges, face_the_same_side
 from tissue.contact.faces import Faces
+from tissue.contact.penalty.block_tree import arrange, enter, find_near
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.contact.penalty.ridges import Ridges
-from tissue.contact.spatial_hash import find_overlaps, insert_box, remove_box
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3, add, cross, norm, scale, sub, vec3
+from tissue.core.vec3 import Vec3, add, cross, norm, scale, store, sub, vec3
 from tissue.geometry.aabb import box_at, segment_box, store_box, widened
 
 NOT_LISTED = -1
@@ -80,47 +80,84 @@ def pair_ridges(
         faces: The piece that each face is of.
     """
     now = pairs.n_updates
-    _list_ridges(ridges, pairs, faces)
+    has_dirty = _list_ridges(ridges, pairs, ways, faces)
     _keep_pairs(found, ridges, now)
-    for edge in range(3 * faces.n_places):
-        if ridges.dirty_at[edge] == now and ridges.is_in_grid[edge] == 1:
-            remove_box(ridges.grid, edge, box_at(ridges.low, ridges.high, edge))
-            ridges.is_in_grid[edge] = 0
+    if not has_dirty:
+        return True
+    _enter_ridges(ridges, ways, now)
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
         if ridges.dirty_at[edge] != now:
             continue
-        a, b = ridges.node[edge, 0], ridges.node[edge, 1]
-        reach = max(ways.radius[a], ways.radius[b]) + 0.5 * CONTACT_REACH * ways.node_size
-        box = widened(segment_box(ways.reference, a, b), reach)
-        n = find_overlaps(ridges.grid, ridges.search, ridges.low, ridges.high, box)
-        for q in range(n):
-            other = ridges.search.found[q]
-            if not _may_cross(ridges, pairs, ways, faces, edge, other):
-                continue
-            if found.n_pairs == len(found.wake):
-                return False
-            _add_pair(found, ridges, edge, other)
-        store_box(ridges.low, ridges.high, edge, box)
-        if not insert_box(ridges.grid, edge, box):
+        n = _find_crossing(ridges, pairs, ways, faces, edge)
+        if found.n_pairs + n > len(found.wake):
             return False
-        ridges.is_in_grid[edge] = 1
+        for q in range(n):
+            _add_pair(found, ridges, edge, ridges.tree.found[q])
     return True
 
 
 @kernel
-def _list_ridges(ridges: Ridges, pairs: NearPairs, faces: Faces) -> None:
-    """List the ridges; those with a node that is paired anew are dirty, too."""
-    now, n = pairs.n_updates, 0
+def _list_ridges(ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces) -> bool:
+    """List the ridges; return whether any are dirty: those with a node that is paired anew are."""
+    now, n, has_dirty, moved = pairs.n_updates, 0, False, pairs.moved_at
     for edge in range(3 * faces.n_places):
         if ridges.is_one[edge] == 0:
             continue
         a, b = ridges.node[edge, 0], ridges.node[edge, 1]
-        if pairs.moved_at[a] == now or pairs.moved_at[b] == now:
+        if moved[a] == now or moved[b] == now:
             ridges.dirty_at[edge] = now
+        is_dirty = ridges.dirty_at[edge] == now
+        has_dirty = has_dirty or is_dirty
+        if is_dirty or moved[ridges.tip[edge, 0]] == now or moved[ridges.tip[edge, 1]] == now:
+            store(ridges.outward, edge, outward_at(ridges, ways.reference, edge))
         ridges.listed[n] = edge
         n += 1
     ridges.n_ridges = n
+    return has_dirty
+
+
+@kernel
+def _enter_ridges(ridges: Ridges, ways: NodeWays, now: int) -> None:
+    """Put the ridges into the tree; those that are dirty with the balls as they are now."""
+    tree = ridges.tree
+    tree.n_items = 0
+    for i in range(ridges.n_ridges):
+        edge = ridges.listed[i]
+        is_dirty = ridges.dirty_at[edge] == now
+        if is_dirty:
+            a, b = ridges.node[edge, 0], ridges.node[edge, 1]
+            reach = max(ways.radius[a], ways.radius[b]) + 0.5 * CONTACT_REACH * ways.node_size
+            box = widened(segment_box(ways.reference, a, b), reach)
+            store_box(ridges.low, ridges.high, edge, box)
+        box = box_at(ridges.low, ridges.high, edge)
+        enter(tree, edge, box, vec3(ridges.outward, edge), is_dirty)
+    arrange(tree, SAME_SIDE)
+
+
+@kernel
+def _find_crossing(
+    ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces, edge: int
+) -> int:
+    """Write the ridges that a dirty one may cross to `tree.found`, in order; return how many.
+
+    Of two that are dirty the first finds none: the second finds it.
+    """
+    tree, outward, n = ridges.tree, vec3(ridges.outward, edge), 0
+    box = box_at(ridges.low, ridges.high, edge)
+    for q in range(find_near(tree, box, outward, norm(outward), False)):
+        other = tree.found[q]
+        if other >= edge and ridges.dirty_at[other] == pairs.n_updates:
+            continue
+        if not _may_cross(ridges, pairs, ways, faces, edge, other):
+            continue
+        at = n
+        while at > 0 and tree.found[at - 1] > other:
+            tree.found[at] = tree.found[at - 1]
+            at -= 1
+        tree.found[at] = other
+        n += 1
+    return n
 
 
 @kernel
@@ -170,7 +207,7 @@ def _may_cross(
         if piece >= 0 and piece == faces.piece[pairs.tetrahedron[other // 3]]:
             return False
     x, radius = ways.reference, ways.radius
-    if face_the_same_side(outward_at(ridges, x, edge), outward_at(ridges, x, other)):
+    if face_the_same_side(vec3(ridges.outward, edge), vec3(ridges.outward, other)):
         return False
     reach = max(radius[a], radius[b]) + max(radius[c], radius[d])
     reach += CONTACT_REACH * ways.node_size

@@ -8,20 +8,13 @@ import numpy as np
 
 from tissue.contact.faces import NO_FACE, Faces
 from tissue.contact.feature_edges import face_across, is_ridge
+from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
 from tissue.contact.penalty.near_pairs import NearPairs
-from tissue.contact.spatial_hash import Grid, Search, new_grid, new_search
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import CUT, Body
 from tissue.mesh.faces import OUTWARD
-
-_CELL = 1.25
-"""Edge of a cell of the grid, per node size. Larger: more ridges are tested in each; smaller: a
-ridge is entered in more cells."""
-
-_CELLS_OF_A_FACE = 8
-"""Entries of the grid that there is room for, per face."""
 
 
 class Ridges(Arrays):
@@ -33,8 +26,6 @@ class Ridges(Arrays):
     """The ridges, shape (3 * face capacity,)."""
     is_one: IntArray
     """1 if an edge is a ridge that its face lists, else 0; shape (3 * face capacity,)."""
-    is_in_grid: IntArray
-    """1 if an edge is in the grid, else 0; shape (3 * face capacity,)."""
     is_of_cut: IntArray
     """1 if one of the two faces of a ridge was made by a cut, else 0; shape (3 * face
     capacity,)."""
@@ -50,17 +41,17 @@ class Ridges(Arrays):
     3)."""
     high: FloatArray
     """Highest corner of that box [m], shape (3 * face capacity, 3)."""
-    grid: Grid
-    """The ridges by their boxes."""
-    search: Search
-    """Scratch of searches in the grid."""
+    outward: FloatArray
+    """Vector out of the body at each ridge, with its nodes where they were when they were paired:
+    the sum of the unit normals of its two faces; shape (3 * face capacity, 3)."""
+    tree: BlockTree
+    """The ridges by their boxes; those that are paired anew are marked."""
 
 
-def new_ridges(n_faces: int, node_size: float) -> Ridges:
-    """Return no ridges, with room for those of `n_faces`, of a body of that mean node size [m]."""
+def new_ridges(n_faces: int) -> Ridges:
+    """Return no ridges, with room for those of `n_faces`."""
     n = 3 * n_faces
-    of_edges = ("listed", "is_one", "is_in_grid", "is_of_cut", "dirty_at")
-    buckets = 1 << (2 * n_faces - 1).bit_length()
+    of_edges = ("listed", "is_one", "is_of_cut", "dirty_at")
     return Ridges(
         n_ridges=0,
         **{name: np.zeros(n, np.int64) for name in of_edges},
@@ -68,8 +59,8 @@ def new_ridges(n_faces: int, node_size: float) -> Ridges:
         tip=np.zeros((n, 2), np.int64),
         low=np.zeros((n, 3)),
         high=np.zeros((n, 3)),
-        grid=new_grid(buckets, _CELLS_OF_A_FACE * n_faces, float(_CELL * node_size)),
-        search=new_search(n),
+        outward=np.zeros((n, 3)),
+        tree=new_block_tree(n),
     )
 
 

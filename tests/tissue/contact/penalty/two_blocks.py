@@ -29,7 +29,7 @@ class TwoBlocks:
         self.normal = np.zeros((self.body.n_nodes, 3))
         self.ways = new_node_ways(self.body.n_nodes, SIZE)
         self.pairs = new_near_pairs(self.body.n_nodes, len(self.faces.face), 4096)
-        self.ridges = new_ridges(len(self.faces.face), SIZE)
+        self.ridges = new_ridges(len(self.faces.face))
         self.ridge_pairs = new_ridge_pairs(4096)
         self.n_updates = 0
 
