@@ -71,7 +71,7 @@ def update_candidates(
     """
     candidates.path_since_check += move
     if not candidates.path_since_check <= PIECE_PATH * margin:
-        update_piece_boxes(faces, body)
+        update_piece_boxes(faces, body, margin)
         candidates.path_since_check = 0.0
         has_changed = True
     candidates.n_updates += 1
@@ -141,7 +141,7 @@ def _list_dirty(candidates: Candidates, faces: Faces, body: Body, reach: float) 
         has_changed = candidates.seen_generation[at] != faces.generation[at]
         if has_changed or has_checked_pieces:
             face = faces.face[at]
-            is_wanted = face != NO_FACE and may_touch(faces, body, face, reach)
+            is_wanted = face != NO_FACE and may_touch(faces, body, at, reach, False)
             has_changed = has_changed or is_wanted != (candidates.is_active[at] == 1)
             candidates.should_be_active[at] = is_wanted
         if has_changed or (candidates.is_active[at] == 1 and _has_marked(candidates, at)):

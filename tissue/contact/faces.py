@@ -10,6 +10,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import CUT, OUTER, Body, grown
 from tissue.mesh.changes import Change
+from tissue.mesh.faces import OUTWARD
 from tissue.mesh.pieces import label_pieces
 
 ROOM_FOR_FACES = 1 << 14
@@ -30,6 +31,9 @@ class Faces(Arrays):
     """1 if skin is among the faces, else 0."""
     face: IntArray
     """4 * tetrahedron + local face, or NO_FACE; shape (capacity,)."""
+    node: IntArray
+    """Corners of each face, counter-clockwise seen from outside, and the fourth node of its
+    tetrahedron; shape (capacity, 4)."""
     generation: IntArray
     """How often what is in each place has changed, shape (capacity,)."""
     free: IntArray
@@ -43,6 +47,8 @@ class Faces(Arrays):
     """Lowest corner of the box around each piece [m], shape (n_pieces, 3)."""
     piece_high: FloatArray
     """Highest corner of the box around each piece [m], shape (n_pieces, 3)."""
+    is_piece_far: IntArray
+    """1 if no other piece was near a piece when the boxes were made, else 0; shape (n_pieces,)."""
 
 
 def new_faces(n_tetrahedra: int) -> Faces:
@@ -52,12 +58,14 @@ def new_faces(n_tetrahedra: int) -> Faces:
         n_free=0,
         has_skin=0,
         face=np.zeros(ROOM_FOR_FACES, np.int64),
+        node=np.zeros((ROOM_FOR_FACES, 4), np.int64),
         generation=np.zeros(ROOM_FOR_FACES, np.int64),
         free=np.zeros(ROOM_FOR_FACES, np.int64),
         place=np.full((n_tetrahedra, 4), -1, np.int64),
         piece=np.full(n_tetrahedra, -1, np.int64),
         piece_low=np.zeros((1, 3)),
         piece_high=np.zeros((1, 3)),
+        is_piece_far=np.zeros(1, np.int64),
     )
 
 
@@ -73,14 +81,18 @@ def with_room(faces: Faces, n_more: int) -> Faces:
     needed = faces.n_places + n_more
     if needed <= len(faces.face):
         return faces
-    of_faces = ("face", "generation", "free")
+    of_faces = ("face", "node", "generation", "free")
     return faces.replaced(**{name: grown(getattr(faces, name), 2 * needed) for name in of_faces})
 
 
 def with_pieces(faces: Faces, piece: IntArray, n_pieces: int) -> Faces:
     """Return the faces of a body in `n_pieces`; `piece` is that of each tetrahedron, (n_tets,)."""
     faces.piece[: len(piece)] = piece
-    return faces.replaced(piece_low=np.zeros((n_pieces, 3)), piece_high=np.zeros((n_pieces, 3)))
+    return faces.replaced(
+        piece_low=np.zeros((n_pieces, 3)),
+        piece_high=np.zeros((n_pieces, 3)),
+        is_piece_far=np.zeros(n_pieces, np.int64),
+    )
 
 
 def with_found_pieces(faces: Faces, body: Body) -> Faces | None:
@@ -141,6 +153,9 @@ def _update_tetrahedron(faces: Faces, body: Body, t: int) -> None:
             faces.n_free += 1
         if at >= 0:
             faces.generation[at] += 1
+            for k in range(3):
+                faces.node[at, k] = body.tetrahedra[t, OUTWARD[f, k]]
+            faces.node[at, 3] = body.tetrahedra[t, f]
 
 
 @kernel

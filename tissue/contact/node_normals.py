@@ -6,7 +6,6 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, cross, dot, store, sub, vec3
 from tissue.mesh.body import Body
-from tissue.mesh.faces import OUTWARD
 
 
 @kernel
@@ -26,17 +25,13 @@ def update_normals(
     nothing = Vec3(0.0, 0.0, 0.0)
     for at in range(faces.n_places):
         if faces.face[at] != NO_FACE:
-            t, f = faces.face[at] // 4, faces.face[at] % 4
             for k in range(3):
-                store(normal, body.tetrahedra[t, OUTWARD[f, k]], nothing)
+                store(normal, faces.node[at, k], nothing)
     for at in range(faces.n_places):
         if faces.face[at] == NO_FACE:
             continue
-        t, f = faces.face[at] // 4, faces.face[at] % 4
-        i = body.tetrahedra[t, OUTWARD[f, 0]]
-        j = body.tetrahedra[t, OUTWARD[f, 1]]
-        k = body.tetrahedra[t, OUTWARD[f, 2]]
-        behind = body.tetrahedra[t, f]
+        i, j, k = faces.node[at, 0], faces.node[at, 1], faces.node[at, 2]
+        behind = faces.node[at, 3]
         a = vec3(x, i)
         area = cross(sub(vec3(x, j), a), sub(vec3(x, k), a))
         store(normal, i, add(vec3(normal, i), area))

@@ -69,7 +69,7 @@ def _least_slack(search: SearchState, node: int) -> float:
     pairs, ways = search.pairs, search.ways
     still, least = _STILL * ways.node_size, math.inf
     own = vec3(ways.displacement, node)
-    for k in range(pairs.first + pairs.begin[node], pairs.first + pairs.end[node]):
+    for k in range(pairs.begin[node], pairs.end[node]):
         face = pairs.face[k]
         left = pairs.wake[k] - ways.way[node] - triangle_way(pairs, ways.way, face)
         if pairs.is_near[k] == 1:
@@ -130,7 +130,7 @@ def _seek(search: SearchState, forces: PenaltyForces, body: Body, node: int, to:
     pairs, ways, n = search.pairs, search.ways, 0
     near = _WAY_NEAR * ways.node_size
     least = math.inf
-    for k in range(pairs.first + pairs.begin[node], pairs.first + pairs.end[node]):
+    for k in range(pairs.begin[node], pairs.end[node]):
         face = pairs.face[k]
         way = ways.way[node] + triangle_way(pairs, ways.way, face)
         if pairs.is_near[k] == 1 or way > pairs.wake[k]:

@@ -49,8 +49,10 @@ class NearPairs(Arrays):
     """Number of nodes that were paired anew in the last update."""
     n_updates: IntCell
     """Number of the last update, from 1."""
+    n_kept: IntCell
+    """Number of pairs that hold in this update."""
     n_found: IntCell
-    """Number of pairs that hold or were found in this update; there may be no room for all."""
+    """Number of pairs that were found in this update; there may be no room for all."""
     nodes: IntArray
     """Nodes of faces, shape (node capacity,)."""
     seen_at: IntArray
@@ -70,9 +72,9 @@ class NearPairs(Arrays):
     moved: IntArray
     """Nodes that were paired anew in the last update, shape (node capacity,)."""
     begin: IntArray
-    """First pair of each node, counted from `first`; shape (node capacity,)."""
+    """Row of the first pair of each node, shape (node capacity,)."""
     end: IntArray
-    """Behind its last pair, shape (node capacity,)."""
+    """Row behind its last pair, shape (node capacity,)."""
     triangle: IntArray
     """Nodes of each face, counter-clockwise seen from outside; shape (face capacity, 3)."""
     tetrahedron: IntArray
@@ -96,6 +98,12 @@ class NearPairs(Arrays):
     is_near: IntArray
     """1 if node and face touch, or may by what they move against each other; else 0. Shape
     (2 * capacity,)."""
+    is_kept: IntArray
+    """Scratch: 1 if a pair holds in this update, else 0; shape (2 * capacity,)."""
+    found_node: IntArray
+    """Scratch: nodes of the pairs that were found, shape (capacity,)."""
+    found_face: IntArray
+    """Scratch: places of their faces, shape (capacity,)."""
     wake: FloatArray
     """Sum of the ways of its four nodes up to which a pair needs no look [m], shape
     (2 * capacity,)."""
@@ -122,6 +130,7 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_nodes=0,
         n_moved=0,
         n_updates=1,
+        n_kept=0,
         n_found=0,
         **{name: np.zeros(n_nodes, np.int64) for name in _OF_NODES},
         triangle=np.zeros((n_faces, 3), np.int64),
@@ -129,7 +138,11 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         seen_generation=np.full(n_faces, -1, np.int64),
         low=np.zeros((n_faces, 3)),
         high=np.zeros((n_faces, 3)),
-        **{name: np.zeros(2 * capacity, np.int64) for name in ("node", "face", "is_near")},
+        **{
+            name: np.zeros(2 * capacity, np.int64)
+            for name in ("node", "face", "is_near", "is_kept")
+        },
+        **{name: np.zeros(capacity, np.int64) for name in ("found_node", "found_face")},
         wake=np.zeros(2 * capacity),
         relative=np.zeros((2 * capacity, 3)),
         tree=new_block_tree(n_nodes),

@@ -31,7 +31,6 @@ from tissue.geometry.aabb import (
     with_point,
 )
 from tissue.mesh.body import Body
-from tissue.mesh.faces import OUTWARD
 
 DEEPEST = 0.25
 """Depth below a face up to which a node is paired with it, per node size. Larger: nodes on the far
@@ -93,8 +92,7 @@ def update_pairs(
     for at in range(faces.n_places):
         if pairs.is_active[at] == 1 and _has_moved_corner(pairs, at):
             pairs.dirty_at[at] = pairs.n_updates
-    first = len(pairs.wake) // 2 - pairs.first
-    _keep_pairs(pairs, first)
+    _mark_kept_pairs(pairs)
     _enter_nodes(pairs, ways, normal)
     box = _box_of_moved(pairs, ways)
     for at in range(faces.n_places):
@@ -106,9 +104,9 @@ def update_pairs(
             _ask(pairs, ways, faces, body, normal, asking, False)
         elif overlap(box_at(pairs.low, pairs.high, at), box):
             _ask(pairs, ways, faces, body, normal, _asking(pairs, ways, at), True)
-    if pairs.n_found > len(pairs.wake) // 2:
+    if pairs.n_kept + pairs.n_found > len(pairs.wake) // 2:
         return False
-    _sort(pairs, first)
+    _join_pairs(pairs)
     return True
 
 
@@ -116,16 +114,16 @@ def update_pairs(
 def _take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> None:
     """Note faces that changed, and skin that came near another piece or left it."""
     has_skin_moved = faces.has_skin == 1 and not ways.largest_way <= SKIN_WAY * ways.node_size
-    if has_skin_moved:
-        update_piece_boxes(faces, body)
-        ways.largest_way = 0.0
     reach = (2.0 * SKIN_WAY + CONTACT_REACH + 2.0 * BALL) * ways.node_size
+    if has_skin_moved:
+        update_piece_boxes(faces, body, reach)
+        ways.largest_way = 0.0
     for at in range(faces.n_places):
         has_changed = pairs.seen_generation[at] != faces.generation[at]
         if not (has_changed or has_skin_moved):
             continue
         face = faces.face[at]
-        is_wanted = face != NO_FACE and may_touch(faces, body, face, reach)
+        is_wanted = face != NO_FACE and may_touch(faces, body, at, reach, has_skin_moved)
         if not has_changed and is_wanted == (pairs.is_active[at] == 1):
             continue
         pairs.seen_generation[at] = faces.generation[at]
@@ -135,7 +133,7 @@ def _take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> N
             pairs.is_of_cut[at] = is_face_of_cut(faces, body, at)
             pairs.tetrahedron[at] = face // 4
             for q in range(3):
-                pairs.triangle[at, q] = body.tetrahedra[face // 4, OUTWARD[face % 4, q]]
+                pairs.triangle[at, q] = faces.node[at, q]
 
 
 @kernel
@@ -180,19 +178,23 @@ def _has_moved_corner(pairs: NearPairs, at: int) -> bool:
 
 
 @kernel
-def _keep_pairs(pairs: NearPairs, first: int) -> None:
-    """Copy the pairs that hold to the other list, whose first row is `first`."""
+def _mark_kept_pairs(pairs: NearPairs) -> None:
+    """Find the pairs that hold, and count them at their nodes, in `end`."""
     now, n = pairs.n_updates, 0
+    for i in range(pairs.n_nodes):
+        pairs.end[pairs.nodes[i]] = 0
     for k in range(pairs.first, pairs.first + pairs.n_pairs):
         node, at = pairs.node[k], pairs.face[k]
         has_moved = pairs.seen_at[node] != now or pairs.moved_at[node] == now
-        if has_moved or pairs.is_active[at] == 0 or pairs.dirty_at[at] == now:
-            if pairs.is_near[k] == 1:
-                pairs.lost_at[node] = now
-            continue
-        _copy_pair(pairs, k, first + n)
-        n += 1
-    pairs.n_found = n
+        is_kept = not (has_moved or pairs.is_active[at] == 0 or pairs.dirty_at[at] == now)
+        if is_kept:
+            pairs.end[node] += 1
+            n += 1
+        elif pairs.is_near[k] == 1:
+            pairs.lost_at[node] = now
+        pairs.is_kept[k] = is_kept
+    pairs.n_kept = n
+    pairs.n_found = 0
 
 
 @kernel
@@ -262,11 +264,9 @@ def _ask(
         if not _may_meet(pairs, ways, faces, body, normal, face, node):
             continue
         if pairs.n_found < room:
-            k = room - pairs.first + pairs.n_found
-            pairs.node[k] = node
-            pairs.face[k] = face.at
-            pairs.is_near[k] = 0
-            pairs.wake[k] = -1.0
+            pairs.found_node[pairs.n_found] = node
+            pairs.found_face[pairs.n_found] = face.at
+            pairs.end[node] += 1
         pairs.n_found += 1
 
 
@@ -299,21 +299,23 @@ def _may_meet(
 
 
 @kernel
-def _sort(pairs: NearPairs, first: int) -> None:
-    """Sort the pairs from row `first` on by their nodes, into the list in use."""
-    n, to = pairs.n_found, pairs.first
-    for i in range(pairs.n_nodes):
-        pairs.end[pairs.nodes[i]] = 0
-    for k in range(first, first + n):
-        pairs.end[pairs.node[k]] += 1
-    total = 0
+def _join_pairs(pairs: NearPairs) -> None:
+    """Write the pairs that hold, and those found, by their nodes into the other list; use that."""
+    first, total = len(pairs.wake) // 2 - pairs.first, 0
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
-        pairs.begin[node] = total
+        pairs.begin[node] = first + total
         total += pairs.end[node]
         pairs.end[node] = pairs.begin[node]
-    for k in range(first, first + n):
-        node = pairs.node[k]
-        _copy_pair(pairs, k, to + pairs.end[node])
+    for k in range(pairs.first, pairs.first + pairs.n_pairs):
+        if pairs.is_kept[k] == 1:
+            node = pairs.node[k]
+            _copy_pair(pairs, k, pairs.end[node])
+            pairs.end[node] += 1
+    for i in range(pairs.n_found):
+        node = pairs.found_node[i]
+        k = pairs.end[node]
+        pairs.node[k], pairs.face[k] = node, pairs.found_face[i]
+        pairs.is_near[k], pairs.wake[k] = 0, -1.0
         pairs.end[node] += 1
-    pairs.n_pairs = n
+    pairs.first, pairs.n_pairs = first, total

@@ -61,6 +61,6 @@ def test_no_pair_is_listed_twice_and_they_are_sorted_by_nodes():
     assert search.n_updates > 3
     assert len(known) == len(set(known)) > 0
     for node in pairs.nodes[: pairs.n_nodes]:
-        own = slice(pairs.first + pairs.begin[node], pairs.first + pairs.end[node])
+        own = slice(pairs.begin[node], pairs.end[node])
         assert (pairs.node[own] == node).all()
         assert pairs.end[node] - pairs.begin[node] == sum(n == node for n, _ in known)
