@@ -48,11 +48,16 @@ def find_due(search: SearchState, is_anew: bool) -> int:
         is_anew: Whether pairs have just been updated.
     """
     pairs, ways, n = search.pairs, search.ways, 0
+    is_quiet = not is_anew and ways.n_loud == 0
+    if is_quiet and search.n_due == 0 and ways.quiet_way < search.all_calm_until:
+        return 0
+    all_calm_until = math.inf
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
         search.is_due[node] = 0
         is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
         if is_calm and not is_stirred(ways, node):
+            all_calm_until = min(all_calm_until, search.calm_until[node])
             continue
         slack = _least_slack(search, node)
         has_lost = is_anew and pairs.lost_at[node] == pairs.n_updates
@@ -60,6 +65,9 @@ def find_due(search: SearchState, is_anew: bool) -> int:
             search.is_due[node] = 1
             n += 1
         search.calm_until[node] = ways.quiet_way + slack
+        all_calm_until = min(all_calm_until, search.calm_until[node])
+    search.n_due = n
+    search.all_calm_until = all_calm_until
     return n
 
 

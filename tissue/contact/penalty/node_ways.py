@@ -10,7 +10,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.hash_table import hash_of
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, dot, norm, store, sub, vec3
 from tissue.mesh.body import Body, grown
@@ -58,6 +58,8 @@ class NodeWays(Arrays):
     """Number of the search, from 1."""
     n_known: IntCell
     """Number of nodes that were there in the last search."""
+    n_loud: IntCell
+    """Number of nodes of faces that moved much since the last search."""
     quiet_way: FloatCell
     """How much nearer four quiet nodes can have brought two sides so far [m]."""
     largest_way: FloatCell
@@ -72,6 +74,8 @@ class NodeWays(Arrays):
     """Radius of the ball of each node [m], shape (node capacity,)."""
     way: FloatArray
     """How far each node has gone so far [m], shape (node capacity,)."""
+    bucket: IntArray
+    """Bucket of the cell that the reference of each node is in, shape (node capacity,)."""
     stirred: IntArray
     """Search in which something in the cells around moved much, shape (buckets,)."""
     stirrer: IntArray
@@ -85,6 +89,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
     return NodeWays(
         frame=0,
         n_known=0,
+        n_loud=0,
         quiet_way=0.0,
         largest_way=np.inf,
         before=np.zeros((n_nodes, 3)),
@@ -92,6 +97,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         displacement=np.zeros((n_nodes, 3)),
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),
+        bucket=np.zeros(n_nodes, np.int64),
         stirred=np.zeros(_N_BUCKETS, np.int64),
         stirrer=np.zeros(_N_BUCKETS, np.int64),
         node_size=float(node_size),
@@ -100,7 +106,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
 
 def grown_node_ways(ways: NodeWays, n_nodes: int) -> NodeWays:
     """Return the motion with room for `n_nodes`."""
-    of_nodes = ("before", "reference", "displacement", "radius", "way")
+    of_nodes = ("before", "reference", "displacement", "radius", "way", "bucket")
     return ways.replaced(**{name: grown(getattr(ways, name), n_nodes) for name in of_nodes})
 
 
@@ -111,7 +117,7 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
         store(ways.before, node, vec3(body.positions, node))
     ways.n_known = body.n_nodes
     ways.frame += 1
-    quiet, most, result = _QUIET * ways.node_size, 0.0, IN_BALL
+    quiet, most, result, n_loud = _QUIET * ways.node_size, 0.0, IN_BALL, 0
     for i in range(n):
         node = nodes[i]
         p = vec3(body.positions, node)
@@ -126,8 +132,10 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
         if way <= quiet:
             most = max(most, way)
         else:
-            _stir(ways, vec3(ways.reference, node))
+            _stir(ways, node)
+            n_loud += 1
     ways.quiet_way += 4.0 * most
+    ways.n_loud = n_loud
     return result
 
 
@@ -157,26 +165,27 @@ def begin_ball(ways: NodeWays, body: Body, node: int) -> None:
     size = ways.node_size
     store(ways.reference, node, vec3(body.positions, node))
     store(ways.displacement, node, Vec3(0.0, 0.0, 0.0))
+    p = vec3(ways.reference, node)
+    ways.bucket[node] = _bucket(_cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z))
     fast = max(norm(vec3(body.velocities, node)) - _SLOW, 0.0)
     ways.radius[node] = min(BALL * size + _TIME_IN_BALL * fast, LARGEST_BALL * size)
 
 
-@kernel
+@inlined
 def is_stirred(ways: NodeWays, node: int) -> bool:
     """Whether something near a node moved much since the last search."""
-    p = vec3(ways.reference, node)
-    i, j, k = _cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z)
-    return bool(ways.stirred[_bucket(i, j, k)] == ways.frame)
+    return bool(ways.stirred[ways.bucket[node]] == ways.frame)
 
 
 @kernel
-def _stir(ways: NodeWays, p: Vec3) -> None:
-    """Note that something moved much at `p` [m], in the cell there and those around it."""
-    i, j, k = _cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z)
-    own = _bucket(i, j, k)
+def _stir(ways: NodeWays, node: int) -> None:
+    """Note that a node moved much, in the cell where it is and those around it."""
+    own = ways.bucket[node]
     if ways.stirrer[own] == ways.frame:
         return
     ways.stirrer[own] = ways.frame
+    p = vec3(ways.reference, node)
+    i, j, k = _cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z)
     for a in range(-1, 2):
         for b in range(-1, 2):
             for c in range(-1, 2):

@@ -92,6 +92,8 @@ class PenaltyContact:
             is_listing_due=1,
             since_pairing=0,
             since_normals=SEARCHES_TO_NORMALS,
+            n_due=0,
+            all_calm_until=0.0,
             faces=faces,
             pairs=new_near_pairs(n_nodes, len(faces.face), CAPACITY_OF_PAIRS),
             ridges=new_ridges(len(faces.face)),

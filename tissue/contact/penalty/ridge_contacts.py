@@ -1,5 +1,7 @@
 """Contacts of ridges: which are to be sought in a time step, and their rows in the list."""
 
+import math
+
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs
@@ -21,10 +23,12 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
         forces: The contacts as they are.
         body: Where the nodes are.
     """
-    found, has_changed = search.ridge_pairs, False
-    n_touching = 0
+    found, ways, has_changed = search.ridge_pairs, search.ways, False
+    if ways.n_loud == 0 and ways.quiet_way < found.calm_until:
+        return bool(found.n_touching < found.n_contacts)
+    n_touching, least = 0, math.inf
     for k in range(found.n_pairs):
-        way = _way(found, search.ridges, search.ways.way, k)
+        way = _way(found, search.ridges, ways.way, k)
         if way > found.wake[k]:
             if found.wake[k] < 0.0:
                 found.contact[k] = _contact_of(found, search.ridges, forces, k)
@@ -36,7 +40,9 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
             found.place[k, 0], found.place[k, 1] = touch.s, touch.t
             store(found.normal, k, touch.normal)
         n_touching += found.is_touching[k]
+        least = min(least, found.wake[k] - way)
     found.n_touching = n_touching
+    found.calm_until = ways.quiet_way + least
     return has_changed or n_touching < found.n_contacts
 
 

@@ -4,6 +4,8 @@ A pair is listed if two ridges would touch wherever in their balls their four no
 until one of them leaves its ball or a face beside it changes (`pair_update`).
 """
 
+import math
+
 import numpy as np
 
 from tissue.contact.distance import distance_of_edges
@@ -15,7 +17,7 @@ from tissue.contact.penalty.node_ways import NodeWays
 from tissue.contact.penalty.ridges import Ridges
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays, IntCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, cross, norm, scale, store, sub, vec3
 from tissue.geometry.aabb import box_at, segment_box, store_box, widened
 
@@ -33,6 +35,9 @@ class RidgePairs(Arrays):
     """First contact of ridges in the list in use."""
     n_contacts: IntCell
     """Number of contacts of ridges in the list in use."""
+    calm_until: FloatCell
+    """Value of `NodeWays.quiet_way` up to which no pair needs a look while nothing is stirred
+    [m]."""
     ridge: IntArray
     """The ridges of each pair, shape (capacity, 2)."""
     wake: FloatArray
@@ -58,6 +63,7 @@ def new_ridge_pairs(capacity: int) -> RidgePairs:
         n_touching=0,
         first=0,
         n_contacts=0,
+        calm_until=0.0,
         ridge=np.zeros((capacity, 2), np.int64),
         wake=np.zeros(capacity),
         **{name: np.zeros(capacity, np.int64) for name in of_pairs},
@@ -80,6 +86,7 @@ def pair_ridges(
         faces: The piece that each face is of.
     """
     now = pairs.n_updates
+    found.calm_until = -math.inf
     has_dirty = _list_ridges(ridges, pairs, ways, faces)
     _keep_pairs(found, ridges, now)
     if not has_dirty:

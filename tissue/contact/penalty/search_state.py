@@ -7,7 +7,7 @@ from tissue.contact.penalty.ridge_pairs import RidgePairs
 from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.stiffness import Limits
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.structs import Arrays, IntCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 
 
 class SearchState(Arrays):
@@ -36,6 +36,11 @@ class SearchState(Arrays):
     """Number of searches since pairs were updated."""
     since_normals: IntCell
     """Number of searches since normals were computed."""
+    n_due: IntCell
+    """Number of nodes whose contacts are sought in this search."""
+    all_calm_until: FloatCell
+    """Value of `NodeWays.quiet_way` up to which no node need be asked while nothing is stirred
+    [m]."""
     faces: Faces
     pairs: NearPairs
     ridges: Ridges
