@@ -52,11 +52,12 @@ def find_due(search: SearchState, is_anew: bool) -> int:
     if is_quiet and search.n_due == 0 and ways.quiet_way < search.all_calm_until:
         return 0
     all_calm_until = math.inf
+    _find_loud_faces(search)
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
         search.is_due[node] = 0
         is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
-        if is_calm and not is_stirred(ways, node):
+        if is_calm and not (is_stirred(ways, node) and _hears(search, node)):
             all_calm_until = min(all_calm_until, search.calm_until[node])
             continue
         slack = _least_slack(search, node)
@@ -69,6 +70,30 @@ def find_due(search: SearchState, is_anew: bool) -> int:
     search.n_due = n
     search.all_calm_until = all_calm_until
     return n
+
+
+@kernel
+def _find_loud_faces(search: SearchState) -> None:
+    """Note which faces have a corner that moved much since the last search."""
+    pairs, loud, now = search.pairs, search.ways.loud_at, search.ways.frame
+    if search.ways.n_loud == 0:
+        return
+    for at in range(search.faces.n_places):
+        a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
+        if loud[a] == now or loud[b] == now or loud[c] == now:
+            pairs.loud_at[at] = now
+
+
+@kernel
+def _hears(search: SearchState, node: int) -> bool:
+    """Whether a node, or a face that it is paired with, moved much since the last search."""
+    pairs, now = search.pairs, search.ways.frame
+    if search.ways.loud_at[node] == now:
+        return True
+    for k in range(pairs.begin[node], pairs.end[node]):
+        if pairs.loud_at[pairs.face[k]] == now:
+            return True
+    return False
 
 
 @kernel

@@ -87,6 +87,8 @@ class NearPairs(Arrays):
     """Generation in `Faces` of each face when it was last looked at; shape (face capacity,)."""
     dirty_at: IntArray
     """Update in which each face was last paired anew, shape (face capacity,)."""
+    loud_at: IntArray
+    """Search in which a corner of each face last moved much, shape (face capacity,)."""
     low: FloatArray
     """Lowest corner of the box in which each face asks for nodes [m], shape (face capacity, 3)."""
     high: FloatArray
@@ -123,7 +125,7 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_faces: Faces that there is room for.
         capacity: Pairs that there is room for.
     """
-    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at")
+    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at", "loud_at")
     return NearPairs(
         first=0,
         n_pairs=0,

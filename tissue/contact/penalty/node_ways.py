@@ -74,6 +74,8 @@ class NodeWays(Arrays):
     """Radius of the ball of each node [m], shape (node capacity,)."""
     way: FloatArray
     """How far each node has gone so far [m], shape (node capacity,)."""
+    loud_at: IntArray
+    """Search in which each node last moved much, shape (node capacity,)."""
     bucket: IntArray
     """Bucket of the cell that the reference of each node is in, shape (node capacity,)."""
     stirred: IntArray
@@ -97,6 +99,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         displacement=np.zeros((n_nodes, 3)),
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),
+        loud_at=np.zeros(n_nodes, np.int64),
         bucket=np.zeros(n_nodes, np.int64),
         stirred=np.zeros(_N_BUCKETS, np.int64),
         stirrer=np.zeros(_N_BUCKETS, np.int64),
@@ -106,7 +109,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
 
 def grown_node_ways(ways: NodeWays, n_nodes: int) -> NodeWays:
     """Return the motion with room for `n_nodes`."""
-    of_nodes = ("before", "reference", "displacement", "radius", "way", "bucket")
+    of_nodes = ("before", "reference", "displacement", "radius", "way", "loud_at", "bucket")
     return ways.replaced(**{name: grown(getattr(ways, name), n_nodes) for name in of_nodes})
 
 
@@ -132,6 +135,7 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
         if way <= quiet:
             most = max(most, way)
         else:
+            ways.loud_at[node] = ways.frame
             _stir(ways, node)
             n_loud += 1
     ways.quiet_way += 4.0 * most

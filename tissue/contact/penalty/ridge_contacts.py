@@ -24,26 +24,56 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
         body: Where the nodes are.
     """
     found, ways, has_changed = search.ridge_pairs, search.ways, False
-    if ways.n_loud == 0 and ways.quiet_way < found.calm_until:
-        return bool(found.n_touching < found.n_contacts)
-    n_touching, least = 0, math.inf
-    for k in range(found.n_pairs):
-        way = _way(found, search.ridges, ways.way, k)
-        if way > found.wake[k]:
-            if found.wake[k] < 0.0:
-                found.contact[k] = _contact_of(found, search.ridges, forces, k)
-            touch = ridge_touch_of(search, body, k)
-            has_changed = has_changed or touch.is_touching or found.is_touching[k] == 1
-            found.wake[k] = way + touch.slack
-            found.is_touching[k] = 1 if touch.is_touching else 0
-            found.is_sought[k] = 1
-            found.place[k, 0], found.place[k, 1] = touch.s, touch.t
-            store(found.normal, k, touch.normal)
-        n_touching += found.is_touching[k]
-        least = min(least, found.wake[k] - way)
-    found.n_touching = n_touching
-    found.calm_until = ways.quiet_way + least
-    return has_changed or n_touching < found.n_contacts
+    is_calm = ways.quiet_way < found.calm_until
+    if not (is_calm and ways.n_loud == 0):
+        ridge, loud, now = found.ridge, search.ridges.loud_at, ways.frame
+        least = found.calm_until - ways.quiet_way if is_calm else math.inf
+        _find_loud_ridges(search)
+        for k in range(found.n_pairs):
+            if is_calm and loud[ridge[k, 0]] != now and loud[ridge[k, 1]] != now:
+                continue
+            way = _way(found, search.ridges, ways.way, k)
+            if way > found.wake[k]:
+                has_changed = _look_at_ridges(search, forces, body, k, way) or has_changed
+            least = min(least, found.wake[k] - way)
+        found.calm_until = ways.quiet_way + least
+    return has_changed or bool(found.n_touching < found.n_contacts)
+
+
+@kernel
+def _find_loud_ridges(search: SearchState) -> None:
+    """Note which ridges have an end that moved much since the last search."""
+    ridges, loud, now = search.ridges, search.ways.loud_at, search.ways.frame
+    for i in range(ridges.n_ridges):
+        edge = ridges.listed[i]
+        if loud[ridges.node[edge, 0]] == now or loud[ridges.node[edge, 1]] == now:
+            ridges.loud_at[edge] = now
+
+
+@kernel
+def _look_at_ridges(
+    search: SearchState, forces: PenaltyForces, body: Body, k: int, way: float
+) -> bool:
+    """Look at a pair of ridges; return whether it touches, or did.
+
+    Args:
+        search: The pair is written.
+        forces: The contacts as they are.
+        body: Where the nodes are.
+        k: The pair.
+        way: Sum of the ways of its nodes [m].
+    """
+    found = search.ridge_pairs
+    if found.wake[k] < 0.0:
+        found.contact[k] = _contact_of(found, search.ridges, forces, k)
+    touch, did_touch = ridge_touch_of(search, body, k), found.is_touching[k]
+    found.wake[k] = way + touch.slack
+    found.is_touching[k] = 1 if touch.is_touching else 0
+    found.n_touching += found.is_touching[k] - did_touch
+    found.is_sought[k] = 1
+    found.place[k, 0], found.place[k, 1] = touch.s, touch.t
+    store(found.normal, k, touch.normal)
+    return touch.is_touching or bool(did_touch == 1)
 
 
 @kernel

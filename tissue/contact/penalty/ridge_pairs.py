@@ -170,7 +170,7 @@ def _find_crossing(
 @kernel
 def _keep_pairs(found: RidgePairs, ridges: Ridges, now: int) -> None:
     """Close up the pairs that hold."""
-    n = 0
+    n, n_touching = 0, 0
     for k in range(found.n_pairs):
         if ridges.dirty_at[found.ridge[k, 0]] == now or ridges.dirty_at[found.ridge[k, 1]] == now:
             continue
@@ -183,8 +183,9 @@ def _keep_pairs(found: RidgePairs, ridges: Ridges, now: int) -> None:
         found.is_touching[n] = found.is_touching[k]
         found.is_sought[n] = found.is_sought[k]
         found.contact[n] = found.contact[k]
+        n_touching += found.is_touching[k]
         n += 1
-    found.n_pairs = n
+    found.n_pairs, found.n_touching = n, n_touching
 
 
 @kernel

@@ -31,6 +31,8 @@ class Ridges(Arrays):
     capacity,)."""
     dirty_at: IntArray
     """Update of the pairs in which each edge was last paired anew, shape (3 * face capacity,)."""
+    loud_at: IntArray
+    """Search in which an end of each ridge last moved much, shape (3 * face capacity,)."""
     node: IntArray
     """Ends of each ridge, shape (3 * face capacity, 2)."""
     tip: IntArray
@@ -51,7 +53,7 @@ class Ridges(Arrays):
 def new_ridges(n_faces: int) -> Ridges:
     """Return no ridges, with room for those of `n_faces`."""
     n = 3 * n_faces
-    of_edges = ("listed", "is_one", "is_of_cut", "dirty_at")
+    of_edges = ("listed", "is_one", "is_of_cut", "dirty_at", "loud_at")
     return Ridges(
         n_ridges=0,
         **{name: np.zeros(n, np.int64) for name in of_edges},
