@@ -285,12 +285,17 @@ def _eight_points(builder: Any, points: _Array, of: _Array, i: Any) -> Any:
     for k in range(WIDTH):
         row = points.at(builder.load(of.at(builder.add(i, i.type(k)))), 3)
         rows.append(builder.load(builder.bitcast(row, _POINT.as_pointer()), align=8))
+    return _tuple_of(builder, _transposed(builder, rows))
+
+
+def _transposed(builder: Any, rows: list[Any]) -> list[Any]:
+    """Return x, y and z of eight points."""
     a, b, c, d = (_shuffled(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4))
     ab, cd = (_shuffled(builder, *pair, _EVEN) for pair in ((a, b), (c, d)))
     x = _shuffled(builder, ab, cd, _FIRST)
     z = _shuffled(builder, ab, cd, _SECOND)
     ab, cd = (_shuffled(builder, *pair, _ODD) for pair in ((a, b), (c, d)))
-    return _tuple_of(builder, [x, _shuffled(builder, ab, cd, _FIRST), z])
+    return [x, _shuffled(builder, ab, cd, _FIRST), z]
 
 
 def _tuple_of(builder: Any, values: list[Any]) -> Any:

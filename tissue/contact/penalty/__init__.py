@@ -5,6 +5,7 @@ In the order in which they are best read:
     penalty_contact    owns the arrays
     search             the stages of a search
     contact_forces     contacts as springs with friction, evaluated with all other forces
+    eight_contacts     vectors of eight contacts
     line_of_action     where a force acts, so that it and its reaction turn nothing
     stiffness          stiffness by mass splitting, and offsets that keep forces continuous
     contact_list       one contact for each direction in which a node is pushed

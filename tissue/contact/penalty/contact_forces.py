@@ -18,12 +18,27 @@ springs with friction.
 
 import numpy as np
 
+from tissue.contact.penalty.eight_contacts import (
+    combined,
+    four_of,
+    nodes_of,
+    share_within,
+    smaller,
+    three_of,
+    where_positive,
+)
 from tissue.contact.penalty.line_of_action import weights_on_line
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH, filled, lanes, load_lanes, store_lanes
+from tissue.core.simd_blocks import sum_of_lanes
+from tissue.core.simd_gather import larger, larger_bits, largest, where_larger
+from tissue.core.simd_rows import (
+    store_rows_of_four,
+    store_rows_of_three,
+)
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.geometry.tetrahedron import Weights
+from tissue.core.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 
 HANDED_ON = -1.0
 """Value of `PenaltyForces.push` where another contact of the next list has taken over the force."""
@@ -32,7 +47,8 @@ HANDED_ON = -1.0
 class PenaltyForces(Arrays):
     """Two lists of contacts: that in use, and room for the next; both of `capacity` rows.
 
-    The rows of one list are one after the other, so arrays have 2 * capacity rows.
+    The capacity is a multiple of eight: so many contacts are evaluated at a time. The rows of one
+    list are one after the other, so arrays have 2 * capacity rows.
     """
 
     first: IntCell
@@ -80,6 +96,10 @@ class PenaltyForces(Arrays):
     velocity: FloatArray
     """sum(w_i v_i) as a contact began to push in this substep [m/s], with the weights `spread`;
     shape (2 * capacity, 3)."""
+    acting: FloatArray
+    """Scratch: the forces of eight contacts, and their pressures [N]; shape (8, 4)."""
+    place: FloatArray
+    """The numbers from 0 to 7."""
     friction: float
     """Coefficient of friction."""
     retardation_time: float
@@ -88,7 +108,7 @@ class PenaltyForces(Arrays):
 
 def new_penalty_forces(capacity: int, friction: float, retardation_time: float) -> PenaltyForces:
     """Return no contacts, with room for that many."""
-    rows = 2 * capacity
+    rows = 2 * filled(capacity)
     of_floats = ("height", "stiffness", "offset", "largest_depth", "push")
     return PenaltyForces(
         first=0,
@@ -105,6 +125,8 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         normal=np.zeros((rows, 3)),
         **{name: np.zeros(rows) for name in of_floats},
         **{name: np.zeros((rows, 3)) for name in ("anchor", "impulse", "velocity")},
+        acting=np.zeros((WIDTH, 4)),
+        place=np.arange(float(WIDTH)),
         friction=float(friction),
         retardation_time=float(retardation_time),
     )
@@ -134,12 +156,7 @@ def clear_contact_totals(forces: PenaltyForces) -> None:
 @kernel
 def weighted_sum(forces: PenaltyForces, c: int, values: FloatArray) -> Vec3:
     """Return the weighted sum of nodal values at contact `c`: one side less the other."""
-    return _sum_with(forces.weight, forces.node, c, values)
-
-
-@kernel
-def _sum_with(weight: FloatArray, node: IntArray, c: int, values: FloatArray) -> Vec3:
-    """Return the sum of nodal values at contact `c` with these weights."""
+    weight, node = forces.weight, forces.node
     total = scale(weight[c, 0], vec3(values, node[c, 0]))
     for q in range(1, 4):
         total = axpy(weight[c, q], vec3(values, node[c, q]), total)
@@ -173,70 +190,97 @@ def add_contact_forces(
 
     Args:
         forces: Totals are written.
-        positions: Positions of the nodes [m].
-        velocities: Their velocities [m/s].
+        positions: Positions of the nodes [m], as `points_of_column` reads them.
+        velocities: Their velocities [m/s], alike.
         seconds: Weight of this evaluation in the integral over time [s].
         external: Forces on the nodes [N], shape (capacity, 3); those of contact are added.
     """
-    tau = forces.retardation_time
-    pressure = 0.0
-    for c in range(forces.first, forces.first + forces.n_contacts):
-        across = weighted_sum(forces, c, positions)
-        normal = vec3(forces.normal, c)
-        along = dot(normal, across)
-        depth = forces.offset[c] + forces.height[c] - along
-        if not depth > 0.0:
-            continue
-        depth = min(depth, forces.largest_depth[c])
-        k = forces.stiffness[c]
-        velocity = weighted_sum(forces, c, velocities)
-        approach = dot(normal, velocity)
-        force = max(k * (depth - tau * approach), 0.0)
-        stretch = sub(axpy(-along, normal, across), vec3(forces.anchor, c))
-        pull = axpy(tau, axpy(-approach, normal, velocity), stretch)
-        size, limit = k * norm(pull), forces.friction * k * depth
-        share = limit / size if size > limit else 1.0
-        total = axpy(force, normal, scale(-share * k, pull))
-        if not dot(total, total) > 0.0:
-            continue
-        _spread_force(forces, c, positions, total, external)
-        before = vec3(forces.impulse, c)
-        if not dot(before, before) > 0.0:
-            store(forces.velocity, c, _sum_with(forces.spread, forces.node, c, velocities))
-        store(forces.impulse, c, axpy(seconds, total, before))
-        if is_floor_contact(forces, c):
-            forces.floor_impulse[0] += seconds * total.x
-            forces.floor_impulse[1] += seconds * total.y
-            forces.floor_impulse[2] += seconds * total.z
-        else:
-            pressure += force
-    forces.pressure_impulse += seconds * pressure
+    end = forces.first + forces.n_contacts
+    for c in range(forces.first, end, WIDTH):
+        pressing = _eight_forces(forces, positions, velocities, seconds, c)
+        if pressing != 0:
+            _add_eight(forces, c, min(end - c, WIDTH), pressing, seconds, external)
 
 
-@kernel
-def _spread_force(
-    forces: PenaltyForces, c: int, positions: FloatArray, force: Vec3, external: FloatArray
-) -> None:
-    """Add the force of contact `c` to those on its nodes, so that it turns nothing.
+@inlined
+def _eight_forces(
+    forces: PenaltyForces, positions: FloatArray, velocities: FloatArray, seconds: float, c: int
+) -> int:
+    """Compute the forces of eight contacts, and add up their impulses; return bits for which press.
 
     Args:
-        forces: `spread` is written.
-        c: The contact.
+        forces: `spread`, `acting`, `impulse` and `velocity` are written.
         positions: Positions of the nodes [m].
-        force: The force on the side of the positive weights [N].
+        velocities: Their velocities [m/s].
+        seconds: Weight of this evaluation in the integral over time [s].
+        c: The first of them.
+    """
+    zero, tau = lanes(0.0), lanes(forces.retardation_time)
+    x, w = nodes_of(forces.node, positions, c), four_of(forces.weight, c)
+    across, normal = combined(w, x), three_of(forces.normal, c)
+    along = dot(normal, across)
+    free = load_lanes(forces.offset, c) + load_lanes(forces.height, c) - along
+    if larger_bits(free, zero) == 0:
+        return 0
+    depth = smaller(free, load_lanes(forces.largest_depth, c))
+    k, v = load_lanes(forces.stiffness, c), nodes_of(forces.node, velocities, c)
+    velocity = combined(w, v)
+    approach = dot(normal, velocity)
+    force = larger(k * (depth - tau * approach), zero)
+    anchor = three_of(forces.anchor, c)
+    stretch = sub(axpy(zero - along, normal, across), anchor)
+    pull = axpy(tau, axpy(zero - approach, normal, velocity), stretch)
+    share = share_within(lanes(forces.friction) * depth, pull)
+    total = axpy(force, normal, scale(zero - share * k, pull))
+    is_acting = where_larger(free, zero, dot(total, total), zero)
+    found = weights_on_line(x, w, total)
+    now, last = combined(found, v), four_of(forces.spread, c)
+    spread = where_positive(is_acting, found, last)
+    before = three_of(forces.impulse, c)
+    began = three_of(forces.velocity, c)
+    has_begun, weight = dot(before, before), where_larger(is_acting, zero, lanes(seconds), zero)
+    began = Vec3(
+        where_larger(has_begun, zero, began.x, now.x),
+        where_larger(has_begun, zero, began.y, now.y),
+        where_larger(has_begun, zero, began.z, now.z),
+    )
+    store_rows_of_four(forces.spread, c, spread.a, spread.b, spread.c, spread.d)
+    after = axpy(weight, total, before)
+    store_rows_of_three(forces.impulse, c, after.x, after.y, after.z)
+    store_rows_of_three(forces.velocity, c, began.x, began.y, began.z)
+    store_rows_of_four(forces.acting, 0, total.x, total.y, total.z, force)
+    return larger_bits(is_acting, zero)
+
+
+@inlined
+def _add_eight(
+    forces: PenaltyForces, c: int, n: int, pressing: int, seconds: float, external: FloatArray
+) -> None:
+    """Add the forces of eight contacts to those on the nodes.
+
+    Args:
+        forces: Totals are written.
+        c: The first contact.
+        n: How many of the eight there are.
+        pressing: Bits for which press.
+        seconds: Weight of this evaluation in the integral over time [s].
         external: Forces on the nodes [N]; written.
     """
-    if is_floor_contact(forces, c):
-        w = Weights(1.0, 0.0, 0.0, 0.0)
-    else:
-        w = weights_on_line(forces.node, forces.weight, c, positions, force)
-    spread = forces.spread
-    spread[c, 0], spread[c, 1], spread[c, 2], spread[c, 3] = w.a, w.b, w.c, w.d
-    for q in range(4):
-        node, weight = forces.node[c, q], spread[c, q]
-        external[node, 0] += weight * force.x
-        external[node, 1] += weight * force.y
-        external[node, 2] += weight * force.z
+    for i in range(n):
+        if pressing >> i & 1 == 0:
+            continue
+        x, y, z = forces.acting[i, 0], forces.acting[i, 1], forces.acting[i, 2]
+        for q in range(4):
+            node, weight = forces.node[c + i, q], forces.spread[c + i, q]
+            external[node, 0] += weight * x
+            external[node, 1] += weight * y
+            external[node, 2] += weight * z
+        if is_floor_contact(forces, c + i):
+            forces.floor_impulse[0] += seconds * x
+            forces.floor_impulse[1] += seconds * y
+            forces.floor_impulse[2] += seconds * z
+        else:
+            forces.pressure_impulse += seconds * forces.acting[i, 3]
 
 
 @kernel
@@ -250,47 +294,57 @@ def end_contact_substep(
 
     Args:
         forces: Written.
-        positions: Positions of the nodes [m].
-        velocities: Their velocities [m/s].
+        positions: Positions of the nodes [m], as `points_of_column` reads them.
+        velocities: Their velocities [m/s], alike.
         external: Forces on the nodes [N], shape (capacity, 3); those of contact are cleared.
     """
     clear_contact_forces(forces, external)
-    forces.work += _work_since(forces, velocities)
-    stored, n_pressing = 0.0, 0
-    for c in range(forces.first, forces.first + forces.n_contacts):
-        across = weighted_sum(forces, c, positions)
-        normal = vec3(forces.normal, c)
-        along = dot(normal, across)
-        free = forces.offset[c] + forces.height[c] - along
-        tangential = axpy(-along, normal, across)
-        if not free > 0.0:
-            forces.push[c] = 0.0
-            store(forces.anchor, c, tangential)
-            continue
-        k = forces.stiffness[c]
-        depth = min(free, forces.largest_depth[c])
-        forces.push[c] = k * depth
-        stretch = sub(tangential, vec3(forces.anchor, c))
-        size, longest = norm(stretch), forces.friction * depth
-        if size > longest:
-            stretch = scale(longest / size, stretch)
-            store(forces.anchor, c, sub(tangential, stretch))
-        stored += k * (depth * (free - 0.5 * depth) + 0.5 * dot(stretch, stretch))
-        n_pressing += 1
-        forces.penetration = max(forces.penetration, forces.height[c] - along)
-    forces.stored = stored
-    forces.n_pressing = n_pressing
+    forces.stored, forces.n_pressing = 0.0, 0
+    end = forces.first + forces.n_contacts
+    for c in range(forces.first, end, WIDTH):
+        _end_eight(forces, positions, velocities, c, min(end - c, WIDTH))
 
 
-@kernel
-def _work_since(forces: PenaltyForces, velocities: FloatArray) -> float:
-    """Return the work of all contacts since the last call [J], and begin to count anew."""
-    work = 0.0
-    for c in range(forces.first, forces.first + forces.n_contacts):
-        impulse = vec3(forces.impulse, c)
-        if dot(impulse, impulse) > 0.0:
-            after = _sum_with(forces.spread, forces.node, c, velocities)
-            both = add(vec3(forces.velocity, c), after)
-            work += 0.5 * dot(impulse, both)
-            store(forces.impulse, c, Vec3(0.0, 0.0, 0.0))
-    return work
+@inlined
+def _end_eight(
+    forces: PenaltyForces, positions: FloatArray, velocities: FloatArray, c: int, n: int
+) -> None:
+    """End a substep for eight contacts, of which `n` are there, from `c` on."""
+    zero, half, w = lanes(0.0), lanes(0.5), four_of(forces.weight, c)
+    across, normal = combined(w, nodes_of(forces.node, positions, c)), three_of(forces.normal, c)
+    along, height = dot(normal, across), load_lanes(forces.height, c)
+    is_there = lanes(float(n)) - load_lanes(forces.place, 0)
+    free = where_larger(is_there, zero, load_lanes(forces.offset, c) + height - along, zero)
+    pressing = larger_bits(free, zero)
+    tangential = axpy(zero - along, normal, across)
+    anchor = three_of(forces.anchor, c)
+    depth = smaller(free, load_lanes(forces.largest_depth, c))
+    k = where_larger(free, zero, load_lanes(forces.stiffness, c), zero)
+    stretch = sub(tangential, anchor)
+    share, one = share_within(lanes(forces.friction) * depth, stretch), lanes(1.0)
+    stretch = scale(share, stretch)
+    slid = sub(tangential, stretch)
+    # What has let go is slack where it is; what holds keeps its anchor to the last bit.
+    anchor = Vec3(
+        where_larger(free, zero, where_larger(one, share, slid.x, anchor.x), tangential.x),
+        where_larger(free, zero, where_larger(one, share, slid.y, anchor.y), tangential.y),
+        where_larger(free, zero, where_larger(one, share, slid.z, anchor.z), tangential.z),
+    )
+    store_rows_of_three(forces.anchor, c, anchor.x, anchor.y, anchor.z)
+    store_lanes(forces.push, c, k * depth)
+    before = three_of(forces.impulse, c)
+    has_begun = where_larger(is_there, zero, dot(before, before), zero)
+    if larger_bits(has_begun, zero) != 0:
+        v, began = nodes_of(forces.node, velocities, c), three_of(forces.velocity, c)
+        both = add(began, combined(four_of(forces.spread, c), v))
+        work = where_larger(has_begun, zero, half * dot(before, both), zero)
+        forces.work += sum_of_lanes(work)
+    store_rows_of_three(forces.impulse, c, zero, zero, zero)
+    if pressing == 0:
+        return
+    held = depth * (free - half * depth) + half * dot(stretch, stretch)
+    forces.stored += sum_of_lanes(where_larger(free, zero, k * held, zero))
+    deepest = largest(where_larger(free, zero, height - along, zero))
+    forces.penetration = max(forces.penetration, deepest)
+    for i in range(n):
+        forces.n_pressing += pressing >> i & 1

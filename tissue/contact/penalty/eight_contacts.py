@@ -1,0 +1,97 @@
+"""Vectors of eight contacts inside kernels: their nodes, weights and lengths."""
+
+from typing import NamedTuple
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import inlined
+from tissue.core.simd import Lanes, lanes, square_root
+from tissue.core.simd_gather import larger, larger_bits, where_larger
+from tissue.core.simd_rows import points_of_column, rows_of_four, rows_of_three
+from tissue.core.vec3 import Vec3, axpy, dot, scale
+
+_TINY = 1e-300
+"""Stands for a length of 0 where it divides."""
+
+
+class Four(NamedTuple):
+    """A number for each of the four nodes of a contact, of eight contacts."""
+
+    a: Lanes
+    b: Lanes
+    c: Lanes
+    d: Lanes
+
+
+class Nodes(NamedTuple):
+    """A vector for each of the four nodes of a contact, of eight contacts."""
+
+    a: Vec3
+    b: Vec3
+    c: Vec3
+    d: Vec3
+
+
+@inlined
+def three_of(rows: FloatArray, c: int) -> Vec3:
+    """Return rows of three of eight contacts."""
+    x, y, z = rows_of_three(rows, c)
+    return Vec3(x, y, z)
+
+
+@inlined
+def four_of(rows: FloatArray, first: int) -> Four:
+    """Return rows of four of eight contacts."""
+    a, b, c, d = rows_of_four(rows, first)
+    return Four(a, b, c, d)
+
+
+@inlined
+def _of_column(values: FloatArray, node: IntArray, c: int, q: int) -> Vec3:
+    """Return nodal values at node `q` of eight contacts."""
+    x, y, z = points_of_column(values, node, c, q)
+    return Vec3(x, y, z)
+
+
+@inlined
+def nodes_of(node: IntArray, values: FloatArray, c: int) -> Nodes:
+    """Return nodal values at the nodes of eight contacts."""
+    return Nodes(
+        _of_column(values, node, c, 0),
+        _of_column(values, node, c, 1),
+        _of_column(values, node, c, 2),
+        _of_column(values, node, c, 3),
+    )
+
+
+@inlined
+def combined(w: Four, x: Nodes) -> Vec3:
+    """Return sums over the four nodes, weighted."""
+    return axpy(w.d, x.d, axpy(w.c, x.c, axpy(w.b, x.b, scale(w.a, x.a))))
+
+
+@inlined
+def where_positive(a: Lanes, this: Four, other: Four) -> Four:
+    """Return `this` where `a` is positive, and `other` elsewhere."""
+    zero = lanes(0.0)
+    return Four(
+        where_larger(a, zero, this.a, other.a),
+        where_larger(a, zero, this.b, other.b),
+        where_larger(a, zero, this.c, other.c),
+        where_larger(a, zero, this.d, other.d),
+    )
+
+
+@inlined
+def smaller(a: Lanes, b: Lanes) -> Lanes:
+    """Return the smaller of two numbers."""
+    return where_larger(a, b, b, a)
+
+
+@inlined
+def share_within(longest: Lanes, a: Vec3) -> Lanes:
+    """Return how much of a vector is within a length: 1 where it is no longer."""
+    square, one = dot(a, a), lanes(1.0)
+    if larger_bits(square, longest * longest) == 0:
+        return one
+    size = square_root(square)
+    return where_larger(size, longest, longest / larger(size, lanes(_TINY)), one)
