@@ -19,7 +19,6 @@ from tissue.contact.penalty.near_pairs import (
     triangle_displacement,
     triangle_way,
 )
-from tissue.contact.penalty.node_ways import is_stirred
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
@@ -57,7 +56,7 @@ def find_due(search: SearchState, is_anew: bool) -> int:
         node = pairs.nodes[i]
         search.is_due[node] = 0
         is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
-        if is_calm and not (is_stirred(ways, node) and _hears(search, node)):
+        if is_calm and (ways.n_loud == 0 or not _hears(search, node)):
             all_calm_until = min(all_calm_until, search.calm_until[node])
             continue
         slack = _least_slack(search, node)

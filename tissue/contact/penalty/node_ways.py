@@ -9,8 +9,7 @@ import math
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.hash_table import hash_of
-from tissue.core.jit import inlined, kernel
+from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, dot, norm, store, sub, vec3
 from tissue.mesh.body import Body, grown
@@ -40,15 +39,8 @@ _QUIET = 6e-4
 """Way in a time step up to which a node is quiet, per node size. Larger: neighbourhoods that
 tremble are left alone, and all quiet ones are asked more often; smaller: more is asked."""
 
-_CELL = 2.0
-"""Size of a neighbourhood's cell, per node size: a node hears of what moves in the cells around its
-own. A corner of a face beside it can be up to two edges away."""
-
 _LARGEST_WAY = 1.0
 """Way in a time step [m] from which on a body has exploded, and nothing is searched for."""
-
-_N_BUCKETS = 1 << 13
-"""Buckets of the table of cells, a power of two. Fewer: what is quiet is taken for its double."""
 
 
 class NodeWays(Arrays):
@@ -76,12 +68,6 @@ class NodeWays(Arrays):
     """How far each node has gone so far [m], shape (node capacity,)."""
     loud_at: IntArray
     """Search in which each node last moved much, shape (node capacity,)."""
-    bucket: IntArray
-    """Bucket of the cell that the reference of each node is in, shape (node capacity,)."""
-    stirred: IntArray
-    """Search in which something in the cells around moved much, shape (buckets,)."""
-    stirrer: IntArray
-    """Search in which something in the cell itself moved much, shape (buckets,)."""
     node_size: float
     """Mean node size [m]."""
 
@@ -100,16 +86,13 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),
         loud_at=np.zeros(n_nodes, np.int64),
-        bucket=np.zeros(n_nodes, np.int64),
-        stirred=np.zeros(_N_BUCKETS, np.int64),
-        stirrer=np.zeros(_N_BUCKETS, np.int64),
         node_size=float(node_size),
     )
 
 
 def grown_node_ways(ways: NodeWays, n_nodes: int) -> NodeWays:
     """Return the motion with room for `n_nodes`."""
-    of_nodes = ("before", "reference", "displacement", "radius", "way", "loud_at", "bucket")
+    of_nodes = ("before", "reference", "displacement", "radius", "way", "loud_at")
     return ways.replaced(**{name: grown(getattr(ways, name), n_nodes) for name in of_nodes})
 
 
@@ -136,7 +119,6 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
             most = max(most, way)
         else:
             ways.loud_at[node] = ways.frame
-            _stir(ways, node)
             n_loud += 1
     ways.quiet_way += 4.0 * most
     ways.n_loud = n_loud
@@ -169,40 +151,5 @@ def begin_ball(ways: NodeWays, body: Body, node: int) -> None:
     size = ways.node_size
     store(ways.reference, node, vec3(body.positions, node))
     store(ways.displacement, node, Vec3(0.0, 0.0, 0.0))
-    p = vec3(ways.reference, node)
-    ways.bucket[node] = _bucket(_cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z))
     fast = max(norm(vec3(body.velocities, node)) - _SLOW, 0.0)
     ways.radius[node] = min(BALL * size + _TIME_IN_BALL * fast, LARGEST_BALL * size)
-
-
-@inlined
-def is_stirred(ways: NodeWays, node: int) -> bool:
-    """Whether something near a node moved much since the last search."""
-    return bool(ways.stirred[ways.bucket[node]] == ways.frame)
-
-
-@kernel
-def _stir(ways: NodeWays, node: int) -> None:
-    """Note that a node moved much, in the cell where it is and those around it."""
-    own = ways.bucket[node]
-    if ways.stirrer[own] == ways.frame:
-        return
-    ways.stirrer[own] = ways.frame
-    p = vec3(ways.reference, node)
-    i, j, k = _cell(ways, p.x), _cell(ways, p.y), _cell(ways, p.z)
-    for a in range(-1, 2):
-        for b in range(-1, 2):
-            for c in range(-1, 2):
-                ways.stirred[_bucket(i + a, j + b, k + c)] = ways.frame
-
-
-@kernel
-def _cell(ways: NodeWays, x: float) -> int:
-    """Return the cell of a coordinate [m] along its axis."""
-    return math.floor(x / (_CELL * ways.node_size))
-
-
-@kernel
-def _bucket(i: int, j: int, k: int) -> int:
-    """Return the bucket of a cell."""
-    return hash_of(i, j, k, 0) & (_N_BUCKETS - 1)

@@ -36,7 +36,7 @@ class RidgePairs(Arrays):
     n_contacts: IntCell
     """Number of contacts of ridges in the list in use."""
     calm_until: FloatCell
-    """Value of `NodeWays.quiet_way` up to which no pair needs a look while nothing is stirred
+    """Value of `NodeWays.quiet_way` up to which no pair needs a look while no node moves much
     [m]."""
     ridge: IntArray
     """The ridges of each pair, shape (capacity, 2)."""

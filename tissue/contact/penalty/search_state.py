@@ -39,7 +39,7 @@ class SearchState(Arrays):
     n_due: IntCell
     """Number of nodes whose contacts are sought in this search."""
     all_calm_until: FloatCell
-    """Value of `NodeWays.quiet_way` up to which no node need be asked while nothing is stirred
+    """Value of `NodeWays.quiet_way` up to which no node need be asked while no node moves much
     [m]."""
     faces: Faces
     pairs: NearPairs
@@ -55,8 +55,8 @@ class SearchState(Arrays):
     is_due: IntArray
     """1 if the contacts of a node are sought in this search, else 0; shape (node capacity,)."""
     calm_until: FloatArray
-    """Value of `NodeWays.quiet_way` up to which a node need not be asked while nothing near it is
-    stirred [m], shape (node capacity,)."""
+    """Value of `NodeWays.quiet_way` up to which a node need not be asked while neither it nor a
+    corner of a face that it is paired with moves much [m], shape (node capacity,)."""
     contact: IntArray
     """First contact of each node with faces, in the list in use; shape (node capacity,)."""
     n_contacts: IntArray
