@@ -85,8 +85,8 @@ def update_pairs(
     """
     if faces.n_places > len(pairs.triangle):
         return False
+    take_faces(pairs, ways, faces, body)
     pairs.n_updates += 1
-    _take_faces(pairs, ways, faces, body)
     find_changed_ridges(ridges, pairs, faces, body)
     _list_nodes(pairs, ways, faces, body)
     for at in range(faces.n_places):
@@ -111,8 +111,12 @@ def update_pairs(
 
 
 @kernel
-def _take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> None:
-    """Note faces that changed, and skin that came near another piece or left it."""
+def take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> bool:
+    """Note faces that changed, and skin that came near another piece or left it; return if any.
+
+    They are dirty in the next update.
+    """
+    has_any = False
     has_skin_moved = faces.has_skin == 1 and not ways.largest_way <= SKIN_WAY * ways.node_size
     reach = (2.0 * SKIN_WAY + CONTACT_REACH + 2.0 * BALL) * ways.node_size
     if has_skin_moved:
@@ -128,12 +132,14 @@ def _take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> N
             continue
         pairs.seen_generation[at] = faces.generation[at]
         pairs.is_active[at] = is_wanted
-        pairs.dirty_at[at] = pairs.n_updates
+        pairs.dirty_at[at] = pairs.n_updates + 1
+        has_any = True
         if is_wanted:
             pairs.is_of_cut[at] = is_face_of_cut(faces, body, at)
             pairs.tetrahedron[at] = face // 4
             for q in range(3):
                 pairs.triangle[at, q] = faces.node[at, q]
+    return has_any
 
 
 @kernel

@@ -12,7 +12,7 @@ from tissue.contact.penalty.contact_list import (
 )
 from tissue.contact.penalty.lost_nodes import look_for_lost_nodes
 from tissue.contact.penalty.node_ways import IN_BALL, LOST, measure_ways, note_places
-from tissue.contact.penalty.pair_update import SKIN_WAY, update_pairs
+from tissue.contact.penalty.pair_update import SKIN_WAY, take_faces, update_pairs
 from tissue.contact.penalty.ridge_contacts import find_touching_ridges
 from tissue.contact.penalty.ridge_pairs import pair_ridges
 from tissue.contact.penalty.search_state import SearchState
@@ -62,7 +62,7 @@ def search_contacts(
             search.n_listings += 1
             search.is_pairing_due = 1
             return DONE
-        search.is_anew = _needs_pairing(search, where != IN_BALL)
+        search.is_anew = _needs_pairing(search, body, where != IN_BALL)
         _renew_normals(search, body)
         search.stage = _PAIRS
     if search.stage == _PAIRS:
@@ -93,13 +93,17 @@ def search_contacts(
 
 
 @kernel
-def _needs_pairing(search: SearchState, has_left: bool) -> bool:
+def _needs_pairing(search: SearchState, body: Body, has_left: bool) -> bool:
     """Whether pairs are out of date; `has_left`: a node has left its ball."""
     search.since_pairing += 1
     is_old = search.has_new_faces == 1 and search.since_pairing >= _SEARCHES_TO_NEW_FACES
+    if has_left or is_old or search.is_pairing_due == 1:
+        return True
     ways = search.ways
     has_skin_moved = search.faces.has_skin == 1 and ways.largest_way > SKIN_WAY * ways.node_size
-    return bool(has_left or is_old or has_skin_moved or search.is_pairing_due == 1)
+    # Skin of a piece that falls moves on and on, and mostly there is nothing near it.
+    may_take = has_skin_moved and search.faces.n_places <= len(search.pairs.triangle)
+    return has_skin_moved and (not may_take or take_faces(search.pairs, ways, search.faces, body))
 
 
 @kernel
