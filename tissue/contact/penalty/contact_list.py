@@ -14,11 +14,7 @@ from tissue.contact.penalty.contact_rows import (
     copy_contact,
     take_over,
 )
-from tissue.contact.penalty.near_pairs import (
-    CONTACT_REACH,
-    triangle_displacement,
-    triangle_way,
-)
+from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
@@ -78,6 +74,8 @@ def _find_loud_faces(search: SearchState) -> None:
     if search.ways.n_loud == 0:
         return
     for at in range(search.faces.n_places):
+        if pairs.is_active[at] == 0:
+            continue
         a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
         if loud[a] == now or loud[b] == now or loud[c] == now:
             pairs.loud_at[at] = now
@@ -103,9 +101,10 @@ def _least_slack(search: SearchState, node: int) -> float:
     own = vec3(ways.displacement, node)
     for k in range(pairs.begin[node], pairs.end[node]):
         face = pairs.face[k]
-        left = pairs.wake[k] - ways.way[node] - triangle_way(pairs, ways.way, face)
+        know_motion(pairs, ways, face)
+        left = pairs.wake[k] - ways.way[node] - pairs.way[face]
         if pairs.is_near[k] == 1:
-            relative = sub(own, triangle_displacement(pairs, ways.displacement, face))
+            relative = sub(own, vec3(pairs.displacement, face))
             moved = sub(relative, vec3(pairs.relative, k))
             left = min(left, still - math.sqrt(dot(moved, moved)))
         if left < 0.0:
@@ -164,7 +163,8 @@ def _seek(search: SearchState, forces: PenaltyForces, body: Body, node: int, to:
     least = math.inf
     for k in range(pairs.begin[node], pairs.end[node]):
         face = pairs.face[k]
-        way = ways.way[node] + triangle_way(pairs, ways.way, face)
+        know_motion(pairs, ways, face)
+        way = ways.way[node] + pairs.way[face]
         if pairs.is_near[k] == 1 or way > pairs.wake[k]:
             touch = touch_of(search, forces, body, node, face)
             if touch.slack > 0.0:
@@ -173,10 +173,8 @@ def _seek(search: SearchState, forces: PenaltyForces, body: Body, node: int, to:
             else:
                 pairs.is_near[k] = 1
                 pairs.wake[k] = way + near
-                relative = sub(
-                    vec3(ways.displacement, node),
-                    triangle_displacement(pairs, ways.displacement, face),
-                )
+                own = vec3(ways.displacement, node)
+                relative = sub(own, vec3(pairs.displacement, face))
                 store(pairs.relative, k, relative)
                 least = min(least, _STILL * ways.node_size)
             if touch.is_touching:

@@ -8,10 +8,10 @@ anew (`pair_update`). Faces go by their places in `Faces`.
 import numpy as np
 
 from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
+from tissue.contact.penalty.node_ways import NodeWays
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3
 from tissue.mesh.body import grown
 
 CONTACT_REACH = 0.05
@@ -89,6 +89,14 @@ class NearPairs(Arrays):
     """Update in which each face was last paired anew, shape (face capacity,)."""
     loud_at: IntArray
     """Search in which a corner of each face last moved much, shape (face capacity,)."""
+    known_at: IntArray
+    """Search in which `way` and `displacement` of each face were last computed, shape (face
+    capacity,)."""
+    way: FloatArray
+    """Sum of the ways of the corners of each face [m], shape (face capacity,)."""
+    displacement: FloatArray
+    """How far the middle of each face is from where it was when it was paired [m], shape (face
+    capacity, 3)."""
     low: FloatArray
     """Lowest corner of the box in which each face asks for nodes [m], shape (face capacity, 3)."""
     high: FloatArray
@@ -125,7 +133,7 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_faces: Faces that there is room for.
         capacity: Pairs that there is room for.
     """
-    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at", "loud_at")
+    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at", "loud_at", "known_at")
     return NearPairs(
         first=0,
         n_pairs=0,
@@ -138,6 +146,8 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         triangle=np.zeros((n_faces, 3), np.int64),
         **{name: np.zeros(n_faces, np.int64) for name in of_faces},
         seen_generation=np.full(n_faces, -1, np.int64),
+        way=np.zeros(n_faces),
+        displacement=np.zeros((n_faces, 3)),
         low=np.zeros((n_faces, 3)),
         high=np.zeros((n_faces, 3)),
         **{
@@ -157,20 +167,14 @@ def grown_near_pairs(pairs: NearPairs, n_nodes: int) -> NearPairs:
     return pairs.replaced(**larger, tree=new_block_tree(n_nodes))
 
 
-@kernel
-def triangle_displacement(pairs: NearPairs, displacement: FloatArray, face: int) -> Vec3:
-    """Return how far the middle of a face is from where it was when it was paired [m]."""
+@inlined
+def know_motion(pairs: NearPairs, ways: NodeWays, face: int) -> None:
+    """Compute how far a face has moved, unless that was done in this search."""
+    if pairs.known_at[face] == ways.frame:
+        return
+    pairs.known_at[face] = ways.frame
+    way, d, third = ways.way, ways.displacement, 1.0 / 3.0
     a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    third = 1.0 / 3.0
-    return Vec3(
-        third * (displacement[a, 0] + displacement[b, 0] + displacement[c, 0]),
-        third * (displacement[a, 1] + displacement[b, 1] + displacement[c, 1]),
-        third * (displacement[a, 2] + displacement[b, 2] + displacement[c, 2]),
-    )
-
-
-@kernel
-def triangle_way(pairs: NearPairs, way: FloatArray, face: int) -> float:
-    """Return the sum of the ways of the nodes of a face [m]."""
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    return float(way[a] + way[b] + way[c])
+    pairs.way[face] = way[a] + way[b] + way[c]
+    for x in range(3):
+        pairs.displacement[face, x] = third * (d[a, x] + d[b, x] + d[c, x])

@@ -8,7 +8,6 @@ from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs
 from tissue.contact.penalty.ridge_touch import ridge_touch_of
 from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.search_state import SearchState
-from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import store, vec3
 from tissue.mesh.body import Body
@@ -28,11 +27,11 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
     if not (is_calm and ways.n_loud == 0):
         ridge, loud, now = found.ridge, search.ridges.loud_at, ways.frame
         least = found.calm_until - ways.quiet_way if is_calm else math.inf
-        _find_loud_ridges(search)
+        _measure_ridges(search)
         for k in range(found.n_pairs):
             if is_calm and loud[ridge[k, 0]] != now and loud[ridge[k, 1]] != now:
                 continue
-            way = _way(found, search.ridges, ways.way, k)
+            way = search.ridges.way[ridge[k, 0]] + search.ridges.way[ridge[k, 1]]
             if way > found.wake[k]:
                 has_changed = _look_at_ridges(search, forces, body, k, way) or has_changed
             least = min(least, found.wake[k] - way)
@@ -41,13 +40,15 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
 
 
 @kernel
-def _find_loud_ridges(search: SearchState) -> None:
-    """Note which ridges have an end that moved much since the last search."""
-    ridges, loud, now = search.ridges, search.ways.loud_at, search.ways.frame
+def _measure_ridges(search: SearchState) -> None:
+    """Add up the ways of the ends of ridges; note where one moved much since the last search."""
+    ridges, ways = search.ridges, search.ways
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
-        if loud[ridges.node[edge, 0]] == now or loud[ridges.node[edge, 1]] == now:
-            ridges.loud_at[edge] = now
+        a, b = ridges.node[edge, 0], ridges.node[edge, 1]
+        ridges.way[edge] = ways.way[a] + ways.way[b]
+        if ways.loud_at[a] == ways.frame or ways.loud_at[b] == ways.frame:
+            ridges.loud_at[edge] = ways.frame
 
 
 @kernel
@@ -74,14 +75,6 @@ def _look_at_ridges(
     found.place[k, 0], found.place[k, 1] = touch.s, touch.t
     store(found.normal, k, touch.normal)
     return touch.is_touching or bool(did_touch == 1)
-
-
-@kernel
-def _way(found: RidgePairs, ridges: Ridges, way: FloatArray, k: int) -> float:
-    """Return the sum of the ways of the nodes of a pair [m]."""
-    one, other = found.ridge[k, 0], found.ridge[k, 1]
-    first = way[ridges.node[one, 0]] + way[ridges.node[one, 1]]
-    return float(first + way[ridges.node[other, 0]] + way[ridges.node[other, 1]])
 
 
 @kernel

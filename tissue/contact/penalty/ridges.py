@@ -33,6 +33,9 @@ class Ridges(Arrays):
     """Update of the pairs in which each edge was last paired anew, shape (3 * face capacity,)."""
     loud_at: IntArray
     """Search in which an end of each ridge last moved much, shape (3 * face capacity,)."""
+    way: FloatArray
+    """Sum of the ways of the ends of each ridge as it was last computed [m], shape (3 * face
+    capacity,)."""
     node: IntArray
     """Ends of each ridge, shape (3 * face capacity, 2)."""
     tip: IntArray
@@ -57,6 +60,7 @@ def new_ridges(n_faces: int) -> Ridges:
     return Ridges(
         n_ridges=0,
         **{name: np.zeros(n, np.int64) for name in of_edges},
+        way=np.zeros(n),
         node=np.zeros((n, 2), np.int64),
         tip=np.zeros((n, 2), np.int64),
         low=np.zeros((n, 3)),
