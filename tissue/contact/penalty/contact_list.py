@@ -14,7 +14,7 @@ from tissue.contact.penalty.contact_rows import (
     copy_contact,
     take_over,
 )
-from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion
+from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion, sort_by_faces
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
@@ -47,12 +47,13 @@ def find_due(search: SearchState, is_anew: bool) -> int:
     if is_quiet and search.n_due == 0 and ways.quiet_way < search.all_calm_until:
         return 0
     all_calm_until = math.inf
-    _find_loud_faces(search)
+    _tell_of_loud_faces(search)
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
         search.is_due[node] = 0
         is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
-        if is_calm and (ways.n_loud == 0 or not _hears(search, node)):
+        is_loud = ways.loud_at[node] == ways.frame or pairs.heard_at[node] == ways.frame
+        if is_calm and not is_loud:
             all_calm_until = min(all_calm_until, search.calm_until[node])
             continue
         slack = _least_slack(search, node)
@@ -68,29 +69,21 @@ def find_due(search: SearchState, is_anew: bool) -> int:
 
 
 @kernel
-def _find_loud_faces(search: SearchState) -> None:
-    """Note which faces have a corner that moved much since the last search."""
+def _tell_of_loud_faces(search: SearchState) -> None:
+    """Note at nodes which of them are paired with a face of which a corner has moved much."""
     pairs, loud, now = search.pairs, search.ways.loud_at, search.ways.frame
     if search.ways.n_loud == 0:
         return
-    for at in range(search.faces.n_places):
+    # Faces that a cut has just made may be more than there is room for; they are in no pair.
+    n = min(search.faces.n_places, len(pairs.is_active))
+    sort_by_faces(pairs, n)
+    for at in range(n):
         if pairs.is_active[at] == 0:
             continue
         a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
         if loud[a] == now or loud[b] == now or loud[c] == now:
-            pairs.loud_at[at] = now
-
-
-@kernel
-def _hears(search: SearchState, node: int) -> bool:
-    """Whether a node, or a face that it is paired with, moved much since the last search."""
-    pairs, now = search.pairs, search.ways.frame
-    if search.ways.loud_at[node] == now:
-        return True
-    for k in range(pairs.begin[node], pairs.end[node]):
-        if pairs.loud_at[pairs.face[k]] == now:
-            return True
-    return False
+            for i in range(pairs.face_begin[at], pairs.face_begin[at + 1]):
+                pairs.heard_at[pairs.of_face[i]] = now
 
 
 @kernel

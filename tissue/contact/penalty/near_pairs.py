@@ -10,7 +10,7 @@ import numpy as np
 from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import inlined
+from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import grown
 
@@ -26,6 +26,7 @@ _OF_NODES = (
     "lost_at",
     "is_lost",
     "found_in",
+    "heard_at",
     "moved",
     "begin",
     "end",
@@ -49,6 +50,8 @@ class NearPairs(Arrays):
     """Number of nodes that were paired anew in the last update."""
     n_updates: IntCell
     """Number of the last update, from 1."""
+    n_indexed: IntCell
+    """Update after which pairs were last sorted by their faces."""
     n_kept: IntCell
     """Number of pairs that hold in this update."""
     n_found: IntCell
@@ -69,6 +72,9 @@ class NearPairs(Arrays):
     found_in: IntArray
     """Round of `lost_nodes` in which each node was last found to be lost, shape (node
     capacity,)."""
+    heard_at: IntArray
+    """Search in which a corner of a face that a node is paired with last moved much, shape (node
+    capacity,)."""
     moved: IntArray
     """Nodes that were paired anew in the last update, shape (node capacity,)."""
     begin: IntArray
@@ -87,8 +93,10 @@ class NearPairs(Arrays):
     """Generation in `Faces` of each face when it was last looked at; shape (face capacity,)."""
     dirty_at: IntArray
     """Update in which each face was last paired anew, shape (face capacity,)."""
-    loud_at: IntArray
-    """Search in which a corner of each face last moved much, shape (face capacity,)."""
+    face_begin: IntArray
+    """Where the nodes of each face begin in `of_face`, shape (face capacity + 2,)."""
+    of_face: IntArray
+    """The nodes that each face is paired with, face by face; shape (capacity,)."""
     known_at: IntArray
     """Search in which `way` and `displacement` of each face were last computed, shape (face
     capacity,)."""
@@ -133,19 +141,22 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_faces: Faces that there is room for.
         capacity: Pairs that there is room for.
     """
-    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at", "loud_at", "known_at")
+    of_faces = ("tetrahedron", "is_of_cut", "is_active", "dirty_at", "known_at")
     return NearPairs(
         first=0,
         n_pairs=0,
         n_nodes=0,
         n_moved=0,
         n_updates=1,
+        n_indexed=0,
         n_kept=0,
         n_found=0,
         **{name: np.zeros(n_nodes, np.int64) for name in _OF_NODES},
         triangle=np.zeros((n_faces, 3), np.int64),
         **{name: np.zeros(n_faces, np.int64) for name in of_faces},
         seen_generation=np.full(n_faces, -1, np.int64),
+        face_begin=np.zeros(n_faces + 2, np.int64),
+        of_face=np.zeros(capacity, np.int64),
         way=np.zeros(n_faces),
         displacement=np.zeros((n_faces, 3)),
         low=np.zeros((n_faces, 3)),
@@ -178,3 +189,22 @@ def know_motion(pairs: NearPairs, ways: NodeWays, face: int) -> None:
     pairs.way[face] = way[a] + way[b] + way[c]
     for x in range(3):
         pairs.displacement[face, x] = third * (d[a, x] + d[b, x] + d[c, x])
+
+
+@kernel
+def sort_by_faces(pairs: NearPairs, n_faces: int) -> None:
+    """Write the nodes that each of the first `n_faces` is paired with, unless that is done."""
+    if pairs.n_indexed == pairs.n_updates:
+        return
+    pairs.n_indexed = pairs.n_updates
+    begin, rows = pairs.face_begin, range(pairs.first, pairs.first + pairs.n_pairs)
+    for at in range(n_faces + 2):
+        begin[at] = 0
+    for k in rows:
+        begin[pairs.face[k] + 2] += 1
+    for at in range(2, n_faces + 2):
+        begin[at] += begin[at - 1]
+    for k in rows:
+        at = pairs.face[k]
+        pairs.of_face[begin[at + 1]] = pairs.node[k]
+        begin[at + 1] += 1
