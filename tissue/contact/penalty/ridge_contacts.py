@@ -4,7 +4,7 @@ import math
 
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
-from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs
+from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs, sort_by_ridges
 from tissue.contact.penalty.ridge_touch import ridge_touch_of
 from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.search_state import SearchState
@@ -24,31 +24,51 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
     """
     found, ways, has_changed = search.ridge_pairs, search.ways, False
     is_calm = ways.quiet_way < found.calm_until
-    if not (is_calm and ways.n_loud == 0):
-        ridge, loud, now = found.ridge, search.ridges.loud_at, ways.frame
-        least = found.calm_until - ways.quiet_way if is_calm else math.inf
+    if not is_calm:
         _measure_ridges(search)
+        found.calm_until = math.inf
         for k in range(found.n_pairs):
-            if is_calm and loud[ridge[k, 0]] != now and loud[ridge[k, 1]] != now:
-                continue
-            way = search.ridges.way[ridge[k, 0]] + search.ridges.way[ridge[k, 1]]
-            if way > found.wake[k]:
-                has_changed = _look_at_ridges(search, forces, body, k, way) or has_changed
-            least = min(least, found.wake[k] - way)
-        found.calm_until = ways.quiet_way + least
+            has_changed = _look_if_moved(search, forces, body, k) or has_changed
+    elif ways.n_loud > 0:
+        has_changed = _look_at_loud_ridges(search, forces, body)
     return has_changed or bool(found.n_touching < found.n_contacts)
 
 
 @kernel
 def _measure_ridges(search: SearchState) -> None:
-    """Add up the ways of the ends of ridges; note where one moved much since the last search."""
-    ridges, ways = search.ridges, search.ways
+    """Add up the ways of the ends of all ridges."""
+    ridges, way = search.ridges, search.ways.way
+    for i in range(ridges.n_ridges):
+        edge = ridges.listed[i]
+        ridges.way[edge] = way[ridges.node[edge, 0]] + way[ridges.node[edge, 1]]
+
+
+@kernel
+def _look_at_loud_ridges(search: SearchState, forces: PenaltyForces, body: Body) -> bool:
+    """Look at the pairs of ridges of which an end moved much; see `find_touching_ridges`."""
+    found, ridges, ways, has_changed = search.ridge_pairs, search.ridges, search.ways, False
+    _measure_ridges(search)
+    sort_by_ridges(found, ridges)
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
         a, b = ridges.node[edge, 0], ridges.node[edge, 1]
-        ridges.way[edge] = ways.way[a] + ways.way[b]
-        if ways.loud_at[a] == ways.frame or ways.loud_at[b] == ways.frame:
-            ridges.loud_at[edge] = ways.frame
+        if ways.loud_at[a] != ways.frame and ways.loud_at[b] != ways.frame:
+            continue
+        for e in range(ridges.first_pair[edge], ridges.first_pair[edge + 1]):
+            k = found.of_ridge[e]
+            has_changed = _look_if_moved(search, forces, body, k) or has_changed
+    return has_changed
+
+
+@kernel
+def _look_if_moved(search: SearchState, forces: PenaltyForces, body: Body, k: int) -> bool:
+    """Look at pair `k` if its nodes moved enough; return whether it was, and touches, or did."""
+    found, way = search.ridge_pairs, search.ridges.way
+    moved = way[found.ridge[k, 0]] + way[found.ridge[k, 1]]
+    has_changed = moved > found.wake[k] and _look_at_ridges(search, forces, body, k, moved)
+    calm_until = search.ways.quiet_way + (found.wake[k] - moved)
+    found.calm_until = min(found.calm_until, calm_until)
+    return has_changed
 
 
 @kernel

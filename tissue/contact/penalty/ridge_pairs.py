@@ -35,11 +35,15 @@ class RidgePairs(Arrays):
     """First contact of ridges in the list in use."""
     n_contacts: IntCell
     """Number of contacts of ridges in the list in use."""
+    is_indexed: IntCell
+    """1 if `of_ridge` is up to date, else 0."""
     calm_until: FloatCell
     """Value of `NodeWays.quiet_way` up to which no pair needs a look while no node moves much
     [m]."""
     ridge: IntArray
     """The ridges of each pair, shape (capacity, 2)."""
+    of_ridge: IntArray
+    """The pairs of each ridge, ridge by ridge; shape (2 * capacity,)."""
     wake: FloatArray
     """Sum of the ways of its four nodes up to which a pair needs no look [m]; below 0 for one that
     is new; shape (capacity,)."""
@@ -63,7 +67,9 @@ def new_ridge_pairs(capacity: int) -> RidgePairs:
         n_touching=0,
         first=0,
         n_contacts=0,
+        is_indexed=0,
         calm_until=0.0,
+        of_ridge=np.zeros(2 * capacity, np.int64),
         ridge=np.zeros((capacity, 2), np.int64),
         wake=np.zeros(capacity),
         **{name: np.zeros(capacity, np.int64) for name in of_pairs},
@@ -86,7 +92,7 @@ def pair_ridges(
         faces: The piece that each face is of.
     """
     now = pairs.n_updates
-    found.calm_until = -math.inf
+    found.calm_until, found.is_indexed = -math.inf, 0
     has_dirty = _list_ridges(ridges, pairs, ways, faces)
     _keep_pairs(found, ridges, now)
     if not has_dirty:
@@ -199,6 +205,27 @@ def _add_pair(found: RidgePairs, ridges: Ridges, edge: int, other: int) -> None:
     found.is_touching[k] = found.is_sought[k] = 0
     found.contact[k] = NOT_LISTED
     found.n_pairs += 1
+
+
+@kernel
+def sort_by_ridges(found: RidgePairs, ridges: Ridges) -> None:
+    """Write which pairs each ridge is in, unless that is done."""
+    if found.is_indexed == 1 or ridges.n_ridges == 0:
+        return
+    found.is_indexed = 1
+    begin, n_edges = ridges.first_pair, ridges.listed[ridges.n_ridges - 1] + 1
+    for edge in range(n_edges + 2):
+        begin[edge] = 0
+    for k in range(found.n_pairs):
+        begin[found.ridge[k, 0] + 2] += 1
+        begin[found.ridge[k, 1] + 2] += 1
+    for edge in range(2, n_edges + 2):
+        begin[edge] += begin[edge - 1]
+    for k in range(found.n_pairs):
+        for side in range(2):
+            edge = found.ridge[k, side]
+            found.of_ridge[begin[edge + 1]] = k
+            begin[edge + 1] += 1
 
 
 @kernel

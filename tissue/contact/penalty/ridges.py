@@ -31,8 +31,9 @@ class Ridges(Arrays):
     capacity,)."""
     dirty_at: IntArray
     """Update of the pairs in which each edge was last paired anew, shape (3 * face capacity,)."""
-    loud_at: IntArray
-    """Search in which an end of each ridge last moved much, shape (3 * face capacity,)."""
+    first_pair: IntArray
+    """Where the pairs of each ridge begin in `RidgePairs.of_ridge`, shape (3 * face capacity +
+    2,)."""
     way: FloatArray
     """Sum of the ways of the ends of each ridge as it was last computed [m], shape (3 * face
     capacity,)."""
@@ -56,10 +57,11 @@ class Ridges(Arrays):
 def new_ridges(n_faces: int) -> Ridges:
     """Return no ridges, with room for those of `n_faces`."""
     n = 3 * n_faces
-    of_edges = ("listed", "is_one", "is_of_cut", "dirty_at", "loud_at")
+    of_edges = ("listed", "is_one", "is_of_cut", "dirty_at")
     return Ridges(
         n_ridges=0,
         **{name: np.zeros(n, np.int64) for name in of_edges},
+        first_pair=np.zeros(n + 2, np.int64),
         way=np.zeros(n),
         node=np.zeros((n, 2), np.int64),
         tip=np.zeros((n, 2), np.int64),
