@@ -16,7 +16,7 @@ from tissue.contact.penalty.contact_rows import (
 )
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion, sort_by_faces
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
-from tissue.contact.penalty.search_state import SearchState
+from tissue.contact.penalty.search_state import SearchState, are_many_loud
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
@@ -46,12 +46,13 @@ def find_due(search: SearchState, is_anew: bool) -> int:
     is_quiet = not is_anew and ways.n_loud == 0
     if is_quiet and search.n_due == 0 and ways.quiet_way < search.all_calm_until:
         return 0
-    all_calm_until = math.inf
-    _tell_of_loud_faces(search)
+    all_calm_until, asks_all = math.inf, is_anew or are_many_loud(search)
+    if not asks_all:
+        _tell_of_loud_faces(search)
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
         search.is_due[node] = 0
-        is_calm = not is_anew and ways.quiet_way < search.calm_until[node]
+        is_calm = not asks_all and ways.quiet_way < search.calm_until[node]
         is_loud = ways.loud_at[node] == ways.frame or pairs.heard_at[node] == ways.frame
         if is_calm and not is_loud:
             all_calm_until = min(all_calm_until, search.calm_until[node])

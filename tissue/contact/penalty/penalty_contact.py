@@ -105,6 +105,8 @@ class PenaltyContact:
             calm_until=np.zeros(n_nodes),
             floor_contact=np.zeros(n_nodes, np.int64),
             floor_listed_at=np.zeros(n_nodes, np.int64),
+            ridge_contact=np.zeros(n_nodes, np.int64),
+            ridge_contact_at=np.zeros(n_nodes, np.int64),
             distance=np.zeros(DIRECTIONS),
             share=np.zeros(n_nodes),
             floor=-np.inf if floor is None else float(floor),
@@ -201,7 +203,8 @@ class PenaltyContact:
         """Make room for a body of `n_nodes` and `n_tetrahedra`."""
         search = self._search
         of_nodes = ("inverted_step", "is_due", "contact", "n_contacts", "listed_at", "calm_until")
-        others = ("floor_contact", "floor_listed_at", "share", "normal")
+        of_floor = ("floor_contact", "floor_listed_at")
+        others = (*of_floor, "ridge_contact", "ridge_contact_at", "share", "normal")
         self._search = search.replaced(
             faces=grown_faces(search.faces, n_tetrahedra),
             pairs=grown_near_pairs(search.pairs, n_nodes),

@@ -4,10 +4,9 @@ import math
 
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
-from tissue.contact.penalty.ridge_pairs import NOT_LISTED, RidgePairs, sort_by_ridges
+from tissue.contact.penalty.ridge_pairs import NOT_LISTED, sort_by_ridges
 from tissue.contact.penalty.ridge_touch import ridge_touch_of
-from tissue.contact.penalty.ridges import Ridges
-from tissue.contact.penalty.search_state import SearchState
+from tissue.contact.penalty.search_state import SearchState, are_many_loud
 from tissue.core.jit import kernel
 from tissue.core.vec3 import store, vec3
 from tissue.mesh.body import Body
@@ -24,8 +23,10 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
     """
     found, ways, has_changed = search.ridge_pairs, search.ways, False
     is_calm = ways.quiet_way < found.calm_until
-    if not is_calm:
+    if not is_calm or are_many_loud(search):
         _measure_ridges(search)
+        if search.is_anew == 1:
+            _sort_contacts(search, forces)
         found.calm_until = math.inf
         for k in range(found.n_pairs):
             has_changed = _look_if_moved(search, forces, body, k) or has_changed
@@ -86,7 +87,7 @@ def _look_at_ridges(
     """
     found = search.ridge_pairs
     if found.wake[k] < 0.0:
-        found.contact[k] = _contact_of(found, search.ridges, forces, k)
+        found.contact[k] = _contact_of(search, forces, k)
     touch, did_touch = ridge_touch_of(search, body, k), found.is_touching[k]
     found.wake[k] = way + touch.slack
     found.is_touching[k] = 1 if touch.is_touching else 0
@@ -98,17 +99,34 @@ def _look_at_ridges(
 
 
 @kernel
-def _contact_of(found: RidgePairs, ridges: Ridges, forces: PenaltyForces, k: int) -> int:
+def _sort_contacts(search: SearchState, forces: PenaltyForces) -> None:
+    """Link the contacts of ridges that begin with the same node."""
+    found, last, now = search.ridge_pairs, search.ridge_contact, search.ways.frame
+    for i in range(found.n_contacts):
+        node = forces.node[found.first + i, 0]
+        is_first = search.ridge_contact_at[node] != now
+        found.before[i] = NOT_LISTED if is_first else last[node]
+        search.ridge_contact_at[node], last[node] = now, i
+
+
+@kernel
+def _contact_of(search: SearchState, forces: PenaltyForces, k: int) -> int:
     """Return the contact that a pair had before it was paired anew, or NOT_LISTED."""
+    found, ridges = search.ridge_pairs, search.ridges
     one, other = found.ridge[k, 0], found.ridge[k, 1]
-    for c in range(found.first, found.first + found.n_contacts):
+    node = ridges.node[one, 0]
+    if search.ridge_contact_at[node] != search.ways.frame:
+        return NOT_LISTED
+    i = search.ridge_contact[node]
+    while i != NOT_LISTED:
+        c = found.first + i
         if (
-            forces.node[c, 0] == ridges.node[one, 0]
-            and forces.node[c, 1] == ridges.node[one, 1]
+            forces.node[c, 1] == ridges.node[one, 1]
             and forces.node[c, 2] == ridges.node[other, 0]
             and forces.node[c, 3] == ridges.node[other, 1]
         ):
-            return c
+            return int(c)
+        i = found.before[i]
     return NOT_LISTED
 
 

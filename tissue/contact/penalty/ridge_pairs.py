@@ -53,6 +53,9 @@ class RidgePairs(Arrays):
     """1 if a pair was looked at since it was listed as a contact, else 0; shape (capacity,)."""
     contact: IntArray
     """Contact of each pair in the list in use, or NOT_LISTED; shape (capacity,)."""
+    before: IntArray
+    """Scratch: the contact before each that begins with the same node, both counted from `first`;
+    or NOT_LISTED; shape (capacity,)."""
     place: FloatArray
     """Where along its two ridges a pair touches, as fractions; shape (capacity, 2)."""
     normal: FloatArray
@@ -61,7 +64,7 @@ class RidgePairs(Arrays):
 
 def new_ridge_pairs(capacity: int) -> RidgePairs:
     """Return no pairs, with room for that many."""
-    of_pairs = ("is_touching", "is_sought", "contact")
+    of_pairs = ("is_touching", "is_sought", "contact", "before")
     return RidgePairs(
         n_pairs=0,
         n_touching=0,

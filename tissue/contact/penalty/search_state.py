@@ -7,7 +7,11 @@ from tissue.contact.penalty.ridge_pairs import RidgePairs
 from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.stiffness import Limits
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
+
+_MANY_LOUD = 4
+"""One over the share of loud nodes from which on it is cheaper to ask all."""
 
 
 class SearchState(Arrays):
@@ -68,9 +72,20 @@ class SearchState(Arrays):
     """Contact of each node with the floor in the list in use, shape (node capacity,)."""
     floor_listed_at: IntArray
     """Listing in which each node was last in contact with the floor, shape (node capacity,)."""
+    ridge_contact: IntArray
+    """Scratch: last contact of ridges that begins with each node, counted from their first; shape
+    (node capacity,)."""
+    ridge_contact_at: IntArray
+    """Search in which that was written, shape (node capacity,)."""
     distance: FloatArray
     """Scratch: squared distance of the contacts that a node was found to have [m2], shape (3,)."""
     share: FloatArray
     """Scratch of `split_masses`, shape (node capacity,)."""
     floor: float
     """Height of the floor [m], or -inf."""
+
+
+@kernel
+def are_many_loud(search: SearchState) -> bool:
+    """Whether so many nodes moved much that all are asked."""
+    return bool(_MANY_LOUD * search.ways.n_loud > search.pairs.n_nodes)
