@@ -99,7 +99,9 @@ def scale_masses(
 @inlined
 def free_fall(body: Body, node: int, gravity: Vec3) -> Point:
     """Acceleration of a node in gravity [m/s2]: the mass that was added has no weight."""
-    own = 1.0 - body.added_masses[node] / body.masses[node]
+    added, own = body.added_masses[node], 1.0
+    if added != 0.0:  # of few nodes: most need no division
+        own = 1.0 - added / body.masses[node]
     fall: Point = times(own, point_of(*gravity))
     return fall
 

@@ -35,7 +35,7 @@ from tissue.core.simd_blocks import (
     sum_of_eight_rows,
     width_of,
 )
-from tissue.core.simd_gather import sum_of_eight
+from tissue.core.simd_gather import natural, sum_of_eight
 from tissue.core.vec3 import Vec3, add, cross, dot, scale
 from tissue.elasticity.energy_density import EnergyDensity
 from tissue.elasticity.finite_elements import N_SHAPE, VOLUME, Solid
@@ -83,9 +83,11 @@ def solid_forces(
 def solid_force(solid: Solid, node: int) -> Point:
     """Return the force of the tetrahedra around a node on it [N], from `corner_forces`."""
     total = point_of(0.0, 0.0, 0.0)
-    first = solid.first[node]
-    for slot in range(first, first + solid.count[node], WIDTH):
+    slot = solid.first[node]
+    end = slot + solid.count[node]
+    while slot < end:
         total = total + sum_of_eight_rows(solid.forces, solid.corner, slot)
+        slot += WIDTH
     return total
 
 
@@ -115,7 +117,7 @@ def displacements(
         end: End of them.
     """
     for i in range(begin, end):
-        node = nodes[i]
+        node = natural(nodes[i])
         store_row(solid.displacement, node, point(positions, node) - point(body.rest, node))
 
 
@@ -139,9 +141,20 @@ def displacement_gradients(solid: Solid, blocks: IntArray, begin: int, end: int)
 def pressures(solid: Solid, nodes: IntArray, begin: int, end: int) -> None:
     """Write lam (J - 1) of `nodes[begin:end]`, from the volumes around them."""
     for i in range(begin, end):
-        node = nodes[i]
-        grown = dilated_around(solid, node) / solid.node_volume[node]
-        solid.pressure[node] = solid.law.lam_of_nodes * grown
+        _write_pressure(solid, natural(nodes[natural(i)]))
+
+
+@kernel
+def pressures_in_order(solid: Solid, begin: int, end: int) -> None:
+    """Write lam (J - 1) of the nodes from `begin` to `end`: `pressures` without a list."""
+    for node in range(begin, end):
+        _write_pressure(solid, natural(node))
+
+
+@inlined
+def _write_pressure(solid: Solid, node: int) -> None:
+    grown = dilated_around(solid, node) / solid.node_volume[node]
+    solid.pressure[node] = solid.law.lam_of_nodes * grown
 
 
 @kernel
@@ -376,7 +389,9 @@ def _pressure_of_nodes(solid: Solid, block: int, a: Lanes) -> Lanes:
 def dilated_around(solid: Solid, node: int) -> float:
     """Return a quarter of V (J - 1) of the tetrahedra around a node [m3]."""
     total = 0.0
-    first = solid.first[node]
-    for slot in range(first, first + solid.count[node], WIDTH):
+    slot = solid.first[node]
+    end = slot + solid.count[node]
+    while slot < end:
         total += sum_of_eight(solid.dilated, solid.around, slot)
+        slot += WIDTH
     return 0.25 * total

@@ -10,7 +10,6 @@ from tissue.core.simd import (
     WIDTH,
     Point,
     eight_points,
-    filled,
     lanes,
     load_lanes,
     square_root,
@@ -29,13 +28,15 @@ def elastic_force(springs: Springs, node: int, positions: FloatArray) -> Point:
     """Return the pull of the springs on a node [N]: the sum of k (l - l0) along each."""
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     fx = fy = fz = lanes(0.0)
-    first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         length = square_root(dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH))
         pull = load_lanes(springs.stiffness, slot) - load_lanes(springs.rest_pull, slot) / length
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
     return summed(fx, fy, fz)
 
 
@@ -59,8 +60,9 @@ def damping_force(
     x, y, z = lanes(positions[node, 0]), lanes(positions[node, 1]), lanes(positions[node, 2])
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     fx = fy = fz = lanes(0.0)
-    first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)
@@ -68,6 +70,7 @@ def damping_force(
         squared = dx * dx + dy * dy + dz * dz + lanes(NO_LENGTH)
         pull = load_lanes(springs.stiffness, slot) * approach / squared
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
     return times(retardation_time, summed(fx, fy, fz))
 
 
@@ -92,8 +95,9 @@ def elastic_and_damping_force(
     u, v, w = lanes(velocities[node, 0]), lanes(velocities[node, 1]), lanes(velocities[node, 2])
     time, one = lanes(retardation_time), lanes(1.0)
     fx = fy = fz = lanes(0.0)
-    first = springs.first[node]
-    for slot in range(first, first + filled(springs.count[node]), WIDTH):
+    slot = springs.first[node]
+    end = slot + springs.count[node]
+    while slot < end:
         dx, dy, dz = eight_points(positions, springs.neighbour, slot)
         dx, dy, dz = dx - x, dy - y, dz - z
         du, dv, dw = eight_points(velocities, springs.neighbour, slot)
@@ -103,4 +107,5 @@ def elastic_and_damping_force(
         pull = stiffness - load_lanes(springs.rest_pull, slot) * inverse
         pull = pull + stiffness * (time * approach * inverse * inverse)
         fx, fy, fz = fx + pull * dx, fy + pull * dy, fz + pull * dz
+        slot += WIDTH
     return summed(fx, fy, fz)

@@ -15,6 +15,7 @@ the kinetic energy is what the dampers dissipate, so that no integral of a power
 
 from tissue.core.jit import kernel
 from tissue.core.simd import point, point_of, store_point, times
+from tissue.core.simd_gather import natural
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import Elastic, viscous_force
@@ -72,7 +73,8 @@ def damping_changes(
     """
     time, drag = damping.retardation_time, damping.drag
     x, v = body.positions, body.velocities
-    for i in range(begin, end):
+    for node in range(begin, end):
+        i = natural(node)
         change = point_of(0.0, 0.0, 0.0)
         if not body.fixed[i]:
             change = times(-drag, point(v, i))

@@ -25,8 +25,10 @@ from typing import Final
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
+from tissue.integrators.node_loops import is_solid
 from tissue.integrators.runge_kutta import apply_outer_forces
 from tissue.integrators.shared_loops import (
+    DISPLACED,
     DISPLACEMENTS,
     DISPLACEMENTS_2,
     DISPLACEMENTS_LAST,
@@ -60,7 +62,7 @@ def three_stage_nystroem(
         share: Length of the step as a fraction of the time step.
     """
     body, stages, h = context.body, context.stages, share * dt
-    is_moving = context.supports.is_moving == 1
+    is_moving, is_displaced = context.supports.is_moving == 1, is_solid(context)
     x1, v1, w1 = body.positions, body.velocities, WEIGHTS[0]
     apply_outer_forces(context, edge, x1, v1, at + INSTANTS[0] * share, share * w1, dt)
     deform_shared(context, DISPLACEMENTS)
@@ -69,13 +71,13 @@ def three_stage_nystroem(
     run_loop(context, NYSTROEM_FIRST, h)
     x2, v2, w2 = stages.positions, stages.velocities, WEIGHTS[1]
     apply_outer_forces(context, edge, x2, v2, at + INSTANTS[1] * share, share * w2, dt)
-    deform_shared(context, DISPLACEMENTS_2)
+    deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_2)
     if is_moving:
         add_support_work(context, x2, v2, h * w2)
     run_loop(context, NYSTROEM_SECOND, h)
     x3, v3, w3 = stages.last_positions, stages.velocities, WEIGHTS[2]
     apply_outer_forces(context, edge, x3, v3, at + INSTANTS[2] * share, share * w3, dt)
-    deform_shared(context, DISPLACEMENTS_LAST)
+    deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_LAST)
     if is_moving:
         add_support_work(context, x3, v3, h * w3)
     run_loop(context, NYSTROEM_THIRD, h)

@@ -20,7 +20,7 @@ from tissue.elasticity.neo_hookean import (
     displacement_gradients,
     displacements,
     has_averaged_volumes,
-    pressures,
+    pressures_in_order,
 )
 from tissue.elasticity.viscoelasticity import relax_blocks
 from tissue.integrators.damping import damping_changes
@@ -41,6 +41,8 @@ GRADIENTS, CORNER_FORCES, STRESS_RELAXATION = 0, 1, 2
 """Loops over blocks of tetrahedra."""
 DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, PRESSURES = 3, 4, 5, 6
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
+DISPLACED = -1
+"""Stands for a loop of displacements where the loop before has written them."""
 FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
 """Loops over nodes of the Runge-Kutta method on two levels."""
 NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 11, 12, 13
@@ -115,12 +117,13 @@ def deform_shared(context: StepContext, loop_of_displacements: int) -> None:
 
     Args:
         context: What takes part.
-        loop_of_displacements: Says at which positions.
+        loop_of_displacements: Says at which positions; `DISPLACED` where that is not needed.
     """
     elastic = context.elastic
     if elastic.has_tetrahedra:
         solid = elastic.solid
-        run_loop(context, loop_of_displacements, 0.0)
+        if loop_of_displacements != DISPLACED:
+            run_loop(context, loop_of_displacements, 0.0)
         run_loop(context, GRADIENTS, 0.0)
         if has_averaged_volumes(solid):
             run_loop(context, PRESSURES, 0.0)
@@ -167,7 +170,7 @@ def _deform_part(context: StepContext, loop: int, begin: int, end: int) -> None:
     elif loop == STRESS_RELAXATION:
         relax_blocks(solid, begin, end)
     elif loop == PRESSURES:
-        pressures(solid, solid.every, begin, end)
+        pressures_in_order(solid, begin, end)
     else:
         positions = body.positions
         if loop == DISPLACEMENTS_2:

@@ -10,8 +10,10 @@ between the steps (`tissue.integrators.damping`).
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
+from tissue.integrators.node_loops import is_solid
 from tissue.integrators.runge_kutta import apply_outer_forces
 from tissue.integrators.shared_loops import (
+    DISPLACED,
     DISPLACEMENTS,
     DRIFTING,
     KICKING,
@@ -33,13 +35,14 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
         at: Fraction of the time step at which the step begins.
         share: Length of the step as a fraction of the time step.
     """
-    body, h = context.body, share * dt
+    body, h, moves_in_loops = context.body, share * dt, is_solid(context)
     run_loop(context, DRIFTING, 0.5 * h)
     at_middle = at + 0.5 * share
     apply_outer_forces(context, edge, body.positions, body.velocities, at_middle, share, dt)
-    deform_shared(context, DISPLACEMENTS)
+    deform_shared(context, DISPLACED if moves_in_loops else DISPLACEMENTS)
     if context.supports.is_moving == 1:
         add_support_work(context, body.positions, body.velocities, h)
     run_loop(context, KICKING, h)
-    # Only now: until here springs saw all nodes at the middle of the step.
-    run_loop(context, DRIFTING, 0.5 * h)
+    if not moves_in_loops:
+        # Only now: until here springs saw all nodes at the middle of the step.
+        run_loop(context, DRIFTING, 0.5 * h)

@@ -5,7 +5,7 @@ import pytest
 
 from tissue.core.jit import kernel
 from tissue.core.simd import load_lanes, store_lanes
-from tissue.core.simd_gather import larger, larger_bits, largest, sum_of_eight
+from tissue.core.simd_gather import larger, larger_bits, largest, natural, sum_of_eight
 
 pytestmark = pytest.mark.kernel
 
@@ -49,3 +49,16 @@ def test_bits_say_in_which_lanes_a_number_is_larger():
     compare_bits(VALUES, expected)
     assert out[0] == expected[0]
     assert expected[0] == sum(1 << k for k in range(8) if VALUES[k] > VALUES[8 + k])
+
+
+def picked(values, of, out):
+    for i in range(len(of)):
+        out[natural(i)] = values[natural(of[i])]
+
+
+def test_an_index_that_is_not_negative_is_itself():
+    out, expected = np.zeros((2, len(OF)))
+    kernel(picked)(VALUES, OF, out)
+    picked(VALUES, OF, expected)
+    np.testing.assert_array_equal(out, expected)
+    np.testing.assert_array_equal(out, VALUES[OF])
