@@ -159,6 +159,46 @@ def _row(builder: Any, rows: _Array, i: Any) -> Any:
     return builder.load(pointer, align=4 * _size_of(rows.element))
 
 
+def store_everywhere(rows: FloatArray, i: int, value: float) -> None:
+    """Write a number into all four columns of row `i`, for `values_of_rows`."""
+    rows[i] = value
+
+
+@_compiled(store_everywhere, types.Array, types.Integer, types.Float, result=types.void)
+def _store_everywhere(builder: Any, rows: _Array, i: Any, value: Any) -> None:
+    kind = ir.VectorType(rows.element, 4)
+    values = _everywhere(builder, _converted(builder, value, rows.element), kind)
+    pointer = builder.bitcast(rows.at(i, 4), kind.as_pointer())
+    builder.store(values, pointer, align=4 * _size_of(rows.element))
+
+
+def values_of_rows(rows: FloatArray, of: SlotArray, i: int) -> Lanes:
+    """Return a number of each of the rows at `of[i]` and the places behind it, shape (n, 4).
+
+    Each row holds its number four times, so that no number moves from lane to lane: the corner
+    forces of tetrahedra take 0.96 times as long as with a gather of single numbers.
+    """
+    places = of[i : i + width_of(rows)]
+    return rows[places, np.arange(len(places)) % 4]
+
+
+@_compiled(values_of_rows, types.Array, types.Array, types.Integer, result=_kind_of)
+def _values_of_rows(builder: Any, rows: _Array, of: _Array, i: Any) -> Any:
+    n = _vector_of(rows).count
+    found = [_row(builder, rows, builder.load(of.at(builder.add(i, i.type(k))))) for k in range(n)]
+    for lane in range(1, 4):
+        order = [4 + c if c == lane else c for c in range(4)]
+        for first in range(0, n, 4):
+            found[first] = _shuffled(builder, found[first], found[first + lane], order)
+    made = found[::4]
+    while len(made) > 1:
+        made = [
+            _shuffled(builder, a, b, range(2 * a.type.count))
+            for a, b in zip(made[::2], made[1::2], strict=True)
+        ]
+    return made[0]
+
+
 def sum_of_eight_rows(rows: FloatArray, of: SlotArray, i: int) -> Point:
     """Return the sum of rows `of[i]` to `of[i + 7]` of an array of shape (n, 4), in doubles."""
     return np.asarray(_tree(list(rows[of[i : i + 8]])), dtype=np.float64)
@@ -216,7 +256,8 @@ def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
     """Write the points of a vector into as many rows, lane k into row `i + row_of_lane(k)`.
 
     Args:
-        rows: Rows of four, shape (n, 4); the last column becomes 0.
+        rows: Rows of four, shape (n, 4); the last column becomes z again, which takes two
+            operations less than 0.
         i: First row.
         x: First coordinates.
         y: Second coordinates.
@@ -224,30 +265,27 @@ def store_rows(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
     """
     n = len(x)
     for lane in range(n):
-        rows[i + row_of_lane(lane, n)] = (x[lane], y[lane], z[lane], 0.0)
+        rows[i + row_of_lane(lane, n)] = (x[lane], y[lane], z[lane], z[lane])
 
 
 for _kind in _BOTH:
 
     @_compiled(store_rows, types.Array, types.Integer, _kind, _kind, _kind, result=types.void)
     def _store_rows(builder: Any, rows: _Array, i: Any, x: Any, y: Any, z: Any) -> None:
-        def shuffled(a: Any, b: Any, order: Any) -> Any:
-            return _shuffled(builder, a, b, order)
-
         n = x.type.count
-        zero = ir.Constant(x.type, [0.0] * n)
-        if n == 8:
-            a, b = shuffled(x, y, _EVEN), shuffled(z, zero, _EVEN)
-            c, d = shuffled(x, y, _ODD), shuffled(z, zero, _ODD)
-            orders = (a, b, _FIRST), (c, d, _FIRST), (a, b, _SECOND), (c, d, _SECOND)
-        else:
-            a, b = shuffled(x, y, _LOW), shuffled(z, zero, _LOW)
-            c, d = shuffled(x, y, _HIGH), shuffled(z, zero, _HIGH)
-            orders = (a, b, _FORMER), (a, b, _LATTER), (c, d, _FORMER), (c, d, _LATTER)
-        for k, order in enumerate(orders):
+        first, second = (_EVEN, _ODD) if n == 8 else (_LOW, _HIGH)
+        low, high = _shuffled(builder, x, y, first), _shuffled(builder, x, y, second)
+        for k in range(4):
+            # x and y of lane k of each four are in `xy`, at `at`.
+            if n == 8:
+                xy, at = (high if k % 2 else low), 2 * (k // 2)
+            else:
+                xy, at = (high if k >= 2 else low), 2 * (k % 2)
+            order = [c for q in range(0, n, 4) for c in (q + at, q + at + 1, n + q + k, n + q + k)]
             place = rows.at(builder.add(i, i.type(k * n // 4)), 4)
             pointer = builder.bitcast(place, x.type.as_pointer())
-            builder.store(shuffled(*order), pointer, align=4 * _size_of(rows.element))
+            values = _shuffled(builder, xy, z, order)
+            builder.store(values, pointer, align=4 * _size_of(rows.element))
 
 
 # functions of `tissue.core.simd` for singles

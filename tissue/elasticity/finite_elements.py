@@ -137,9 +137,10 @@ class Solid(Arrays, two_precisions=True):
     fastest: IntCell
     """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
     pressure: FloatArray
-    """Scratch: lam (J - 1) of each node [Pa], tension is positive; shape (nodes,)."""
+    """Scratch: lam (J - 1) of each node [Pa], tension is positive, four times in a row
+    (`values_of_rows`); shape (nodes, 4)."""
     forces: FloatArray
-    """Scratch: force on each corner of each tetrahedron [N], as rows x, y, z, 0, shape (rows, 4):
+    """Scratch: force on each corner of each tetrahedron [N], as rows x, y, z, z, shape (rows, 4):
     a block of rows that are 0, then for each block its corners 0, 1, 2 and 3 (`corner_row`)."""
 
 
@@ -212,7 +213,7 @@ def no_solid(
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
         fastest=-1,
-        pressure=np.zeros(n_nodes, real),
+        pressure=aligned(4 * n_nodes, real).reshape(-1, 4),
         forces=aligned(4 * 4 * room, real).reshape(-1, 4),
     )
 

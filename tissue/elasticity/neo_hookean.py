@@ -26,13 +26,14 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, Point, point, point_of
 from tissue.core.simd_blocks import (
     alike,
-    gathered_alike,
     load_block,
     points_of_rows,
     store_block,
+    store_everywhere,
     store_row,
     store_rows,
     sum_of_eight_rows,
+    values_of_rows,
     width_of,
 )
 from tissue.core.simd_gather import natural, sum_of_eight
@@ -154,7 +155,7 @@ def pressures_in_order(solid: Solid, begin: int, end: int) -> None:
 @inlined
 def _write_pressure(solid: Solid, node: int) -> None:
     grown = dilated_around(solid, node) / solid.node_volume[node]
-    solid.pressure[node] = solid.law.lam_of_nodes * grown
+    store_everywhere(solid.pressure, node, solid.law.lam_of_nodes * grown)
 
 
 @kernel
@@ -235,7 +236,7 @@ def pressure_of(solid: Solid, block: int, v: Lanes) -> Lanes:
     """Return the elastic pressures p of the tetrahedra of a block [Pa], of volumes `v` [m3]."""
     law, p = solid.law, alike(0.0, v)
     if law.lam_of_nodes != 0.0:
-        p = alike(0.25, v) * _pressure_of_nodes(solid, block, v)
+        p = alike(0.25, v) * _pressure_of_nodes(solid, block)
     if law.lam_of_tetrahedra != 0.0:
         p = p + alike(law.lam_of_tetrahedra, v) * own_dilatation(solid, block, v)
     return p
@@ -375,14 +376,13 @@ def gradient_of_shape(solid: Solid, block: int, first: int) -> Vec3:
 
 
 @inlined
-def _pressure_of_nodes(solid: Solid, block: int, a: Lanes) -> Lanes:
-    """Return the sum of the pressures at the four nodes [Pa], as a vector of the type of `a`."""
-    width = width_of(solid.shape)
+def _pressure_of_nodes(solid: Solid, block: int) -> Lanes:
+    """Return the sum of the pressures at the four nodes [Pa]."""
+    width, rows, nodes = width_of(solid.shape), solid.pressure, solid.nodes
     first = 4 * width * block
-    ends = gathered_alike(a, solid.pressure, solid.nodes, first)
-    ends = ends + gathered_alike(a, solid.pressure, solid.nodes, first + width)
-    others = gathered_alike(a, solid.pressure, solid.nodes, first + 2 * width)
-    return ends + (others + gathered_alike(a, solid.pressure, solid.nodes, first + 3 * width))
+    ends = values_of_rows(rows, nodes, first) + values_of_rows(rows, nodes, first + width)
+    others = values_of_rows(rows, nodes, first + 2 * width)
+    return ends + (others + values_of_rows(rows, nodes, first + 3 * width))
 
 
 @inlined

@@ -12,10 +12,12 @@ from tissue.core.simd_blocks import (
     points_of_rows,
     row_of_lane,
     store_block,
+    store_everywhere,
     store_row,
     store_rows,
     sum_of_eight_rows,
     sum_of_lanes,
+    values_of_rows,
     width_of,
 )
 from tissue.core.simd_gather import larger, largest, where_larger
@@ -108,7 +110,21 @@ def test_rows_are_gathered_as_points_and_stored_again_as_rows(real):
     np.testing.assert_array_equal(compiled, plain)
     places = [width + row_of_lane(lane, width) for lane in range(width)]
     assert sorted(places) == list(range(width, 2 * width))
-    np.testing.assert_array_equal(plain[places], rows[OF[:width]])
+    np.testing.assert_array_equal(plain[places], rows[OF[:width]][:, [0, 1, 2, 2]])
+
+
+def spread_values(values, of, rows, out):
+    for i in range(40):
+        store_everywhere(rows, i, float(values[i]))
+    store_block(out, 0, values_of_rows(rows, of, 8))
+
+
+def test_numbers_of_rows_are_gathered(real):
+    values, rows = filled(40, real), aligned(4 * 40, real).reshape(-1, 4)
+    width = 64 // values.itemsize
+    compiled, plain = both(spread_values, values, OF, rows, out=np.zeros(width, real))
+    np.testing.assert_array_equal(compiled, plain)
+    np.testing.assert_array_equal(plain, values[OF[8 : 8 + width]])
 
 
 def summed(rows, of, points, out):
