@@ -7,8 +7,6 @@ from tests import bodies, strokes
 from tests.test_penalty_contact import PENALTY, pressed_blocks
 from tissue import Material, Tissue, block
 
-pytestmark = pytest.mark.kernel
-
 
 def wake_all(tissue: Tissue) -> None:
     """Let the next search ask all nodes and all pairs of ridges."""
