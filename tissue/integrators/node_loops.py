@@ -48,7 +48,7 @@ def _acceleration(
         velocities: Their velocities [m/s].
         solid: What `is_solid` returns; a constant where this is called.
     """
-    body, surroundings = context.body, context.surroundings
+    body, surroundings, node = context.body, context.surroundings, natural(node)
     if body.fixed[node]:
         return point_of(0.0, 0.0, 0.0)
     if solid:
@@ -104,7 +104,8 @@ def third_stage(context: StepContext, h: float, begin: int, end: int) -> None:
     """Find a3: it differs from a2 by damping alone, and damping is linear in the velocities."""
     body, stages, surroundings = context.body, context.stages, context.surroundings
     time = surroundings.retardation_time
-    for i in range(begin, end):
+    for node in range(begin, end):
+        i = natural(node)
         a2 = point(stages.a2, i)
         a3 = a2
         if not body.fixed[i]:
@@ -143,7 +144,7 @@ def nystroem_first(context: StepContext, h: float, begin: int, end: int) -> None
     """Find a1 of the nodes from `begin` to `end`, and where the second stage has them."""
     if is_solid(context):
         for i in range(begin, end):
-            _nystroem_first(context, h, natural(i), True)
+            _nystroem_first(context, h, i, True)
     else:
         for i in range(begin, end):
             _nystroem_first(context, h, i, False)
@@ -167,7 +168,7 @@ def nystroem_second(context: StepContext, h: float, begin: int, end: int) -> Non
     """Find a2 of the nodes from `begin` to `end`, and where the third stage has them."""
     if is_solid(context):
         for i in range(begin, end):
-            _nystroem_second(context, h, natural(i), True)
+            _nystroem_second(context, h, i, True)
     else:
         for i in range(begin, end):
             _nystroem_second(context, h, i, False)
@@ -193,7 +194,7 @@ def nystroem_third(context: StepContext, h: float, begin: int, end: int) -> None
     """Find a3 of the nodes from `begin` to `end`, and where they are after the step."""
     if is_solid(context):
         for i in range(begin, end):
-            _nystroem_third(context, h, natural(i), True)
+            _nystroem_third(context, h, i, True)
     else:
         for i in range(begin, end):
             _nystroem_third(context, h, i, False)
@@ -235,7 +236,7 @@ def kick(context: StepContext, h: float, begin: int, end: int) -> None:
     x, v = context.body.positions, context.body.velocities
     if is_solid(context):
         for i in range(begin, end):
-            now = point(v, i) + times(h, _acceleration(context, natural(i), x, v, True))
+            now = point(v, i) + times(h, _acceleration(context, i, x, v, True))
             store_point(v, i, now)
             store_point(x, i, point(x, i) + times(0.5 * h, now))
     else:
