@@ -133,7 +133,7 @@ class Elasticity:
         """
         if not self._has_solid:
             return 0.0
-        return strained_frequency(self.arrays, body, body.positions, visits, limit)
+        return strained_frequency(self.arrays, body, body.positions, visits, limit, False)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""

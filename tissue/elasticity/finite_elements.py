@@ -134,6 +134,8 @@ class Solid(Arrays, two_precisions=True):
     """Test in which `strained_frequency_squared` was written, shape (nodes,)."""
     test: IntCell
     """Number of the test of strained frequencies."""
+    are_gradients_known: IntCell
+    """1 where `gradient` and `dilated` are those at the body's positions, for the next step."""
     fastest: IntCell
     """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
     pressure: FloatArray
@@ -212,6 +214,7 @@ def no_solid(
         dilatation_test=np.zeros(n_nodes, dtype=np.int64),
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
+        are_gradients_known=0,
         fastest=-1,
         pressure=aligned(4 * n_nodes, real).reshape(-1, 4),
         forces=aligned(4 * 4 * room, real).reshape(-1, 4),
@@ -224,7 +227,7 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     prony = list(zip(solid.relaxing_shares, solid.relaxation_times, strict=True))
     room = (n_nodes, n_tetrahedra, pool)
     larger = no_solid(solid.law, *room, prony=prony, is_single=is_single)
-    cells = {"used", "test", "fastest"}
+    cells = {"used", "test", "are_gradients_known", "fastest"}
     for name in cells:
         setattr(larger, name, getattr(solid, name))
     for name in set(Solid.__annotations__) - cells - {"law", "every"}:

@@ -32,6 +32,7 @@ from tissue.elasticity.neo_hookean import (
     displacements,
     gradient_of_displacement,
     gradient_of_shape,
+    known_gradient,
 )
 from tissue.elasticity.stiffening import (
     stiffening_factor,
@@ -61,7 +62,12 @@ class StepLimit(NamedTuple):
 
 @kernel
 def strained_frequency(
-    elastic: Elastic, body: Body, points: FloatArray, visits: Visits, limit: StepLimit
+    elastic: Elastic,
+    body: Body,
+    points: FloatArray,
+    visits: Visits,
+    limit: StepLimit,
+    is_known: bool,
 ) -> float:
     """Return a bound on w^2 of the tetrahedra as they are deformed [1/s2].
 
@@ -71,21 +77,23 @@ def strained_frequency(
         points: Where the nodes are [m].
         visits: For searches.
         limit: It need not be nearer to the truth than the number of steps asks for.
+        is_known: Whether `displacement_gradients` was run there, and gradients are kept.
     """
     solid = elastic.solid
     width, highest, allowed, fastest = width_of(solid.shape), 0.0, limit.allowed, -1
     solid.test += 1
     law, blocks = solid.law, n_blocks(solid, body.n_tetrahedra)
-    displacements(solid, body, points, solid.every, 0, body.n_nodes)
+    if not is_known:
+        displacements(solid, body, points, solid.every, 0, body.n_nodes)
     if stiffens(law):
         # Before any bound is evaluated at a node: that takes all tetrahedra around it.
         for block in range(blocks):
-            _write_stiffness(solid, block, *gradient_of_displacement(solid, block))
+            _write_stiffness(solid, block, *_gradient(solid, block, is_known))
     if 0 <= solid.fastest < body.n_tetrahedra:
         highest = _bound_at_nodes(elastic, body, points, visits, solid.fastest)
         fastest, allowed = solid.fastest, _allowed_for(limit, highest)
     for block in range(blocks):
-        growth = _growth(solid, block, *gradient_of_displacement(solid, block))
+        growth = _growth(solid, block, *_gradient(solid, block, is_known))
         at_rest = _highest_at_rest(elastic.frequency_squared, solid, block, growth)
         bound, further = growth * at_rest, _further(solid.tested_growth, block, growth)
         if stiffens(law):
@@ -111,6 +119,14 @@ def strained_frequency(
                     highest, fastest, allowed = found, t, _allowed_for(limit, found)
     solid.fastest = fastest if highest > limit.allowed else -1
     return highest
+
+
+@inlined
+def _gradient(solid: Solid, block: int, is_known: bool) -> tuple[Vec3, Vec3, Vec3]:
+    """Return the rows of H of the tetrahedra of a block; see `strained_frequency`."""
+    if is_known:
+        return known_gradient(solid, block)
+    return gradient_of_displacement(solid, block)
 
 
 @kernel

@@ -28,6 +28,7 @@ from tissue.core.jit import kernel
 from tissue.integrators.node_loops import is_solid
 from tissue.integrators.runge_kutta import apply_outer_forces
 from tissue.integrators.shared_loops import (
+    DEFORMED,
     DISPLACED,
     DISPLACEMENTS,
     DISPLACEMENTS_2,
@@ -65,7 +66,9 @@ def three_stage_nystroem(
     is_moving, is_displaced = context.supports.is_moving == 1, is_solid(context)
     x1, v1, w1 = body.positions, body.velocities, WEIGHTS[0]
     apply_outer_forces(context, edge, x1, v1, at + INSTANTS[0] * share, share * w1, dt)
-    deform_shared(context, DISPLACEMENTS)
+    solid = context.elastic.solid
+    deform_shared(context, DEFORMED if solid.are_gradients_known == 1 else DISPLACEMENTS)
+    solid.are_gradients_known = 0
     if is_moving:
         add_support_work(context, x1, v1, h * w1)
     run_loop(context, NYSTROEM_FIRST, h)

@@ -43,6 +43,8 @@ DISPLACEMENTS, DISPLACEMENTS_2, DISPLACEMENTS_LAST, PRESSURES = 3, 4, 5, 6
 """Loops over nodes; displacements of the body, of `Stages.positions` and of `last_positions`."""
 DISPLACED = -1
 """Stands for a loop of displacements where the loop before has written them."""
+DEFORMED = -2
+"""Stands for it where gradients are known, too (`Solid.are_gradients_known`)."""
 FIRST_STAGE, SECOND_STAGE, THIRD_STAGE, FOURTH_STAGE = 7, 8, 9, 10
 """Loops over nodes of the Runge-Kutta method on two levels."""
 NYSTROEM_FIRST, NYSTROEM_SECOND, NYSTROEM_THIRD = 11, 12, 13
@@ -117,14 +119,16 @@ def deform_shared(context: StepContext, loop_of_displacements: int) -> None:
 
     Args:
         context: What takes part.
-        loop_of_displacements: Says at which positions; `DISPLACED` where that is not needed.
+        loop_of_displacements: Says at which positions; `DISPLACED` or `DEFORMED` where that is
+            not needed.
     """
     elastic = context.elastic
     if elastic.has_tetrahedra:
         solid = elastic.solid
-        if loop_of_displacements != DISPLACED:
+        if loop_of_displacements >= 0:
             run_loop(context, loop_of_displacements, 0.0)
-        run_loop(context, GRADIENTS, 0.0)
+        if loop_of_displacements != DEFORMED:
+            run_loop(context, GRADIENTS, 0.0)
         if has_averaged_volumes(solid):
             run_loop(context, PRESSURES, 0.0)
         run_loop(context, CORNER_FORCES, 0.0)

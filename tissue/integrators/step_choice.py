@@ -16,10 +16,12 @@ from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.elasticity.internal_forces import Surroundings
+from tissue.elasticity.neo_hookean import keeps_gradients
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
-from tissue.integrators.stability import damping_rate, stable_step
+from tissue.integrators.shared_loops import DISPLACEMENTS, GRADIENTS, run_loop
+from tissue.integrators.stability import NYSTROEM, damping_rate, stable_step
 from tissue.integrators.step_context import StepContext
 from tissue.mesh.bounding_boxes import largest_speed
 
@@ -169,7 +171,19 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
         n = STEPS_BETWEEN_STRAIN_BOUNDS
     choice.n_steps = n
     choice.done += n
+    elastic.solid.are_gradients_known = 1 if _knows_gradients(choice, context) else 0
     return True
+
+
+@kernel
+def _knows_gradients(choice: StepChoice, context: StepContext) -> bool:
+    """Return whether the bound on the strained body and the first stage share their gradients.
+
+    Position Verlet moves the nodes before it evaluates forces.
+    """
+    elastic = context.elastic
+    has_tetrahedra: bool = elastic.has_tetrahedra == 1
+    return choice.method == NYSTROEM and has_tetrahedra and keeps_gradients(elastic.solid)
 
 
 @kernel
@@ -213,9 +227,12 @@ def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -
     """
     elastic, body, visits = context.elastic, context.body, context.visits
     method, surroundings = choice.method, choice.surroundings
-    strained = 0.0
+    strained, is_known = 0.0, _knows_gradients(choice, context)
+    if is_known:
+        run_loop(context, DISPLACEMENTS, 0.0)
+        run_loop(context, GRADIENTS, 0.0)
     if elastic.has_tetrahedra == 1:
-        strained = strained_frequency(elastic, body, body.positions, visits, limit)
+        strained = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
     highest = max(choice.least, strained + limit.added)
     step: float = stable_step(method, elastic, highest, surroundings)
     if not stiffens(elastic.solid.law) or math.isinf(step):  # infinite: every node is held
@@ -224,6 +241,6 @@ def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -
     seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
     for i in range(body.n_nodes):
         store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
-    strained = max(strained, strained_frequency(elastic, body, ahead, visits, limit))
+    strained = max(strained, strained_frequency(elastic, body, ahead, visits, limit, False))
     step = stable_step(method, elastic, max(choice.least, strained + limit.added), surroundings)
     return step
