@@ -27,7 +27,7 @@ from tissue.core.vec3 import vec3
 from tissue.cutting.blade_path import Path, path_travel
 from tissue.geometry.aabb import box_between, overlap
 from tissue.mesh.body import Body
-from tissue.mesh.point_location import TetrahedronGrid, list_appended, list_moved
+from tissue.mesh.point_location import TetrahedronGrid, fits, list_appended, list_moved
 from tissue.mesh.star import Visits
 
 NOT_SEARCHED: Final = 0
@@ -71,7 +71,7 @@ class BladeContext(Arrays):
 def _list_tetrahedra(context: BladeContext, nodes: IntArray, n: int) -> bool:
     """List in the grid where the tetrahedra are now; return whether there was room."""
     body, grid = context.body, context.grid
-    if len(grid.listed_at) != len(body.positions) or len(grid.cells) != len(body.tetrahedra):
+    if not fits(grid, body):
         return False
     around = context.blade.queue
     if not list_moved(body, context.visits, grid, nodes, n, around):

@@ -8,7 +8,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import path_travel, resampled
 from tissue.cutting.incision import CutHooks, Incision
-from tissue.mesh.point_location import build_grid
+from tissue.mesh.point_location import build_grid, list_appended
 
 
 def cut_along(
@@ -43,6 +43,8 @@ def cut_along(
             points = (1.0 - at) * rows[i - 1] + at * rows[i]
             direction = Vec3(*((1.0 - at) * forward[i - 1] + at * forward[i]).tolist())
             body, visits = hooks.mesh()  # after a cut perhaps another body, with more room
+            if not list_appended(body, body.rest, grid):
+                grid = build_grid(body, body.rest, 0.0)
             prescribe_path(path, body, grid, points, direction)
             if incision.detect(body, visits, path_travel(incision.path)):
                 incision.cut(hooks)

@@ -7,7 +7,6 @@ from tissue.cutting.blade_path import Path
 from tissue.mesh.body import Body, walk
 from tissue.mesh.point_location import (
     TetrahedronGrid,
-    list_appended,
     tetrahedron_at,
     tetrahedron_in_box,
 )
@@ -36,11 +35,10 @@ def prescribe_path(
     Args:
         path: Written; its last end is the new start.
         body: The tissue.
-        grid: Where its tetrahedra are at rest; appended ones are listed.
+        grid: Where its tetrahedra are at rest.
         points: Points of the edge in the body at rest [m], shape (n, 3).
         forward: Unit vector in which the edge cuts, in the body at rest.
     """
-    list_appended(body, body.rest, grid)
     n = len(path.member)
     along = sub(vec3(points, n - 1), vec3(points, 0))
     normal = cross(forward, along)

@@ -115,8 +115,20 @@ def _no_cells(n: int) -> SlotArray:
 
 
 @kernel
+def fits(grid: TetrahedronGrid, body: Body) -> bool:
+    """Return whether the grid has room for all nodes and tetrahedra that the body has room for."""
+    n_nodes, n_tetrahedra = len(body.positions), len(body.tetrahedra)
+    return len(grid.listed_at) == n_nodes and len(grid.cells) == n_tetrahedra
+
+
+@kernel
 def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> bool:
-    """List the tetrahedra that were appended since the last call; return whether there was room."""
+    """List the tetrahedra that were appended since the last call; return whether there was room.
+
+    There is none for a body whose arrays have grown since the grid was built.
+    """
+    if not fits(grid, body):
+        return False
     while grid.n_listed < body.n_tetrahedra:
         t = grid.n_listed
         for k in range(4):

@@ -8,6 +8,7 @@ from tests.tissue.kernels_of import cut_of
 from tissue.core.vec3 import Vec3
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
+from tissue.mesh.body import grown_body
 from tissue.mesh.bounding_boxes import write_bounds
 from tissue.mesh.point_location import (
     build_grid,
@@ -95,6 +96,15 @@ def test_points_are_found_after_nodes_went_to_and_fro(cut):
         cut.body.positions[:n] += random.uniform(-2.0, 2.0, 3) * MARGIN
         assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
         expect_found(cut.body, cells, seed)
+
+
+def test_a_grid_has_no_room_for_a_body_whose_arrays_have_grown(cut):
+    body, cells = cut.body, build_grid(cut.body, cut.body.positions, MARGIN)
+    n_nodes, n_tetrahedra = len(body.positions), len(body.tetrahedra)
+    for room in ((2 * n_nodes, n_tetrahedra), (n_nodes, 2 * n_tetrahedra)):
+        larger = grown_body(body, *room)
+        assert not list_appended(larger, larger.positions, cells)
+    assert list_appended(body, body.positions, cells)
 
 
 def test_points_are_found_in_tetrahedra_that_were_appended(cut):
