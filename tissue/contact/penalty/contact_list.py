@@ -16,7 +16,7 @@ from tissue.contact.penalty.contact_rows import (
 )
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion, sort_by_faces
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
-from tissue.contact.penalty.search_state import SearchState, are_many_loud
+from tissue.contact.penalty.search_state import SearchState, are_many_moving
 from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
@@ -43,18 +43,18 @@ def find_due(search: SearchState, is_anew: bool) -> int:
         is_anew: Whether pairs have just been updated.
     """
     pairs, ways, n = search.pairs, search.ways, 0
-    is_quiet = not is_anew and ways.n_loud == 0
+    is_quiet = not is_anew and ways.n_moving == 0
     if is_quiet and search.n_due == 0 and ways.quiet_way < search.all_calm_until:
         return 0
-    all_calm_until, asks_all = math.inf, is_anew or are_many_loud(search)
+    all_calm_until, asks_all = math.inf, is_anew or are_many_moving(search)
     if not asks_all:
-        _tell_of_loud_faces(search)
+        _note_moving_faces(search)
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
         search.is_due[node] = 0
         is_calm = not asks_all and ways.quiet_way < search.calm_until[node]
-        is_loud = ways.loud_at[node] == ways.frame or pairs.heard_at[node] == ways.frame
-        if is_calm and not is_loud:
+        is_moving = ways.moved_at[node] == ways.frame or pairs.face_moved_at[node] == ways.frame
+        if is_calm and not is_moving:
             all_calm_until = min(all_calm_until, search.calm_until[node])
             continue
         slack = _least_slack(search, node)
@@ -70,10 +70,10 @@ def find_due(search: SearchState, is_anew: bool) -> int:
 
 
 @kernel
-def _tell_of_loud_faces(search: SearchState) -> None:
+def _note_moving_faces(search: SearchState) -> None:
     """Note at nodes which of them are paired with a face of which a corner has moved much."""
-    pairs, loud, now = search.pairs, search.ways.loud_at, search.ways.frame
-    if search.ways.n_loud == 0:
+    pairs, moved_at, now = search.pairs, search.ways.moved_at, search.ways.frame
+    if search.ways.n_moving == 0:
         return
     # Faces that a cut has just made may be more than there is room for; they are in no pair.
     n = min(search.faces.n_places, len(pairs.is_active))
@@ -82,9 +82,9 @@ def _tell_of_loud_faces(search: SearchState) -> None:
         if pairs.is_active[at] == 0:
             continue
         a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
-        if loud[a] == now or loud[b] == now or loud[c] == now:
+        if moved_at[a] == now or moved_at[b] == now or moved_at[c] == now:
             for i in range(pairs.face_begin[at], pairs.face_begin[at + 1]):
-                pairs.heard_at[pairs.of_face[i]] = now
+                pairs.face_moved_at[pairs.of_face[i]] = now
 
 
 @kernel

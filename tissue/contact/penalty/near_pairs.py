@@ -26,7 +26,7 @@ _OF_NODES = (
     "lost_at",
     "is_lost",
     "found_in",
-    "heard_at",
+    "face_moved_at",
     "moved",
     "begin",
     "end",
@@ -72,7 +72,7 @@ class NearPairs(Arrays):
     found_in: IntArray
     """Round of `lost_nodes` in which each node was last found to be lost, shape (node
     capacity,)."""
-    heard_at: IntArray
+    face_moved_at: IntArray
     """Search in which a corner of a face that a node is paired with last moved much, shape (node
     capacity,)."""
     moved: IntArray

@@ -50,7 +50,7 @@ class NodeWays(Arrays):
     """Number of the search, from 1."""
     n_known: IntCell
     """Number of nodes that were there in the last search."""
-    n_loud: IntCell
+    n_moving: IntCell
     """Number of nodes of faces that moved much since the last search."""
     quiet_way: FloatCell
     """How much nearer four quiet nodes can have brought two sides so far [m]."""
@@ -66,7 +66,7 @@ class NodeWays(Arrays):
     """Radius of the ball of each node [m], shape (node capacity,)."""
     way: FloatArray
     """How far each node has gone so far [m], shape (node capacity,)."""
-    loud_at: IntArray
+    moved_at: IntArray
     """Search in which each node last moved much, shape (node capacity,)."""
     node_size: float
     """Mean node size [m]."""
@@ -77,7 +77,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
     return NodeWays(
         frame=0,
         n_known=0,
-        n_loud=0,
+        n_moving=0,
         quiet_way=0.0,
         largest_way=np.inf,
         before=np.zeros((n_nodes, 3)),
@@ -85,14 +85,14 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         displacement=np.zeros((n_nodes, 3)),
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),
-        loud_at=np.zeros(n_nodes, np.int64),
+        moved_at=np.zeros(n_nodes, np.int64),
         node_size=float(node_size),
     )
 
 
 def grown_node_ways(ways: NodeWays, n_nodes: int) -> NodeWays:
     """Return the motion with room for `n_nodes`."""
-    of_nodes = ("before", "reference", "displacement", "radius", "way", "loud_at")
+    of_nodes = ("before", "reference", "displacement", "radius", "way", "moved_at")
     return ways.replaced(**{name: grown(getattr(ways, name), n_nodes) for name in of_nodes})
 
 
@@ -103,7 +103,7 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
         store(ways.before, node, vec3(body.positions, node))
     ways.n_known = body.n_nodes
     ways.frame += 1
-    quiet, most, result, n_loud = _QUIET * ways.node_size, 0.0, IN_BALL, 0
+    quiet, most, result, n_moving = _QUIET * ways.node_size, 0.0, IN_BALL, 0
     for i in range(n):
         node = nodes[i]
         p = vec3(body.positions, node)
@@ -118,10 +118,10 @@ def measure_ways(ways: NodeWays, body: Body, nodes: IntArray, n: int) -> int:
         if way <= quiet:
             most = max(most, way)
         else:
-            ways.loud_at[node] = ways.frame
-            n_loud += 1
+            ways.moved_at[node] = ways.frame
+            n_moving += 1
     ways.quiet_way += 4.0 * most
-    ways.n_loud = n_loud
+    ways.n_moving = n_moving
     return result
 
 

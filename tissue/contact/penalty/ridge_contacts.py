@@ -6,7 +6,7 @@ from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, sort_by_ridges
 from tissue.contact.penalty.ridge_touch import ridge_touch_of
-from tissue.contact.penalty.search_state import SearchState, are_many_loud
+from tissue.contact.penalty.search_state import SearchState, are_many_moving
 from tissue.core.jit import kernel
 from tissue.core.vec3 import store, vec3
 from tissue.mesh.body import Body
@@ -23,15 +23,15 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
     """
     found, ways, has_changed = search.ridge_pairs, search.ways, False
     is_calm = ways.quiet_way < found.calm_until
-    if not is_calm or are_many_loud(search):
+    if not is_calm or are_many_moving(search):
         _measure_ridges(search)
         if search.is_anew == 1:
             _sort_contacts(search, forces)
         found.calm_until = math.inf
         for k in range(found.n_pairs):
             has_changed = _look_if_moved(search, forces, body, k) or has_changed
-    elif ways.n_loud > 0:
-        has_changed = _look_at_loud_ridges(search, forces, body)
+    elif ways.n_moving > 0:
+        has_changed = _look_at_moving_ridges(search, forces, body)
     return has_changed or bool(found.n_touching < found.n_contacts)
 
 
@@ -45,7 +45,7 @@ def _measure_ridges(search: SearchState) -> None:
 
 
 @kernel
-def _look_at_loud_ridges(search: SearchState, forces: PenaltyForces, body: Body) -> bool:
+def _look_at_moving_ridges(search: SearchState, forces: PenaltyForces, body: Body) -> bool:
     """Look at the pairs of ridges of which an end moved much; see `find_touching_ridges`."""
     found, ridges, ways, has_changed = search.ridge_pairs, search.ridges, search.ways, False
     _measure_ridges(search)
@@ -53,7 +53,7 @@ def _look_at_loud_ridges(search: SearchState, forces: PenaltyForces, body: Body)
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
         a, b = ridges.node[edge, 0], ridges.node[edge, 1]
-        if ways.loud_at[a] != ways.frame and ways.loud_at[b] != ways.frame:
+        if ways.moved_at[a] != ways.frame and ways.moved_at[b] != ways.frame:
             continue
         for e in range(ridges.first_pair[edge], ridges.first_pair[edge + 1]):
             k = found.of_ridge[e]

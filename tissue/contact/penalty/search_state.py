@@ -10,8 +10,8 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
 
-_MANY_LOUD = 4
-"""One over the share of loud nodes from which on it is cheaper to ask all."""
+_MANY_MOVING = 4
+"""One over the share of moving nodes from which on it is cheaper to ask all."""
 
 
 class SearchState(Arrays):
@@ -86,6 +86,6 @@ class SearchState(Arrays):
 
 
 @kernel
-def are_many_loud(search: SearchState) -> bool:
+def are_many_moving(search: SearchState) -> bool:
     """Whether so many nodes moved much that all are asked."""
-    return bool(_MANY_LOUD * search.ways.n_loud > search.pairs.n_nodes)
+    return bool(_MANY_MOVING * search.ways.n_moving > search.pairs.n_nodes)
