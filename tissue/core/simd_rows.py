@@ -70,7 +70,15 @@ def _rows_of_three(builder: Any, rows: _Array, i: Any) -> Any:
 
 
 def store_rows_of_three(rows: FloatArray, i: int, x: Lanes, y: Lanes, z: Lanes) -> None:
-    """Write rows `i` to `i + 7` of an array of shape (n, 3), given by columns."""
+    """Write eight rows of an array of shape (n, 3).
+
+    Args:
+        rows: The array.
+        i: First row.
+        x: First column of the rows.
+        y: Second column.
+        z: Third column.
+    """
     for column, values in enumerate((x, y, z)):
         rows[i : i + WIDTH, column] = values
 

@@ -22,7 +22,7 @@ from tissue.geometry.aabb import Aabb, box_at, empty_box, store_box, with_point
 N_ROWS = 9
 """Rows of eight numbers for each eight of a level."""
 
-HIGH, FACING = 3, 6
+HIGH, DIRECTION = 3, 6
 """The first of the rows for the highest corners of boxes, behind those for the lowest; and for what
 faces alike: the middle of all directions, over the cosine with an asking one above which nothing
 there can touch, or 0."""
@@ -40,7 +40,7 @@ class Level(Arrays):
     """Things, blocks or groups, eight at a time: what each encloses.
 
     Of each eight there are nine rows of eight numbers: the lowest corners of
-    boxes, the highest (`HIGH`), and what faces alike (`FACING`).
+    boxes, the highest (`HIGH`), and what faces alike (`DIRECTION`).
     """
 
     rows: FloatArray
@@ -111,7 +111,15 @@ def new_block_tree(capacity: int) -> BlockTree:
 
 @inlined
 def enter(tree: BlockTree, item: int, box: Aabb, direction: Vec3, is_marked: bool) -> None:
-    """Enter a thing; `direction` is of any length. `arrange` is called after the last."""
+    """Enter a node or a ridge; `arrange` is called after the last.
+
+    Args:
+        tree: Written.
+        item: Its number.
+        box: The box around it [m].
+        direction: Where it faces, of any length.
+        is_marked: Whether queries for marked ones find it.
+    """
     i = tree.n_items
     tree.n_items += 1
     tree.item[i] = item
@@ -205,9 +213,9 @@ def _near(level: Level, i: int, box: Aabb, direction: Vec3, length: float, least
         larger(_gap(rows, at + WIDTH, low.y, high.y), _gap(rows, at + 2 * WIDTH, low.z, high.z)),
     )
     along = (
-        lanes(direction.x) * load_lanes(rows, at + FACING * WIDTH)
-        + lanes(direction.y) * load_lanes(rows, at + (FACING + 1) * WIDTH)
-        + lanes(direction.z) * load_lanes(rows, at + (FACING + 2) * WIDTH)
+        lanes(direction.x) * load_lanes(rows, at + DIRECTION * WIDTH)
+        + lanes(direction.y) * load_lanes(rows, at + (DIRECTION + 1) * WIDTH)
+        + lanes(direction.z) * load_lanes(rows, at + (DIRECTION + 2) * WIDTH)
     )
     is_out = larger_bits(apart, lanes(0.0)) | larger_bits(along, lanes(length))
     return ~is_out & larger_bits(load_lanes(level.mark, WIDTH * i), lanes(least))
@@ -337,7 +345,7 @@ def _write_hull(level: Level, i: int, box: Aabb, middle: Vec3, least: float, ali
     rows[at], rows[at + WIDTH], rows[at + 2 * WIDTH] = low.x, low.y, low.z
     at += HIGH * WIDTH
     rows[at], rows[at + WIDTH], rows[at + 2 * WIDTH] = high.x, high.y, high.z
-    at += (FACING - HIGH) * WIDTH
+    at += (DIRECTION - HIGH) * WIDTH
     rows[at], rows[at + WIDTH] = facing * middle.x, facing * middle.y
     rows[at + 2 * WIDTH] = facing * middle.z
     store(level.middle, i, middle)

@@ -21,7 +21,7 @@ import numpy as np
 from tissue.contact.penalty.eight_contacts import (
     combined,
     four_of,
-    nodes_of,
+    points_of_contacts,
     share_within,
     smaller,
     three_of,
@@ -216,14 +216,14 @@ def _eight_forces(
         c: The first of them.
     """
     zero, tau = lanes(0.0), lanes(forces.retardation_time)
-    x, w = nodes_of(forces.node, positions, c), four_of(forces.weight, c)
+    x, w = points_of_contacts(forces.node, positions, c), four_of(forces.weight, c)
     across, normal = combined(w, x), three_of(forces.normal, c)
     along = dot(normal, across)
     free = load_lanes(forces.offset, c) + load_lanes(forces.height, c) - along
     if larger_bits(free, zero) == 0:
         return 0
     depth = smaller(free, load_lanes(forces.largest_depth, c))
-    k, v = load_lanes(forces.stiffness, c), nodes_of(forces.node, velocities, c)
+    k, v = load_lanes(forces.stiffness, c), points_of_contacts(forces.node, velocities, c)
     velocity = combined(w, v)
     approach = dot(normal, velocity)
     force = larger(k * (depth - tau * approach), zero)
@@ -311,7 +311,10 @@ def _end_eight(
 ) -> None:
     """End a substep for eight contacts, of which `n` are there, from `c` on."""
     zero, half, w = lanes(0.0), lanes(0.5), four_of(forces.weight, c)
-    across, normal = combined(w, nodes_of(forces.node, positions, c)), three_of(forces.normal, c)
+    across, normal = (
+        combined(w, points_of_contacts(forces.node, positions, c)),
+        three_of(forces.normal, c),
+    )
     along, height = dot(normal, across), load_lanes(forces.height, c)
     is_there = lanes(float(n)) - load_lanes(forces.place, 0)
     free = where_larger(is_there, zero, load_lanes(forces.offset, c) + height - along, zero)
@@ -335,7 +338,7 @@ def _end_eight(
     before = three_of(forces.impulse, c)
     has_begun = where_larger(is_there, zero, dot(before, before), zero)
     if larger_bits(has_begun, zero) != 0:
-        v, began = nodes_of(forces.node, velocities, c), three_of(forces.velocity, c)
+        v, began = points_of_contacts(forces.node, velocities, c), three_of(forces.velocity, c)
         both = add(began, combined(four_of(forces.spread, c), v))
         work = where_larger(has_begun, zero, half * dot(before, both), zero)
         forces.work += sum_of_lanes(work)

@@ -22,7 +22,7 @@ class Four(NamedTuple):
     d: Lanes
 
 
-class Nodes(NamedTuple):
+class FourPoints(NamedTuple):
     """A vector for each of the four nodes of a contact, of eight contacts."""
 
     a: Vec3
@@ -53,9 +53,9 @@ def _of_column(values: FloatArray, node: IntArray, c: int, q: int) -> Vec3:
 
 
 @inlined
-def nodes_of(node: IntArray, values: FloatArray, c: int) -> Nodes:
+def points_of_contacts(node: IntArray, values: FloatArray, c: int) -> FourPoints:
     """Return nodal values at the nodes of eight contacts."""
-    return Nodes(
+    return FourPoints(
         _of_column(values, node, c, 0),
         _of_column(values, node, c, 1),
         _of_column(values, node, c, 2),
@@ -64,7 +64,7 @@ def nodes_of(node: IntArray, values: FloatArray, c: int) -> Nodes:
 
 
 @inlined
-def combined(w: Four, x: Nodes) -> Vec3:
+def combined(w: Four, x: FourPoints) -> Vec3:
     """Return sums over the four nodes, weighted."""
     return axpy(w.d, x.d, axpy(w.c, x.c, axpy(w.b, x.b, scale(w.a, x.a))))
 

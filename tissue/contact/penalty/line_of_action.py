@@ -8,7 +8,7 @@ ridges, where its line meets both.
 Eight contacts at a time: each number is a vector of eight.
 """
 
-from tissue.contact.penalty.eight_contacts import Four, Nodes
+from tissue.contact.penalty.eight_contacts import Four, FourPoints
 from tissue.core.jit import inlined
 from tissue.core.simd import WIDTH, Lanes, lanes
 from tissue.core.simd_gather import larger, larger_bits, where_larger
@@ -27,7 +27,7 @@ ALL = (1 << WIDTH) - 1
 
 
 @inlined
-def weights_on_line(x: Nodes, listed: Four, force: Vec3) -> Four:
+def weights_on_line(x: FourPoints, listed: Four, force: Vec3) -> Four:
     """Return the weights of the nodes for forces that turn nothing.
 
     Args:
@@ -69,7 +69,7 @@ def _if_near(found: Four, listed: Four) -> Four:
 
 
 @inlined
-def _of_node_and_face(x: Nodes, force: Vec3) -> Four:
+def _of_node_and_face(x: FourPoints, force: Vec3) -> Four:
     """Return the weights of a node and of the point of a face on a line through the node."""
     ab, ac, from_a = sub(x.c, x.b), sub(x.d, x.b), sub(x.a, x.b)
     area = cross(ab, ac)
@@ -84,7 +84,7 @@ def _of_node_and_face(x: Nodes, force: Vec3) -> Four:
 
 
 @inlined
-def _of_ridges(x: Nodes, force: Vec3) -> Four:
+def _of_ridges(x: FourPoints, force: Vec3) -> Four:
     """Return the weights of the points of the edges ab and cd on one line along a force."""
     u, v, apart = sub(x.b, x.a), sub(x.d, x.c), sub(x.a, x.c)
     across = cross(u, v)
