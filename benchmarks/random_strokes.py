@@ -1,11 +1,12 @@
 """Random strokes across the organ, and whether its motion stays stable.
 
-Usage: PYTHONPATH=. python benchmarks/random_strokes.py [--strokes N] [--seed N]
+Usage: PYTHONPATH=. python benchmarks/random_strokes.py [--strokes N] [--seed N] [--overlaps]
 
 Each stroke crosses the organ at a random position, direction, lean, depth and speed, at steps of
 1 ms with default settings; loose pieces land on a floor. The table shows the body and its motion
 after each stroke. The last line says whether the run stayed stable: every number finite, no node
-much faster than the blade, and all at rest again within a second of the last stroke.
+much faster than the blade, and all at rest again within a second of the last stroke. With
+`--overlaps` it is then also looked how deep the faces of cuts lie in other parts of the body.
 """
 
 import argparse
@@ -15,6 +16,7 @@ from dataclasses import replace
 from time import thread_time
 
 import numpy as np
+from overlaps import report
 from rich.console import Console
 from rich.table import Table
 
@@ -42,6 +44,7 @@ def main() -> int:
     parser.add_argument("--relaxation", choices=("global", "verlet", "hierarchical"), default=None)
     parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     parser.add_argument("--law", choices=("springs", "neo_hookean"), default=None)
+    parser.add_argument("--overlaps", action="store_true")
     options = parser.parse_args()
     scene = SCENES["organ"]
     material = scene.material
@@ -87,6 +90,8 @@ def main() -> int:
     console.print(
         f"{'stable' if is_stable else 'NOT STABLE'}; fastest node at the end {final_speed:.4f} m/s"
     )
+    if options.overlaps:
+        report(tissue)
     return 0 if is_stable else 1
 
 
