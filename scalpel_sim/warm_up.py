@@ -22,6 +22,7 @@ from bridge import TissueFrame
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.scenes import PARENCHYMA, PHANTOM, Scene
 from scalpel_sim.strokes.stroke import Stroke
@@ -41,11 +42,11 @@ from tissue import (
 
 _SIDE = 0.02
 """Length of the sides of the block that is cut [m]."""
-N_STEPS = 20
+N_STEPS = 40
 _DT = 1e-3
 _SECONDS_PER_LOOK = 0.1
 """How often the progress of the processes is looked at [s]."""
-USUAL_NUMBER = 645
+USUAL_NUMBER = 705
 """How many kernels a set has, about: the end of the progress bar, unless there are more."""
 
 Progress = Callable[[int, int], None]
@@ -170,19 +171,21 @@ def _note(kernels: KernelSet) -> None:
 
 
 def _cut(kernels: KernelSet, dt: float = _DT) -> None:
-    """Settle a small block, cut it half through in steps of `dt` [s], and measure it."""
+    """Settle a small block, cut it through in steps of `dt` [s], and measure it."""
     tissue = kernels.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE)), "left,right")
     if dt > 0.0:
         tissue.settle()
     before = _edge(-0.1)
-    for fraction in np.linspace(-0.1, 0.6, N_STEPS):
+    for fraction in np.linspace(-0.1, 1.5, N_STEPS):
         after = _edge(fraction)
         result = tissue.step(BladeSweep(before, after), dt)
         before = after
     wall_times = WallTimes(*result.stage_times, 0.0, 0.0)
     wrenches = (result.wrench, result.wrench)
     FrameRows(TissueFrame()).row_of(0.0, before, *wrenches, result, wall_times)
+    force_parts(result.contacts, before.forward)
     tissue.step(None, dt)
+    tissue.chunks()
     tissue.surface()
     tissue.snapshot()
     tissue.n_pieces()
@@ -214,7 +217,9 @@ def _lead_an_arm() -> None:
     """Let a hand lead an arm beside any tissue."""
     arm = Arm()
     pose = arm.blade.segment()
-    StrokeFollower(arm.hand, Stroke((0.0, 1.0), (pose, pose)), TissueFrame()).lead(0.0)
+    stroke = Stroke((0.0, 1.0), (pose, pose))
+    StrokeFollower(arm.hand, stroke, TissueFrame()).lead(0.0)
+    stroke.pose(0.0)
     CollisionMonitor(arm).check()
 
 

@@ -32,7 +32,7 @@ counted = Compilations()
 event.register("numba:compile", counted)
 from scalpel_sim import SCENES, prepare
 simulation = prepare(SCENES["grid2"])
-simulation.run(0.01)
+simulation.run(simulation.stroke.duration)
 import scalpel_sim
 print(scalpel_sim.__file__)
 print(counted.names)
