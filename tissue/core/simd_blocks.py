@@ -297,6 +297,7 @@ def _register_singles() -> None:
     kind = LANES_OF_SINGLES
 
     _compiled(simd_gather.larger, kind, kind, result=kind)(simd_gather._larger)
+    _compiled(simd_gather.any_above, kind, kind, result=types.boolean)(simd_gather._any_above)
     _compiled(simd_gather.where_larger, kind, kind, kind, kind, result=kind)(
         simd_gather._where_larger
     )

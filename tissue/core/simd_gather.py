@@ -1,4 +1,4 @@
-"""Sums over the row of a node, indices, and the larger and the largest of the numbers of vectors.
+"""Sums over the row of a node, indices, and comparisons of the numbers of vectors.
 
 As in `tissue.core.simd` each function is also a plain Python function, which runs when the JIT is
 off.
@@ -82,6 +82,18 @@ def largest(a: Lanes) -> float:
 def _largest(builder: Any, a: Any) -> Any:
     values = [builder.extract_element(a, _I32(k)) for k in range(WIDTH)]
     return _tree(values, lambda b, c: builder.select(builder.fcmp_ordered(">", b, c), b, c))
+
+
+def any_above(a: Lanes, b: Lanes) -> bool:
+    """Return whether `a` is above `b` in any lane, or cannot be compared with it (NaN)."""
+    return bool((~(a <= b)).any())
+
+
+@_compiled(any_above, LANES, LANES, result=types.boolean)
+def _any_above(builder: Any, a: Any, b: Any) -> Any:
+    bits = ir.IntType(a.type.count)
+    above = builder.bitcast(builder.fcmp_unordered(">", a, b), bits)
+    return builder.icmp_unsigned("!=", above, bits(0))
 
 
 def larger_bits(a: Lanes, b: Lanes) -> int:

@@ -9,7 +9,7 @@ from tissue.elasticity.frequency_refinement import tighten
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import LIMIT_STEP, MassScaling, scale_masses
 from tissue.elasticity.springs import bound_frequencies
-from tissue.elasticity.strained_frequency import forget_tests
+from tissue.elasticity.tested_frequency import bound_tetrahedra, forget_tests
 from tissue.mesh.body import Body
 from tissue.mesh.changes import largest_frequency
 from tissue.mesh.star import Visits
@@ -55,6 +55,8 @@ def update_frequencies(
     highest = largest_frequency(body, springs.frequency_squared, changed, n)
     elastic.highest_of_dampers = max(elastic.highest_of_dampers, highest)
     bound_both_frequencies(elastic, changed, n)
+    if elastic.has_tetrahedra == 1:
+        bound_tetrahedra(elastic, body, changed, n)
     highest = largest_frequency(body, elastic.frequency_squared, changed, n)
     elastic.highest = max(elastic.highest, highest)
 

@@ -103,21 +103,31 @@ class Solid(Arrays, two_precisions=True):
     dilated: FloatArray
     """Scratch: V (J - 1) of tetrahedron t [m3], behind a first block of zeros."""
     growth: FloatArray
-    """Scratch of `strained_frequency` and of energies: growth of the faces of tetrahedron t,
+    """Scratch of `quick_frequency` and of energies: growth of the faces of tetrahedron t,
     behind a first block."""
     tested_growth: FloatArray
     """Growth of the faces of tetrahedron t when the bound was last evaluated at its nodes, behind a
-    first block (`strained_frequency`); 1 where it was not."""
+    first block (`tested_frequency`); 1 where it was not."""
     tested_bound: FloatArray
     """Bound on w^2 at the nodes of tetrahedron t that was found then [1/s2], behind a first
     block; 0 where it was not evaluated."""
+    inverse_bound: FloatArray
+    """One over the highest bound on w^2 at rest at the nodes of tetrahedron t [s2], behind a first
+    block. Where a node has got mass since, it is smaller than that."""
+    shear_share: FloatArray
+    """Share of that bound that the shear part of the law alone would have [1]."""
+    strained_bound: FloatArray
+    """Scratch of `quick_frequency`: a quick bound on w^2 of tetrahedron t [1/s2], behind a first
+    block."""
+    fast_blocks: IntArray
+    """Scratch of `quick_frequency`: blocks with a tetrahedron that may be too fast."""
     stiffening: FloatArray
-    """Scratch of `strained_frequency`, under laws that stiffen: shear modulus of tetrahedron t over
+    """Scratch of `quick_frequency`, under laws that stiffen: shear modulus of tetrahedron t over
     that at rest, behind a first block (`tissue.elasticity.stiffening`)."""
     stiffening_slope: FloatArray
-    """Scratch of `strained_frequency`, under laws that stiffen: how fast that rises."""
+    """Scratch of `quick_frequency`, under laws that stiffen: how fast that rises."""
     stiffness: FloatArray
-    """Scratch of `strained_frequency`, under laws that stiffen: a bound on the stiffness of the
+    """Scratch of `quick_frequency`, under laws that stiffen: a bound on the stiffness of the
     shear part over that at rest."""
     tested_stiffness: FloatArray
     """`stiffness` at the test of `tested_growth`."""
@@ -125,9 +135,9 @@ class Solid(Arrays, two_precisions=True):
     """The part of `frequency_squared` that the shear part of the law alone would have [1/s2],
     under laws that stiffen; shape (nodes,)."""
     strained_dilatation: FloatArray
-    """Scratch of `strained_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
+    """Scratch of `tested_frequency`: `dilatation` as the body is deformed, shape (nodes,)."""
     strained_frequency_squared: FloatArray
-    """Scratch of `strained_frequency`: `frequency_squared` as it is deformed, shape (nodes,)."""
+    """Scratch of `tested_frequency`: `frequency_squared` as it is deformed, shape (nodes,)."""
     dilatation_test: IntArray
     """Test in which `strained_dilatation` was written, shape (nodes,)."""
     frequency_test: IntArray
@@ -136,6 +146,8 @@ class Solid(Arrays, two_precisions=True):
     """Number of the test of strained frequencies."""
     are_gradients_known: IntCell
     """1 where `gradient` and `dilated` are those at the body's positions, for the next step."""
+    is_bound_current: IntCell
+    """1 where no tetrahedron has changed since `strained_frequency` was run for the next step."""
     fastest: IntCell
     """Tetrahedron that set the number of steps in the last test, or -1 where none did."""
     pressure: FloatArray
@@ -204,6 +216,10 @@ def no_solid(
         growth=aligned(room, real),
         tested_growth=tested_growth,
         tested_bound=aligned(room, real),
+        inverse_bound=aligned(room, real),
+        shear_share=aligned(room, real),
+        strained_bound=aligned(room, real),
+        fast_blocks=np.zeros(blocks, dtype=np.int64),
         stiffening=aligned(room, real),
         stiffening_slope=aligned(room, real),
         stiffness=aligned(room, real),
@@ -215,6 +231,7 @@ def no_solid(
         frequency_test=np.zeros(n_nodes, dtype=np.int64),
         test=0,
         are_gradients_known=0,
+        is_bound_current=0,
         fastest=-1,
         pressure=aligned(4 * n_nodes, real).reshape(-1, 4),
         forces=aligned(4 * 4 * room, real).reshape(-1, 4),
@@ -227,7 +244,7 @@ def grown_solid(solid: Solid, n_nodes: int, n_tetrahedra: int, pool: int) -> Sol
     prony = list(zip(solid.relaxing_shares, solid.relaxation_times, strict=True))
     room = (n_nodes, n_tetrahedra, pool)
     larger = no_solid(solid.law, *room, prony=prony, is_single=is_single)
-    cells = {"used", "test", "are_gradients_known", "fastest"}
+    cells = {"used", "test", "are_gradients_known", "is_bound_current", "fastest"}
     for name in cells:
         setattr(larger, name, getattr(solid, name))
     for name in set(Solid.__annotations__) - cells - {"law", "every"}:

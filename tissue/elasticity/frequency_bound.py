@@ -224,7 +224,7 @@ def bounds_of_node(
     """Return the bounds on w^2 at a node with its tetrahedra deformed.
 
     The shear part of the law is taken at rest; under a law that stiffens with the modulus
-    `solid.stiffening` and its slope (`tissue.elasticity.strained_frequency`).
+    `solid.stiffening` and its slope (`tissue.elasticity.quick_frequency`).
 
     Args:
         solid: Weights and the row of the node.

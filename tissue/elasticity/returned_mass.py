@@ -10,7 +10,7 @@ from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import Elastic, bound_both_frequencies
 from tissue.elasticity.mass_scaling import scale_masses
 from tissue.elasticity.springs import bound_frequencies
-from tissue.elasticity.strained_frequency import forget_tests
+from tissue.elasticity.tested_frequency import bound_tetrahedra, forget_tests
 from tissue.mesh.body import Body
 
 
@@ -31,6 +31,7 @@ def return_mass(elastic: Elastic, body: Body, every: IntArray) -> None:
     scaling.lost += before - _energy_of_added_mass(body)
     bound_frequencies(body, elastic.springs, every, n)
     bound_both_frequencies(elastic, every, n)
+    bound_tetrahedra(elastic, body, every, n)
     forget_tests(elastic.solid, every, n)
 
 

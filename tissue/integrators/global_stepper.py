@@ -71,7 +71,7 @@ def method_of(options: IntegratorOptions, law: Law) -> Method:
 
 
 class GlobalStepper:
-    """All nodes together. An `Integrator` without memory.
+    """All nodes together: an `Integrator` that remembers the last bound on the strained body.
 
     Args:
         method: How they are moved.
@@ -167,10 +167,11 @@ class GlobalStepper:
         return relaxation
 
     def mesh_changed(self, nodes: IntArray) -> None:
-        """Do nothing: no step depends on the one before."""
+        """Do nothing: `Solid.is_bound_current` says that bounds have changed."""
 
     def body_moved(self, body: Body) -> None:
-        """Do nothing: no step depends on the one before."""
+        """Forget the bound on the strained body: it is another one now."""
+        self._choice = None
 
     def grow(self, n_nodes: int) -> None:
         """Do nothing: there are no arrays."""

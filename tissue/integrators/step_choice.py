@@ -15,19 +15,34 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.neo_hookean import keeps_gradients
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.integrators.damping import LONGEST_INTERVAL, SLOW_DAMPING
-from tissue.integrators.shared_loops import DISPLACEMENTS, GRADIENTS, run_loop
-from tissue.integrators.stability import NYSTROEM, damping_rate, stable_step
+from tissue.integrators.shared_loops import (
+    DISPLACEMENTS,
+    DISPLACEMENTS_LAST,
+    GRADIENTS,
+    run_loop,
+)
+from tissue.integrators.stability import NYSTROEM, VERLET, damping_rate, stable_step
 from tissue.integrators.step_context import StepContext
 from tissue.mesh.bounding_boxes import largest_speed
 
 STEPS_BETWEEN_STRAIN_BOUNDS: Final = 2
 """Steps between two bounds on the frequencies of the strained body. A lip that snaps back, or is
 pinched, is as much shorter within a frame of eight steps as an element is long."""
+
+MOTION_BETWEEN_STRAIN_BOUNDS: Final = 0.01
+"""How far a node may move from one bound to the next where there are more steps between them, as a
+share of the node size. Strains change by some percent then. A bound takes as long as half a step:
+without this a body at rest would be looked at as often as one that swings."""
+
+_SAME_LIMIT = 1e-6
+"""Relative difference of two limits of w^2 below which they are the same: they differ by rounding
+where steps are as long as before."""
 
 LONGEST_MOTION: Final = 0.5
 """How far the fastest node moves in a step, as a share of the node size, at most. A bound on
@@ -58,6 +73,8 @@ class StepChoice(Arrays):
     """Length of the time step [s]."""
     begin: FloatCell
     """Fraction of the time step at which the part begins."""
+    part_seconds: FloatCell
+    """Length of the last part [s]."""
     part_end: FloatCell
     """Fraction of the time step at which the part ends."""
     end: FloatCell
@@ -74,6 +91,14 @@ class StepChoice(Arrays):
     """Steps that the motion asks for in the rest of the increment."""
     at_rest: FloatCell
     """Steps that the body at rest would take for it."""
+    strained: FloatCell
+    """The last bound on w^2 of the tetrahedra as they are deformed [1/s2]."""
+    allowed: FloatCell
+    """Up to which w^2 it was not brought near the truth [1/s2]."""
+    moved: FloatCell
+    """How far nodes have moved since, at most [m]."""
+    speed: FloatCell
+    """Speed of the fastest node at the begin of the part [m/s]."""
     node_size: float
     """Mean node size of the body [m]."""
     surroundings: Surroundings
@@ -93,6 +118,7 @@ def new_step_choice(
         is_unstable=0,
         dt=0.0,
         begin=0.0,
+        part_seconds=0.0,
         part_end=0.0,
         end=0.0,
         span=0.0,
@@ -101,6 +127,10 @@ def new_step_choice(
         added=0.0,
         asked=0.0,
         at_rest=0.0,
+        strained=0.0,
+        allowed=0.0,
+        moved=math.inf,
+        speed=0.0,
         node_size=node_size,
         surroundings=surroundings,
         no_frequency=np.zeros(n_nodes),
@@ -153,9 +183,9 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
     span = choice.dt * (choice.end - choice.begin)
     longest = stable_step(choice.method, elastic, choice.least, surroundings)
     n, highest = _without_another_step(choice.least, longest, span)
+    _note_motion(choice, context)
     step = _strained_step(choice, context, StepLimit(highest - choice.added, choice.added, n))
-    moved = largest_speed(context.body) * span / choice.node_size
-    choice.asked = max(span / step, moved / LONGEST_MOTION)
+    choice.asked = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
     choice.at_rest = max(span / longest, 1.0)
     # A comparison with nan is false.
     if not choice.asked <= MOST_STEPS * choice.at_rest:
@@ -169,21 +199,17 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
         share = STEPS_BETWEEN_STRAIN_BOUNDS / n
         choice.part_end = choice.begin + share * (choice.end - choice.begin)
         n = STEPS_BETWEEN_STRAIN_BOUNDS
+    choice.part_seconds = choice.dt * (choice.part_end - choice.begin)
     choice.n_steps = n
     choice.done += n
-    elastic.solid.are_gradients_known = 1 if _knows_gradients(choice, context) else 0
     return True
 
 
 @kernel
-def _knows_gradients(choice: StepChoice, context: StepContext) -> bool:
-    """Return whether the bound on the strained body and the first stage share their gradients.
-
-    Position Verlet moves the nodes before it evaluates forces.
-    """
-    elastic = context.elastic
-    has_tetrahedra: bool = elastic.has_tetrahedra == 1
-    return choice.method == NYSTROEM and has_tetrahedra and keeps_gradients(elastic.solid)
+def _note_motion(choice: StepChoice, context: StepContext) -> None:
+    """Note how fast the fastest node is, and how far nodes moved in the part before."""
+    before, choice.speed = choice.speed, largest_speed(context.body)
+    choice.moved += max(before, choice.speed) * choice.part_seconds
 
 
 @kernel
@@ -217,30 +243,70 @@ def _without_another_step(
 def _strained_step(choice: StepChoice, context: StepContext, limit: StepLimit) -> float:
     """Return the largest stable step [s] until the next bound on the strained body.
 
-    Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes will
-    be then: an exponential law can double its modulus in two steps.
-
     Args:
         choice: What the steps depend on.
         context: Body and forces.
         limit: The strained body is looked at no closer than the number of steps asks for.
     """
+    elastic, strained = context.elastic, 0.0
+    elastic.solid.are_gradients_known = 0
+    if elastic.has_tetrahedra == 1:
+        if not _is_bound_known(choice, elastic.solid, limit):
+            _bound_strained_body(choice, context, limit)
+        strained = choice.strained
+    highest = max(choice.least, strained + limit.added)
+    step: float = stable_step(choice.method, elastic, highest, choice.surroundings)
+    return step
+
+
+@kernel
+def _is_bound_known(choice: StepChoice, solid: Solid, limit: StepLimit) -> bool:
+    """Return whether the last bound on the strained body still holds, and is as near the truth."""
+    if solid.is_bound_current == 0:
+        return False
+    is_near = choice.strained <= limit.allowed or choice.allowed <= limit.allowed * (
+        1.0 + _SAME_LIMIT
+    )
+    return is_near and choice.moved <= MOTION_BETWEEN_STRAIN_BOUNDS * choice.node_size
+
+
+@kernel
+def _bound_strained_body(choice: StepChoice, context: StepContext, limit: StepLimit) -> None:
+    """Bound the frequencies of the body as it is deformed.
+
+    Where the law stiffens as tissue is stretched, the bound is also evaluated where the nodes will
+    be at the next one: an exponential law can double its modulus in two steps. The Nystroem method
+    begins where the bound is evaluated, and its first stage shares the gradients. Position Verlet
+    evaluated them last half a step before: where no tetrahedron has changed since, they are used.
+    """
     elastic, body, visits = context.elastic, context.body, context.visits
-    method, surroundings = choice.method, choice.surroundings
-    strained, is_known = 0.0, _knows_gradients(choice, context)
-    if is_known:
+    solid, strained = elastic.solid, 0.0
+    keeps = keeps_gradients(solid)
+    is_known = (
+        keeps
+        and choice.method == VERLET
+        and solid.is_bound_current == 1
+        and not math.isinf(choice.moved)
+    )
+    if stiffens(solid.law):
+        highest = max(choice.least, choice.strained + limit.added)  # as it was last
+        step = stable_step(choice.method, elastic, highest, choice.surroundings)
+        if not math.isinf(step):  # every node is held
+            ahead, v = context.stages.last_positions, body.velocities
+            seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
+            for i in range(body.n_nodes):
+                store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
+            if keeps:
+                run_loop(context, DISPLACEMENTS_LAST, 0.0)
+                run_loop(context, GRADIENTS, 0.0)
+            strained = strained_frequency(elastic, body, ahead, visits, limit, keeps)
+    if keeps and choice.method == NYSTROEM:
         run_loop(context, DISPLACEMENTS, 0.0)
         run_loop(context, GRADIENTS, 0.0)
-    if elastic.has_tetrahedra == 1:
-        strained = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
-    highest = max(choice.least, strained + limit.added)
-    step: float = stable_step(method, elastic, highest, surroundings)
-    if not stiffens(elastic.solid.law) or math.isinf(step):  # infinite: every node is held
-        return step
-    ahead, v = context.stages.last_positions, body.velocities
-    seconds = STEPS_BETWEEN_STRAIN_BOUNDS * step
-    for i in range(body.n_nodes):
-        store_point(ahead, i, point(body.positions, i) + times(seconds, point(v, i)))
-    strained = max(strained, strained_frequency(elastic, body, ahead, visits, limit, False))
-    step = stable_step(method, elastic, max(choice.least, strained + limit.added), surroundings)
-    return step
+        solid.are_gradients_known = 1
+        is_known = True
+    found = strained_frequency(elastic, body, body.positions, visits, limit, is_known)
+    choice.strained = max(strained, found)
+    choice.allowed = limit.allowed
+    choice.moved = 0.0
+    solid.is_bound_current = 1

@@ -10,11 +10,8 @@ from tissue.core.jit import is_compiling
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import no_springs
-from tissue.elasticity.strained_frequency import (
-    StepLimit,
-    forget_tests,
-    strained_frequency,
-)
+from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
+from tissue.elasticity.tested_frequency import FURTHER, bound_tetrahedra, forget_tests
 from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel
@@ -34,7 +31,7 @@ STRETCHES = {
 def elastic_of(solid):
     """Return the elastic arrays of a solid without springs."""
     n = len(solid.body.rest)
-    return Elastic(
+    elastic = Elastic(
         springs=no_springs(n, 0),
         solid=solid.solid,
         has_springs=0,
@@ -45,6 +42,8 @@ def elastic_of(solid):
         scaling=no_mass_scaling(),
         frequency_squared=solid.solid.frequency_squared.copy(),
     )
+    bound_tetrahedra(elastic, solid.body, solid.solid.every, solid.body.n_nodes)
+    return elastic
 
 
 def above(allowed):
@@ -162,8 +161,9 @@ def test_a_bound_holds_whatever_was_allowed_before(stretch, law):
 
 @pytest.mark.parametrize("law", ["averaged", "exponential"])
 @pytest.mark.parametrize("stretch", STRETCHES.values(), ids=STRETCHES)
-def test_the_number_of_steps_is_that_of_the_bound_near_the_truth(stretch, law):
-    """Once more steps are needed, bounds that need no more than those stay wide."""
+def test_steps_are_no_more_than_for_bounds_five_percent_above_those_near_the_truth(stretch, law):
+    """Once more steps are needed, bounds that need no more than those stay wide; and what is
+    deformed nearly as at the last test keeps what was found then. A bound tests 64 tetrahedra."""
     solid = solid_of(MESH, LAWS[law])
     body, elastic = solid.body, elastic_of(solid)
     visits = no_visits(len(body.rest), len(body.tetrahedra))
@@ -171,14 +171,18 @@ def test_the_number_of_steps_is_that_of_the_bound_near_the_truth(stretch, law):
     allowed, added = 1.1 * solid.frequency() ** 2, 0.3 * solid.frequency() ** 2
     limit = StepLimit(allowed, added, 2)
     per_step = np.sqrt(allowed + added) / limit.n_steps
+
+    def steps_for(strained):
+        return np.ceil(np.sqrt(max(strained, allowed) + added) / per_step - 1e-9)
+
     for _ in range(5):
         shake = 0.05 * np.ptp(MESH.positions) * random.normal(size=MESH.positions.shape)
         body.positions[: len(shake)] = MESH.positions @ stretch.T + shake
-        steps = []
-        for asked in (limit, above(allowed)):
-            strained = strained_frequency(elastic, body, body.positions, visits, asked, False)
-            steps.append(np.ceil(np.sqrt(max(strained, allowed) + added) / per_step - 1e-9))
-        assert steps[0] == steps[1] >= limit.n_steps
+        *_, quick, near = (
+            strained_frequency(elastic, body, body.positions, visits, asked, False)
+            for asked in (limit, limit, limit, limit, above(allowed))
+        )
+        assert limit.n_steps <= steps_for(near) <= steps_for(quick) <= steps_for(FURTHER * near)
 
 
 def test_the_bound_of_a_sheet_stretched_to_twice_its_edges_is_four_times_as_high():

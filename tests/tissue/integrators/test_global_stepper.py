@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from tests import incisions
 from tissue import Material, SolverSettings, Tissue, TissueError, block
-from tissue.integrators.step_choice import LONGEST_MOTION
+from tissue.integrators.step_choice import LONGEST_MOTION, MOTION_BETWEEN_STRAIN_BOUNDS
 
 SOLID = Material(law="neo_hookean", poisson_ratio=0.45, retardation_time=0.0)
 FRAME = 1e-3
@@ -38,3 +39,30 @@ def test_motion_that_became_unstable_ends_with_an_error_and_can_be_read(method, 
         for _ in range(10):
             tissue.step(None, FRAME)
     assert tissue.snapshot().positions.shape == (tissue.n_nodes, 3)
+
+
+def bounds_in(tissue, n_frames):
+    """Return how often the frequencies of the strained body are bounded in some frames."""
+    solid = tissue._system.elasticity.arrays.solid
+    before = solid.test
+    for _ in range(n_frames):
+        tissue.step(None, FRAME)
+    return tissue._system.elasticity.arrays.solid.test - before
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_body_is_bounded_again_once_it_has_moved_by_a_part_of_its_node_size(method):
+    tissue = moving(0.0, method)
+    speed = 0.4 * MOTION_BETWEEN_STRAIN_BOUNDS * tissue.node_size / FRAME
+    assert bounds_in(tissue, 10) == 1
+    assert 4 <= bounds_in(moving(speed, method), 10) <= 5
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_body_that_was_cut_or_settled_is_bounded_again(method):
+    tissue = moving(0.0, method)
+    tissue.step(None, FRAME)
+    tissue.incise(*incisions.incision(block((2, 2, 2)), "tilted", 0))
+    assert bounds_in(tissue, 1) > 0
+    tissue.settle()
+    assert bounds_in(tissue, 1) > 0
