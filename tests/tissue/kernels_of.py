@@ -146,7 +146,14 @@ class Network(NamedTuple):
             blade=self.blade,
             contacts=new_penalty_forces(0, 0.0, 0.0),
             surroundings=self.surroundings,
-            damping=Damping(interval=1, owed=0.0, dissipated=0.0, retardation_time=0.0, drag=0.0),
+            damping=Damping(
+                interval=1,
+                owed=0.0,
+                dissipated=0.0,
+                rate_uncut=0.0,
+                retardation_time=0.0,
+                drag=0.0,
+            ),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             supports=supports_at_rest(),
             loose=no_loose_pieces(),
@@ -186,6 +193,7 @@ class Network(NamedTuple):
             interval=interval,
             owed=0.5 * interval * h if is_running else 0.0,
             dissipated=0.0,
+            rate_uncut=0.0,
             retardation_time=around.retardation_time,
             drag=around.drag,
         )

@@ -23,10 +23,15 @@ from tissue.integrators.stages import Stages
 from tissue.mesh.body import Body
 
 SLOW_DAMPING = 0.5
-"""Highest rate of damping times two steps up to which damping acts once in two steps. What dies
-away fastest does so at 1.39 times its rate then, a mode of single elements. In liver the product is
-0.33 with four steps of Verlet in a millisecond, and 0.67 with two of the Nystroem method: with
-these, damping acts in each."""
+"""Highest rate of damping times two steps up to which damping acts once in two steps; with Verlet
+that of the uncut body. What dies away fastest does so at 1.39 times its rate then, a mode of single
+elements. In liver the product is 0.33 with four steps of Verlet in a millisecond, and 0.67 with two
+of the Nystroem method: with these, damping acts in each."""
+
+FASTEST_DECAY = 1.0
+"""The same for the body as it is cut, with Verlet: up to here damping stops no motion in less than
+the interval, and turns none round. Slivers die away faster than by their rate then. After the
+organ's cut, whose slivers double the highest rate, it is 0.67 with four steps."""
 
 LONGEST_INTERVAL = 2
 """Steps between two times that damping acts, at most. What turns by pi in an interval, at the same
@@ -45,6 +50,8 @@ class Damping(Arrays):
     dissipated: FloatCell
     """Energy lost in viscosity and drag so far [J]; where damping acts in every stage it is counted
     for an account of energy alone."""
+    rate_uncut: float
+    """Highest rate at which damping stops a motion of the body before it is cut [1/s]."""
     retardation_time: float
     """Damping along each edge, per stiffness of the edge [s]; 0 where it acts in every stage."""
     drag: float

@@ -17,7 +17,7 @@ from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
-from tissue.integrators.stability import stable_step
+from tissue.integrators.stability import damping_rate, stable_step
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.support_state import supports_at_rest
@@ -75,6 +75,7 @@ class System:
             interval=1,
             owed=0.0,
             dissipated=0.0,
+            rate_uncut=damping_rate(elasticity.arrays, surroundings),
             retardation_time=damped.retardation_time,
             drag=damped.drag,
         )
