@@ -259,10 +259,12 @@ def bounds_of_node(
             + solid.weight[solid.nodes[node_place(solid, t, 3)]] * norm(n3)
         )
         at_rest = n0 if k == 0 else (n1 if k == 1 else (n2 if k == 2 else n3))
-        n1, n2, n3, _ = normals(body, points, t)
-        normal = n1 if k == 1 else (n2 if k == 2 else n3)
-        if k == 0:
-            normal = scale(-1.0, add(n1, add(n2, n3)))
+        normal = at_rest
+        if is_strained:
+            n1, n2, n3, _ = normals(body, points, t)
+            normal = n1 if k == 1 else (n2 if k == 2 else n3)
+            if k == 0:
+                normal = scale(-1.0, add(n1, add(n2, n3)))
         length = norm(at_rest)
         share = ratios / (36.0 * volume * weight)  # of V grad N^2 = n^2 / (36 V)
         if has_stiffened:

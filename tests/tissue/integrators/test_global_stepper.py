@@ -10,6 +10,7 @@ from tissue import Material, SolverSettings, Tissue, TissueError, block
 from tissue.integrators.step_choice import LONGEST_MOTION, MOTION_BETWEEN_STRAIN_BOUNDS
 
 SOLID = Material(law="neo_hookean", poisson_ratio=0.45, retardation_time=0.0)
+DAMPED = Material(law="neo_hookean", poisson_ratio=0.45, retardation_time=2e-3)
 FRAME = 1e-3
 METHODS = ["global", "verlet"]
 
@@ -66,3 +67,14 @@ def test_a_body_that_was_cut_or_settled_is_bounded_again(method):
     assert bounds_in(tissue, 1) > 0
     tissue.settle()
     assert bounds_in(tissue, 1) > 0
+
+
+@pytest.mark.parametrize(("factor", "interval"), [(1.0, 2), (2.0, 2), (4.0, 1)])
+def test_damping_acts_once_in_two_steps_unless_slivers_would_be_turned_round(factor, interval):
+    """The rate of the uncut body times two steps is 0.45; that of its slivers a multiple of it."""
+    tissue = Tissue(block((2, 2, 2)), DAMPED, solver=SolverSettings(relaxation="verlet"))
+    elastic, damping = tissue._system.elasticity.arrays, tissue._system.damping
+    seconds = 0.225 / damping.rate_uncut
+    elastic.highest_of_dampers *= factor
+    assert tissue.step(None, seconds).n_substeps == 1
+    assert damping.interval == interval
