@@ -13,7 +13,7 @@ from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sam
 from tissue.blade.toughness import ToughnessLaw, toughness_at
 from tissue.blade.walls import Walls, new_walls
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, sub
 from tissue.geometry.tetrahedron import Weights, interpolate
@@ -184,8 +184,14 @@ def stored_energy(
         law: Toughness of the tissue.
     """
     surplus = surplus_stretch(anchors, k, stretch, pose, law)
-    held = sub(stretch, surplus)
     stiffness: float = anchors.stiffness[k]
+    return energy_of(stiffness, stretch, surplus)
+
+
+@inlined
+def energy_of(stiffness: float, stretch: Vec3, surplus: Vec3) -> float:
+    """Return the energy of a spring [J] from its stretch and the surplus of that [m]."""
+    held = sub(stretch, surplus)
     return stiffness * (0.5 * dot(held, held) + dot(held, surplus))
 
 
@@ -206,9 +212,14 @@ def anchors_energy(anchors: Anchors, body: Body, pose: BladePose, law: Toughness
 @kernel
 def clear_anchor_forces(anchors: Anchors, body: Body, external: FloatArray) -> None:
     """Set the forces on the nodes that anchors pull on to zero."""
+    before = -1
     for k in range(len(anchors.state)):
+        t = anchors.tetrahedron[k]
+        if anchors.state[k] != ANCHORED or t == before:
+            continue
+        before = t
         for q in range(4):
-            node = body.tetrahedra[anchors.tetrahedron[k], q]
+            node = body.tetrahedra[t, q]
             external[node, 0] = external[node, 1] = external[node, 2] = 0.0
 
 

@@ -103,7 +103,7 @@ def update_faces(context: BladeContext, edge: Edge, when: float, nodes: IntArray
         return NOT_SEARCHED
     if not _list_tetrahedra(context, nodes, n):
         return GRID_IS_FULL
-    if not find_faces(blade, context.body, context.visits, context.grid, edge, when):
+    if not find_faces(blade, context.body, context.grid, edge, when):
         return NO_ROOM_FOR_FACES
     update_blunt_sides(blade, context.body, context.grid, motion_at(edge, when))
     return SEARCHED
@@ -141,7 +141,7 @@ def update_anchors(
             return NOT_SEARCHED
     if not _list_tetrahedra(context, nodes, n):
         return GRID_IS_FULL
-    anchor_entering(blade.anchors, body, context.grid, edge, when, context.slit_reach, low, high)
+    anchor_entering(blade, body, context.grid, edge, when, context.slit_reach, low, high)
     return SEARCHED
 
 

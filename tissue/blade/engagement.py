@@ -30,7 +30,7 @@ from tissue.geometry.tetrahedron import (
     normalised,
 )
 from tissue.mesh.body import CUT, Body
-from tissue.mesh.point_location import TetrahedronGrid, tetrahedron_at
+from tissue.mesh.point_location import TetrahedronGrid, tetrahedra_along
 from tissue.mesh.star import Visits
 
 _BESIDE = 0.7
@@ -167,7 +167,7 @@ def _runs_in_slit(
 
 @kernel
 def anchor_entering(
-    anchors: Anchors,
+    blade: BladeState,
     body: Body,
     grid: TetrahedronGrid,
     edge: Edge,
@@ -179,7 +179,7 @@ def anchor_entering(
     """Anchor the free samples that have entered the tissue.
 
     Args:
-        anchors: The samples.
+        blade: The anchors are written.
         body: The tissue.
         grid: Grid that lists the tetrahedra.
         edge: The cutting edge over the time step.
@@ -188,20 +188,42 @@ def anchor_entering(
         low: Lowest corner of the tissue's box [m].
         high: Highest corner of the tissue's box [m].
     """
+    anchors, found = blade.anchors, blade.queue
     n = len(anchors.state)
     pose = pose_at(edge, when)
-    for k in range(n):
-        if anchors.state[k] != FREE:
+    k = 0
+    while k < n:
+        stop = k
+        while stop < n and _may_enter(anchors, pose, stop, low, high):
+            stop += 1
+        if stop == k:
+            k += 1
             continue
-        b = sample_point(pose, k, n)
-        if not _in_box(b, low, high):
-            continue
-        t = tetrahedron_at(body, grid, body.positions, b)
-        if t >= 0:
-            w = barycentric_in(b, body.positions, body.tetrahedra, t)
-            p = interpolate(w, body.rest, body.tetrahedra, t)
-            if not is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
-                _begin_anchor(anchors, body, k, t, p, True)
+        after = tetrahedra_along(body, grid, (pose.tip, pose.heel), n, k, stop, found)
+        for sample in range(k, after):
+            if found[sample] >= 0:
+                _enter(anchors, body, pose, sample, found[sample], slit_reach)
+        k = after
+
+
+@kernel
+def _may_enter(anchors: Anchors, pose: BladePose, k: int, low: Vec3, high: Vec3) -> bool:
+    """Return whether sample `k` is free, and lies in the box from `low` to `high` [m]."""
+    return bool(
+        anchors.state[k] == FREE and _in_box(sample_point(pose, k, len(anchors.state)), low, high)
+    )
+
+
+@kernel
+def _enter(
+    anchors: Anchors, body: Body, pose: BladePose, k: int, t: int, slit_reach: float
+) -> None:
+    """Anchor sample `k` where it is, in tetrahedron `t`, unless it is in a slit there."""
+    b = sample_point(pose, k, len(anchors.state))
+    w = barycentric_in(b, body.positions, body.tetrahedra, t)
+    p = interpolate(w, body.rest, body.tetrahedra, t)
+    if not is_in_slit(body, t, p, pose.along, pose.forward, slit_reach):
+        _begin_anchor(anchors, body, k, t, p, True)
 
 
 @kernel
@@ -217,10 +239,10 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
 def any_free_in_box(anchors: Anchors, pose: BladePose, low: Vec3, high: Vec3) -> bool:
     """Return whether a free sample lies in the box from `low` to `high` [m]."""
     n = len(anchors.state)
-    for k in range(n):
-        if anchors.state[k] == FREE and _in_box(sample_point(pose, k, n), low, high):
-            return True
-    return False
+    k = 0
+    while k < n and not _may_enter(anchors, pose, k, low, high):
+        k += 1
+    return k < n
 
 
 @kernel

@@ -56,6 +56,9 @@ def begin_blade_step(
     clear_impulses(blade.totals)
     for k in range(len(anchors.state)):
         anchors.cut[k] = 0.0
+    if blade.toughness.exponent == 0.0:  # then speed does not change the energy
+        measure_speeds(anchors, edge, dt)
+        return True
     pose = pose_at(edge, 0.0)
     before = anchors_energy(anchors, body, pose, blade.toughness)
     measure_speeds(anchors, edge, dt)

@@ -155,7 +155,7 @@ class BladeInteraction:
         relocate(self.state, body, visits)
         relocate_blunt_sides(self.state, body, visits)
         if self._shape is not None:
-            forget_changed_faces(self.state.sides, change.dirty, change.n_dirty)
+            forget_changed_faces(self.state.sides, body, change.dirty, change.n_dirty)
 
     def begin_step(self, body: Body, edge: Edge, dt: float, is_checked: bool) -> bool:
         """Begin a time step: impulses are counted from zero; see `begin_blade_step`."""

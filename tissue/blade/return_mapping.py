@@ -11,6 +11,7 @@ from tissue.blade.anchors import (
     RETRACTED,
     Anchors,
     anchor_position,
+    energy_of,
     held_toughness,
     stored_energy,
     surplus_stretch,
@@ -22,6 +23,7 @@ from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.geometry.tetrahedron import (
+    Weights,
     barycentric_in,
     clipped,
     interpolate,
@@ -102,7 +104,13 @@ def set_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3) -> None:
         t: Tetrahedron that holds the point, or is near it.
         p: The point [m]; outside the tetrahedron, a point of the tetrahedron nearby is taken.
     """
-    w = clipped(barycentric_in(p, body.rest, body.tetrahedra, t))
+    _hold(anchors, body, k, t, barycentric_in(p, body.rest, body.tetrahedra, t))
+
+
+@kernel
+def _hold(anchors: Anchors, body: Body, k: int, t: int, weights: Weights) -> None:
+    """Anchor sample `k` at the point of these weights in tetrahedron `t`, or one nearby in it."""
+    w = clipped(weights)
     anchors.tetrahedron[k] = t
     anchors.weights[k, 0] = w.a
     anchors.weights[k, 1] = w.b
@@ -151,29 +159,41 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
                 continue
             totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
             anchors.state[k] = ANCHORED
-        _slip_anchor(blade, body, visits, k, stretch, pose)
+        _slip_anchor(blade, body, visits, k, a, stretch, pose)
 
 
 @kernel
 def _slip_anchor(
-    blade: BladeState, body: Body, visits: Visits, k: int, stretch: Vec3, pose: BladePose
+    blade: BladeState, body: Body, visits: Visits, k: int, a: Vec3, stretch: Vec3, pose: BladePose
 ) -> None:
-    """Slip anchor `k` along its stretch [m] back to the yield limit; count the work."""
+    """Slip an anchor back to the yield limit; count the work.
+
+    Args:
+        blade: Anchors and totals are written.
+        body: The tissue.
+        visits: For searches.
+        k: The anchor.
+        a: Where it is in the deformed body [m].
+        stretch: Vector from there to its sample of the edge [m].
+        pose: Pose of the blade.
+    """
     anchors, totals, law = blade.anchors, blade.totals, blade.toughness
     in_plane = axpy(-dot(stretch, pose.normal), pose.normal, stretch)
     distance = norm(in_plane)
     if distance == 0.0:
         return
     across = anchors.length[k] * dot(in_plane, pose.forward) / distance
-    surplus = norm(surplus_stretch(anchors, k, stretch, pose, law))
+    beyond = surplus_stretch(anchors, k, stretch, pose, law)
+    surplus = norm(beyond)
     anchors.slips[k] = surplus > 0.0
     if surplus == 0.0:
         return
-    before = stored_energy(anchors, k, stretch, pose, law)
+    before = energy_of(anchors.stiffness[k], stretch, beyond)
     spent = held_toughness(anchors, k, law) * across * surplus
-    anchors.at_skin[k] = False  # once broken, the skin is no tougher than the rest
-    slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
-    a = anchor_position(anchors, body, body.positions, k)
+    slip = surplus
+    if anchors.at_skin[k]:
+        anchors.at_skin[k] = False  # once broken, the skin is no tougher than the rest
+        slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
     _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
     if anchors.state[k] == LEFT:
         anchors.cut[k] += surplus * across
@@ -197,6 +217,10 @@ def _move_anchor(blade: BladeState, body: Body, visits: Visits, k: int, step: Ve
     anchors.slipped[k] = True
     t = anchors.tetrahedron[k]
     p = add(vec3(anchors.rest, k), to_material(body, t, step))
+    weights = barycentric_in(p, body.rest, body.tetrahedra, t)
+    if smallest_weight(weights) >= -INSIDE_TOLERANCE:  # most often it stays in its tetrahedron
+        _hold(anchors, body, k, t, weights)
+        return
     location = locate(body, visits, p, t, blade.queue)
     if location.beyond_skin:
         anchors.state[k] = LEFT

@@ -24,10 +24,10 @@ import numpy as np
 
 from tissue.blade.edge import BladeCoordinates, BladePose
 from tissue.blade_shape import BladeShape
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3, axpy, scale, vec3
+from tissue.core.vec3 import Vec3, axpy, dot, scale, vec3
 from tissue.material import Material
 from tissue.mesh.body import grown
 from tissue.mesh.faces import OUTWARD
@@ -49,6 +49,9 @@ within one step, and need shorter steps."""
 SEARCH_MARGIN = 0.5
 """Distance from the blade up to which faces are found, per mean node size: twice as far as the
 blade moves between two searches."""
+
+CLEARANCE = 1e-9
+"""Distance beyond which a face is surely out of reach of the blade [m]: above any rounding."""
 
 _FACES_AT_FIRST = 64
 """Room for faces at first; it doubles when it is used up."""
@@ -81,8 +84,6 @@ class SideContacts(Arrays):
     """Number of faces."""
     n_around: IntCell
     """Number of faces in `around`; -1 where they must be listed again."""
-    n_entries: IntCell
-    """`TetrahedronGrid.n_entries` when `around` was listed."""
     half_thickness: float
     """Half the thickness of the blade [m]; 0 for a blade that is a line."""
     slope: float
@@ -106,11 +107,16 @@ class SideContacts(Arrays):
     row_of_face: IntArray
     """Row of each face of each tetrahedron, or -1; shape (4 * n_tets,)."""
     around: IntArray
-    """Open faces in the cells of the grid that the blade's box met last, shape (capacity,)."""
+    """Open faces in the cells of the grid that the blade's box met last, in order of their numbers;
+    shape (capacity,)."""
+    node_around: IntArray
+    """Their nodes, of which the first three columns are used, shape (capacity, 4)."""
+    is_around: SlotArray
+    """1 for each tetrahedron whose open faces are in `around`; shape (n_tets,)."""
     cells: IntArray
     """First cell along each axis that the blade's box met last, then the last; shape (6,)."""
     found: IntArray
-    """Scratch: the faces that a search found, shape (capacity,)."""
+    """Scratch: the faces that a search found, in order; shape (capacity,)."""
     row_before: IntArray
     """Scratch: the row that each face found had before, or -1; shape (capacity,)."""
     states_before: ContactStates
@@ -127,7 +133,6 @@ def new_side_contacts(
     return SideContacts(
         n_faces=0,
         n_around=-1,
-        n_entries=-1,
         half_thickness=0.0 if shape is None else float(0.5 * shape.thickness),
         slope=1.0 if shape is None else float(shape.slope),
         height=0.0 if shape is None else float(shape.height),
@@ -136,6 +141,7 @@ def new_side_contacts(
         viscosity=float(material.blade_viscosity),
         margin=float(SEARCH_MARGIN * node_size),
         row_of_face=np.full(0 if thin else 4 * n_tetrahedra, -1, np.int64),
+        is_around=np.zeros(0 if thin else n_tetrahedra, np.int32),
         cells=np.full(6, -1, np.int64),
         outward=OUTWARD,
         **_rows(0 if thin else _FACES_AT_FIRST),
@@ -148,6 +154,7 @@ def _rows(capacity: int) -> dict[str, np.ndarray | ContactStates]:
         "node": np.zeros((capacity, 3), np.int64),
         "states": _new_states(capacity),
         "around": np.zeros(capacity, np.int64),
+        "node_around": np.zeros((capacity, 4), np.int64),
         "found": np.zeros(capacity, np.int64),
         "row_before": np.zeros(capacity, np.int64),
         "states_before": _new_states(capacity),
@@ -167,7 +174,7 @@ def _new_states(capacity: int) -> ContactStates:
 def with_more_faces(sides: SideContacts) -> SideContacts:
     """Return the side contacts with room for twice as many faces."""
     n = 2 * len(sides.face)
-    names = ("face", "node", "around", "found", "row_before")
+    names = ("face", "node", "around", "node_around", "found", "row_before")
     arrays = {name: grown(getattr(sides, name), n) for name in names}
     states = {name: grown(getattr(sides.states, name), n) for name in ContactStates.__annotations__}
     return sides.replaced(**arrays, states=ContactStates(**states), states_before=_new_states(n))
@@ -177,7 +184,10 @@ def grown_side_contacts(sides: SideContacts, n_tetrahedra: int) -> SideContacts:
     """Return the side contacts with room for that many tetrahedra."""
     if sides.half_thickness == 0.0:
         return sides
-    return sides.replaced(row_of_face=grown(sides.row_of_face, 4 * n_tetrahedra, -1))
+    return sides.replaced(
+        row_of_face=grown(sides.row_of_face, 4 * n_tetrahedra, -1),
+        is_around=grown(sides.is_around, n_tetrahedra),
+    )
 
 
 class Profile(NamedTuple):
@@ -252,6 +262,20 @@ def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) ->
     p = scale(CORNER, vec3(positions, node[i, q]))
     p = axpy(OTHER, vec3(positions, node[i, (q + 1) % 3]), p)
     return axpy(OTHER, vec3(positions, node[i, (q + 2) % 3]), p)
+
+
+@kernel
+def is_clear(sides: SideContacts, pose: BladePose, positions: FloatArray, i: int) -> bool:
+    """Return whether a face is farther from the blade's plane than the blade is thick anywhere."""
+    normal = pose.normal
+    side = sides.states.side[i]
+    reach = side * dot(pose.tip, normal) + sides.half_thickness + CLEARANCE
+    is_clear: bool = (
+        side * dot(vec3(positions, sides.node[i, 0]), normal) > reach
+        and side * dot(vec3(positions, sides.node[i, 1]), normal) > reach
+        and side * dot(vec3(positions, sides.node[i, 2]), normal) > reach
+    )
+    return is_clear
 
 
 @kernel

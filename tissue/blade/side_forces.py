@@ -16,20 +16,18 @@ from tissue.blade.side_contact import (
     END_SLOPE,
     OTHER,
     POINTS,
+    ContactStates,
     SideContacts,
     contact_forces,
     contact_point,
     friction_stretch,
+    is_clear,
     penetration,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, dot, vec3
+from tissue.core.vec3 import Vec3, add
 from tissue.mesh.body import Body
-
-CLEARANCE = 1e-9
-"""Distance beyond the thickness of the blade from which a face is skipped [m]: above any
-rounding."""
 
 
 @kernel
@@ -57,7 +55,7 @@ def apply_side_forces(
     seconds = share * dt
     running = running_totals(blade.totals)
     for i in range(sides.n_faces):
-        if _is_clear(sides, pose, positions, i):
+        if is_clear(sides, pose, positions, i):
             continue
         for q in range(POINTS):
             p = contact_point(sides, positions, i, q)
@@ -70,20 +68,6 @@ def apply_side_forces(
                 running = add_to_node(external, running, node, w, force, seconds)
             running = add_reaction(running, p, force, displacement_of(motion, p), share, seconds)
     store_totals(blade.totals, running)
-
-
-@kernel
-def _is_clear(sides: SideContacts, pose: BladePose, positions: FloatArray, i: int) -> bool:
-    """Return whether a face is farther from the blade's plane than the blade is thick anywhere."""
-    normal = pose.normal
-    side = sides.states.side[i]
-    reach = side * dot(pose.tip, normal) + sides.half_thickness + CLEARANCE
-    is_clear: bool = (
-        side * dot(vec3(positions, sides.node[i, 0]), normal) > reach
-        and side * dot(vec3(positions, sides.node[i, 1]), normal) > reach
-        and side * dot(vec3(positions, sides.node[i, 2]), normal) > reach
-    )
-    return is_clear
 
 
 @kernel
@@ -111,6 +95,9 @@ def apply_sliding(
     sides, totals = blade.sides, blade.totals
     states = sides.states
     for i in range(sides.n_faces):
+        if _rests(states, i) and is_clear(sides, pose, positions, i):
+            _let_go(sides, pose, positions, i)
+            continue
         stiffness = sides.stiffness * states.area[i]
         energy = 0.0
         for q in range(POINTS):
@@ -131,6 +118,24 @@ def apply_sliding(
             totals.work_of_friction += spent - kept
             energy += 0.5 * stiffness * depth * depth + kept
         states.energy[i] = energy
+
+
+@kernel
+def _rests(states: ContactStates, i: int) -> bool:
+    """Return whether no point of face `i` slid when sliding was applied last."""
+    speed = states.sliding_speed
+    return bool(speed[i, 0] == 0.0 and speed[i, 1] == 0.0 and speed[i, 2] == 0.0)
+
+
+@kernel
+def _let_go(sides: SideContacts, pose: BladePose, positions: FloatArray, i: int) -> None:
+    """Let the points of a face follow the blade that do not touch it, and spend nothing."""
+    states = sides.states
+    for q in range(POINTS):
+        at = blade_coordinates(pose, contact_point(sides, positions, i, q))
+        states.stuck_along[i, q] = at.along
+        states.stuck_behind[i, q] = at.behind
+    states.energy[i] = 0.0
 
 
 @kernel

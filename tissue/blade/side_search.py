@@ -1,32 +1,43 @@
 """The search for the faces of the tissue near the blade, repeated in each part of a step.
 
-The cost is that of the tetrahedra in the box of the blade. A face that was known keeps its state; a
-face that is new and already within the blade begins where it is (see `tissue.blade.side_contact`).
+The cost is that of the open faces in the cells of the grid that the box of the blade meets. They
+are listed where the box comes to other cells; after that, what is cut or listed there. A face that
+was known keeps its state; a face that is new and already within the blade begins where it is (see
+`tissue.blade.side_contact`).
 """
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at
 from tissue.blade.side_contact import (
+    CLEARANCE,
     POINTS,
     ContactStates,
     SideContacts,
     contact_point,
     friction_stretch,
+    is_clear,
     penetration,
 )
-from tissue.core.array_types import IntArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH, Lanes, lanes
+from tissue.core.simd_gather import larger, larger_bits
+from tissue.core.simd_rows import points_of_column
 from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.mesh.body import Body, is_open
-from tissue.mesh.point_location import TetrahedronGrid, cell_along
-from tissue.mesh.star import Visits
+from tissue.mesh.point_location import TETRAHEDRA_PER_LINE, TetrahedronGrid, cell_along
 
 LEAST_COSINE = 0.5
 """Least cosine of the angle between the normals of blade and face for a face that is beside the
 blade. Other faces, such as the skin that the edge goes through, are pressed by the edge. With 0.05
 that skin, once tilted by three degrees, was pressed aside whole: the force on a blade rose by a
 third to a half while it went in."""
+
+
+_LISTED, _CHANGED = 1, 2
+"""Values of `SideContacts.is_around`: the open faces of a tetrahedron are listed, or were when it
+changed."""
 
 
 @kernel
@@ -59,12 +70,32 @@ def release_faces(blade: BladeState) -> None:
 
 
 @kernel
-def forget_changed_faces(sides: SideContacts, changed: IntArray, n: int) -> None:
-    """Treat the faces of the first `n` of `changed`, tetrahedra that were cut, as new."""
-    forget_cells(sides)
+def forget_changed_faces(sides: SideContacts, body: Body, changed: IntArray, n: int) -> None:
+    """Treat the faces of the first `n` of `changed`, tetrahedra that were cut, as new.
+
+    Those that are listed are listed again: other faces of them may be open, with other nodes.
+    """
+    listed = sides.is_around
+    if n == len(changed):  # there may be more
+        forget_cells(sides)
     for i in range(n):
+        t = changed[i]
         for f in range(4):
-            sides.row_of_face[4 * changed[i] + f] = -1
+            sides.row_of_face[4 * t + f] = -1
+        if listed[t] == _LISTED:
+            listed[t] = _CHANGED
+    if sides.n_around < 0:
+        return
+    kept = 0
+    for i in range(sides.n_around):
+        if listed[sides.around[i] // 4] == _LISTED:
+            _move_row(sides, i, kept)
+            kept += 1
+    sides.n_around = kept
+    for i in range(n):
+        if listed[changed[i]] == _CHANGED and not _list_open_faces_of(sides, body, changed[i]):
+            forget_cells(sides)
+            return
 
 
 @kernel
@@ -77,7 +108,6 @@ def forget_cells(sides: SideContacts) -> None:
 def find_faces(
     blade: BladeState,
     body: Body,
-    visits: Visits,
     grid: TetrahedronGrid,
     edge: Edge,
     when: float,
@@ -89,104 +119,152 @@ def find_faces(
     Args:
         blade: Its side contacts are written.
         body: The tissue.
-        visits: For searches.
-        grid: Grid that lists the tetrahedra.
+        grid: Grid that lists the tetrahedra; its log is read.
         edge: The cutting edge over the time step.
         when: Instant, as a fraction of the time step.
     """
     sides, pose = blade.sides, pose_at(edge, when)
-    if _are_other_cells(sides, grid, _box_at(sides, pose)):
-        sides.n_around = _list_open_faces(sides, body, visits, grid)
+    are_others = _are_other_cells(sides, grid, _box_at(sides, pose))
+    if sides.n_around < 0 or are_others or grid.n_logged > len(grid.log):
+        _list_open_faces(sides, body, grid)
+    else:
+        _list_logged(sides, body, grid)
+    grid.n_logged = 0
     if sides.n_around < 0:
         return False
     n = 0
-    for i in range(sides.n_around):
-        face = sides.around[i]
-        if _is_near(sides, body, pose, face // 4, face % 4):
-            _insert_in_order(sides.found, n, face)
-            n += 1
+    for i in range(0, sides.n_around, WIDTH):
+        near = _near_plane(sides, body.positions, pose, i)
+        for k in range(i, min(i + WIDTH, sides.n_around)):
+            if near >> (k - i) & 1 == 1 and _is_near(sides, body.positions, pose, k):
+                sides.found[n] = sides.around[k]
+                n += 1
     _replace_faces(blade, body, pose, n)
     return True
 
 
 @kernel
-def _insert_in_order(faces: IntArray, n: int, face: int) -> None:
-    """Insert a face among the first `n`, which rise.
-
-    The order of faces is that of the sums of their forces. The grid lists tetrahedra in an order
-    that depends on when each was listed.
-    """
-    i = n
-    while i > 0 and faces[i - 1] > face:
-        faces[i] = faces[i - 1]
-        i -= 1
-    faces[i] = face
-
-
-@kernel
 def _are_other_cells(sides: SideContacts, grid: TetrahedronGrid, box: Aabb) -> bool:
-    """Write which cells `box` [m] overlaps; return whether they or their lists changed.
+    """Write which cells `box` [m] overlaps; return whether they are others than before.
 
     A blade often stays within the same cells for many steps.
     """
     cells = sides.cells
-    are_others = sides.n_around < 0
+    are_others = False
     for c in range(3):
         first, last = cell_along(grid, box.low[c], c), cell_along(grid, box.high[c], c)
         are_others = are_others or cells[c] != first or cells[3 + c] != last
         cells[c], cells[3 + c] = first, last
-    if not are_others:
-        are_others = _have_new_entries(sides, grid)
-    sides.n_entries = grid.n_entries
     return are_others
 
 
 @kernel
-def _have_new_entries(sides: SideContacts, grid: TetrahedronGrid) -> bool:
-    """Return whether tetrahedra were listed in the cells since `sides.n_entries` was written."""
-    cells, known = sides.cells, sides.n_entries
+def _list_open_faces(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> None:
+    """List the open faces in those cells; `sides.n_around` is -1 where there is no room."""
+    cells, listed = sides.cells, sides.is_around
+    for t in range(len(listed)):
+        listed[t] = 0
     for i in range(cells[0], cells[3] + 1):
         for j in range(cells[1], cells[4] + 1):
             for k in range(cells[2], cells[5] + 1):
-                if grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k] >= known:
-                    return True
-    return False
+                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
+                line, n_in_line = grid.head[cell, 0], grid.head[cell, 1]
+                while line >= 0:
+                    for at in range(1, n_in_line + 1):
+                        listed[grid.lines[line, at]] = _LISTED
+                    line, n_in_line = grid.lines[line, 0], TETRAHEDRA_PER_LINE
+    sides.n_around = 0
+    for t in range(body.n_tetrahedra):
+        if listed[t] == _LISTED and not _list_open_faces_of(sides, body, t):
+            forget_cells(sides)
+            return
 
 
 @kernel
-def _list_open_faces(sides: SideContacts, body: Body, visits: Visits, grid: TetrahedronGrid) -> int:
-    """Write the open faces in those cells to `sides.around`; return how many, -1 without room."""
-    visits.epoch += 1
-    epoch, cells = visits.epoch, sides.cells
-    n = 0
-    for i in range(cells[0], cells[3] + 1):
-        for j in range(cells[1], cells[4] + 1):
-            for k in range(cells[2], cells[5] + 1):
-                entry = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
-                while entry >= 0:
-                    t = grid.entry[entry]
-                    entry = grid.following[entry]
-                    if visits.tetrahedra[t] == epoch:
-                        continue
-                    visits.tetrahedra[t] = epoch
-                    for f in range(4):
-                        if is_open(body.links[t, f]):
-                            if n == len(sides.around):
-                                return -1
-                            sides.around[n] = 4 * t + f
-                            n += 1
-    return n
+def _list_logged(sides: SideContacts, body: Body, grid: TetrahedronGrid) -> None:
+    """List the open faces of tetrahedra that were listed in those cells since the last search."""
+    for i in range(grid.n_logged):
+        t = grid.log[i]
+        is_new = sides.is_around[t] == 0 and _is_in_cells(sides, grid, t)
+        if is_new and not _list_open_faces_of(sides, body, t):
+            forget_cells(sides)
+            return
 
 
 @kernel
-def _is_near(sides: SideContacts, body: Body, pose: BladePose, t: int, f: int) -> bool:
-    """Return whether the box of a face, in the axes of the blade, meets the blade."""
-    a = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 0]]), pose.tip)
-    b = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 1]]), pose.tip)
-    c = sub(vec3(body.positions, body.tetrahedra[t, sides.outward[f, 2]]), pose.tip)
+def _is_in_cells(sides: SideContacts, grid: TetrahedronGrid, t: int) -> bool:
+    """Return whether a tetrahedron is listed in one of those cells."""
+    for c in range(3):
+        if grid.cells[t, c] > sides.cells[3 + c] or grid.cells[t, 3 + c] < sides.cells[c]:
+            return False
+    return True
+
+
+@kernel
+def _list_open_faces_of(sides: SideContacts, body: Body, t: int) -> bool:
+    """List the open faces of a tetrahedron; return whether there was room.
+
+    The list rises: its order is that of the sums of the forces of faces. The grid lists tetrahedra
+    in an order that depends on when each was listed.
+    """
+    sides.is_around[t] = _LISTED
+    for f in range(4):
+        if is_open(body.links[t, f]):
+            i = sides.n_around
+            if i == len(sides.around):
+                return False
+            while i > 0 and sides.around[i - 1] > 4 * t + f:
+                _move_row(sides, i - 1, i)
+                i -= 1
+            sides.around[i] = 4 * t + f
+            for corner in range(3):
+                sides.node_around[i, corner] = body.tetrahedra[t, sides.outward[f, corner]]
+            sides.n_around += 1
+    return True
+
+
+@kernel
+def _move_row(sides: SideContacts, i: int, j: int) -> None:
+    """Move a listed face from row `i` to row `j`."""
+    sides.around[j] = sides.around[i]
+    for corner in range(3):
+        sides.node_around[j, corner] = sides.node_around[i, corner]
+
+
+@inlined
+def _near_plane(sides: SideContacts, x: FloatArray, pose: BladePose, i: int) -> int:
+    """Return a bit for each of eight faces from `i` on: whether it may be near the blade's plane.
+
+    A blade is thin: most faces are beside it.
+    """
+    first = _across(sides, x, pose, i, 0)
+    second = _across(sides, x, pose, i, 1)
+    third = _across(sides, x, pose, i, 2)
+    reach = lanes(sides.half_thickness + sides.margin + CLEARANCE)
+    none = lanes(0.0)
+    highest = larger(first, larger(second, third))
+    lowest = larger(none - first, larger(none - second, none - third))  # with the other sign
+    return larger_bits(highest + reach, none) & larger_bits(lowest + reach, none)
+
+
+@inlined
+def _across(sides: SideContacts, x: FloatArray, pose: BladePose, i: int, corner: int) -> Lanes:
+    """Return how far a corner of eight faces from `i` on is from the blade's plane [m]."""
+    px, py, pz = points_of_column(x, sides.node_around, i, corner)
+    tip, normal = pose.tip, pose.normal
+    along_x = (px - lanes(tip.x)) * lanes(normal.x)
+    along_y = (py - lanes(tip.y)) * lanes(normal.y)
+    return along_x + along_y + (pz - lanes(tip.z)) * lanes(normal.z)
+
+
+@kernel
+def _is_near(sides: SideContacts, x: FloatArray, pose: BladePose, i: int) -> bool:
+    """Return whether the box of face `i` of `around`, in the axes of the blade, meets the blade."""
+    a = sub(vec3(x, sides.node_around[i, 0]), pose.tip)
+    b = sub(vec3(x, sides.node_around[i, 1]), pose.tip)
+    c = sub(vec3(x, sides.node_around[i, 2]), pose.tip)
     margin = sides.margin
     reach = sides.half_thickness + margin
-    # A blade is thin: most faces are beside it.
     return (
         _meets(dot(a, pose.normal), dot(b, pose.normal), dot(c, pose.normal), -reach, reach)
         and _meets(
@@ -304,6 +382,8 @@ def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: 
 @kernel
 def _face_energy(sides: SideContacts, body: Body, pose: BladePose, row: int) -> float:
     """Return the energy between a face and the blade, by pressure and friction [J]."""
+    if is_clear(sides, pose, body.positions, row):
+        return 0.0
     stiffness = sides.stiffness * sides.states.area[row]
     energy = 0.0
     for q in range(POINTS):

@@ -75,14 +75,13 @@ def write_rotation(walls: Walls, body: Body, tetrahedra: IntArray, first: int, e
     c0 = Vec3(0.0, 0.0, 0.0)
     c1 = Vec3(0.0, 0.0, 0.0)
     c2 = Vec3(0.0, 0.0, 0.0)
+    gradient, before = Matrix3(c0, c1, c2), -1
     for k in range(first, end):
         if walls.first[k] == first:
             t = tetrahedra[k]
-            now = edge_matrix(body.positions, body.tetrahedra, t)
-            rest = edge_matrix(body.rest, body.tetrahedra, t)
-            c0 = add(c0, apply(now, solve(rest, Vec3(1.0, 0.0, 0.0))))
-            c1 = add(c1, apply(now, solve(rest, Vec3(0.0, 1.0, 0.0))))
-            c2 = add(c2, apply(now, solve(rest, Vec3(0.0, 0.0, 1.0))))
+            if t != before:  # several samples in turn are in the same one
+                gradient, before = _gradient(body, t), t
+            c0, c1, c2 = add(c0, gradient.c0), add(c1, gradient.c1), add(c2, gradient.c2)
     r = nearest_rotation(Matrix3(c0, c1, c2))
     for k in range(first, end):
         if walls.first[k] == first:
@@ -91,3 +90,15 @@ def write_rotation(walls: Walls, body: Body, tetrahedra: IntArray, first: int, e
                 walls.rotation[k, 3 * column] = c.x
                 walls.rotation[k, 3 * column + 1] = c.y
                 walls.rotation[k, 3 * column + 2] = c.z
+
+
+@kernel
+def _gradient(body: Body, t: int) -> Matrix3:
+    """Return the deformation gradient of tetrahedron `t`."""
+    now = edge_matrix(body.positions, body.tetrahedra, t)
+    rest = edge_matrix(body.rest, body.tetrahedra, t)
+    return Matrix3(
+        apply(now, solve(rest, Vec3(1.0, 0.0, 0.0))),
+        apply(now, solve(rest, Vec3(0.0, 1.0, 0.0))),
+        apply(now, solve(rest, Vec3(0.0, 0.0, 1.0))),
+    )

@@ -1,19 +1,23 @@
 """Point location: which tetrahedron holds a point, by a grid of cells that list tetrahedra.
 
-Each tetrahedron is listed in the cells that its box overlaps, widened by a margin. Where a node has
-moved further than the margin, the tetrahedra around it are listed again where they are now, in the
-cells in which they were not listed before. Stale entries cost a test, never a wrong answer. So the
-cost of a step is one pass over the nodes that moved, and listing the tetrahedra around those that
-moved far.
+Each tetrahedron is listed in a box of cells: those that its own box overlaps, widened by a margin.
+While its nodes stay in that box of cells, whatever point it holds is in one of them. So each node
+has a box of its own, that of the cells in which all tetrahedra around it are listed; where it has
+left that, they are listed again where they are now, in the cells in which they were not listed
+before. Stale entries cost a test, never a wrong answer. So the cost of a step is one pass over the
+nodes that moved, and listing the tetrahedra around those that left their box.
 """
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH, aligned
+from tissue.core.simd_gather import larger_bits
+from tissue.core.simd_rows import rows_of_three
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3
-from tissue.geometry.aabb import Aabb, overlap, tetrahedron_box, widened
+from tissue.core.vec3 import Vec3, lerp, vec3
+from tissue.geometry.aabb import Aabb, overlap, tetrahedron_box, widened, with_point
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body
 from tissue.mesh.star import Visits, star
@@ -26,16 +30,26 @@ _MOST_CELLS = 1 << 20
 """Cells at most, for a body that fills little of its box."""
 
 ENTRIES_PER_TETRAHEDRON = 24
-"""Room for entries. A tetrahedron of the organ overlaps 12 to 15 cells with its margin; when the
-room is used up the grid is built again, which takes a millisecond. Less: what moves uses it up
+"""Room for entries. A tetrahedron of the organ is listed in 12 to 15 cells with its margin; when
+the room is used up the grid is built again, which takes a millisecond. Less: what moves uses it up
 within some frames; more: the lists become long with stale entries."""
 
 LEAST_ENTRIES = 1 << 14
 """Room for entries at least."""
 
+TETRAHEDRA_PER_LINE = 15
+"""Tetrahedra in a line of a list, which with the number of the next line fills a cache line. As a
+list of single entries each of them took 45 ns to read, for two lines of the cache."""
+
+LOGGED = 256
+"""Tetrahedra that `TetrahedronGrid.log` has room for."""
+
+_INSIDE = 1e-6
+"""How far within a cell its limits for a node are, per spacing: more than any rounding."""
+
 
 class TetrahedronGrid(Arrays):
-    """Linked lists of tetrahedra, one for each cell."""
+    """Lists of tetrahedra, one for each cell."""
 
     origin: FloatArray
     """Lowest corner [m], shape (3,)."""
@@ -44,38 +58,63 @@ class TetrahedronGrid(Arrays):
     shape: IntArray
     """Number of cells along each axis, shape (3,). Cells on the rim reach to infinity."""
     head: IntArray
-    """First entry of each cell's list, -1 if it is empty; shape (n_cells,)."""
-    following: SlotArray
-    """The next entry of the same list, -1 at its end; shape (room,)."""
-    entry: SlotArray
-    """Tetrahedron of each entry, shape (room,)."""
+    """First line of each cell's list, -1 if it is empty, and how many tetrahedra are in it; shape
+    (n_cells, 2)."""
+    lines: SlotArray
+    """The next line of the same list, -1 at its end, and tetrahedra. Lines behind the first one of
+    a list are full. Shape (room, 1 + TETRAHEDRA_PER_LINE)."""
+    n_lines: IntCell
+    """Number of lines in all lists."""
     n_listed: IntCell
     """Number of tetrahedra listed: 0 to `n_listed` - 1."""
-    n_entries: IntCell
-    """Number of entries in all lists."""
+    n_logged: IntCell
+    """Number of tetrahedra listed in other cells than before since `log` was read; there may be
+    more than `log` has room for."""
+    log: SlotArray
+    """These tetrahedra, shape (LOGGED,)."""
     cells: SlotArray
     """First cell along each axis in which each tetrahedron was listed last, then the last one;
     shape (tetrahedron capacity, 6). The last is before the first where it was not listed yet."""
-    listed_at: FloatArray
-    """Where each node was when its tetrahedra were listed last [m], shape (node capacity, 3)."""
+    low: FloatArray
+    """Lowest corner of the box that each node may move in [m], shape (node capacity, 3)."""
+    high: FloatArray
+    """Highest corner [m], shape (node capacity, 3); below the lowest one for new nodes."""
     margin: float
     """Distance by which the boxes of tetrahedra are widened [m]."""
 
 
 def no_grid() -> TetrahedronGrid:
     """Return a grid that lists nothing."""
+    return _empty_grid(np.zeros(3), 1.0, np.ones(3, np.int64), 0, (0, 0), 0.0)
+
+
+def _empty_grid(
+    origin: FloatArray,
+    spacing: float,
+    shape: IntArray,
+    n_lines: int,
+    capacity: tuple[int, int],
+    margin: float,
+) -> TetrahedronGrid:
+    """Return a grid that lists nothing yet, for that many nodes and tetrahedra."""
+    n_nodes, n_tetrahedra = capacity
+    cells = np.zeros((n_tetrahedra, 6), np.int32)
+    cells[:, 3:] = -1
+    per_line = 1 + TETRAHEDRA_PER_LINE
     return TetrahedronGrid(
-        origin=np.zeros(3),
-        spacing=1.0,
-        shape=np.ones(3, np.int64),
-        head=np.full(1, -1, np.int64),
-        following=np.zeros(0, np.int32),
-        entry=np.zeros(0, np.int32),
+        origin=origin,
+        spacing=spacing,
+        shape=shape,
+        head=np.tile([-1, TETRAHEDRA_PER_LINE], (int(shape.prod()), 1)),
+        lines=aligned(n_lines * per_line, np.int32).reshape(n_lines, per_line),
+        n_lines=0,
         n_listed=0,
-        n_entries=0,
-        cells=np.zeros((0, 6), np.int32),
-        listed_at=np.zeros((0, 3)),
-        margin=0.0,
+        n_logged=0,
+        log=np.zeros(LOGGED, np.int32),
+        cells=cells,
+        low=np.full((n_nodes, 3), np.inf),
+        high=np.full((n_nodes, 3), -np.inf),
+        margin=margin,
     )
 
 
@@ -84,41 +123,26 @@ def build_grid(body: Body, positions: FloatArray, margin: float) -> TetrahedronG
     n_nodes, n_tetrahedra = body.n_nodes, body.n_tetrahedra
     low = positions[:n_nodes].min(axis=0) - margin
     size = positions[:n_nodes].max(axis=0) + margin - low
-    n_cells = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), _MOST_CELLS)
-    spacing = float(max(np.cbrt(size.prod() / n_cells), size.max() / n_cells))
+    most = min(max(n_tetrahedra / TETRAHEDRA_PER_CELL, 1.0), _MOST_CELLS)
+    spacing = float(max(np.cbrt(size.prod() / most), size.max() / most))
     shape = np.floor(size / spacing).astype(np.int64) + 1
+    n_cells = int(shape.prod())
     room = max(ENTRIES_PER_TETRAHEDRON * n_tetrahedra, LEAST_ENTRIES)
+    capacity = len(positions), len(body.tetrahedra)
     while True:
-        grid = TetrahedronGrid(
-            origin=low,
-            spacing=spacing,
-            shape=shape,
-            head=np.full(int(shape.prod()), -1, np.int64),
-            following=np.empty(room, np.int32),
-            entry=np.empty(room, np.int32),
-            n_listed=0,
-            n_entries=0,
-            cells=_no_cells(len(body.tetrahedra)),
-            listed_at=positions.copy(),
-            margin=margin,
-        )
+        n_lines = n_cells + room // TETRAHEDRA_PER_LINE
+        grid = _empty_grid(low, spacing, shape, n_lines, capacity, margin)
+        grid.low[:n_nodes], grid.high[:n_nodes] = -np.inf, np.inf
         if list_appended(body, positions, grid):
             return grid
         room *= 2
-
-
-def _no_cells(n: int) -> SlotArray:
-    """Return `TetrahedronGrid.cells` of that many tetrahedra that are not listed."""
-    cells = np.zeros((n, 6), np.int32)
-    cells[:, 3:] = -1
-    return cells
 
 
 @kernel
 def fits(grid: TetrahedronGrid, body: Body) -> bool:
     """Return whether the grid has room for all nodes and tetrahedra that the body has room for."""
     n_nodes, n_tetrahedra = len(body.positions), len(body.tetrahedra)
-    return len(grid.listed_at) == n_nodes and len(grid.cells) == n_tetrahedra
+    return len(grid.low) == n_nodes and len(grid.cells) == n_tetrahedra
 
 
 @kernel
@@ -130,12 +154,7 @@ def list_appended(body: Body, positions: FloatArray, grid: TetrahedronGrid) -> b
     if not fits(grid, body):
         return False
     while grid.n_listed < body.n_tetrahedra:
-        t = grid.n_listed
-        for k in range(4):
-            node = body.tetrahedra[t, k]
-            for c in range(3):
-                grid.listed_at[node, c] = positions[node, c]
-        if not _list_tetrahedron(body, positions, grid, t):
+        if not _list_tetrahedron(body, positions, grid, grid.n_listed):
             return False
         grid.n_listed += 1
     return True
@@ -150,7 +169,7 @@ def list_moved(
     n_nodes: int,
     around: IntArray,
 ) -> bool:
-    """List the tetrahedra around nodes that moved far again; return whether there was room.
+    """List the tetrahedra around nodes that left their box again; return whether there was room.
 
     Args:
         body: The body now.
@@ -161,21 +180,57 @@ def list_moved(
         around: Scratch, shape (LARGEST_STAR,).
     """
     x = body.positions
-    limit = grid.margin * grid.margin
-    for i in range(n_nodes):
-        node = nodes[i]
-        dx = x[node, 0] - grid.listed_at[node, 0]
-        dy = x[node, 1] - grid.listed_at[node, 1]
-        dz = x[node, 2] - grid.listed_at[node, 2]
-        if dx * dx + dy * dy + dz * dz <= limit:
+    are_all = n_nodes == body.n_nodes  # each is listed once
+    i = 0
+    while i < n_nodes:
+        if are_all and i + WIDTH <= n_nodes and _eight_stayed(grid, x, i):
+            i += WIDTH
             continue
-        for c in range(3):
-            grid.listed_at[node, c] = x[node, c]
+        node = i if are_all else nodes[i]
+        i += 1
+        if _stayed(grid, x, node):
+            continue
         n = star(body, visits, node, body.node_tetrahedron[node], around)
         for k in range(n):
             if not _list_tetrahedron(body, x, grid, around[k]):
                 return False
+        for c in range(3):
+            grid.low[node, c], grid.high[node, c] = -np.inf, np.inf
+        for k in range(n):
+            _hold_node(grid, node, around[k])
     return True
+
+
+@inlined
+def _eight_stayed(grid: TetrahedronGrid, x: FloatArray, i: int) -> bool:
+    """Return whether eight nodes from `i` on are in their boxes."""
+    x0, y0, z0 = rows_of_three(grid.low, i)
+    x1, y1, z1 = rows_of_three(grid.high, i)
+    px, py, pz = rows_of_three(x, i)
+    below = larger_bits(x0, px) | larger_bits(y0, py) | larger_bits(z0, pz)
+    above = larger_bits(px, x1) | larger_bits(py, y1) | larger_bits(pz, z1)
+    return below | above == 0
+
+
+@inlined
+def _stayed(grid: TetrahedronGrid, x: FloatArray, node: int) -> bool:
+    """Return whether a node is in its box."""
+    p, low, high = vec3(x, node), vec3(grid.low, node), vec3(grid.high, node)
+    below = low.x > p.x or low.y > p.y or low.z > p.z
+    return not (below or p.x > high.x or p.y > high.y or p.z > high.z)
+
+
+@inlined
+def _hold_node(grid: TetrahedronGrid, node: int, t: int) -> None:
+    """Hold a node in the cells in which tetrahedron `t` around it is listed."""
+    cells, inside = grid.cells, _INSIDE * grid.spacing
+    for c in range(3):
+        if cells[t, c] > 0:
+            low = grid.origin[c] + cells[t, c] * grid.spacing + inside
+            grid.low[node, c] = max(grid.low[node, c], low)
+        if cells[t, 3 + c] < grid.shape[c] - 1:
+            high = grid.origin[c] + (cells[t, 3 + c] + 1) * grid.spacing - inside
+            grid.high[node, c] = min(grid.high[node, c], high)
 
 
 @kernel
@@ -185,22 +240,35 @@ def _list_tetrahedron(body: Body, positions: FloatArray, grid: TetrahedronGrid, 
     x0, x1 = cell_along(grid, box.low.x, 0), cell_along(grid, box.high.x, 0)
     y0, y1 = cell_along(grid, box.low.y, 1), cell_along(grid, box.high.y, 1)
     z0, z1 = cell_along(grid, box.low.z, 2), cell_along(grid, box.high.z, 2)
-    if grid.n_entries + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.entry):
+    if _is_listed_in(grid, t, x0, y0, z0) and _is_listed_in(grid, t, x1, y1, z1):
+        return True  # and in all cells between
+    if grid.n_lines + (x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1) > len(grid.lines):
         return False
     for i in range(x0, x1 + 1):
         for j in range(y0, y1 + 1):
             for k in range(z0, z1 + 1):
-                if _is_listed_in(grid, t, i, j, k):
-                    continue
-                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
-                at = grid.n_entries
-                grid.n_entries += 1
-                grid.entry[at] = t
-                grid.following[at] = grid.head[cell]
-                grid.head[cell] = at
+                if not _is_listed_in(grid, t, i, j, k):
+                    _add_to_cell(grid, (i * grid.shape[1] + j) * grid.shape[2] + k, t)
     grid.cells[t, 0], grid.cells[t, 1], grid.cells[t, 2] = x0, y0, z0
     grid.cells[t, 3], grid.cells[t, 4], grid.cells[t, 5] = x1, y1, z1
+    for k in range(4):
+        _hold_node(grid, body.tetrahedra[t, k], t)
+    if grid.n_logged < len(grid.log):
+        grid.log[grid.n_logged] = t
+    grid.n_logged += 1
     return True
+
+
+@kernel
+def _add_to_cell(grid: TetrahedronGrid, cell: int, t: int) -> None:
+    """Add a tetrahedron to the list of a cell."""
+    head = grid.head
+    if head[cell, 1] == TETRAHEDRA_PER_LINE:
+        grid.lines[grid.n_lines, 0] = head[cell, 0]
+        head[cell, 0], head[cell, 1] = grid.n_lines, 0
+        grid.n_lines += 1
+    head[cell, 1] += 1
+    grid.lines[head[cell, 0], head[cell, 1]] = t
 
 
 @kernel
@@ -222,28 +290,101 @@ def cell_along(grid: TetrahedronGrid, coordinate: float, c: int) -> int:
 
 
 @kernel
+def _cell_of(grid: TetrahedronGrid, p: Vec3) -> int:
+    """Return the cell that holds `p` [m]."""
+    i = cell_along(grid, p.x, 0)
+    j = cell_along(grid, p.y, 1)
+    k = cell_along(grid, p.z, 2)
+    cell: int = (i * grid.shape[1] + j) * grid.shape[2] + k
+    return cell
+
+
+@inlined
+def _point_on_line(ends: tuple[Vec3, Vec3], k: int, n: int) -> Vec3:
+    """Return point `k` of `n` on a line, equally spaced from one end to the other [m]."""
+    return lerp(k / (n - 1.0), ends[0], ends[1])
+
+
+@kernel
 def tetrahedron_at(body: Body, grid: TetrahedronGrid, positions: FloatArray, p: Vec3) -> int:
     """Return the tetrahedron that holds `p` [m], its nodes at `positions` [m]; -1 if none does.
 
     Of several it is the one with the lowest number, so that a point on a face is always found in
     the same one.
     """
-    i = cell_along(grid, p.x, 0)
-    j = cell_along(grid, p.y, 1)
-    k = cell_along(grid, p.z, 2)
     found = -1
     box = Aabb(p, p)
-    at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
-    while at >= 0:
-        t = grid.entry[at]
-        if (
-            (found < 0 or t < found)
-            and overlap(tetrahedron_box(positions, body.tetrahedra, t), box)
-            and smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0
-        ):
-            found = t
-        at = grid.following[at]
+    cell = _cell_of(grid, p)
+    line, n_in_line = grid.head[cell, 0], grid.head[cell, 1]
+    while line >= 0:
+        for i in range(1, n_in_line + 1):
+            t = grid.lines[line, i]
+            if (
+                (found < 0 or t < found)
+                and overlap(tetrahedron_box(positions, body.tetrahedra, t), box)
+                and _holds(body, positions, t, p)
+            ):
+                found = t
+        line, n_in_line = grid.lines[line, 0], TETRAHEDRA_PER_LINE
     return found
+
+
+@kernel
+def tetrahedra_along(
+    body: Body,
+    grid: TetrahedronGrid,
+    ends: tuple[Vec3, Vec3],
+    n: int,
+    begin: int,
+    stop: int,
+    found: IntArray,
+) -> int:
+    """Find the tetrahedra that hold points on a line, as `tetrahedron_at` does for each.
+
+    It takes the points from `begin` on that are in the same cell, and returns the one after them:
+    the list of a cell is long, and is searched once for all.
+
+    Args:
+        body: The body as it is now.
+        grid: Its grid.
+        ends: Where the line begins and ends [m].
+        n: Number of points on the line, equally spaced from one end to the other.
+        begin: First point to look for.
+        stop: One past the last.
+        found: The tetrahedron of each point, or -1, is written; shape (n,) or longer.
+    """
+    first = _point_on_line(ends, begin, n)
+    cell, last, after = _cell_of(grid, first), first, begin
+    while after < stop:
+        p = _point_on_line(ends, after, n)
+        if _cell_of(grid, p) != cell:
+            break
+        found[after] = -1
+        after, last = after + 1, p
+    box = with_point(Aabb(first, first), last)
+    line, n_in_line = grid.head[cell, 0], grid.head[cell, 1]
+    while line >= 0:
+        for i in range(1, n_in_line + 1):
+            t = grid.lines[line, i]
+            around = tetrahedron_box(body.positions, body.tetrahedra, t)
+            if not overlap(around, box):
+                continue
+            for k in range(begin, after):
+                p = _point_on_line(ends, k, n)
+                if (
+                    (found[k] < 0 or t < found[k])
+                    and overlap(around, Aabb(p, p))
+                    and _holds(body, body.positions, t, p)
+                ):
+                    found[k] = t
+        line, n_in_line = grid.lines[line, 0], TETRAHEDRA_PER_LINE
+    return after
+
+
+@kernel
+def _holds(body: Body, positions: FloatArray, t: int, p: Vec3) -> bool:
+    """Return whether tetrahedron `t`, its nodes at `positions` [m], holds a point [m]."""
+    return smallest_weight(barycentric_in(p, positions, body.tetrahedra, t)) >= 0.0
 
 
 @kernel
@@ -262,10 +403,12 @@ def tetrahedron_in_box(
     for i in range(cell_along(grid, low.x, 0), cell_along(grid, high.x, 0) + 1):
         for j in range(cell_along(grid, low.y, 1), cell_along(grid, high.y, 1) + 1):
             for k in range(cell_along(grid, low.z, 2), cell_along(grid, high.z, 2) + 1):
-                at = grid.head[(i * grid.shape[1] + j) * grid.shape[2] + k]
-                while at >= 0:
-                    t: int = grid.entry[at]
-                    if overlap(tetrahedron_box(positions, body.tetrahedra, t), Aabb(low, high)):
-                        return t
-                    at = grid.following[at]
+                cell = (i * grid.shape[1] + j) * grid.shape[2] + k
+                line, n_in_line = grid.head[cell, 0], grid.head[cell, 1]
+                while line >= 0:
+                    for at in range(1, n_in_line + 1):
+                        t: int = grid.lines[line, at]
+                        if overlap(tetrahedron_box(positions, body.tetrahedra, t), Aabb(low, high)):
+                            return t
+                    line, n_in_line = grid.lines[line, 0], TETRAHEDRA_PER_LINE
     return -1

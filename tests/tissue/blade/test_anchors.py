@@ -67,7 +67,7 @@ class AnchoredBlade:
         self.blade = line_blade(self.anchors, Material(toughness=TOUGH)).replaced(reach=REACH)
         self.forces = np.zeros_like(self.body.rest)
         grid = build_grid(self.body, self.body.positions, 0.0)
-        anchor_entering(self.anchors, self.body, grid, edge_at(0.009), 1.0, 1e-3, *BOX)
+        anchor_entering(self.blade, self.body, grid, edge_at(0.009), 1.0, 1e-3, *BOX)
 
     def set_toughness(self, **properties):
         self.blade = self.blade.replaced(toughness=toughness_law_of(Material(**properties), None))
@@ -125,9 +125,9 @@ def test_a_sample_outside_stays_free_and_pulls_nothing(held):
     grid = build_grid(held.body, held.body.positions, 0.0)
     assert not any_free_in_box(anchors, pose_at(edge_at(-0.001), 1.0), *BOX)
     assert any_free_in_box(anchors, pose_at(edge_at(0.001), 1.0), *BOX)
-    anchor_entering(anchors, held.body, grid, edge_at(-0.001), 1.0, 1e-3, *BOX)
-    assert not is_engaged(anchors)
     held.blade = held.blade.replaced(anchors=anchors)
+    anchor_entering(held.blade, held.body, grid, edge_at(-0.001), 1.0, 1e-3, *BOX)
+    assert not is_engaged(anchors)
     totals = held.pull(edge_at(-0.001))
     assert is_zero(totals)
     assert totals.work_of_blade == totals.work_of_cutting == totals.released == 0.0

@@ -23,7 +23,6 @@ from tissue.blade.side_search import find_faces, forget_cells, release_faces
 from tissue.core.vec3 import Vec3, cross, vec3
 from tissue.mesh.body import build_body
 from tissue.mesh.point_location import build_grid
-from tissue.mesh.star import no_visits
 
 pytestmark = pytest.mark.kernel
 
@@ -46,7 +45,6 @@ class Pressed:
 
     def __init__(self, x=0.0115, material=MATERIAL):
         self.body = build_body(BLOCK, None, None)
-        self.visits = no_visits(len(BLOCK.positions), len(BLOCK.tetrahedra))
         anchors = new_anchors(2, LENGTH, 4.0 * material.young_modulus)
         n = len(BLOCK.tetrahedra)
         self.blade = new_blade_state(anchors, SHAPE, material, NODE_SIZE, n)
@@ -63,7 +61,7 @@ class Pressed:
         self.find_in(build_grid(self.body, self.body.positions, 0.0), edge)
 
     def find_in(self, grid, edge):
-        while not find_faces(self.blade, self.body, self.visits, grid, edge, 1.0):
+        while not find_faces(self.blade, self.body, grid, edge, 1.0):
             self.blade = self.blade.replaced(sides=with_more_faces(self.sides))
 
     def rows(self):

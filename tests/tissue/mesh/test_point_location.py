@@ -5,16 +5,19 @@ import pytest
 
 from tests import bodies
 from tests.tissue.kernels_of import cut_of
-from tissue.core.vec3 import Vec3
+from tissue.core.vec3 import Vec3, lerp
 from tissue.cutting.stellar_subdivision import split_edge
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import grown_body
 from tissue.mesh.bounding_boxes import write_bounds
 from tissue.mesh.point_location import (
+    TETRAHEDRA_PER_LINE,
     build_grid,
+    cell_along,
     list_appended,
     list_moved,
     no_grid,
+    tetrahedra_along,
     tetrahedron_at,
     tetrahedron_in_box,
 )
@@ -76,17 +79,74 @@ def test_points_are_found_when_nodes_that_moved_far_are_listed_again(cut):
 
 def test_a_tetrahedron_is_listed_in_cells_that_are_new_to_it_alone(cut):
     cells = build_grid(cut.body, cut.body.positions, MARGIN)
-    n, n_at_first = cut.body.n_nodes, cells.n_entries
+    n, n_at_first = cut.body.n_nodes, n_entries(cells)
     cut.body.positions[:n] -= [0.2, 0.0, 0.0]
     assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
-    assert n_at_first < cells.n_entries < 1.5 * n_at_first
-    for t in range(cut.body.n_tetrahedra):
-        i, j, k = cells.cells[t, :3]
-        at, n_times = cells.head[(i * cells.shape[1] + j) * cells.shape[2] + k], 0
-        while at >= 0:
-            n_times += int(cells.entry[at] == t)
-            at = cells.following[at]
-        assert n_times == 1
+    assert n_at_first < n_entries(cells) < 1.5 * n_at_first
+    for cell in range(len(cells.head)):
+        listed = tetrahedra_in(cells, cell)
+        assert len(set(listed)) == len(listed)
+
+
+def tetrahedra_in(cells, cell: int) -> list[int]:
+    """Return the tetrahedra that a cell lists."""
+    line, n = cells.head[cell]
+    listed = []
+    while line >= 0:
+        listed += cells.lines[line, 1 : 1 + n].tolist()
+        line, n = cells.lines[line, 0], TETRAHEDRA_PER_LINE
+    return listed
+
+
+def n_entries(cells) -> int:
+    return sum(len(tetrahedra_in(cells, cell)) for cell in range(len(cells.head)))
+
+
+def test_whatever_the_nodes_do_a_tetrahedron_is_listed_wherever_its_box_is(cut):
+    """Each node goes its own way, so that tetrahedra leave their cells by one node at a time."""
+    cells, random = build_grid(cut.body, cut.body.positions, MARGIN), np.random.default_rng(5)
+    body, n = cut.body, cut.body.n_nodes
+    velocities = random.uniform(-1.0, 1.0, (n, 3)) * MARGIN
+    for _ in range(12):
+        body.positions[:n] += velocities * random.uniform(0.0, 1.0, (n, 1))
+        assert list_moved(body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
+        for t in range(body.n_tetrahedra):
+            corners = body.positions[body.tetrahedra[t]]
+            ends = np.array(
+                [
+                    [cell_along(cells, corners[:, c].min(), c) for c in range(3)],
+                    [cell_along(cells, corners[:, c].max(), c) for c in range(3)],
+                ]
+            )
+            assert (cells.cells[t, :3] <= ends[0]).all()
+            assert (cells.cells[t, 3:] >= ends[1]).all()
+
+
+def test_what_is_listed_in_other_cells_is_logged(cut):
+    cells = build_grid(cut.body, cut.body.positions, MARGIN)
+    n, cells.n_logged = cut.body.n_nodes, 0
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
+    assert cells.n_logged == 0
+    before = cells.cells.copy()
+    cut.body.positions[0] = [1.0, 1.0, 1.0]  # from the corner opposite
+    assert list_moved(cut.body, cut.visits, cells, np.arange(n), n, cut.scratch.around)
+    changed = np.flatnonzero((cells.cells != before).any(axis=1))
+    assert len(changed) > 0
+    assert sorted(cells.log[: cells.n_logged]) == changed.tolist()
+
+
+def test_points_on_a_line_are_found_as_each_by_itself(cut):
+    cells, random = build_grid(cut.body, cut.body.positions, MARGIN), np.random.default_rng(4)
+    n, found = 40, np.zeros(40, np.int64)
+    for _ in range(10):
+        ends = tuple(Vec3(*row) for row in random.uniform(-0.2, 1.2, (2, 3)).tolist())
+        begin = 0
+        while begin < n:
+            begin = tetrahedra_along(cut.body, cells, ends, n, begin, n, found)
+        for k in range(n):
+            p = lerp(k / (n - 1.0), *ends)
+            assert found[k] == tetrahedron_at(cut.body, cells, cut.body.positions, p)
+            assert found[k] == first_containing(cut.body, p)
 
 
 def test_points_are_found_after_nodes_went_to_and_fro(cut):
