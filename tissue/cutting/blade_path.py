@@ -47,7 +47,8 @@ class Path(Arrays):
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
     boxes: IntArray
     """Lowest and highest lattice point of the quad from each sample to the next, and last those of
-    all quads that are linked, shape (n, 6)."""
+    all quads that are linked, coordinate by coordinate: shape (6, n). Where samples are not linked
+    the lowest is above the highest."""
 
 
 def new_path(n: int) -> Path:
@@ -64,7 +65,7 @@ def new_path(n: int) -> Path:
         known=np.zeros(n, np.bool_),
         linked=np.zeros(n, np.bool_),
         has_left=0,
-        boxes=np.zeros((n, 6), np.int64),
+        boxes=np.zeros((6, n), np.int64),
     )
 
 
@@ -132,38 +133,42 @@ def plane_near(path: Path, p: Vec3) -> Plane:
 @kernel
 def put_on_lattice(path: Path, lattice: Lattice) -> None:
     """Round the path to the lattice and write the boxes of its quads, once a step."""
-    for k in range(len(path.linked)):
-        a = nearest(lattice, vec3(path.t0, k))
-        b = nearest(lattice, vec3(path.t1, k))
-        path.lattice_t0[k, 0] = a.x
-        path.lattice_t0[k, 1] = a.y
-        path.lattice_t0[k, 2] = a.z
-        path.lattice_t1[k, 0] = b.x
-        path.lattice_t1[k, 1] = b.y
-        path.lattice_t1[k, 2] = b.z
-    for k in range(len(path.linked) - 1):
+    n = len(path.linked)
+    for k in range(n):
+        if path.member[k] or path.linked[k] or (k > 0 and path.linked[k - 1]):
+            _round_sample(path, lattice, k)
+    last = n - 1
+    for c in range(6):
+        path.boxes[c, last] = _FARTHEST if c < 3 else -_FARTHEST
+    for k in range(last):
         for c in range(3):
-            path.boxes[k, c] = min(
-                min(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
-                min(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
-            )
-            path.boxes[k, 3 + c] = max(
-                max(path.lattice_t0[k, c], path.lattice_t0[k + 1, c]),
-                max(path.lattice_t1[k, c], path.lattice_t1[k + 1, c]),
-            )
-    _write_box_of_all(path.boxes, path.linked)
+            low, high = _FARTHEST, -_FARTHEST
+            if path.linked[k]:
+                low, high = _extent(path, k, c)
+                path.boxes[c, last] = min(path.boxes[c, last], low)
+                path.boxes[3 + c, last] = max(path.boxes[3 + c, last], high)
+            path.boxes[c, k], path.boxes[3 + c, k] = low, high
 
 
 @kernel
-def _write_box_of_all(boxes: IntArray, linked: BoolArray) -> None:
-    """Write the box of all quads that are linked; where none is, its lowest corner is above."""
-    last = len(linked) - 1
-    for c in range(3):
-        low, high = _FARTHEST, -_FARTHEST
-        for k in range(last):
-            if linked[k]:
-                low, high = min(low, boxes[k, c]), max(high, boxes[k, 3 + c])
-        boxes[last, c], boxes[last, 3 + c] = low, high
+def _round_sample(path: Path, lattice: Lattice, k: int) -> None:
+    """Round both ends of the step of a sample to the lattice."""
+    a = nearest(lattice, vec3(path.t0, k))
+    b = nearest(lattice, vec3(path.t1, k))
+    path.lattice_t0[k, 0] = a.x
+    path.lattice_t0[k, 1] = a.y
+    path.lattice_t0[k, 2] = a.z
+    path.lattice_t1[k, 0] = b.x
+    path.lattice_t1[k, 1] = b.y
+    path.lattice_t1[k, 2] = b.z
+
+
+@kernel
+def _extent(path: Path, k: int, c: int) -> tuple[int, int]:
+    """Return the least and the greatest coordinate of a quad along an axis."""
+    p, q = path.lattice_t0[k, c], path.lattice_t0[k + 1, c]
+    r, s = path.lattice_t1[k, c], path.lattice_t1[k + 1, c]
+    return min(min(p, q), min(r, s)), max(max(p, q), max(r, s))
 
 
 @kernel

@@ -4,16 +4,17 @@ Paper, section 3. In each step the active tetrahedra are found again from those 
 anchors, through faces: the cost is proportional to the number of tetrahedra along the blade.
 """
 
+from typing import NamedTuple
+
 from tissue.core.hash_table import (
     HashTable,
     clear_table,
     fill_slot,
-    first_slot,
     hash_of,
     is_filled,
-    next_slot,
 )
 from tissue.core.jit import kernel
+from tissue.core.simd_gather import natural
 from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
 from tissue.cutting.blade_path import Path, put_on_lattice
 from tissue.cutting.cut_surface import on_sheet
@@ -121,29 +122,53 @@ def _note_segments(cut: Cut, t: int, n: int) -> bool:
     """Note which segments' boxes overlap that of tetrahedron `t`; return whether any does."""
     body, path, segments = cut.body, cut.path, cut.scratch.segments
     box = tetrahedron_box(body.lattice_rest, body.tetrahedra, t)
-    first = -1
-    last = -2
-    n_segments = len(path.linked) - 1
-    if not overlap(_swept_box(path, n_segments), box):
-        n_segments = 0  # most tetrahedra around the active ones
-    for k in range(n_segments):
-        if not path.linked[k] or not overlap(_swept_box(path, k), box):
-            continue
-        if first < 0:
-            first = k
-        last = k
-    segments[n, 0] = first
-    segments[n, 1] = last
-    return first >= 0
+    last = len(path.linked) - 1
+    near = Segments(last, -1)
+    if overlap(_swept_box(path, last), box):  # most tetrahedra around the active ones are not
+        near = segments_near(path, box, 0, last)
+    found = near.first <= near.last
+    segments[n, 0] = near.first if found else -1
+    segments[n, 1] = near.last
+    return found
+
+
+class Segments(NamedTuple):
+    """Segments of the edge that follow each other."""
+
+    first: int
+    """The first one."""
+    last: int
+    """The last one; before the first where there is none."""
+
+
+@kernel
+def segments_near(path: Path, box: Aabb, begin: int, end: int) -> Segments:
+    """Return the first and the last segment, from `begin` to before `end`, that sweep into a box.
+
+    Without a branch, so that LLVM tests eight of them at a time: in a third of the time.
+    """
+    boxes, low, high = path.boxes, box.low, box.high
+    first, last = end, begin - 1
+    for i in range(begin, end):
+        k = natural(i)
+        meets = (
+            (boxes[0, k] <= high.x)
+            & (boxes[1, k] <= high.y)
+            & (boxes[2, k] <= high.z)
+            & (boxes[3, k] >= low.x)
+            & (boxes[4, k] >= low.y)
+            & (boxes[5, k] >= low.z)
+        )
+        first = min(first, k if meets else end)
+        last = max(last, k if meets else begin - 1)
+    return Segments(first, last)
 
 
 @kernel
 def _swept_box(path: Path, k: int) -> Aabb:
     """Return the box that segment `k` sweeps, on the lattice; the last one is that of all."""
-    boxes = path.boxes
-    return Aabb(
-        Vec3(boxes[k, 0], boxes[k, 1], boxes[k, 2]), Vec3(boxes[k, 3], boxes[k, 4], boxes[k, 5])
-    )
+    b = path.boxes
+    return Aabb(Vec3(b[0, k], b[1, k], b[2, k]), Vec3(b[3, k], b[4, k], b[5, k]))
 
 
 @kernel
@@ -151,6 +176,7 @@ def find_crossings(cut: Cut) -> None:
     """Find the edges of active tetrahedra that the swept edge crosses, each tested once."""
     body, scratch = cut.body, cut.scratch
     clear_table(scratch.tested)
+    mask = _mask_for(scratch.tested, 6 * scratch.n_active)
     scratch.n_crossings = 0
     for i in range(scratch.n_active):
         if scratch.segments[i, 0] < 0:
@@ -160,21 +186,30 @@ def find_crossings(cut: Cut) -> None:
             for q in range(p + 1, 4):
                 a = min(body.tetrahedra[t, p], body.tetrahedra[t, q])
                 b = max(body.tetrahedra[t, p], body.tetrahedra[t, q])
-                if _add_tested(scratch.tested, a, b):
+                if _add_tested(scratch.tested, mask, a, b):
                     # Another tetrahedron around the edge may list more segments, but those that
                     # can cross the edge itself are listed by all of them.
                     _cross_edge(cut, a, b, scratch.segments[i, 0], scratch.segments[i, 1])
 
 
 @kernel
-def _add_tested(tested: HashTable, a: int, b: int) -> bool:
+def _mask_for(tested: HashTable, n: int) -> int:
+    """Return the mask of as many of the first slots as `n` edges need: the cache holds few."""
+    n_slots = 1
+    while n_slots < 2 * n and n_slots < len(tested.item):
+        n_slots *= 2
+    return n_slots - 1
+
+
+@kernel
+def _add_tested(tested: HashTable, mask: int, a: int, b: int) -> bool:
     """Add edge ab to the edges tested; return False if it is among them."""
     key = (a << 32) | b
-    slot = first_slot(tested, hash_of(a, b, 0, 0))
+    slot = hash_of(a, b, 0, 0) & mask
     while is_filled(tested, slot):
         if tested.item[slot] == key:
             return False
-        slot = next_slot(tested, slot)
+        slot = (slot + 1) & mask
     fill_slot(tested, slot, key)
     return True
 
@@ -184,8 +219,9 @@ def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
     """Note where one of segments `first` to `last`, swept, crosses edge ab."""
     body, path, scratch = cut.body, cut.path, cut.scratch
     box = segment_box(body.lattice_rest, a, b)
-    for k in range(first, last + 1):
-        if not path.linked[k] or not overlap(_swept_box(path, k), box):
+    near = segments_near(path, box, first, last + 1)
+    for k in range(near.first, near.last + 1):
+        if not overlap(_swept_box(path, k), box):
             continue
         at = _crossing_of_quad(path, cut, a, b, k)
         n = scratch.n_crossings
