@@ -185,11 +185,11 @@ def stored_energy(
     """
     surplus = surplus_stretch(anchors, k, stretch, pose, law)
     stiffness: float = anchors.stiffness[k]
-    return energy_of(stiffness, stretch, surplus)
+    return energy_of_spring(stiffness, stretch, surplus)
 
 
 @inlined
-def energy_of(stiffness: float, stretch: Vec3, surplus: Vec3) -> float:
+def energy_of_spring(stiffness: float, stretch: Vec3, surplus: Vec3) -> float:
     """Return the energy of a spring [J] from its stretch and the surplus of that [m]."""
     held = sub(stretch, surplus)
     return stiffness * (0.5 * dot(held, held) + dot(held, surplus))

@@ -27,8 +27,8 @@ from tissue.core.vec3 import vec3
 from tissue.cutting.blade_path import Path, path_travel
 from tissue.geometry.aabb import box_between, overlap
 from tissue.mesh.body import Body
-from tissue.mesh.point_location import TetrahedronGrid, fits, list_appended, list_moved
 from tissue.mesh.star import Visits
+from tissue.mesh.tetrahedron_grid import TetrahedronGrid, fits, list_appended, list_moved
 
 NOT_SEARCHED: Final = 0
 """Nothing was looked for: the blade is far, or no sample of the edge can have entered."""

@@ -33,8 +33,9 @@ from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, store, sub, vec3
 from tissue.geometry.tetrahedron import Weights, barycentric_in, clipped, interpolate
 from tissue.mesh.body import CUT, Body
-from tissue.mesh.point_location import TetrahedronGrid, tetrahedron_at
+from tissue.mesh.point_location import tetrahedron_at
 from tissue.mesh.star import Visits
+from tissue.mesh.tetrahedron_grid import TetrahedronGrid
 
 LEAST_FACING, LEAST_FACING_OF_LIP = 0.3, 0.9
 """Cosine of the angle between a face's normal and the inward direction of a blunt side, from which
@@ -188,14 +189,13 @@ def _list_faces_in_plane(sides: SideContacts, body: Body, pose: BladePose) -> in
     n = 0
     plane = dot(pose.tip, pose.normal)
     for i in range(sides.n_around):
-        face = sides.around[i]
         low, high = np.inf, -np.inf
         for corner in range(3):
-            node = body.tetrahedra[face // 4, sides.outward[face % 4, corner]]
-            across = dot(vec3(body.positions, node), pose.normal) - plane
+            at = vec3(body.positions, sides.node_around[i, corner])
+            across = dot(at, pose.normal) - plane
             low, high = min(low, across), max(high, across)
         if low <= ON_PLANE and high >= -ON_PLANE:
-            sides.found[n] = face
+            sides.found[n] = i
             n += 1
     return n
 
@@ -213,7 +213,7 @@ def _skin_behind(sides: SideContacts, body: Body, side: BluntSide, normal: Vec3,
     """
     best = Skin(-1, np.inf, Weights(0.0, 0.0, 0.0, 0.0))
     for i in range(n):
-        skin = _face_behind(body, sides.found[i], sides.outward, side, normal)
+        skin = _face_behind(body, sides.around[sides.found[i]], sides.outward, side, normal)
         if skin.face >= 0 and skin.depth < best.depth:
             best = skin
     return best

@@ -30,8 +30,9 @@ from tissue.geometry.tetrahedron import (
     normalised,
 )
 from tissue.mesh.body import CUT, Body
-from tissue.mesh.point_location import TetrahedronGrid, tetrahedra_along
+from tissue.mesh.point_location import tetrahedra_along
 from tissue.mesh.star import Visits
+from tissue.mesh.tetrahedron_grid import TetrahedronGrid
 
 _BESIDE = 0.7
 """Cosine of the angle between the blade's normal and the direction to the nearest cut face, from

@@ -33,8 +33,8 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
-from tissue.mesh.point_location import build_grid, no_grid
 from tissue.mesh.star import Visits
+from tissue.mesh.tetrahedron_grid import build_grid, no_grid
 
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge

@@ -8,7 +8,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import path_travel, resampled
 from tissue.cutting.incision import CutHooks, Incision
-from tissue.mesh.point_location import build_grid, list_appended
+from tissue.mesh.tetrahedron_grid import build_grid, list_appended
 
 
 def cut_along(

@@ -5,11 +5,8 @@ from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path
 from tissue.mesh.body import Body, walk
-from tissue.mesh.point_location import (
-    TetrahedronGrid,
-    tetrahedron_at,
-    tetrahedron_in_box,
-)
+from tissue.mesh.point_location import tetrahedron_at, tetrahedron_in_box
+from tissue.mesh.tetrahedron_grid import TetrahedronGrid
 
 
 @kernel

@@ -11,7 +11,7 @@ from tissue.blade.anchors import (
     RETRACTED,
     Anchors,
     anchor_position,
-    energy_of,
+    energy_of_spring,
     held_toughness,
     stored_energy,
     surplus_stretch,
@@ -188,7 +188,7 @@ def _slip_anchor(
     anchors.slips[k] = surplus > 0.0
     if surplus == 0.0:
         return
-    before = energy_of(anchors.stiffness[k], stretch, beyond)
+    before = energy_of_spring(anchors.stiffness[k], stretch, beyond)
     spent = held_toughness(anchors, k, law) * across * surplus
     slip = surplus
     if anchors.at_skin[k]:

@@ -116,7 +116,7 @@ class SideContacts(Arrays):
     cells: IntArray
     """First cell along each axis that the blade's box met last, then the last; shape (6,)."""
     found: IntArray
-    """Scratch: the faces that a search found, in order; shape (capacity,)."""
+    """Scratch: rows of `around` that a search found, in order; shape (capacity,)."""
     row_before: IntArray
     """Scratch: the row that each face found had before, or -1; shape (capacity,)."""
     states_before: ContactStates

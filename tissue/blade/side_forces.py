@@ -16,7 +16,6 @@ from tissue.blade.side_contact import (
     END_SLOPE,
     OTHER,
     POINTS,
-    ContactStates,
     SideContacts,
     contact_forces,
     contact_point,
@@ -95,9 +94,6 @@ def apply_sliding(
     sides, totals = blade.sides, blade.totals
     states = sides.states
     for i in range(sides.n_faces):
-        if _rests(states, i) and is_clear(sides, pose, positions, i):
-            _let_go(sides, pose, positions, i)
-            continue
         stiffness = sides.stiffness * states.area[i]
         energy = 0.0
         for q in range(POINTS):
@@ -118,24 +114,6 @@ def apply_sliding(
             totals.work_of_friction += spent - kept
             energy += 0.5 * stiffness * depth * depth + kept
         states.energy[i] = energy
-
-
-@kernel
-def _rests(states: ContactStates, i: int) -> bool:
-    """Return whether no point of face `i` slid when sliding was applied last."""
-    speed = states.sliding_speed
-    return bool(speed[i, 0] == 0.0 and speed[i, 1] == 0.0 and speed[i, 2] == 0.0)
-
-
-@kernel
-def _let_go(sides: SideContacts, pose: BladePose, positions: FloatArray, i: int) -> None:
-    """Let the points of a face follow the blade that do not touch it, and spend nothing."""
-    states = sides.states
-    for q in range(POINTS):
-        at = blade_coordinates(pose, contact_point(sides, positions, i, q))
-        states.stuck_along[i, q] = at.along
-        states.stuck_behind[i, q] = at.behind
-    states.energy[i] = 0.0
 
 
 @kernel

@@ -15,7 +15,6 @@ from tissue.blade.side_contact import (
     SideContacts,
     contact_point,
     friction_stretch,
-    is_clear,
     penetration,
 )
 from tissue.core.array_types import FloatArray, IntArray
@@ -26,7 +25,7 @@ from tissue.core.simd_rows import points_of_column
 from tissue.core.vec3 import axpy, cross, dot, norm, sub, vec3
 from tissue.geometry.aabb import Aabb, widened, with_point
 from tissue.mesh.body import Body, is_open
-from tissue.mesh.point_location import TETRAHEDRA_PER_LINE, TetrahedronGrid, cell_along
+from tissue.mesh.tetrahedron_grid import TETRAHEDRA_PER_LINE, TetrahedronGrid, cell_along
 
 LEAST_COSINE = 0.5
 """Least cosine of the angle between the normals of blade and face for a face that is beside the
@@ -137,7 +136,7 @@ def find_faces(
         near = _near_plane(sides, body.positions, pose, i)
         for k in range(i, min(i + WIDTH, sides.n_around)):
             if near >> (k - i) & 1 == 1 and _is_near(sides, body.positions, pose, k):
-                sides.found[n] = sides.around[k]
+                sides.found[n] = k
                 n += 1
     _replace_faces(blade, body, pose, n)
     return True
@@ -300,12 +299,13 @@ def _replace_faces(blade: BladeState, body: Body, pose: BladePose, n: int) -> No
         for q in range(POINTS):
             _copy_point(states, before, i, i, q)
     for i in range(n):
-        sides.row_before[i] = sides.row_of_face[sides.found[i]]
+        sides.row_before[i] = sides.row_of_face[sides.around[sides.found[i]]]
     release_faces(blade)
     for i in range(n):
         row = sides.n_faces
-        face = sides.found[i]
-        _write_nodes(sides, body, row, face)
+        face = sides.around[sides.found[i]]
+        for corner in range(3):
+            sides.node[row, corner] = sides.node_around[sides.found[i], corner]
         old = sides.row_before[i]
         # A face in contact keeps its side and area: measuring a trembling lip again in each step
         # gave it energy, a tenth of the work of the blade in an organ.
@@ -344,13 +344,6 @@ def _copy_point(source: ContactStates, target: ContactStates, i: int, j: int, q:
 
 
 @kernel
-def _write_nodes(sides: SideContacts, body: Body, row: int, face: int) -> None:
-    """Write the nodes of a face to `row`."""
-    for k in range(3):
-        sides.node[row, k] = body.tetrahedra[face // 4, sides.outward[face % 4, k]]
-
-
-@kernel
 def _measure_face(sides: SideContacts, body: Body, pose: BladePose, row: int) -> bool:
     """Write side and area of the face in `row`; return whether it has a side."""
     a = vec3(body.positions, sides.node[row, 0])
@@ -382,8 +375,6 @@ def _begin_point(sides: SideContacts, body: Body, pose: BladePose, row: int, q: 
 @kernel
 def _face_energy(sides: SideContacts, body: Body, pose: BladePose, row: int) -> float:
     """Return the energy between a face and the blade, by pressure and friction [J]."""
-    if is_clear(sides, pose, body.positions, row):
-        return 0.0
     stiffness = sides.stiffness * sides.states.area[row]
     energy = 0.0
     for q in range(POINTS):

@@ -20,7 +20,13 @@ from tissue.blade.blunt_contact import (
 )
 from tissue.blade.edge import BladePose, Edge, blade_coordinates, pose_at, sample_point
 from tissue.blade.impulse_totals import ImpulseTotals
-from tissue.blade.side_contact import POINTS, contact_forces, contact_point, penetration
+from tissue.blade.side_contact import (
+    POINTS,
+    contact_forces,
+    contact_point,
+    is_clear,
+    penetration,
+)
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
@@ -241,6 +247,8 @@ def _report_sides(
     """Add the side contacts to the report; torques are about a point [m]."""
     sides = blade.sides
     for i in range(sides.n_faces):
+        if is_clear(sides, pose, body.positions, i):
+            continue
         stiffness = sides.stiffness * sides.states.area[i]
         for q in range(POINTS):
             p = contact_point(sides, body.positions, i, q)

@@ -8,7 +8,8 @@ In the order in which they are best read:
     workspace         room for the nodes and tetrahedra that a cut adds
     changes           what a cut step changed
     moved_nodes       the nodes that moved since a search asked last
-    point_location    which tetrahedron holds a point
+    tetrahedron_grid  a grid of cells that list tetrahedra
+    point_location    which tetrahedron holds a point, by that grid
     bounding_boxes    the box around the body, and boxes around its parts
     surface           the boundary triangles
     pieces            the connected pieces

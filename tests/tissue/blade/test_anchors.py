@@ -35,8 +35,8 @@ from tissue.core.vec3 import Vec3, vec3
 from tissue.cutting.blade_path import new_path
 from tissue.elasticity.springs import no_springs
 from tissue.mesh.body import CUT, OUTER, build_body, walk
-from tissue.mesh.point_location import build_grid
 from tissue.mesh.star import no_visits
+from tissue.mesh.tetrahedron_grid import build_grid
 
 pytestmark = pytest.mark.kernel
 

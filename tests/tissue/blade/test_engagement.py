@@ -11,8 +11,9 @@ from tissue.blade.engagement import anchor_beside, is_behind_edge, is_in_slit
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
-from tissue.mesh.point_location import build_grid, tetrahedron_at
+from tissue.mesh.point_location import tetrahedron_at
 from tissue.mesh.star import no_visits
+from tissue.mesh.tetrahedron_grid import build_grid
 
 EDGE = 0.04
 REACH = 1e-3

@@ -9,7 +9,7 @@ from tissue import block
 from tissue.blade.prescribed_path import begin_path, prescribe_path
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import resampled
-from tissue.mesh.point_location import build_grid
+from tissue.mesh.tetrahedron_grid import build_grid
 
 pytestmark = pytest.mark.kernel
 

@@ -19,10 +19,16 @@ from tissue.blade.side_contact import (
     with_more_faces,
 )
 from tissue.blade.side_forces import add_side_stiffness, apply_side_forces, apply_sliding
-from tissue.blade.side_search import find_faces, forget_cells, release_faces
+from tissue.blade.side_search import (
+    find_faces,
+    forget_cells,
+    forget_changed_faces,
+    release_faces,
+)
 from tissue.core.vec3 import Vec3, cross, vec3
-from tissue.mesh.body import build_body
-from tissue.mesh.point_location import build_grid
+from tissue.mesh.body import CUT, build_body
+from tissue.mesh.star import no_visits
+from tissue.mesh.tetrahedron_grid import build_grid, list_moved
 
 pytestmark = pytest.mark.kernel
 
@@ -260,3 +266,39 @@ def test_a_blade_that_stays_in_its_grid_cells_finds_the_same_faces_as_a_new_sear
         assert faces[0] == faces[1]
         n_found.append(len(faces[0]))
     assert 0 < n_found.count(0) < len(n_found)
+
+
+def test_faces_that_a_cut_opens_or_a_grid_lists_anew_are_found_as_by_a_new_search():
+    """Links are cut beside the blade, and then nodes move to other cells, all in the same cells."""
+    pressed = Pressed()
+    body, kept = pressed.body, build_grid(pressed.body, pressed.body.positions, 0.5e-3)
+    visits = no_visits(len(body.positions), len(body.tetrahedra))
+    edge, n_before = edge_at(0.0109), pressed.sides.n_faces
+    pressed.find_in(kept, edge)
+    for t in sorted(
+        {face // 4 for face in pressed.sides.around[: pressed.sides.n_around].tolist()}
+    ):
+        for f in range(4):
+            link = int(body.links[t, f])
+            if link >= 0:
+                body.links[t, f] = body.links[link // 4, link % 4] = CUT
+                changed = np.array([t, link // 4, -1])  # room for one more
+                forget_changed_faces(pressed.sides, body, changed, 2)
+                break
+        expect_as_new(pressed, kept, edge)
+    assert pressed.sides.n_faces > n_before
+    for shift in (0.4e-3, -0.8e-3, 1.2e-3):
+        body.positions[:, 1] += shift
+        everything = np.arange(body.n_nodes)
+        n, queue = body.n_nodes, pressed.blade.queue
+        assert list_moved(body, visits, kept, everything, n, queue)
+        expect_as_new(pressed, kept, edge)
+
+
+def expect_as_new(pressed, grid, edge):
+    """Fail unless a search finds what one finds that lists all faces around the blade again."""
+    pressed.find_in(grid, edge)
+    found = pressed.sides.face[pressed.rows()].tolist()
+    forget_cells(pressed.sides)
+    pressed.find_in(grid, edge)
+    assert found == pressed.sides.face[pressed.rows()].tolist() == sorted(found)

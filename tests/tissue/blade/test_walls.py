@@ -17,7 +17,8 @@ from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.mesh.body import build_body
-from tissue.mesh.point_location import build_grid, tetrahedron_at
+from tissue.mesh.point_location import tetrahedron_at
+from tissue.mesh.tetrahedron_grid import build_grid
 
 pytestmark = pytest.mark.kernel
 

@@ -6,7 +6,7 @@ from tests import bodies, strokes
 from tests.test_determinism import fingerprint
 from tissue import BladeShape, Material, SolverSettings, Tissue
 from tissue.integrators.staged_relaxation import relax_in_stages
-from tissue.mesh.point_location import no_grid
+from tissue.mesh.tetrahedron_grid import no_grid
 
 MESH = bodies.jittered(4, 0)
 SOLID = Material(law="neo_hookean", poisson_ratio=0.45)

@@ -10,16 +10,14 @@ from tissue.cutting.stellar_subdivision import split_edge
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import grown_body
 from tissue.mesh.bounding_boxes import write_bounds
-from tissue.mesh.point_location import (
+from tissue.mesh.point_location import tetrahedra_along, tetrahedron_at, tetrahedron_in_box
+from tissue.mesh.tetrahedron_grid import (
     TETRAHEDRA_PER_LINE,
     build_grid,
     cell_along,
     list_appended,
     list_moved,
     no_grid,
-    tetrahedra_along,
-    tetrahedron_at,
-    tetrahedron_in_box,
 )
 
 pytestmark = pytest.mark.kernel
