@@ -25,7 +25,8 @@ import numpy as np
 from tissue.blade.edge import BladeCoordinates, BladePose
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd_gather import natural
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, axpy, dot, scale, vec3
 from tissue.material import Material
@@ -190,6 +191,17 @@ def grown_side_contacts(sides: SideContacts, n_tetrahedra: int) -> SideContacts:
     )
 
 
+class Corners(NamedTuple):
+    """The corners of a face."""
+
+    first: Vec3
+    """Position of the first corner [m]."""
+    second: Vec3
+    """Position of the second [m]."""
+    third: Vec3
+    """Position of the third [m]."""
+
+
 class Profile(NamedTuple):
     """The blade's outline at a point, on the tissue's side."""
 
@@ -264,18 +276,40 @@ def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) ->
     return axpy(OTHER, vec3(positions, node[i, (q + 2) % 3]), p)
 
 
-@kernel
-def is_clear(sides: SideContacts, pose: BladePose, positions: FloatArray, i: int) -> bool:
-    """Return whether a face is farther from the blade's plane than the blade is thick anywhere."""
+@inlined
+def corners_of(sides: SideContacts, positions: FloatArray, i: int) -> Corners:
+    """Return the corners of row `i`, with the nodes at `positions` [m]."""
+    node = sides.node
+    a, b, c = natural(node[i, 0]), natural(node[i, 1]), natural(node[i, 2])
+    return Corners(vec3(positions, a), vec3(positions, b), vec3(positions, c))
+
+
+@inlined
+def point_near_first(corners: Corners) -> Vec3:
+    """Return the contact point at the first of these corners [m]: `contact_point`, bit by bit."""
+    return axpy(OTHER, corners.third, axpy(OTHER, corners.second, scale(CORNER, corners.first)))
+
+
+@inlined
+def turned(corners: Corners) -> Corners:
+    """Return the corners with the second one first."""
+    return Corners(corners.second, corners.third, corners.first)
+
+
+@inlined
+def is_clear(sides: SideContacts, pose: BladePose, corners: Corners, i: int) -> bool:
+    """Return whether face `i` is farther from the blade's plane than the blade is thick anywhere.
+
+    `corners`: where its corners are [m].
+    """
     normal = pose.normal
     side = sides.states.side[i]
     reach = side * dot(pose.tip, normal) + sides.half_thickness + CLEARANCE
-    is_clear: bool = (
-        side * dot(vec3(positions, sides.node[i, 0]), normal) > reach
-        and side * dot(vec3(positions, sides.node[i, 1]), normal) > reach
-        and side * dot(vec3(positions, sides.node[i, 2]), normal) > reach
+    return bool(
+        side * dot(corners.first, normal) > reach
+        and side * dot(corners.second, normal) > reach
+        and side * dot(corners.third, normal) > reach
     )
-    return is_clear
 
 
 @kernel

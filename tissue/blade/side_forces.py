@@ -18,10 +18,12 @@ from tissue.blade.side_contact import (
     POINTS,
     SideContacts,
     contact_forces,
-    contact_point,
+    corners_of,
     friction_stretch,
     is_clear,
     penetration,
+    point_near_first,
+    turned,
 )
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -54,10 +56,12 @@ def apply_side_forces(
     seconds = share * dt
     running = running_totals(blade.totals)
     for i in range(sides.n_faces):
-        if is_clear(sides, pose, positions, i):
+        corners = corners_of(sides, positions, i)
+        if is_clear(sides, pose, corners, i):
             continue
         for q in range(POINTS):
-            p = contact_point(sides, positions, i, q)
+            p = point_near_first(corners)
+            corners = turned(corners)
             force = _force_at(sides, pose, i, q, blade_coordinates(pose, p))
             if force.x == 0.0 and force.y == 0.0 and force.z == 0.0:
                 continue
@@ -96,8 +100,10 @@ def apply_sliding(
     for i in range(sides.n_faces):
         stiffness = sides.stiffness * states.area[i]
         energy = 0.0
+        corners = corners_of(sides, positions, i)
         for q in range(POINTS):
-            at = blade_coordinates(pose, contact_point(sides, positions, i, q))
+            at = blade_coordinates(pose, point_near_first(corners))
+            corners = turned(corners)
             depth = penetration(sides, pose.length, i, q, at).depth
             held = friction_stretch(sides, i, q, at, max(stiffness * depth, 0.0))
             before = held.along * held.along + held.behind * held.behind

@@ -24,6 +24,7 @@ from tissue.blade.side_contact import (
     POINTS,
     contact_forces,
     contact_point,
+    corners_of,
     is_clear,
     penetration,
 )
@@ -247,7 +248,7 @@ def _report_sides(
     """Add the side contacts to the report; torques are about a point [m]."""
     sides = blade.sides
     for i in range(sides.n_faces):
-        if is_clear(sides, pose, body.positions, i):
+        if is_clear(sides, pose, corners_of(sides, body.positions, i), i):
             continue
         stiffness = sides.stiffness * sides.states.area[i]
         for q in range(POINTS):
