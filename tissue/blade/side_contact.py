@@ -191,7 +191,7 @@ def grown_side_contacts(sides: SideContacts, n_tetrahedra: int) -> SideContacts:
     )
 
 
-class Corners(NamedTuple):
+class FaceCorners(NamedTuple):
     """The corners of a face."""
 
     first: Vec3
@@ -277,27 +277,27 @@ def contact_point(sides: SideContacts, positions: FloatArray, i: int, q: int) ->
 
 
 @inlined
-def corners_of(sides: SideContacts, positions: FloatArray, i: int) -> Corners:
+def corners_of(sides: SideContacts, positions: FloatArray, i: int) -> FaceCorners:
     """Return the corners of row `i`, with the nodes at `positions` [m]."""
     node = sides.node
     a, b, c = natural(node[i, 0]), natural(node[i, 1]), natural(node[i, 2])
-    return Corners(vec3(positions, a), vec3(positions, b), vec3(positions, c))
+    return FaceCorners(vec3(positions, a), vec3(positions, b), vec3(positions, c))
 
 
 @inlined
-def point_near_first(corners: Corners) -> Vec3:
+def point_near_first(corners: FaceCorners) -> Vec3:
     """Return the contact point at the first of these corners [m]: `contact_point`, bit by bit."""
     return axpy(OTHER, corners.third, axpy(OTHER, corners.second, scale(CORNER, corners.first)))
 
 
 @inlined
-def turned(corners: Corners) -> Corners:
+def turned(corners: FaceCorners) -> FaceCorners:
     """Return the corners with the second one first."""
-    return Corners(corners.second, corners.third, corners.first)
+    return FaceCorners(corners.second, corners.third, corners.first)
 
 
 @inlined
-def is_clear(sides: SideContacts, pose: BladePose, corners: Corners, i: int) -> bool:
+def is_clear(sides: SideContacts, pose: BladePose, corners: FaceCorners, i: int) -> bool:
     """Return whether face `i` is farther from the blade's plane than the blade is thick anywhere.
 
     `corners`: where its corners are [m].
