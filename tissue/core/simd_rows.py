@@ -6,6 +6,7 @@ off.
 
 from typing import Any, cast
 
+import numpy as np
 from llvmlite import ir
 from numba.core import types
 
@@ -135,6 +136,38 @@ def _store_rows_of_four(builder: Any, rows: _Array, i: Any, a: Any, b: Any, c: A
         vectors.append(_shuffled(builder, ab, cd, [0, 1, 8, 9, 2, 3, 10, 11]))
         vectors.append(_shuffled(builder, ab, cd, [4, 5, 12, 13, 6, 7, 14, 15]))
     _store_vectors(builder, rows.at(i, 4), vectors)
+
+
+def add_to_row(rows: FloatArray, i: int, factor: float, x: float, y: float, z: float) -> None:
+    """Add a multiple of a vector to row `i` of an array of shape (n, 3).
+
+    Args:
+        rows: The array; written.
+        i: Row, not negative.
+        factor: Factor.
+        x: First component of the vector.
+        y: Second component.
+        z: Third component.
+    """
+    rows[i] += factor * np.array([x, y, z])
+
+
+@_compiled(add_to_row, types.Array, types.Integer, *[types.Float] * 4, result=types.void)
+def _add_to_row(builder: Any, rows: _Array, i: Any, factor: Any, x: Any, y: Any, z: Any) -> None:
+    first, pair = rows.at(i, 3), ir.VectorType(ir.DoubleType(), 2)
+    made = ir.Constant(pair, ir.Undefined)
+    both, twice = made, made
+    for k, value in enumerate((x, y)):
+        both = builder.insert_element(both, value, ir.Constant(ir.IntType(32), k))
+        twice = builder.insert_element(twice, factor, ir.Constant(ir.IntType(32), k))
+    # Products and sums are rounded apart, as those of scalars are.
+    low, last = (
+        builder.bitcast(first, pair.as_pointer()),
+        builder.gep(first, [ir.Constant(_I64, 2)]),
+    )
+    total = builder.fadd(builder.load(low, align=8), builder.fmul(twice, both))
+    builder.store(total, low, align=8)
+    builder.store(builder.fadd(builder.load(last), builder.fmul(factor, z)), last)
 
 
 def _vectors(builder: Any, first: Any, n: int) -> list[Any]:

@@ -6,6 +6,7 @@ import pytest
 from tissue.core.jit import kernel
 from tissue.core.simd import room_for_points, store_lanes
 from tissue.core.simd_rows import (
+    add_to_row,
     points_of_column,
     rows_of_four,
     rows_of_three,
@@ -51,3 +52,17 @@ def test_rows_are_read_and_written_by_columns():
         np.testing.assert_array_equal(to_three[1:9], POINTS[2:10])
         np.testing.assert_array_equal(to_four[4:12], FOUR[3:11])
         assert not to_three[[0, *range(9, 12)]].any() and not to_four[[0, 1, 2, 3, 12]].any()
+
+
+def add_multiples(rows, vectors):
+    for i in range(len(vectors)):
+        add_to_row(rows, i % 3, 0.1 * i, vectors[i, 0], vectors[i, 1], vectors[i, 2])
+
+
+def test_a_multiple_of_a_vector_is_added_to_a_row_as_scalars_are():
+    rows, expected = POINTS[:4].copy(), POINTS[:4].copy()
+    kernel(add_multiples)(rows, POINTS)
+    for i in range(len(POINTS)):
+        for x in range(3):
+            expected[i % 3, x] += 0.1 * i * POINTS[i, x]
+    np.testing.assert_array_equal(rows, expected)

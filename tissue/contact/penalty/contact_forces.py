@@ -34,6 +34,7 @@ from tissue.core.simd import WIDTH, filled, lanes, load_lanes, store_lanes
 from tissue.core.simd_blocks import sum_of_lanes
 from tissue.core.simd_gather import larger, larger_bits, largest, where_larger
 from tissue.core.simd_rows import (
+    add_to_row,
     store_rows_of_four,
     store_rows_of_three,
 )
@@ -57,6 +58,10 @@ class PenaltyForces(Arrays):
     """Number of contacts in the list in use."""
     n_pressing: IntCell
     """Number of contacts that pressed at the end of the last substep."""
+    n_nodes: IntCell
+    """Number of nodes in contact."""
+    has_acted: IntCell
+    """1 if forces of contact are among those on the nodes, else 0."""
     work: FloatCell
     """Work of all contact forces on the body so far [J]; mostly negative."""
     stored: FloatCell
@@ -67,6 +72,8 @@ class PenaltyForces(Arrays):
     """Greatest depth of a contact that pressed since totals were cleared [m]."""
     floor_impulse: FloatArray
     """Impulse of the floor on the body since totals were cleared [N s], shape (3,)."""
+    touching: IntArray
+    """Nodes in contact, each once; shape (4 * capacity,)."""
     node: IntArray
     """Nodes: one and the corners of a face, or the ends of two edges; four times the same on the
     floor. Shape (2 * capacity, 4)."""
@@ -114,11 +121,14 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         first=0,
         n_contacts=0,
         n_pressing=0,
+        n_nodes=0,
+        has_acted=0,
         work=0.0,
         stored=0.0,
         pressure_impulse=0.0,
         penetration=0.0,
         floor_impulse=np.zeros(3),
+        touching=np.zeros(2 * rows, np.int64),
         node=np.zeros((rows, 4), np.int64),
         weight=np.zeros((rows, 4)),
         spread=np.zeros((rows, 4)),
@@ -171,11 +181,30 @@ def is_floor_contact(forces: PenaltyForces, c: int) -> bool:
 
 @kernel
 def clear_contact_forces(forces: PenaltyForces, external: FloatArray) -> None:
-    """Set the forces on the nodes of all contacts to zero."""
-    nothing = Vec3(0.0, 0.0, 0.0)
-    for c in range(forces.first, forces.first + forces.n_contacts):
+    """Set the forces on the nodes of all contacts to zero, if there are any."""
+    if forces.has_acted == 0:
+        return
+    forces.has_acted = 0
+    for i in range(forces.n_nodes):
+        store(external, forces.touching[i], Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def list_touching_nodes(forces: PenaltyForces, share: FloatArray) -> None:
+    """List the nodes in contact, and write the share of each in all contacts: sum(|w|)."""
+    rows, n = range(forces.first, forces.first + forces.n_contacts), 0
+    for c in rows:
         for q in range(4):
-            store(external, forces.node[c, q], nothing)
+            share[forces.node[c, q]] = -1.0
+    for c in rows:
+        for q in range(4):
+            node = forces.node[c, q]
+            if share[node] < 0.0:
+                share[node] = 0.0
+                forces.touching[n] = node
+                n += 1
+            share[node] += abs(forces.weight[c, q])
+    forces.n_nodes = n
 
 
 @kernel
@@ -196,6 +225,7 @@ def add_contact_forces(
         external: Forces on the nodes [N], shape (capacity, 3); those of contact are added.
     """
     end = forces.first + forces.n_contacts
+    forces.has_acted = 1
     for c in range(forces.first, end, WIDTH):
         pressing = _eight_forces(forces, positions, velocities, seconds, c)
         if pressing != 0:
@@ -271,10 +301,7 @@ def _add_eight(
             continue
         x, y, z = forces.acting[i, 0], forces.acting[i, 1], forces.acting[i, 2]
         for q in range(4):
-            node, weight = forces.node[c + i, q], forces.spread[c + i, q]
-            external[node, 0] += weight * x
-            external[node, 1] += weight * y
-            external[node, 2] += weight * z
+            add_to_row(external, forces.node[c + i, q], forces.spread[c + i, q], x, y, z)
         if is_floor_contact(forces, c + i):
             forces.floor_impulse[0] += seconds * x
             forces.floor_impulse[1] += seconds * y

@@ -14,7 +14,11 @@ Source: Tonge et al. (2012), Mass splitting for jitter-free parallel rigid body 
 shares.
 """
 
-from tissue.contact.penalty.contact_forces import PenaltyForces, weighted_sum
+from tissue.contact.penalty.contact_forces import (
+    PenaltyForces,
+    list_touching_nodes,
+    weighted_sum,
+)
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell
@@ -103,15 +107,10 @@ def split_masses(
         limits: How stiff contact may be.
         body: Masses and positions.
         frequency_squared: Bound on w^2 of each node without contact [1/s2], shape (capacity,).
-        share: Scratch, shape (capacity,): the share of each node in all contacts.
+        share: Scratch, shape (capacity,).
     """
     rows = range(forces.first, forces.first + forces.n_contacts)
-    for c in rows:
-        for q in range(4):
-            share[forces.node[c, q]] = 0.0
-    for c in rows:
-        for q in range(4):
-            share[forces.node[c, q]] += abs(forces.weight[c, q])
+    list_touching_nodes(forces, share)
     for c in rows:
         softness, mobility = 0.0, 0.0
         for q in range(4):

@@ -8,6 +8,7 @@ from tissue.contact.penalty.contact_forces import (
     add_contact_forces,
     clear_contact_forces,
     end_contact_substep,
+    list_touching_nodes,
     new_penalty_forces,
 )
 
@@ -85,7 +86,24 @@ def test_impulse_of_the_floor_and_work_are_counted_by_the_weight_of_the_evaluati
 
 def test_forces_are_cleared_at_the_nodes_of_contacts_and_nowhere_else():
     body, forces = one_on_floor()
+    list_touching_nodes(forces, np.zeros(body.n_nodes))
+    assert list(forces.touching[: forces.n_nodes]) == [0]
     external = np.ones_like(body.positions)
+    clear_contact_forces(forces, external)
+    assert (external == 1.0).all(), "no forces have been added"
+    add_contact_forces(forces, body.positions, body.velocities, 1e-3, external)
     clear_contact_forces(forces, external)
     assert not external[0].any()
     assert (external[1:] == 1.0).all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_each_node_in_contact_is_listed_once_with_its_share(seed):
+    body, forces = random_contacts(seed)
+    share = np.full(body.n_nodes, np.nan)
+    list_touching_nodes(forces, share)
+    nodes, n = forces.node[: forces.n_contacts], forces.n_nodes
+    assert sorted(forces.touching[:n]) == list(np.unique(nodes))
+    shares = np.zeros(body.n_nodes)
+    np.add.at(shares, nodes, np.abs(forces.weight[: forces.n_contacts]))
+    np.testing.assert_allclose(share[forces.touching[:n]], shares[forces.touching[:n]])
