@@ -28,6 +28,7 @@ from tissue.blade.toughness import toughness_law_of
 from tissue.blade.wrench import BladeReport, blade_report, contacts_of, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import SameTypes
 from tissue.cutting.blade_path import Path
 from tissue.material import Material
 from tissue.mesh.body import Body
@@ -48,6 +49,8 @@ size."""
 
 SHEET_MARGIN = 0.5
 """How far outside the skin the sheet begins and ends, per mean node size."""
+
+_BEGIN, _TRACE, _REPORT = SameTypes(begin_blade_step), SameTypes(trace), SameTypes(report_step)
 
 _SAME_LENGTH = 1e-3
 """Relative change in length below which an edge counts as the same. Poses in single precision, or
@@ -159,7 +162,7 @@ class BladeInteraction:
 
     def begin_step(self, body: Body, edge: Edge, dt: float, is_checked: bool) -> bool:
         """Begin a time step: impulses are counted from zero; see `begin_blade_step`."""
-        return begin_blade_step(self.state, body, edge, dt, is_checked)
+        return _BEGIN.call(self.state, body, edge, dt, is_checked)
 
     def context(
         self, body: Body, visits: Visits, path: Path, bounds: FloatArray, slit_reach: float
@@ -271,11 +274,11 @@ class BladeInteraction:
 
     def trace(self, context: BladeContext, edge: Edge, when: float) -> float:
         """Trace the path of the edge; see `tissue.blade.blade_context.trace`."""
-        return trace(context, edge, when)
+        return _TRACE.call(context, edge, when)
 
     def report(self, context: BladeContext, edge: Edge, dt: float) -> BladeReport:
         """Return what a time step of `dt` [s] came to."""
-        report_step(context, edge, dt)
+        _REPORT.call(context, edge, dt)
         report = blade_report(self._report, self._contacts)
         self._contacts = report.contacts
         return report

@@ -1,7 +1,7 @@
 """`@kernel`: the one decorator that compiles, and the one place where its flags live."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, Generic, TypeVar, cast
 
 import numba as nb
 
@@ -49,3 +49,25 @@ def inlined(function: F) -> F:
 
 def _compiled(function: F, flags: dict[str, Any]) -> F:
     return cast(F, in_parts(function, flags)) if is_compiling() else function
+
+
+class SameTypes(Generic[F]):
+    """A kernel for a caller whose arguments have the same types in each call: `name.call(...)`.
+
+    Numba looks up the type of each argument in each call, which takes 0.3 us for a struct; here it
+    does so in the first call alone. Later ones are not checked, so this is for structs and plain
+    numbers, whose types a type checker sees, and not for arrays that a user passes.
+    """
+
+    def __init__(self, function: F) -> None:
+        self._function: Any = function
+        self.call = cast(F, self._first_call if is_compiling() else function)
+        """Calls the kernel."""
+
+    def _first_call(self, *arguments: Any) -> Any:
+        """Call the kernel, and keep what was compiled for these types."""
+        kernel = self._function
+        result = kernel(*arguments)
+        types = tuple(kernel.typeof_pyval(argument) for argument in arguments)
+        self.call = kernel.overloads[types].entry_point
+        return result

@@ -7,10 +7,12 @@ from typing import NamedTuple
 from tissue.blade.blade_context import BladeContext
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
+from tissue.core.jit import SameTypes
 from tissue.integrators.options import Global, IntegratorOptions, Verlet
 from tissue.integrators.relaxation import (
     NOT_FINITE,
     RELAXED,
+    UNSTABLE,
     Relaxation,
     relax_by_nystroem,
     relax_by_runge_kutta,
@@ -83,6 +85,7 @@ class GlobalStepper:
 
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
+        self._relax = SameTypes(method.relax)
         self._threads = Threads(threads) if threads > 1 else None
         self._choice: StepChoice | None = None
         self._relaxation: Relaxation | None = None
@@ -91,25 +94,29 @@ class GlobalStepper:
         self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
     ) -> int:
         """Relax by an increment; return the steps taken. See `Integrator.relax`."""
-        if isinstance(system.contact, SelfContact):
+        contact = system.contact
+        if isinstance(contact, SelfContact):
             return relax_in_stages(self, system, blade, increment, has_blade)
-        if increment.span > 0.0:
+        edge, dt, begin, end = increment
+        if contact.is_awake and increment.span > 0.0:
             system.find_contacts(increment.span)
         choice = self._choice_for(system)
         if self._threads is not None:
             self._threads.join(system.context)
         while True:
             arrays = self._arrays(system, blade, choice)
-            outcome = self.method.relax(arrays, increment.edge, has_blade, *increment[1:])
+            outcome = self._relax.call(arrays, edge, has_blade, dt, begin, end)
             if outcome == RELAXED:
                 break
+            if outcome == UNSTABLE:
+                expect_stable(choice)
             if outcome == NOT_FINITE:
                 raise not_finite()
             blade = system.interaction.with_room(outcome, blade)
-        expect_stable(choice)
-        if choice.done > 0:
+        n = choice.done
+        if n > 0:
             system.find_new_loose_pieces()
-        return choice.done
+        return n
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""

@@ -35,6 +35,8 @@ RELAXED: Final = 0
 """The increment is done."""
 NOT_FINITE: Final = -1
 """The increment is done, and the position of a node is not a finite number."""
+UNSTABLE: Final = -2
+"""The motion became unstable; the increment is not done."""
 
 _FACES, _STEPS, _ANCHORS, _ANCHORS_AGAIN = 0, 1, 2, 3
 """Stages of an increment; the last one where the grid was full, and is new now."""
@@ -105,9 +107,9 @@ def relax_by_verlet(
 def relax_by_runge_kutta(
     relaxation: Relaxation, edge: Edge, has_blade: bool, dt: float, begin: float, end: float
 ) -> int:
-    """Relax by the Runge-Kutta method; return RELAXED, or NOT_FINITE, or what needs room.
+    """Relax by the Runge-Kutta method; return RELAXED, or what went wrong, or what needs room.
 
-    `relaxation.choice` says how many steps were taken, and whether the motion became unstable.
+    `relaxation.choice` says how many steps were taken.
 
     Args:
         relaxation: Written. What contact adds to w^2 is in its choice of steps.
@@ -147,12 +149,12 @@ def _begin(
 
 @kernel
 def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int:
-    """Do what follows the steps; return RELAXED, or NOT_FINITE, or what needs room."""
+    """Do what follows the steps; return RELAXED, or what went wrong, or what needs room."""
     step, choice = relaxation.step, relaxation.choice
     if relaxation.stage == _STEPS:
         relaxation.stage = _FACES
         if choice.is_unstable == 1:
-            return RELAXED
+            return UNSTABLE
         if choice.done > 0:
             if relaxes(step.elastic.solid):
                 relax_stress(step, choice.span)

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import llvmlite.binding as llvm
 import numba as nb
+import numpy as np
 import pytest
 
 import tissue
 from tissue.core import kernel_parts
 from tissue.core.cache_directory import cache_directory
-from tissue.core.jit import inlined, is_compiling, kernel
+from tissue.core.jit import SameTypes, inlined, is_compiling, kernel
 
 pytestmark = pytest.mark.kernel
 
@@ -201,3 +202,19 @@ def test_compiling_a_kernel_leaves_numba_as_it_was():
 
     assert added(1, 2) == 3
     assert before == (nb.types.Function.get_call_type, list(llvm.ffi.lib._lock._cblist))
+
+
+def test_a_kernel_for_a_caller_of_the_same_types_does_the_same_in_each_call():
+    @kernel
+    def scaled(x, factor):
+        return x[0] * factor
+
+    of_doubles, of_singles = SameTypes(scaled), SameTypes(scaled)
+    for factor in (2.0, 3.0):
+        assert of_doubles.call(np.array([1.5]), factor) == 1.5 * factor
+        assert of_singles.call(np.array([1.5], np.float32), factor) == 1.5 * factor
+    if is_compiling():
+        assert of_doubles.call is not of_singles.call
+        assert {type(each.call).__name__ for each in (of_doubles, of_singles)} == {
+            "builtin_function_or_method"
+        }
