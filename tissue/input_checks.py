@@ -30,9 +30,6 @@ HOW_LOW = {"springs": 20, "neo_hookean": 15}
 _CONTACTS = ("impulses", "penalty")
 """Names that `SolverSettings.contact` may have."""
 
-_LENGTHS = [3] * 6
-"""Numbers in each part of a sweep: tip, heel and forward at its start and at its end."""
-
 _log = logging.getLogger("tissue")
 
 
@@ -88,15 +85,13 @@ def edge_of(sweep: BladeSweep) -> Edge:
     Raises:
         ValueError: tip, heel or forward are not three numbers each.
     """
-    parts = (*sweep.t0, *sweep.t1)
-    try:
-        are_points = [*map(len, parts)] == _LENGTHS
-        numbers = np.concatenate(parts, dtype=np.float64) if are_points else None
-    except (TypeError, ValueError):
-        numbers = None
-    if numbers is None or numbers.ndim != 1:
+    t0, t1 = sweep
+    try:  # plain numbers: to join six arrays takes twice as long
+        (a, b, c), (d, e, f), (g, h, i) = t0.tip.tolist(), t0.heel.tolist(), t0.forward.tolist()
+        (p, q, r), (s, t, u), (v, w, x) = t1.tip.tolist(), t1.heel.tolist(), t1.forward.tolist()
+        return Edge.of_numbers((a, b, c, d, e, f, g, h, i, p, q, r, s, t, u, v, w, x))
+    except (AttributeError, TypeError, ValueError):
         return edge_or_error(sweep)
-    return Edge.of_numbers(numbers.tobytes())
 
 
 def edge_or_error(sweep: BladeSweep) -> Edge:

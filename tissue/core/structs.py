@@ -205,21 +205,26 @@ class Vectors(Arrays):
         cls._numba_type_ = ArraysType(cls.__name__, fields)
 
     def __init__(self, *vectors: Vec3) -> None:
-        self._keep(array("d", sum(vectors, ())))
+        self._keep(sum(vectors, ()))
 
     @classmethod
-    def of_numbers(cls, numbers: bytes) -> Self:
-        """Return a struct of vectors whose doubles stand one after the other in memory."""
+    def of_numbers(cls, numbers: tuple[float, ...]) -> Self:
+        """Return a struct of vectors whose numbers follow one another.
+
+        Raises:
+            TypeError: they are too few or too many, or no numbers.
+        """
         vectors = cls.__new__(cls)
-        vectors._keep(array("d", numbers))
+        vectors._keep(numbers)
         return vectors
 
-    def _keep(self, numbers: "array[float]") -> None:
+    def _keep(self, numbers: tuple[float, ...]) -> None:
         if len(numbers) != 3 * len(self._names):
             raise TypeError(f"{type(self).__name__} takes {list(self._names)}")
-        # An array of Python's own is made in half the time of one of NumPy.
         self._numbers = numbers
-        self.address = numbers.buffer_info()[0]
+        # An array of Python's own is made in half the time of one of NumPy.
+        self._memory = array("d", numbers)
+        self.address = self._memory.buffer_info()[0]
 
     def __getattr__(self, name: str) -> Vec3:
         """Return a vector, which is made when it is asked for first."""

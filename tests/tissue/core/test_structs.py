@@ -155,7 +155,7 @@ def test_a_struct_of_vectors_needs_them_all():
 
 def test_a_struct_of_vectors_is_made_of_vectors_or_of_their_numbers():
     made = Frame(Vec3(1.0, 2.0, 3.0), Vec3(4.0, 5.0, 6.0))
-    read = Frame.of_numbers(np.arange(1.0, 7.0).tobytes())
+    read = Frame.of_numbers((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     for frame in (made, read):
         assert (frame.origin, frame.axis) == ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
         assert along(frame, 2.0) == 13.0
@@ -171,3 +171,9 @@ def along_field(field, i):
 def test_a_kernel_reads_a_vector_beside_arrays():
     field = Field(values=np.array([1.0, 2.0]), direction=Vec3(0.0, 3.0, 0.0))
     assert along_field(field, 1) == 6.0
+
+
+def test_numbers_that_do_not_fit_a_struct_of_vectors_are_refused():
+    for numbers in ((1.0,) * 5, (1.0,) * 5 + ("one",)):
+        with pytest.raises(TypeError):
+            Frame.of_numbers(numbers)
