@@ -1,17 +1,18 @@
 """A tetrahedral body that a blade can cut: `Tissue.step` lists the stages of a step."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from time import perf_counter
 
 import numpy as np
 import numpy.typing as npt
 
 from tissue.blade.blade_context import NOT_ENGAGED, BladeContext
 from tissue.blade.edge import Edge
+from tissue.blade.lazy_result import LazyResult
 from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import BoolArray, FloatArray
-from tissue.core.stage_clock import StageClock
 from tissue.core.vec3 import Vec3
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
@@ -154,24 +155,34 @@ class Tissue(DrivenBody):
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         checked_time_step(dt)
-        interaction, incision, clock = self._system.interaction, self._incision, StageClock()
+        interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
         travel = edge.travel if has_blade else 0.0
-        n_substeps = 0
-        for increment in self._increments(edge, travel, dt):
-            with clock.RX:  # relaxation: forces, contact, motion, slip of the blade
-                n_substeps += self._relax(increment, has_blade)
-            with clock.CD:  # collision detection: path, active tetrahedra, crossed edges
-                is_crossed = has_blade and self._detect(increment)
-            with clock.GC:  # geometric changes: subdivision, separation
-                if is_crossed:
-                    incision.cut(self._hooks)
-                elif has_blade and not interaction.is_engaged:
-                    self._end_incision()
-        with clock.GC:
-            if has_blade and incision.has_rested(travel, dt):
-                incision.open_to_edge(self._hooks)
-        return self._result(edge, has_blade, dt, n_substeps, clock)
+        n, n_substeps = incision.n_increments(travel), 0
+        collision = topology = relaxation = 0.0  # wall times
+        now = perf_counter()
+        for i in range(n):
+            increment, begun = Increment(edge, dt, i / n, (i + 1) / n), now
+            # RX, relaxation: forces, contact, motion, slip of the blade
+            n_substeps += self._relax(increment, has_blade)
+            relaxed = perf_counter()
+            # CD, collision detection: path, active tetrahedra, crossed edges
+            is_crossed = has_blade and self._detect(increment)
+            detected = perf_counter()
+            # GC, geometric changes: subdivision, separation
+            if is_crossed:
+                incision.cut(self._hooks)
+            elif has_blade and not interaction.is_engaged:
+                self._end_incision()
+            now = perf_counter()
+            relaxation += relaxed - begun
+            collision += detected - relaxed
+            topology += now - detected
+        if has_blade and incision.has_rested(travel, dt):
+            incision.open_to_edge(self._hooks)
+            topology += perf_counter() - now
+        stage_times = StageTimes(collision, topology, relaxation)
+        return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
         """Cut along a given surface in the body at rest: no blade, no force, no time passes.
@@ -256,19 +267,16 @@ class Tissue(DrivenBody):
         self._edge_now = (edge, 0.0)
         system.contact.begin()
 
-    def _increments(self, edge: Edge, travel: float, dt: float) -> Iterator[Increment]:
-        """Divide a step in which the edge moves that far [m], so that it moves little in each."""
-        n = self._incision.n_increments(travel)
-        for i in range(n):
-            yield Increment(edge, dt, i / n, (i + 1) / n)
-
     def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
         loads, system = self._loads, self._system
-        loads.spread(system.body, system.stages.loads)
-        before = loads.virtual_work(system.body)
+        before = 0.0
+        if loads.act:
+            loads.spread(system.body, system.stages.loads)
+            before = loads.virtual_work(system.body)
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
-        self._audit.work_of_loads += loads.virtual_work(system.body) - before
+        if loads.act:
+            self._audit.work_of_loads += loads.virtual_work(system.body) - before
         self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
         return n
@@ -290,31 +298,27 @@ class Tissue(DrivenBody):
             forget_path(self._incision.path)
 
     def _result(
-        self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, clock: StageClock
+        self, edge: Edge, has_blade: bool, dt: float, n_substeps: int, stage_times: StageTimes
     ) -> StepResult:
         """Return what the step did."""
-        report = self._system.interaction.report(self._blade_context, edge, dt)
-        amounts = report.amounts
-        return StepResult(
-            wrench=report.mean_wrench,
-            wrench_t1=report.wrench,
-            stiffness=report.stiffness,
-            contacts=report.contacts,
-            force_on_tissue=report.mean_force_on_tissue,
-            bounds=report.bounds,
-            n_tetrahedra=int(amounts.n_tetrahedra),
-            n_nodes=int(amounts.n_nodes),
-            n_active=self._incision.scheme.n_active,
-            active_point_tetrahedron=int(amounts.tip_tetrahedron) if has_blade else -1,
-            anchored_length=amounts.anchored_length,
-            cut_area=self._incision.cut_area,
-            finished_area=self._incision.finished_area,
-            work_of_blade=amounts.work_of_blade,
-            work_of_cutting=amounts.work_of_cutting,
-            n_substeps=n_substeps,
-            body_contacts=self._system.contact.report(dt),
-            stage_times=StageTimes(clock.CD.seconds, clock.GC.seconds, clock.RX.seconds),
-            energies=self._audit.energies(self._system, edge),
+        system, incision = self._system, self._incision
+        report = system.interaction.report(self._blade_context, edge, dt)
+        amounts, change = report.amounts, incision.scheme.change
+        return LazyResult.of(
+            report,
+            int(amounts.n_tetrahedra),
+            int(amounts.n_nodes),
+            incision.scheme.n_active,
+            int(amounts.tip_tetrahedron) if has_blade else -1,
+            amounts.anchored_length,
+            change.area,
+            change.finished_area,
+            amounts.work_of_blade,
+            amounts.work_of_cutting,
+            n_substeps,
+            system.contact.report(dt),
+            stage_times,
+            self._audit.energies(system, edge),
         )
 
     @property

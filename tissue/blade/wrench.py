@@ -99,76 +99,70 @@ def new_report(blade: BladeState) -> WrenchReport:
         normal_force=np.zeros(capacity),
         friction=np.zeros((capacity, 3)),
         cut_area=np.zeros(capacity),
-        **_parts_of(numbers)._asdict(),
+        wrench=numbers[0:6],
+        mean_wrench=numbers[6:12].reshape(2, 3),
+        mean_force_on_tissue=numbers[12:15],
+        tip=numbers[15:18],
+        bounds=numbers[18:24].reshape(2, 3),
+        stiffness=numbers[24:60].reshape(6, 6),
+        amounts=numbers[60:],
         numbers=numbers,
     )
 
 
-class _Parts(NamedTuple):
-    """The arrays of a report whose length does not change; see `WrenchReport`."""
-
-    wrench: FloatArray
-    mean_wrench: FloatArray
-    mean_force_on_tissue: FloatArray
-    tip: FloatArray
-    bounds: FloatArray
-    stiffness: FloatArray
-    amounts: FloatArray
-
-
 _N_NUMBERS = 60 + len(Amounts._fields)
-"""Numbers in them."""
-
-
-def _parts_of(numbers: FloatArray) -> _Parts:
-    """Return views of `WrenchReport.numbers`."""
-    return _Parts(
-        numbers[0:6],
-        numbers[6:12].reshape(2, 3),
-        numbers[12:15],
-        numbers[15:18],
-        numbers[18:24].reshape(2, 3),
-        numbers[24:60].reshape(6, 6),
-        numbers[60:],
-    )
+"""Numbers in the arrays of a report whose length does not change."""
 
 
 class BladeReport(NamedTuple):
-    """What a report came to."""
+    """A copy of what a report came to. The arrays of a property are views of the copy."""
 
-    mean_wrench: Wrench
-    """Mean wrench of the tissue on the blade in the time step, about the tip."""
-    wrench: Wrench
-    """That wrench at the end of the step."""
-    stiffness: FloatArray
-    """Change of that wrench with the pose of the blade, shape (6, 6)."""
-    contacts: BladeContacts
-    """The contacts at the end of the step; views."""
-    mean_force_on_tissue: FloatArray
-    """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
-    bounds: FloatArray
-    """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
+    numbers: FloatArray
+    """`WrenchReport.numbers` at the end of the step."""
     amounts: Amounts
     """Single numbers."""
+    contacts: BladeContacts
+    """The contacts at the end of the step; views of the report, which the next step overwrites."""
+
+    @property
+    def mean_wrench(self) -> Wrench:
+        """Mean wrench of the tissue on the blade in the time step, about the tip."""
+        numbers = self.numbers
+        return Wrench(numbers[6:9], numbers[9:12], numbers[15:18])
+
+    @property
+    def wrench(self) -> Wrench:
+        """That wrench at the end of the step."""
+        numbers = self.numbers
+        return Wrench(numbers[0:3], numbers[3:6], numbers[15:18])
+
+    @property
+    def mean_force_on_tissue(self) -> FloatArray:
+        """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
+        return self.numbers[12:15]
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
+        return self.numbers[18:24].reshape(2, 3)
+
+    @property
+    def stiffness(self) -> FloatArray:
+        """Change of the wrench with the pose of the blade, shape (6, 6)."""
+        return self.numbers[24:60].reshape(6, 6)
 
 
 def blade_report(report: WrenchReport, contacts: BladeContacts) -> BladeReport:
-    """Return a copy of what was reported last; the contacts are views.
+    """Return a copy of what was reported last.
 
     `contacts`: those of the report before, which are taken again where they are as many.
     """
-    now, mean, on_tissue, tip, bounds, stiffness, numbers = _parts_of(report.numbers.copy())
-    amounts = Amounts(*numbers.tolist())
+    numbers = report.numbers.copy()
+    amounts = Amounts(*numbers[60:].tolist())
     n = int(amounts.n_contacts)
-    return BladeReport(
-        Wrench(mean[0], mean[1], tip),
-        Wrench(now[:3], now[3:], tip),
-        stiffness,
-        contacts if len(contacts.normal_force) == n else contacts_of(report, n),
-        on_tissue,
-        bounds,
-        amounts,
-    )
+    if len(contacts.normal_force) != n:
+        contacts = contacts_of(report, n)
+    return BladeReport(numbers, amounts, contacts)
 
 
 def contacts_of(report: WrenchReport, n: int) -> BladeContacts:

@@ -11,5 +11,4 @@ In the order in which they are best read:
     simd_gather    gathers of such vectors from arrays
     atomics        numbers that threads share
     thread_team    loops that threads share
-    stage_clock    times of the stages CD, GC and RX of a step
 """

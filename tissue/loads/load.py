@@ -55,6 +55,11 @@ class Loads:
     def __init__(self) -> None:
         self._loads: list[Load] = []
 
+    @property
+    def act(self) -> bool:
+        """Whether there are any."""
+        return bool(self._loads)
+
     def add(self, load: Load) -> None:
         """Let a load act."""
         self._loads.append(load)
