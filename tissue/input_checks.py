@@ -85,11 +85,8 @@ def edge_of(sweep: BladeSweep) -> Edge:
     Raises:
         ValueError: tip, heel or forward are not three numbers each.
     """
-    t0, t1 = sweep
-    try:  # plain numbers: to join six arrays takes twice as long
-        (a, b, c), (d, e, f), (g, h, i) = t0.tip.tolist(), t0.heel.tolist(), t0.forward.tolist()
-        (p, q, r), (s, t, u), (v, w, x) = t1.tip.tolist(), t1.heel.tolist(), t1.forward.tolist()
-        return Edge.of_numbers((a, b, c, d, e, f, g, h, i, p, q, r, s, t, u, v, w, x))
+    try:
+        return Edge.of_numbers(sweep.t0.numbers + sweep.t1.numbers)
     except (AttributeError, TypeError, ValueError):
         return edge_or_error(sweep)
 

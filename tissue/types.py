@@ -4,11 +4,12 @@ SI units. Every vector in this package is in the tissue frame. The suffixes `_t0
 the start and the end of a step.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.lazy_fields import lazy_fields
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
     from trimesh import Trimesh
@@ -18,8 +19,15 @@ CUT_COLOUR = (212, 68, 60, 255)
 """Red, green, blue and opacity of skin and of cut faces in exported meshes, 0 to 255 (sRGB)."""
 
 
+_T = TypeVar("_T")
+
+
 class TissueError(RuntimeError):
     """The tissue cannot go on: its motion became unstable. What it was before can still be read."""
+
+
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+"""The numbers of three vectors, one after the other."""
 
 
 class BladeSegment(NamedTuple):
@@ -31,6 +39,16 @@ class BladeSegment(NamedTuple):
     """End of the edge nearest the handle [m], shape (3,)."""
     forward: FloatArray
     """Unit vector across the edge, in the plane of the blade, in which it cuts; shape (3,)."""
+
+    @property
+    def numbers(self) -> Nine:
+        """Tip, heel and forward in plain numbers."""
+        return _numbers_of(self)
+
+    @staticmethod
+    def of_numbers(numbers: Nine) -> "BladeSegment":
+        """Return a segment of such numbers; its arrays are made when they are asked for."""
+        return _of_numbers(_LazySegment, numbers)
 
 
 class BladeSweep(NamedTuple):
@@ -51,6 +69,61 @@ class Wrench(NamedTuple):
     """Torque about `point` [N m], shape (3,)."""
     point: FloatArray
     """Point at which they act [m], shape (3,)."""
+
+    @property
+    def numbers(self) -> Nine:
+        """Force, torque and point in plain numbers."""
+        return _numbers_of(self)
+
+    @staticmethod
+    def of_numbers(numbers: Nine) -> "Wrench":
+        """Return a wrench of such numbers; its arrays are made when they are asked for."""
+        return _of_numbers(_LazyWrench, numbers)
+
+
+@lazy_fields(
+    tip=lambda segment: _arrays_of(segment)[0],
+    heel=lambda segment: _arrays_of(segment)[1],
+    forward=lambda segment: _arrays_of(segment)[2],
+)
+class _LazySegment(BladeSegment):
+    @property
+    def numbers(self) -> Nine:
+        return self.__dict__.get("numbers") or _numbers_of(self)
+
+
+@lazy_fields(
+    force=lambda wrench: _arrays_of(wrench)[0],
+    torque=lambda wrench: _arrays_of(wrench)[1],
+    point=lambda wrench: _arrays_of(wrench)[2],
+)
+class _LazyWrench(Wrench):
+    @property
+    def numbers(self) -> Nine:
+        return self.__dict__.get("numbers") or _numbers_of(self)
+
+
+_new: Any = tuple.__new__
+_NONE_MADE = (None, None, None)
+
+
+def _of_numbers(kind: type[_T], numbers: Nine) -> _T:
+    three: _T = _new(kind, _NONE_MADE)
+    three.__dict__["numbers"] = numbers
+    return three
+
+
+def _numbers_of(vectors: tuple[FloatArray, FloatArray, FloatArray]) -> Nine:
+    u, v, w = vectors
+    (a, b, c), (d, e, f), (g, h, i) = u.tolist(), v.tolist(), w.tolist()
+    return a, b, c, d, e, f, g, h, i
+
+
+def _arrays_of(vectors: Any) -> list[FloatArray]:
+    """Make the arrays, and forget the numbers: whoever has an array may change it."""
+    arrays = [*np.array(vectors.__dict__.pop("numbers")).reshape(3, 3)]
+    vectors.__dict__.update(zip(vectors._fields, arrays, strict=True))
+    return arrays
 
 
 class BladeContacts(NamedTuple):

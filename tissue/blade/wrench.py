@@ -115,7 +115,7 @@ _N_NUMBERS = 60 + len(Amounts._fields)
 
 
 class BladeReport(NamedTuple):
-    """A copy of what a report came to. The arrays of a property are views of the copy."""
+    """A copy of what a report came to. Single arrays are views of the copy."""
 
     numbers: FloatArray
     """`WrenchReport.numbers` at the end of the step."""
@@ -127,14 +127,12 @@ class BladeReport(NamedTuple):
     @property
     def mean_wrench(self) -> Wrench:
         """Mean wrench of the tissue on the blade in the time step, about the tip."""
-        numbers = self.numbers
-        return Wrench(numbers[6:9], numbers[9:12], numbers[15:18])
+        return Wrench.of_numbers((*self.numbers[6:12].tolist(), *self.numbers[15:18].tolist()))
 
     @property
     def wrench(self) -> Wrench:
         """That wrench at the end of the step."""
-        numbers = self.numbers
-        return Wrench(numbers[0:3], numbers[3:6], numbers[15:18])
+        return Wrench.of_numbers((*self.numbers[0:6].tolist(), *self.numbers[15:18].tolist()))
 
     @property
     def mean_force_on_tissue(self) -> FloatArray:

@@ -4,6 +4,7 @@ In the order in which they are best read:
 
     array_types    types of arrays, by what they hold
     jit            the decorator that compiles kernels
+    lazy_fields    tuples whose fields are made when they are asked for
     vec3           points and vectors of three numbers
     structs        structs of arrays that a kernel gets as one pointer
     hash_table     a hash table in arrays

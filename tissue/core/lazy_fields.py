@@ -1,0 +1,68 @@
+"""Named tuples some of whose fields are made when they are asked for.
+
+What a frame hands on are named tuples of small arrays, and most of these arrays nobody looks at. To
+make one takes 0.2 us, and 1 us where the body has filled the caches since the last one.
+"""
+
+from collections.abc import Callable
+from typing import Any, NoReturn, TypeVar
+
+C = TypeVar("C", bound=type)
+
+
+class _LazyField:
+    """A field that is made when it is asked for first, and kept."""
+
+    def __init__(self, name: str, made_of: Callable[[Any], Any]) -> None:
+        self._name = name
+        self._made_of = made_of
+
+    def __get__(self, owner: Any, kind: type) -> Any:
+        made = owner.__dict__
+        if self._name not in made:
+            made[self._name] = self._made_of(owner)
+        return made[self._name]
+
+    def __set__(self, owner: Any, value: Any) -> NoReturn:
+        raise AttributeError("can't set attribute")
+
+
+def lazy_fields(**makers: Callable[[Any], Any]) -> Callable[[C], C]:
+    """Return a decorator of a subclass of a named tuple: these fields are made by functions of it.
+
+    In the tuple itself None stands for them. All that looks at a tuple, and copies, also those of
+    `_replace` and `pickle`, get a tuple of the named class with all of its fields.
+    """
+
+    def decorate(cls: C) -> C:
+        plain: Any = cls.__mro__[1]
+        for name, made_of in makers.items():
+            setattr(cls, name, _LazyField(name, made_of))
+        methods: dict[str, Callable[..., Any]] = {
+            "__iter__": lambda self: iter([getattr(self, name) for name in plain._fields]),
+            "__reduce__": lambda self: (plain, tuple(self)),
+            "__repr__": lambda self: repr(plain(*self)),
+            "_replace": lambda self, **fields: plain(*self)._replace(**fields),
+        } | {name: _on_plain(name) for name in _OF_TUPLES}
+        for name, method in methods.items():
+            setattr(cls, name, method)
+        return cls
+
+    return decorate
+
+
+_OF_TUPLES = (
+    *(f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "hash", "add", "getitem")),
+    *("__contains__", "count", "index"),
+)
+"""Methods of a tuple that look at its fields."""
+
+
+def _on_plain(name: str) -> Callable[..., Any]:
+    """Return a method of a tuple that sees all fields of its arguments."""
+    method = getattr(tuple, name)
+    return lambda *arguments: method(*map(_plain, arguments))
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value) if isinstance(value, tuple) else value
