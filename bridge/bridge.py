@@ -132,27 +132,16 @@ class Bridge:
         arm_motion = motion_of(self._arm or arm, arm)
         self._arm = arm
         self._n_frames += 1
-        balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
-        blade = arm if self._proxy is None else pose_of(self._proxy.pose)
-        self._path.append((blade, dt))
-        query = self._query
-        is_due = self._asked_at is None or len(self._path) >= self._tissue_every
-        if is_due and not query.is_pending:
-            self._ask()
-        answer = query.take_answer()
-        if answer is not None:
-            self._process(answer)
-        self._answered = answer is not None
-        self._silence = self._silence + dt if query.is_pending else 0.0
-        raw = self._wrench_on(arm, dt) if balanced is None else balanced
-        if not self._is_direct:
-            self._impulse.record_felt(np.array(raw) - self._correction, blade.segment, dt)
+        if self._is_direct and not self._path:
+            raw = self._advance(arm, dt)
+        else:
+            raw = self._consult(arm, dt)
         work = 0.0 if self._result is None else self._result.work_of_blade
-        travel = Travel(arm_motion, 0.5 * math.dist(arm.tip, arm.heel), work)
+        travel = Travel(arm_motion, 0.5 * arm.length, work)
         self._raw, self._raw_is_felt = raw, False
         felt = self._coupling.felt(raw, arm.tip, dt, travel, self._silence)
         self._raw_is_felt = felt is raw
-        self._felt = self._frame.numbers_to_world(felt, arm.segment.tip)
+        self._felt = self._frame.numbers_to_world(felt, arm.tip)
         return self._felt
 
     @property
@@ -178,7 +167,7 @@ class Bridge:
         """The tissue's last wrench before any limit, in the world."""
         if self._raw_is_felt or self._arm is None:
             return self._felt
-        return self._frame.numbers_to_world(self._raw, self._arm.segment.tip)
+        return self._frame.numbers_to_world(self._raw, self._arm.tip)
 
     @property
     def touching(self) -> tuple[str, ...]:
@@ -203,6 +192,43 @@ class Bridge:
             coupling.passivity,
             self._impulse.written_off,
         )
+
+    def _advance(self, arm: Pose, dt: float) -> Six:
+        """Let the tissue do this frame, and return its wrench: where it answers in each frame."""
+        before = self._asked_at or arm
+        self._path.append((arm, dt))  # stays where a link fails: the next frame then does both
+        touches, self._touching = self._broad_phase.overlaps(
+            before, arm, dt, engaged=self._engaged()
+        )
+        self._n_rejected += not touches
+        sweep = BladeSweep(before.segment, arm.segment) if touches else None
+        result = self._query.step(sweep, dt)
+        self._asked_at = arm
+        self._path.clear()
+        self._take(result, dt)
+        self._answered = True
+        # The wrench is zero, and about no particular point, when no blade is near.
+        fx, fy, fz, tx, ty, tz, _, _, _ = result.wrench.numbers
+        return fx, fy, fz, tx, ty, tz
+
+    def _consult(self, arm: Pose, dt: float) -> Six:
+        """Ask the tissue where that is due, and return its wrench, or what it may be by now."""
+        balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
+        blade = arm if self._proxy is None else pose_of(self._proxy.pose)
+        self._path.append((blade, dt))
+        query = self._query
+        is_due = self._asked_at is None or len(self._path) >= self._tissue_every
+        if is_due and not query.is_pending:
+            self._ask()
+        answer = query.take_answer()
+        if answer is not None:
+            self._process(answer)
+        self._answered = answer is not None
+        self._silence = self._silence + dt if query.is_pending else 0.0
+        raw = self._wrench_on(arm, dt) if balanced is None else balanced
+        if not self._is_direct:
+            self._impulse.record_felt(np.array(raw) - self._correction, blade.segment, dt)
+        return raw
 
     def _follow(self, coupling: VirtualCoupling, arm: Pose, dt: float) -> Six:
         """Let the proxy follow the arm, and return the tissue's wrench on both."""
@@ -253,14 +279,22 @@ class Bridge:
     def _process(self, answer: TissueAnswer) -> None:
         """Update broad phase, local model and impulse from an answer."""
         result = answer.result
-        low, high = result.bounds.tolist()
-        if not math.isfinite(sum(low) + sum(high)):
-            raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
-        self._broad_phase.update_bounds((low, high), answer.seconds)
+        self._take(result, answer.seconds)
         if not self._is_direct:
             self._model.update(result, answer.last_wrench, answer.middle_pose)
             in_contact = self._model.in_contact
             self._impulse.compare(result.wrench, answer.seconds, in_contact=in_contact)
+
+    def _take(self, result: StepResult, seconds: float) -> None:
+        """Take a result of a step of `seconds` [s]; update the broad phase.
+
+        Raises:
+            CouplingError: a node is not finite.
+        """
+        low, high = result.bounds.tolist()
+        if not math.isfinite(sum(low) + sum(high)):
+            raise CouplingError("the tissue's nodes are no longer finite: it has diverged")
+        self._broad_phase.update_bounds((low, high), seconds)
         held = 0.0 if self._result is None else self._result.anchored_length
         self._holds_as_much = 0.0 < result.anchored_length == held
         self._result = result
@@ -270,9 +304,7 @@ class Bridge:
         """Return the tissue's wrench on a blade without a proxy, about its tip."""
         if self._is_direct and self._result is not None:
             # The wrench is zero, and about no particular point, when no blade is near.
-            force, torque, _ = self._result.wrench
-            fx, fy, fz = force.tolist()
-            tx, ty, tz = torque.tolist()
+            fx, fy, fz, tx, ty, tz, _, _, _ = self._result.wrench.numbers
             return fx, fy, fz, tx, ty, tz
         wrench = self._model.wrench(arm.segment)
         self._correction = self._impulse.correction(wrench, arm.segment, dt)

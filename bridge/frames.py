@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.collision.fixtures import Fixture, FixtureBox
 from bridge.input_checks import finite, rotation
-from bridge.poses import Six
+from bridge.poses import Six, Triple
 from tissue import BladeSegment, FloatArray, Wrench
 
 
@@ -28,11 +28,14 @@ class TissueFrame:
     is_rotated: bool = field(init=False, repr=False, default=True)
     """Whether the rotation differs from the identity. Mostly it does not, and the products are
     skipped."""
+    _place: Triple = field(init=False, repr=False, default=())
+    """The origin in plain numbers."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rotation", rotation(self.rotation, "the tissue's rotation"))
         object.__setattr__(self, "origin", finite(self.origin, (3,), "the tissue's origin"))
         object.__setattr__(self, "is_rotated", bool((self.rotation != np.eye(3)).any()))
+        object.__setattr__(self, "_place", tuple(self.origin.tolist()))
         self.rotation.setflags(write=False)
         self.origin.setflags(write=False)
 
@@ -58,9 +61,11 @@ class TissueFrame:
 
     def segment_to_tissue(self, segment: BladeSegment) -> BladeSegment:
         """Return a world segment in the tissue frame."""
-        tip, heel, forward = segment
         if not self.is_rotated:
-            return BladeSegment(tip - self.origin, heel - self.origin, forward.copy())
+            x, y, z = self._place
+            a, b, c, d, e, f, u, v, w = segment.numbers
+            return BladeSegment.of_numbers((a - x, b - y, c - z, d - x, e - y, f - z, u, v, w))
+        tip, heel, forward = segment
         return BladeSegment(
             self.points_to_tissue(tip),
             self.points_to_tissue(heel),
@@ -69,9 +74,11 @@ class TissueFrame:
 
     def segment_to_world(self, segment: BladeSegment) -> BladeSegment:
         """Return a segment of the tissue frame in the world."""
-        tip, heel, forward = segment
         if not self.is_rotated:
-            return BladeSegment(tip + self.origin, heel + self.origin, forward.copy())
+            x, y, z = self._place
+            a, b, c, d, e, f, u, v, w = segment.numbers
+            return BladeSegment.of_numbers((a + x, b + y, c + z, d + x, e + y, f + z, u, v, w))
+        tip, heel, forward = segment
         return BladeSegment(
             self.points_to_world(tip),
             self.points_to_world(heel),
@@ -80,21 +87,21 @@ class TissueFrame:
 
     def wrench_to_world(self, wrench: Wrench) -> Wrench:
         """Return a wrench of the tissue frame in the world, about the same point."""
-        force, torque, point = wrench
         if not self.is_rotated:
-            return Wrench(force.copy(), torque.copy(), point + self.origin)
+            x, y, z = self._place
+            fx, fy, fz, tx, ty, tz, px, py, pz = wrench.numbers
+            return Wrench.of_numbers((fx, fy, fz, tx, ty, tz, px + x, py + y, pz + z))
+        force, torque, point = wrench
         return Wrench(
             self.vectors_to_world(force),
             self.vectors_to_world(torque),
             self.points_to_world(point),
         )
 
-    def numbers_to_world(self, wrench: Six, point: FloatArray) -> Wrench:
+    def numbers_to_world(self, wrench: Six, point: Triple) -> Wrench:
         """Return force [N] and torque [N m] of the tissue frame about a point, in the world."""
-        force, torque = np.array(wrench[:3]), np.array(wrench[3:])
-        if not self.is_rotated:
-            return Wrench(force, torque, point + self.origin)
-        return self.wrench_to_world(Wrench(force, torque, point))
+        px, py, pz = point
+        return self.wrench_to_world(Wrench.of_numbers((*wrench, px, py, pz)))
 
     def fixture_to_tissue(self, fixture: Fixture) -> Fixture:
         """Return a fixture given in the world in the tissue frame."""

@@ -42,14 +42,17 @@ class Pose(NamedTuple):
     """The tip [m]."""
     heel: Triple
     """The heel [m]."""
+    length: float
+    """Length of the edge [m]."""
     axes: Axes
     """Axes of the blade."""
 
 
 def pose_of(segment: BladeSegment) -> Pose:
     """Return the pose of a segment that is known to have a plane."""
-    tip, heel = segment.tip.tolist(), segment.heel.tolist()
-    return Pose(segment, tip, heel, _axes_of(tip, heel, segment.forward.tolist()))
+    numbers = segment.numbers
+    tip, heel = numbers[0:3], numbers[3:6]
+    return Pose(segment, tip, heel, math.dist(tip, heel), _axes_of(tip, heel, numbers[6:9]))
 
 
 def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
@@ -62,7 +65,8 @@ def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
     Raises:
         ValueError: the pose is not finite, or its edge and `forward` span no plane.
     """
-    tip, heel, forward = segment.tip.tolist(), segment.heel.tolist(), segment.forward.tolist()
+    tx, ty, tz, hx, hy, hz, fx, fy, fz = segment.numbers
+    tip, heel, forward = (tx, ty, tz), (hx, hy, hz), (fx, fy, fz)
     length, forward_length = math.dist(tip, heel), math.hypot(*forward)
     if not math.isfinite(length + forward_length):
         raise ValueError(f"the blade's pose is not finite: {given}")
@@ -70,14 +74,13 @@ def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
         raise ValueError(f"the cutting edge is {length} m long; at least {_SHORTEST_EDGE} m")
     if abs(forward_length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"forward must be a unit vector; its length is {forward_length}")
-    (tx, ty, tz), (hx, hy, hz), (fx, fy, fz) = tip, heel, forward
     cosine = abs((tx - hx) * fx + (ty - hy) * fy + (tz - hz) * fz) / length
     if cosine > _LARGEST_COSINE:
         raise ValueError(
             f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
             "degrees apart"
         )
-    return Pose(segment, tip, heel, _axes_of(tip, heel, forward))
+    return Pose(segment, tip, heel, length, _axes_of(tip, heel, forward))
 
 
 def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:

@@ -82,6 +82,14 @@ class Query:
         else:
             self._future = self._thread.submit(self._step, path, pose)
 
+    def step(self, sweep: BladeSweep | None, seconds: float) -> StepResult:
+        """Advance the tissue along one part of a path, and wait for it.
+
+        Raises:
+            LinkError: the tissue is in another process, and did not answer.
+        """
+        return self._link.step(sweep, min(seconds, _LONGEST_STEP))
+
     def take_answer(self) -> TissueAnswer | None:
         """Return the answer, once; None if there is none yet.
 
@@ -96,9 +104,9 @@ class Query:
     def _step(self, path: Sequence[TimedSweep], pose: BladeSegment) -> TissueAnswer:
         if len(path) == 1:
             sweep, duration = path[0]
-            result = self._link.step(sweep, min(duration, _LONGEST_STEP))
+            result = self.step(sweep, duration)
             return TissueAnswer(result, pose, duration, result.wrench, sweep)
-        results = [self._link.step(part.sweep, min(part.seconds, _LONGEST_STEP)) for part in path]
+        results = [self.step(part.sweep, part.seconds) for part in path]
         seconds = [part.seconds for part in path]
         last_wrench = results[-1].wrench
         return TissueAnswer(

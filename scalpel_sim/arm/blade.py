@@ -83,8 +83,10 @@ class Blade:
         """Return the edge as it is now, in the world frame. Copies."""
         (a, b, c), (d, e, f), (g, h, i) = self._rotation.tolist()
         x, y, z = self._forward
-        forward = np.array((a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z))
-        return BladeSegment(self._tip.copy(), self._heel.copy(), forward)
+        tx, ty, tz = self._tip.tolist()
+        hx, hy, hz = self._heel.tolist()
+        fx, fy, fz = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+        return BladeSegment.of_numbers((tx, ty, tz, hx, hy, hz, fx, fy, fz))
 
     def apply(self, wrench: Wrench) -> None:
         """Apply a wrench to the blade until the next call.
@@ -102,9 +104,7 @@ class Blade:
         """
         # The last guard: MuJoCo accepts 1e3 N silently, and resets itself at 1e9 N or NaN.
         # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
-        fx, fy, fz = wrench.force.tolist()
-        tx, ty, tz = wrench.torque.tolist()
-        px, py, pz = wrench.point.tolist()
+        fx, fy, fz, tx, ty, tz, px, py, pz = wrench.numbers
         cx, cy, cz = self._centre_of_mass.tolist()
         rx, ry, rz = px - cx, py - cy, pz - cz
         tx += ry * fz - rz * fy

@@ -41,7 +41,7 @@ def add_up(
     normal: FloatArray,
     normal_force: FloatArray,
     friction: FloatArray,
-    forward: FloatArray,
+    forward: FloatArray | tuple[float, float, float],
     parts: FloatArray,
 ) -> None:
     """Write `ForceParts`, one vector after the other, contact by contact.
@@ -50,7 +50,7 @@ def add_up(
         normal: See `BladeContacts`.
         normal_force: See `BladeContacts`.
         friction: See `BladeContacts`.
-        forward: Unit vector in which the blade cuts, shape (3,).
+        forward: Unit vector in which the blade cuts.
         parts: The first nine numbers are written [N].
     """
     for i in range(9):

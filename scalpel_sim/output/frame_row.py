@@ -59,13 +59,12 @@ class FrameRows:
             result: Last result of the tissue, tissue frame.
             wall_times: Wall times of the frame and of its stages.
         """
-        wrench = (*felt.force.tolist(), *felt.torque.tolist())
         return [
             time,
-            *blade.tip.tolist(),
-            *wrench,
-            *(wrench if raw is felt else (*raw.force.tolist(), *raw.torque.tolist())),
-            *self._columns_at_blade(result, blade.forward),
+            *blade.numbers[:3],
+            *felt.numbers[:6],
+            *raw.numbers[:6],
+            *self._columns_at_blade(result, blade),
             result.cut_area,
             result.finished_area,
             result.n_tetrahedra,
@@ -75,11 +74,11 @@ class FrameRows:
             *wall_times,
         ]
 
-    def _columns_at_blade(self, result: StepResult, forward: FloatArray) -> list[float]:
+    def _columns_at_blade(self, result: StepResult, blade: BladeSegment) -> list[float]:
         """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
         frame, contacts, columns = self._frame, result.contacts, self._at_blade
         if frame.is_rotated:
-            parts = force_parts(contacts, frame.vectors_to_tissue(forward))
+            parts = force_parts(contacts, frame.vectors_to_tissue(blade.forward))
             columns[:9] = frame.vectors_to_world(np.array(parts)).ravel()
             _write_upper(frame.matrix_to_world(result.stiffness[:3, :3]), columns)
         else:
@@ -88,7 +87,7 @@ class FrameRows:
                 contacts.normal_force,
                 contacts.friction,
                 result.stiffness,
-                forward,
+                *blade.numbers[6:],
                 columns,
             )
         return columns.tolist()
@@ -105,11 +104,16 @@ def _write_at_blade(
     normal_force: FloatArray,
     friction: FloatArray,
     stiffness: FloatArray,
-    forward: FloatArray,
+    x: float,
+    y: float,
+    z: float,
     columns: FloatArray,
 ) -> None:
-    """Write `ForceParts` and stiffness of a step, whose frame is parallel to the world."""
-    add_up(normal, normal_force, friction, forward, columns)
+    """Write `ForceParts` and stiffness of a step, whose frame is parallel to the world.
+
+    `x`, `y`, `z`: unit vector in which the blade cuts. As an array it would have to be made.
+    """
+    add_up(normal, normal_force, friction, (x, y, z), columns)
     _write_upper(stiffness, columns)
 
 
