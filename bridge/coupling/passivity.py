@@ -144,7 +144,8 @@ class Passivity:
             wanted: Wrench without the controller.
             travel: Motion and work of the blade as given to `correct`.
         """
-        both = tuple(map(add, self._felt, wrench))
+        (ax, ay, az, au, av, aw), (bx, by, bz, bu, bv, bw) = self._felt, wrench
+        both = ax + bx, ay + by, az + bz, au + bu, av + bv, aw + bw
         self._energy -= 0.5 * _work(both, travel.motion)
         self._least = min(self._least, self._energy - self._given)
         taken = _ZERO_WRENCH if wrench is wanted else tuple(map(sub, wanted, wrench))

@@ -1,6 +1,7 @@
 """A blade on any MuJoCo arm: two sites become a segment, a wrench pushes their body."""
 
 import math
+import struct
 from collections.abc import Sequence
 
 import mujoco
@@ -8,6 +9,8 @@ import numpy as np
 
 from bridge import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
 from tissue import BladeSegment, FloatArray, Wrench
+
+_SIX = struct.Struct("6d")
 
 _SHORTEST_EDGE = 1e-4
 """Shortest cutting edge [m]. A shorter one is a mistake in the model: its direction is noise."""
@@ -77,7 +80,7 @@ class Blade:
         self._tip = data.site_xpos[tip_id]
         self._rotation = data.xmat[body_id].reshape(3, 3)
         self._centre_of_mass = data.xipos[body_id]
-        self._applied = data.xfrc_applied[body_id]
+        self._applied = data.xfrc_applied[body_id].data.cast("B")
 
     def segment(self) -> BladeSegment:
         """Return the edge as it is now, in the world frame. Copies."""
@@ -117,7 +120,7 @@ class Blade:
                 f"on the blade; it must be finite and at most {MAX_PLAUSIBLE_FORCE:g} N and "
                 f"{MAX_PLAUSIBLE_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
             )
-        self._applied[:] = (fx, fy, fz, tx, ty, tz)
+        _SIX.pack_into(self._applied, 0, fx, fy, fz, tx, ty, tz)
 
 
 def _identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str) -> int:

@@ -86,8 +86,8 @@ class _Cell:
         self._is_float = is_float
 
     def __get__(self, struct: Any, owner: type) -> int | float:
-        cells = struct._float_cells if self._is_float else struct._table
-        value: int | float = cells.item(self._place)
+        # A view of memory is read in half the time of an array.
+        value: int | float = (struct._floats if self._is_float else struct._ints)[self._place]
         return value
 
     def __set__(self, struct: Any, value: float) -> None:
@@ -153,6 +153,7 @@ class Arrays:
                 kinds.append((name, _array_type(value.dtype, value.ndim)))
         self._table = np.array(words, dtype=np.int64)
         self._float_cells = self._table.view(np.float64)
+        self._ints, self._floats = self._table.data, self._float_cells.data
         self.address = self._table.ctypes.data
         # Numba takes long to compare types; each of these is one object that stays.
         known, key = self._types, tuple([id(kind) for _, kind in kinds])

@@ -7,6 +7,7 @@ cases, so that no case is missing: cuts may cross, turn back and join.
 
 import numpy as np
 
+from tissue.core.jit import SameTypes
 from tissue.cutting.blade_path import Path
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.cut_pass import ALONG_PATH, TO_EDGE, TO_THE_END, cut_in_a_pass
@@ -18,6 +19,8 @@ from tissue.mesh.body import Body
 from tissue.mesh.changes import clear_changes, new_change
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
+
+_DETECT, _CUT = SameTypes(detect_collisions), SameTypes(cut_in_a_pass)
 
 
 class StellarScheme:
@@ -47,11 +50,11 @@ class StellarScheme:
 
     def detect(self, body: Body, visits: Visits, path: Path) -> None:
         """Detect collisions: the active tetrahedra, and what the edge crossed along `path`."""
-        detect_collisions(self._arrays(body, visits, path))
+        _DETECT.call(self._arrays(body, visits, path))
 
     def cut(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut what was detected, in one pass."""
-        cut_in_a_pass(self._arrays(body, visits, path), ALONG_PATH)
+        _CUT.call(self._arrays(body, visits, path), ALONG_PATH)
 
     def cut_to_edge(self, body: Body, visits: Visits, path: Path) -> None:
         """Cut up to the edge itself, which rests, in one pass."""

@@ -57,6 +57,10 @@ CAPACITY_OF_PAIRS = 1 << 12
 """Pairs that there is room for at first."""
 
 
+_NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, np.zeros(3))
+_NOTHING_TOUCHES.force_of_floor.setflags(write=False)  # many results share it
+
+
 class PenaltyContact:
     """Contact of one body with itself and with the floor, as forces.
 
@@ -139,7 +143,7 @@ class PenaltyContact:
     def report(self, dt: float) -> BodyContacts:
         """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
         if not self._has_touched:
-            return BodyContacts(0, 0.0, 0.0, np.zeros(3))
+            return _NOTHING_TOUCHES
         forces = self.forces
         per_second = 1.0 / dt if dt > 0.0 else 0.0
         return BodyContacts(
