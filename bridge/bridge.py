@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bridge.arithmetic import PLAIN, Six, compiled
 from bridge.collision.broad_phase import BroadPhase
 from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
@@ -20,8 +21,8 @@ from bridge.coupling.passivity import Travel
 from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
-from bridge.link import TissueLink, link_to
-from bridge.poses import Pose, Six, checked_pose, motion_of, pose_of, six
+from bridge.link import InProcessLink, TissueLink, link_to
+from bridge.poses import Pose, checked_pose, pose_of, six
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -74,7 +75,11 @@ class Bridge:
             )
         link = link_to(tissue)
         self._frame = frame
-        self._coupling = Coupling(limits or DeviceLimits(), passivity=passivity)
+        # A process without the tissue starts without its compiler.
+        self._arithmetic = compiled() if isinstance(link, InProcessLink) else PLAIN
+        self._coupling = Coupling(
+            limits or DeviceLimits(), passivity=passivity, arithmetic=self._arithmetic
+        )
         body = link.describe()
         self._broad_phase = BroadPhase(
             body.bounds,
@@ -128,8 +133,10 @@ class Bridge:
         """
         if not (dt > 0.0 and math.isfinite(dt)):
             raise ValueError(f"the frame lasts {dt} s; it must be positive and finite")
-        arm = checked_pose(self._frame.segment_to_tissue(segment), segment)
-        arm_motion = motion_of(self._arm or arm, arm)
+        arithmetic, before = self._arithmetic, self._arm
+        arm = checked_pose(self._frame.segment_to_tissue(segment), segment, arithmetic)
+        before = arm if before is None else before
+        arm_motion = arithmetic.motion.call(before.tip, before.axes, arm.tip, arm.axes)
         self._arm = arm
         self._n_frames += 1
         if self._is_direct and not self._path:

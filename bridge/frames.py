@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bridge.arithmetic import Six, Triple
 from bridge.collision.fixtures import Fixture, FixtureBox
 from bridge.input_checks import finite, rotation
-from bridge.poses import Six, Triple
 from tissue import BladeSegment, FloatArray, Wrench
 
 

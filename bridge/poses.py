@@ -1,11 +1,11 @@
 """Poses of a blade: their check, the motion between two of them, and a pose moved by a motion."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from bridge.arithmetic import PLAIN, Arithmetic, Axes, Six, Three, axes_of, motion_between
 from tissue import BladeSegment, FloatArray
 
 _SHORTEST_EDGE = 1e-6
@@ -19,14 +19,6 @@ _UNIT_TOLERANCE = 1e-6
 """Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
 
-Triple = Sequence[float]
-"""A vector in plain numbers. As arrays the few of a frame take several times as long."""
-Six = tuple[float, float, float, float, float, float]
-"""Force [N] and torque [N m]; or translation [m] and rotation vector [rad]."""
-Axes = tuple[float, float, float, float, float, float, float, float, float]
-"""Unit vectors along the edge from the tip, forward across it, and normal to the flat."""
-
-
 def six(array: FloatArray) -> Six:
     """Return the numbers of an array of shape (6,)."""
     a, b, c, d, e, f = array.tolist()
@@ -38,9 +30,9 @@ class Pose(NamedTuple):
 
     segment: BladeSegment
     """The pose as arrays."""
-    tip: Triple
+    tip: Three
     """The tip [m]."""
-    heel: Triple
+    heel: Three
     """The heel [m]."""
     length: float
     """Length of the edge [m]."""
@@ -50,17 +42,20 @@ class Pose(NamedTuple):
 
 def pose_of(segment: BladeSegment) -> Pose:
     """Return the pose of a segment that is known to have a plane."""
-    numbers = segment.numbers
-    tip, heel = numbers[0:3], numbers[3:6]
-    return Pose(segment, tip, heel, math.dist(tip, heel), _axes_of(tip, heel, numbers[6:9]))
+    tx, ty, tz, hx, hy, hz, fx, fy, fz = segment.numbers
+    tip, heel = (tx, ty, tz), (hx, hy, hz)
+    return Pose(segment, tip, heel, math.dist(tip, heel), axes_of(tip, heel, (fx, fy, fz)))
 
 
-def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
+def checked_pose(
+    segment: BladeSegment, given: BladeSegment, arithmetic: Arithmetic = PLAIN
+) -> Pose:
     """Return the pose of a segment, after a check that it is finite and has a plane.
 
     Args:
         segment: The pose.
         given: The pose as the user of the bridge gave it, for the message.
+        arithmetic: What finds its axes.
 
     Raises:
         ValueError: the pose is not finite, or its edge and `forward` span no plane.
@@ -80,7 +75,7 @@ def checked_pose(segment: BladeSegment, given: BladeSegment) -> Pose:
             f"forward must be across the edge; they are {math.degrees(math.acos(cosine)):.2g} "
             "degrees apart"
         )
-    return Pose(segment, tip, heel, length, _axes_of(tip, heel, forward))
+    return Pose(segment, tip, heel, length, arithmetic.axes.call(tip, heel, forward))
 
 
 def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
@@ -94,19 +89,7 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
 
 def motion_of(before: Pose, after: Pose) -> Six:
     """Return `motion` in plain numbers."""
-    ax, ay, az, bx, by, bz, cx, cy, cz = before.axes
-    ux, uy, uz, vx, vy, vz, wx, wy, wz = after.axes
-    # Over the three axes, the sum of a x u is the axis of rotation times twice the sine, and the
-    # sum of a . u is one plus twice the cosine.
-    sx = (ay * uz - az * uy) + (by * vz - bz * vy) + (cy * wz - cz * wy)
-    sy = (az * ux - ax * uz) + (bz * vx - bx * vz) + (cz * wx - cx * wz)
-    sz = (ax * uy - ay * ux) + (bx * vy - by * vx) + (cx * wy - cy * wx)
-    trace = (ax * ux + ay * uy + az * uz) + (bx * vx + by * vy + bz * vz)
-    trace += cx * wx + cy * wy + cz * wz
-    sine = 0.5 * math.sqrt(sx * sx + sy * sy + sz * sz)
-    half = 0.5 * math.atan2(sine, 0.5 * (trace - 1.0)) / sine if sine > 0.0 else 0.5
-    (x, y, z), (u, v, w) = before.tip, after.tip
-    return u - x, v - y, w - z, half * sx, half * sy, half * sz
+    return motion_between(before.tip, before.axes, after.tip, after.axes)
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:
@@ -141,15 +124,3 @@ def _rotation(vector: FloatArray, angle: float) -> FloatArray:
             (d * x * z - s * y, d * y * z + s * x, c + d * z * z),
         )
     )
-
-
-def _axes_of(tip: Triple, heel: Triple, forward: Triple) -> Axes:
-    (tx, ty, tz), (hx, hy, hz), (fx, fy, fz) = tip, heel, forward
-    ex, ey, ez = hx - tx, hy - ty, hz - tz
-    size = 1.0 / math.sqrt(ex * ex + ey * ey + ez * ez)
-    ex, ey, ez = ex * size, ey * size, ez * size
-    along = ex * fx + ey * fy + ez * fz
-    fx, fy, fz = fx - along * ex, fy - along * ey, fz - along * ez
-    size = 1.0 / math.sqrt(fx * fx + fy * fy + fz * fz)
-    fx, fy, fz = fx * size, fy * size, fz * size
-    return ex, ey, ez, fx, fy, fz, ey * fz - ez * fy, ez * fx - ex * fz, ex * fy - ey * fx

@@ -7,6 +7,7 @@ from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray
 from .core.cache_directory import cache_directory as cache_directory
 from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
+from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
 from .cut_settings import CutReport as CutReport
@@ -78,6 +79,7 @@ __all__ = [
     "MeshMeasures",
     "Piece",
     "Preset",
+    "SameTypes",
     "SchemeStatistics",
     "Snapshot",
     "SolverSettings",

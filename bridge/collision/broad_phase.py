@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridge.arithmetic import Triple
 from bridge.collision.chunk_boxes import ChunkBoxes
 from bridge.collision.collision_objects import MovableBox, Obstacles, are_colliding, fixture_objects
 from bridge.collision.fixtures import Fixture
 from bridge.collision.separating_axis import SeparatingAxis
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox, swept_blade
 from bridge.collision.witness_point import WitnessPoint
-from bridge.poses import Pose, Triple
+from bridge.poses import Pose
 from tissue import BladeShape, BladeSweep, Chunks, FloatArray
 
 

@@ -3,9 +3,9 @@
 import fcl
 import numpy as np
 
+from bridge.arithmetic import Triple
 from bridge.collision.collision_objects import MovableBox, are_colliding
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox
-from bridge.poses import Triple
 from tissue import FloatArray, IntArray
 
 _WORLD_AXES = np.eye(3)

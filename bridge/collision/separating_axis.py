@@ -2,9 +2,10 @@
 
 import math
 
+from bridge.arithmetic import Triple
 from bridge.collision.separation import largest_gap
 from bridge.collision.swept_box import TOUCHING_MARGIN, SweptBox
-from bridge.poses import Pose, Triple
+from bridge.poses import Pose
 from tissue import BladeShape
 
 _MOST_SIDES = math.sqrt(3.0)

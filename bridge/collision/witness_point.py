@@ -2,7 +2,8 @@
 
 import math
 
-from bridge.poses import Pose, Triple
+from bridge.arithmetic import Triple
+from bridge.poses import Pose
 from tissue import BladeShape
 
 _N_STARTS = 9

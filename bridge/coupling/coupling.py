@@ -5,10 +5,11 @@ from typing import NoReturn
 
 import numpy as np
 
+from bridge.arithmetic import PLAIN, Arithmetic, Six, Triple
 from bridge.coupling.limits import DeviceLimits, factor_to_limit
 from bridge.coupling.passivity import Passivity, PassivityCounters, Travel
 from bridge.coupling.watchdog import Watchdog
-from bridge.poses import Six, Triple, six
+from bridge.poses import six
 from tissue import Wrench
 
 MAX_PLAUSIBLE_FORCE = 1e3
@@ -48,12 +49,15 @@ class Coupling:
     Args:
         limits: Limits of the device.
         passivity: Whether the passivity controller acts; its observer always counts.
+        arithmetic: What computes its energies.
     """
 
-    def __init__(self, limits: DeviceLimits, *, passivity: bool = True) -> None:
+    def __init__(
+        self, limits: DeviceLimits, *, passivity: bool = True, arithmetic: Arithmetic = PLAIN
+    ) -> None:
         self._limits = limits
         self._watchdog = Watchdog()
-        self._passivity = Passivity(limits, acts=passivity)
+        self._passivity = Passivity(limits, passivity, arithmetic)
         self._felt = _NO_WRENCH
         self._n_implausible_in_a_row = 0
         self.n_force_limited = 0

@@ -10,14 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridge.arithmetic import PLAIN, Arithmetic, Six
 from bridge.coupling.limits import DeviceLimits
-from bridge.poses import Six, six
+from bridge.poses import six
 from tissue import FloatArray
-
-ENERGY_TOLERANCE = 5e-7
-"""Energy [J] that may be missing before the controller acts. At 1 kHz a wrench is half a frame
-late, by which a blade that moves at v = 50 mm/s through tissue of K = 400 N/m gains this much in a
-frame: K v^2 dt^2 / 2. With zero the controller would correct rounding errors."""
 
 _ZERO_WRENCH: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -77,14 +73,22 @@ class Passivity:
             is. The slew limit cannot be kept here: where it prevents a force from falling as fast
             as the energy runs out, it takes precedence, and `least_energy` shows by how much.
         acts: Whether the controller acts. The observer always counts.
+        arithmetic: What computes energies.
     """
 
-    def __init__(self, limits: DeviceLimits = DeviceLimits(), acts: bool = True) -> None:
+    def __init__(
+        self,
+        limits: DeviceLimits = DeviceLimits(),
+        acts: bool = True,
+        arithmetic: Arithmetic = PLAIN,
+    ) -> None:
         self._limits = limits
+        self._balance = arithmetic.balance
         self._acts = acts
         self._felt = _ZERO_WRENCH
         self._taken: Sequence[float] = _ZERO_WRENCH
         self._energy = 0.0
+        self._energy_after = 0.0
         self._given = 0.0
         self._work_at_start = 0.0
         self._least = 0.0
@@ -98,19 +102,17 @@ class Passivity:
             wanted: Force [N] and torque about the tip [N m], within the device's limits.
             travel: Motion and work of the blade since the last frame.
         """
-        motion, felt = travel.motion, self._felt
-        if not (any(felt) or any(wanted)):
-            self._energy, self._work_at_start = 0.0, travel.work_on_tissue
-        self._given = min(0.0, travel.work_on_tissue - self._work_at_start)
-        if not self._acts:
-            return wanted
-        spent, power = _work(felt, motion), _work(wanted, motion)
-        left = self._energy - 0.5 * spent - self._given + ENERGY_TOLERANCE
-        # While energy is left, both halves of the work are reserved. A deficit must be recovered in
-        # the half that is being decided; reversing the last wrench is always enough, unless the
-        # tissue has taken back what it returned.
-        most = left if left >= 0.0 else max(2.0 * left, -abs(spent))
-        if power <= most:
+        balance = self._balance.call(
+            self._felt,
+            wanted,
+            travel.motion,
+            self._energy,
+            self._work_at_start,
+            travel.work_on_tissue,
+        )
+        self._energy, self._work_at_start, self._given, spent, power, most, after = balance
+        self._energy_after = after
+        if power <= most or not self._acts:
             return wanted
         self._n_acted += 1
         return six(self._damped(np.array(wanted), power, most, spent, travel))
@@ -144,9 +146,11 @@ class Passivity:
             wanted: Wrench without the controller.
             travel: Motion and work of the blade as given to `correct`.
         """
-        (ax, ay, az, au, av, aw), (bx, by, bz, bu, bv, bw) = self._felt, wrench
-        both = ax + bx, ay + by, az + bz, au + bu, av + bv, aw + bw
-        self._energy -= 0.5 * _work(both, travel.motion)
+        if wrench is wanted:
+            self._energy = self._energy_after
+        else:
+            both = tuple(map(add, self._felt, wrench))
+            self._energy -= 0.5 * _work(both, travel.motion)
         self._least = min(self._least, self._energy - self._given)
         taken = _ZERO_WRENCH if wrench is wanted else tuple(map(sub, wanted, wrench))
         if taken is not self._taken:

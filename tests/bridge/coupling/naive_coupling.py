@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from bridge.arithmetic import ENERGY_TOLERANCE
 from bridge.coupling.coupling import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
-from bridge.coupling.passivity import ENERGY_TOLERANCE
 from bridge.coupling.watchdog import DECAY_AFTER, RAMP, ZERO_AFTER
 
 

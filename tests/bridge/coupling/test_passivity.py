@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import DeviceLimits
-from bridge.coupling.passivity import ENERGY_TOLERANCE, Passivity, Travel
+from bridge.arithmetic import ENERGY_TOLERANCE
+from bridge.coupling.passivity import Passivity, Travel
 from bridge.coupling.virtual_coupling import least_damping
 from bridge.poses import six
 
