@@ -226,14 +226,15 @@ def checked_threads(threads: int) -> int:
     return threads
 
 
-def checked_time_step(dt: float) -> None:
-    """Refuse a time step that is not finite or negative.
+def checked_time_step(dt: float) -> float:
+    """Return a time step [s] as a float: kernels that are called with one take no other number.
 
     Raises:
-        ValueError: it is.
+        ValueError: it is not finite, or negative.
     """
     if not (math.isfinite(dt) and dt >= 0.0):
         raise ValueError(f"dt is {dt} s; it must be finite and not negative")
+    return float(dt)
 
 
 def checked_contact(name: str | None, options: IntegratorOptions) -> str:

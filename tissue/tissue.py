@@ -154,7 +154,7 @@ class Tissue(DrivenBody):
         """
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
-        checked_time_step(dt)
+        dt = checked_time_step(dt)
         interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
         travel = edge.travel if has_blade else 0.0

@@ -74,7 +74,8 @@ class BroadPhase:
         low, high = bounds.tolist()
         self._bounds: tuple[Triple, Triple] = low, high
         self._sound_speed = sound_speed
-        self._bounds_speed = 0.0
+        self._bounds_before, self._seconds = self._bounds, 1.0
+        self._way: float | None = None
         self._blade_shape = blade
         self._chunks = chunks
         self._blade = MovableBox()
@@ -104,15 +105,23 @@ class BroadPhase:
 
     def update_bounds(self, bounds: tuple[Triple, Triple], dt: float) -> None:
         """Set lowest and highest corner of the tissue [m] after a step of `dt` [s]."""
-        ((ax, ay, az), (bx, by, bz)), ((ux, uy, uz), (vx, vy, vz)) = self._bounds, bounds
-        moved = max(abs(ux - ax), abs(uy - ay), abs(uz - az))
-        moved = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz))
-        self._bounds, self._bounds_speed = bounds, moved / dt
-        self._separating.tissue_moved(moved)
+        self._bounds_before, self._bounds, self._seconds = self._bounds, bounds, dt
+        self._way = None
+        if self._separating.is_found:
+            self._separating.tissue_moved(self._way_of_bounds())
+
+    def _way_of_bounds(self) -> float:
+        """Return how far the fastest side of the box around the tissue moved in a step [m]."""
+        if self._way is None:  # a blade that holds tissue does not ask
+            (ax, ay, az), (bx, by, bz) = self._bounds_before
+            (ux, uy, uz), (vx, vy, vz) = self._bounds
+            moved = max(abs(ux - ax), abs(uy - ay), abs(uz - az))
+            self._way = max(moved, abs(vx - bx), abs(vy - by), abs(vz - bz))
+        return self._way
 
     def _reaches_tissue(self, before: Pose, after: Pose, dt: float) -> bool:
         """Return whether the blade can touch the tissue: its box, and then one of its chunks."""
-        travel = (self._sound_speed + self._bounds_speed) * dt
+        travel = (self._sound_speed + self._way_of_bounds() / self._seconds) * dt
         if self._separating.separates(before, after, self._bounds, travel):
             return False
         witness = self._witness

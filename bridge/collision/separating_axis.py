@@ -42,6 +42,11 @@ class SeparatingAxis:
         """Take note that blade and tissue are no longer apart."""
         self._axis = None
 
+    @property
+    def is_found(self) -> bool:
+        """Whether an axis separated blade and tissue when they were looked at last."""
+        return self._axis is not None
+
     def tissue_moved(self, distance: float) -> None:
         """Take note that no side of the box around the tissue has moved farther than this [m]."""
         self._gap -= distance

@@ -5,7 +5,7 @@ import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
 from scalpel_sim.arm.joint_reach import JointReach, hinge_displacement
-from tissue import FloatArray, kernel
+from tissue import FloatArray, SameTypes, kernel
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
@@ -63,6 +63,7 @@ class ArmParts:
         """How far the parts can have moved."""
         self._positions, self._axes = data.geom_xpos, data.geom_xmat
         self._positions_before, self._axes_before = self._positions.copy(), self._axes.copy()
+        self._remain_within = SameTypes(_remain_within)
 
     def remain_within(self, distance: float) -> bool:
         """Return whether no part can have moved that far since `reach.begin` [m].
@@ -70,7 +71,7 @@ class ArmParts:
         If so, where the parts are now is kept for `before`.
         """
         reach = self.reach
-        return _remain_within(
+        return self._remain_within.call(
             distance,
             reach.angles,
             reach.start,

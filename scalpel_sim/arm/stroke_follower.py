@@ -7,7 +7,7 @@ from scalpel_sim.arm.hand import Hand, lead_to
 from scalpel_sim.quaternions import Vector
 from scalpel_sim.strokes.path import pose_on_path
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import FloatArray, kernel
+from tissue import FloatArray, SameTypes, kernel
 
 
 class StrokeFollower:
@@ -24,10 +24,11 @@ class StrokeFollower:
         self._placement = np.vstack((frame.rotation, frame.origin))
         self._is_turned = frame.is_rotated
         self._command = hand.command
+        self._lead = SameTypes(_lead)
 
     def lead(self, t: float) -> None:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""
-        _lead(t, self._path, self._placement, self._is_turned, *self._command)
+        self._lead.call(t, self._path, self._placement, self._is_turned, *self._command)
 
 
 @kernel

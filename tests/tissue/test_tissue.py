@@ -3,6 +3,8 @@
 import copy
 import gc
 import pickle
+import subprocess
+import sys
 import weakref
 
 import numpy as np
@@ -255,3 +257,18 @@ def test_a_tissue_that_is_no_longer_used_is_freed_at_once():
         assert remains() is None
     finally:
         gc.enable()
+
+
+def test_a_whole_number_of_seconds_leaves_fractions_as_they_are():
+    program = """
+import numpy as np
+from tissue import Tissue, block
+tissue = Tissue(block((1, 1, 1), (0.02, 0.02, 0.02)))
+tissue.step(None, 0)
+tissue.step(None, 1e-3)
+print(tissue.snapshot().velocities[:, 2].max())
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert float(done.stdout) == pytest.approx(-9.81e-3, rel=1e-2)

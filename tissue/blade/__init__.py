@@ -22,6 +22,7 @@ In reading order:
 - `path_tracing`: the path of the edge through the material, from the anchors.
 - `prescribed_path`: the path of an edge that is given.
 - `wrench`: the wrench on the blade.
+- `lazy_result`: the result of a step, whose arrays are made when they are asked for.
 - `blade_context`: what `BladeInteraction` calls, on one struct.
 - `interaction`: `BladeInteraction`, which `Tissue` calls.
 """

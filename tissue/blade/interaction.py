@@ -25,7 +25,7 @@ from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
 from tissue.blade.side_search import forget_cells, forget_changed_faces
 from tissue.blade.toughness import toughness_law_of
-from tissue.blade.wrench import BladeReport, blade_report, contacts_of, new_report
+from tissue.blade.wrench import BladeReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
@@ -36,6 +36,7 @@ from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
+from tissue.types import BladeContacts
 
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
@@ -86,7 +87,7 @@ class BladeInteraction:
     def _renew_report(self) -> None:
         """Make a report with room for all contacts that the blade may have."""
         self._report = new_report(self.state)
-        self._contacts = contacts_of(self._report, 0)
+        self._views: dict[int, BladeContacts] = {}
 
     @property
     def n_samples(self) -> int:
@@ -279,9 +280,7 @@ class BladeInteraction:
     def report(self, context: BladeContext, edge: Edge, dt: float) -> BladeReport:
         """Return what a time step of `dt` [s] came to."""
         _REPORT.call(context, edge, dt)
-        report = blade_report(self._report, self._contacts)
-        self._contacts = report.contacts
-        return report
+        return blade_report(self._report, self._views)
 
     def all_nodes(self, body: Body) -> IntArray:
         """Return 0, 1, 2, ... up to the room that the body has for nodes."""

@@ -100,11 +100,11 @@ def new_report(blade: BladeState) -> WrenchReport:
         friction=np.zeros((capacity, 3)),
         cut_area=np.zeros(capacity),
         wrench=numbers[0:6],
-        mean_wrench=numbers[6:12].reshape(2, 3),
-        mean_force_on_tissue=numbers[12:15],
-        tip=numbers[15:18],
-        bounds=numbers[18:24].reshape(2, 3),
-        stiffness=numbers[24:60].reshape(6, 6),
+        mean_wrench=numbers[51:57].reshape(2, 3),
+        mean_force_on_tissue=numbers[6:9],
+        tip=numbers[57:60],
+        bounds=numbers[9:15].reshape(2, 3),
+        stiffness=numbers[15:51].reshape(6, 6),
         amounts=numbers[60:],
         numbers=numbers,
     )
@@ -115,52 +115,55 @@ _N_NUMBERS = 60 + len(Amounts._fields)
 
 
 class BladeReport(NamedTuple):
-    """A copy of what a report came to. Single arrays are views of the copy."""
+    """A copy of what a report came to. The arrays of a property are views of the copy."""
 
+    report: WrenchReport
+    """The report itself, which the next step overwrites."""
+    views: dict[int, BladeContacts]
+    """Views of its first contacts, by their number, as far as they were asked for."""
     numbers: FloatArray
     """`WrenchReport.numbers` at the end of the step."""
+    mean_wrench: Wrench
+    """Mean wrench of the tissue on the blade in the time step, about the tip."""
     amounts: Amounts
     """Single numbers."""
-    contacts: BladeContacts
-    """The contacts at the end of the step; views of the report, which the next step overwrites."""
-
-    @property
-    def mean_wrench(self) -> Wrench:
-        """Mean wrench of the tissue on the blade in the time step, about the tip."""
-        return Wrench.of_numbers((*self.numbers[6:12].tolist(), *self.numbers[15:18].tolist()))
 
     @property
     def wrench(self) -> Wrench:
         """That wrench at the end of the step."""
-        return Wrench.of_numbers((*self.numbers[0:6].tolist(), *self.numbers[15:18].tolist()))
+        numbers = self.numbers
+        return Wrench(numbers[0:3], numbers[3:6], numbers[57:60])
 
     @property
     def mean_force_on_tissue(self) -> FloatArray:
         """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
-        return self.numbers[12:15]
+        return self.numbers[6:9]
 
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
-        return self.numbers[18:24].reshape(2, 3)
+        return self.numbers[9:15].reshape(2, 3)
 
     @property
     def stiffness(self) -> FloatArray:
         """Change of the wrench with the pose of the blade, shape (6, 6)."""
-        return self.numbers[24:60].reshape(6, 6)
+        return self.numbers[15:51].reshape(6, 6)
+
+    @property
+    def contacts(self) -> BladeContacts:
+        """The contacts at the end of the step; views of the report."""
+        n, views = int(self.amounts.n_contacts), self.views
+        if n not in views:
+            views[n] = contacts_of(self.report, n)
+        return views[n]
 
 
-def blade_report(report: WrenchReport, contacts: BladeContacts) -> BladeReport:
-    """Return a copy of what was reported last.
-
-    `contacts`: those of the report before, which are taken again where they are as many.
-    """
+def blade_report(report: WrenchReport, views: dict[int, BladeContacts]) -> BladeReport:
+    """Return a copy of what was reported last; `views`: see `BladeReport`."""
     numbers = report.numbers.copy()
-    amounts = Amounts(*numbers[60:].tolist())
-    n = int(amounts.n_contacts)
-    if len(contacts.normal_force) != n:
-        contacts = contacts_of(report, n)
-    return BladeReport(numbers, amounts, contacts)
+    a, b, c, d, e, f, g, h, i, *amounts = numbers[51:].tolist()
+    mean_wrench = Wrench.of_numbers((a, b, c, d, e, f, g, h, i))
+    return BladeReport(report, views, numbers, mean_wrench, Amounts(*amounts))
 
 
 def contacts_of(report: WrenchReport, n: int) -> BladeContacts:
