@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import inlined, kernel
+from tissue.core.jit import SameTypes, inlined, kernel
 from tissue.core.vec3 import Vec3, dot, store, vec3
 from tissue.geometry.aabb import Aabb, box_between, empty_box, with_point
 from tissue.mesh.body import Body
@@ -96,7 +96,7 @@ def chunk_nodes(body: Body) -> ChunkNodes:
 def chunks_of(body: Body, chunks: ChunkNodes) -> Chunks:
     """Return the boxes of the chunks now, and the speed of the fastest node."""
     boxes = np.empty((len(chunks.first) - 1, 2, 3))
-    return Chunks(boxes, enclose(body, chunks, boxes))
+    return Chunks(boxes, _ENCLOSE.call(body, chunks, boxes))
 
 
 @kernel
@@ -105,13 +105,18 @@ def enclose(body: Body, chunks: ChunkNodes, boxes: FloatArray) -> float:
     x = body.positions
     for chunk in range(len(boxes)):
         first = chunks.first[chunk]
-        for axis in range(3):
-            low = high = x[chunks.nodes[first], axis]
-            for i in range(first + 1, chunks.first[chunk + 1]):
-                here = x[chunks.nodes[i], axis]
-                low, high = min(low, here), max(high, here)
-            boxes[chunk, 0, axis], boxes[chunk, 1, axis] = low, high
+        # The axes in one pass: each comparison waits for the one before on its axis alone.
+        low = high = vec3(x, chunks.nodes[first])
+        for i in range(first + 1, chunks.first[chunk + 1]):
+            p = vec3(x, chunks.nodes[i])
+            low = Vec3(min(low.x, p.x), min(low.y, p.y), min(low.z, p.z))
+            high = Vec3(max(high.x, p.x), max(high.y, p.y), max(high.z, p.z))
+        store(boxes[chunk], 0, low)
+        store(boxes[chunk], 1, high)
     return largest_speed(body)
+
+
+_ENCLOSE = SameTypes(enclose)
 
 
 @kernel

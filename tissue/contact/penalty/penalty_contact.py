@@ -36,6 +36,7 @@ from tissue.contact.penalty.search import (
 from tissue.contact.penalty.search_state import SearchState
 from tissue.contact.penalty.stiffness import new_limits
 from tissue.core.array_types import FloatArray
+from tissue.core.jit import SameTypes
 from tissue.core.simd import room_for_points
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import Change
@@ -56,6 +57,8 @@ organ of liver. Larger: shorter steps; smaller: what meets bounces and trembles 
 CAPACITY_OF_PAIRS = 1 << 12
 """Pairs that there is room for at first."""
 
+
+_SEARCH = SameTypes(search_contacts)
 
 _NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, np.zeros(3))
 _NOTHING_TOUCHES.force_of_floor.setflags(write=False)  # many results share it
@@ -168,7 +171,7 @@ class PenaltyContact:
             return
         self._is_searched = True
         while True:
-            found = search_contacts(
+            found = _SEARCH.call(
                 self._search, self.forces, body, frequency_squared, highest, seconds
             )
             if found == DONE:
