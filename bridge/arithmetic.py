@@ -17,7 +17,7 @@ Six = tuple[float, float, float, float, float, float]
 """Force [N] and torque [N m]; or translation [m] and rotation vector [rad]."""
 Axes = tuple[float, float, float, float, float, float, float, float, float]
 """Unit vectors along the edge from the tip, forward across it, and normal to the flat."""
-Balance = tuple[float, float, float, float, float, float, float]
+EnergyNumbers = tuple[float, float, float, float, float, float, float]
 
 ENERGY_TOLERANCE = 5e-7
 """Energy [J] that may be missing before the controller acts. At 1 kHz a wrench is half a frame
@@ -61,7 +61,7 @@ def motion_between(tip_t0: Three, axes_t0: Axes, tip_t1: Three, axes_t1: Axes) -
 
 def energy_balance(
     felt: Six, wanted: Six, motion: Six, energy: float, work_at_start: float, work: float
-) -> Balance:
+) -> EnergyNumbers:
     """Return what `bridge.coupling.passivity.Passivity` knows of a frame before it acts.
 
     Args:
@@ -104,15 +104,15 @@ def energy_balance(
     return energy, work_at_start, given, spent, power, most, energy - 0.5 * both
 
 
-F = TypeVar("F", bound=Callable[..., object])
+_F = TypeVar("_F", bound=Callable[..., object])
 
 
-class _Callable(Protocol[F]):
-    call: F
+class _Callable(Protocol[_F]):
+    call: _F
 
 
-class _Plain(Generic[F]):
-    def __init__(self, function: F) -> None:
+class _Plain(Generic[_F]):
+    def __init__(self, function: _F) -> None:
         self.call = function
 
 
@@ -123,7 +123,7 @@ class Arithmetic(NamedTuple):
     """`axes_of`."""
     motion: "_Callable[Callable[[Three, Axes, Three, Axes], Six]]"
     """`motion_between`."""
-    balance: "_Callable[Callable[[Six, Six, Six, float, float, float], Balance]]"
+    balance: "_Callable[Callable[[Six, Six, Six, float, float, float], EnergyNumbers]]"
     """`energy_balance`."""
 
 

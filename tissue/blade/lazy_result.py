@@ -1,4 +1,4 @@
-"""`LazyResult`: a `StepResult` most of whose arrays are made when they are asked for."""
+"""`LazyResult`: a `StepResult` of which what a frame does not need is made when it is asked for."""
 
 from typing import Any, Self
 
@@ -9,8 +9,6 @@ from tissue.types import StepResult
 
 @lazy_fields(
     wrench_t1=lambda result: result.report.wrench,
-    stiffness=lambda result: result.report.stiffness,
-    contacts=lambda result: result.report.contacts,
     force_on_tissue=lambda result: result.report.mean_force_on_tissue,
 )
 class LazyResult(StepResult):
@@ -21,10 +19,11 @@ class LazyResult(StepResult):
     @classmethod
     def of(cls, report: BladeReport, *others: object) -> Self:
         """Return the result of a step: its report, and the fields of `StepResult` after bounds."""
-        result: Self = _new(cls, (report.mean_wrench, *_NOT_MADE, report.bounds, *others))
+        mean_wrench, stiffness, contacts, bounds, _, _ = report
+        first = (mean_wrench, None, stiffness, contacts, None, bounds)
+        result: Self = _new(cls, (*first, *others))
         result.report = report
         return result
 
 
-_NOT_MADE = (None, None, None, None)
 _new: Any = tuple.__new__

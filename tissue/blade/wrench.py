@@ -65,8 +65,8 @@ class WrenchReport(Arrays):
     """Change of the wrench with a displacement and rotation of the blade, shape (6, 6)."""
     amounts: FloatArray
     """The numbers of `Amounts`."""
-    numbers: FloatArray
-    """The arrays from `wrench` to `amounts` one after the other, which are views of it."""
+    plain: FloatArray
+    """All that a result has in plain numbers: mean wrench, tip, wrench, mean force, amounts."""
 
 
 class Amounts(NamedTuple):
@@ -91,7 +91,7 @@ class Amounts(NamedTuple):
 def new_report(blade: BladeState) -> WrenchReport:
     """Return a report without contacts, with room for as many as the blade may have."""
     capacity = len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.blunt.state)
-    numbers = np.zeros(_N_NUMBERS)
+    plain = np.zeros(18 + len(Amounts._fields))
     return WrenchReport(
         n_contacts=0,
         point=np.zeros((capacity, 3)),
@@ -99,71 +99,64 @@ def new_report(blade: BladeState) -> WrenchReport:
         normal_force=np.zeros(capacity),
         friction=np.zeros((capacity, 3)),
         cut_area=np.zeros(capacity),
-        wrench=numbers[0:6],
-        mean_wrench=numbers[51:57].reshape(2, 3),
-        mean_force_on_tissue=numbers[6:9],
-        tip=numbers[57:60],
-        bounds=numbers[9:15].reshape(2, 3),
-        stiffness=numbers[15:51].reshape(6, 6),
-        amounts=numbers[60:],
-        numbers=numbers,
+        wrench=plain[9:15],
+        mean_wrench=plain[0:6].reshape(2, 3),
+        mean_force_on_tissue=plain[15:18],
+        tip=plain[6:9],
+        bounds=np.zeros((2, 3)),
+        stiffness=np.zeros((6, 6)),
+        amounts=plain[18:],
+        plain=plain,
     )
 
 
-_N_NUMBERS = 60 + len(Amounts._fields)
-"""Numbers in the arrays of a report whose length does not change."""
-
-
 class BladeReport(NamedTuple):
-    """A copy of what a report came to. The arrays of a property are views of the copy."""
+    """A copy of what a report came to."""
 
-    report: WrenchReport
-    """The report itself, which the next step overwrites."""
-    views: dict[int, BladeContacts]
-    """Views of its first contacts, by their number, as far as they were asked for."""
-    numbers: FloatArray
-    """`WrenchReport.numbers` at the end of the step."""
     mean_wrench: Wrench
     """Mean wrench of the tissue on the blade in the time step, about the tip."""
+    stiffness: FloatArray
+    """Change of the wrench at the end of the step with the pose of the blade, shape (6, 6)."""
+    contacts: BladeContacts
+    """The contacts at the end of the step; views of the report, which the next step overwrites."""
+    bounds: FloatArray
+    """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
     amounts: Amounts
     """Single numbers."""
+    plain: list[float]
+    """`WrenchReport.plain`."""
 
     @property
     def wrench(self) -> Wrench:
-        """That wrench at the end of the step."""
-        numbers = self.numbers
-        return Wrench(numbers[0:3], numbers[3:6], numbers[57:60])
+        """The wrench at the end of the step."""
+        wrench, tip = np.array(self.plain[9:15]), np.array(self.plain[6:9])
+        return Wrench(wrench[:3], wrench[3:], tip)
 
     @property
     def mean_force_on_tissue(self) -> FloatArray:
         """Mean force of the blade on the nodes in the step, summed [N], shape (3,)."""
-        return self.numbers[6:9]
-
-    @property
-    def bounds(self) -> FloatArray:
-        """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
-        return self.numbers[9:15].reshape(2, 3)
-
-    @property
-    def stiffness(self) -> FloatArray:
-        """Change of the wrench with the pose of the blade, shape (6, 6)."""
-        return self.numbers[15:51].reshape(6, 6)
-
-    @property
-    def contacts(self) -> BladeContacts:
-        """The contacts at the end of the step; views of the report."""
-        n, views = int(self.amounts.n_contacts), self.views
-        if n not in views:
-            views[n] = contacts_of(self.report, n)
-        return views[n]
+        return np.array(self.plain[15:18])
 
 
 def blade_report(report: WrenchReport, views: dict[int, BladeContacts]) -> BladeReport:
-    """Return a copy of what was reported last; `views`: see `BladeReport`."""
-    numbers = report.numbers.copy()
-    a, b, c, d, e, f, g, h, i, *amounts = numbers[51:].tolist()
-    mean_wrench = Wrench.of_numbers((a, b, c, d, e, f, g, h, i))
-    return BladeReport(report, views, numbers, mean_wrench, Amounts(*amounts))
+    """Return a copy of what was reported last.
+
+    `views`: views of the first contacts of the report by their number, as far as they were made.
+    """
+    plain = report.plain.tolist()
+    a, b, c, d, e, f, g, h, i = plain[:9]
+    amounts = Amounts(*plain[18:])
+    n = int(amounts.n_contacts)
+    if n not in views:
+        views[n] = contacts_of(report, n)
+    return BladeReport(
+        Wrench.of_numbers((a, b, c, d, e, f, g, h, i)),
+        report.stiffness.copy(),
+        views[n],
+        report.bounds.copy(),
+        amounts,
+        plain,
+    )
 
 
 def contacts_of(report: WrenchReport, n: int) -> BladeContacts:
