@@ -13,7 +13,7 @@ from tissue.contact.penalty.near_pairs import CONTACT_REACH
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, outward_at
 from tissue.contact.penalty.ridges import Ridges
 from tissue.contact.penalty.search_state import SearchState
-from tissue.contact.penalty.touch import ENTRY, OVERLAP_DEPTH, TIME_AHEAD
+from tissue.contact.penalty.touch import ENTRY, OVERLAP_DEPTH, REST_REACH, TIME_AHEAD
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
@@ -28,8 +28,8 @@ _BEYOND, _HELD_BEYOND = 0.02, 0.1
 the ridges are in contact. Without a difference contacts at a limit come and go."""
 
 _LEAST_SLACK = 0.01
-"""Way that the nodes go, per node size, before ridges that are near and do not touch are looked at
-again. Larger: they overlap before they are seen; smaller: they are looked at in each time step."""
+"""Motion against each other after which ridges that are near are looked at again, per node size.
+Larger: they overlap before they are seen; smaller: they are looked at in each time step."""
 
 
 class RidgeTouch(NamedTuple):
@@ -37,7 +37,7 @@ class RidgeTouch(NamedTuple):
 
     is_touching: bool
     slack: float
-    """By how much the ways of the four nodes may add up before the pair needs another look [m]."""
+    """How far they may move against each other before the pair needs another look [m]."""
     s: float
     """Where along the first, as a fraction."""
     t: float
@@ -86,14 +86,43 @@ def ridge_touch_of(search: SearchState, body: Body, k: int) -> RidgeTouch:
         return apart
     before = _edges(ridges, search.ways.before, one, other)
     gap_before = dot(normal, separation(before, crossing.s, crossing.t))
-    if not (is_held or gap_before >= -ENTRY * size):
+    if not (
+        is_held
+        or gap_before >= -ENTRY * size
+        or _lost_contact(ridges, body, one, other, crossing, size)
+    ):
         return apart
     return RidgeTouch(True, apart.slack, crossing.s, crossing.t, normal)
 
 
 @kernel
+def _lost_contact(
+    ridges: Ridges, body: Body, one: int, other: int, crossing: Crossing, size: float
+) -> bool:
+    """Whether two ridges that overlap have lost their contact: they do not overlap at rest.
+
+    A cut that divides a ridge makes two of it, of which no contact is known. Ridges that lie the
+    wrong way round in the body at rest are those on two sides of a thin piece of tissue.
+
+    Args:
+        ridges: The ridges.
+        body: The body at rest.
+        one: The first ridge.
+        other: The second.
+        crossing: Where they cross now.
+        size: Mean node size [m].
+    """
+    rest = _edges(ridges, body.rest, one, other)
+    across = cross(sub(rest.b, rest.a), sub(rest.d, rest.c))
+    apart = separation(rest, crossing.s, crossing.t)
+    towards = 1.0 if dot(across, outward_at(ridges, body.rest, other)) > 0.0 else -1.0
+    is_behind = towards * dot(across, apart) < -1e-3 * size * norm(across)
+    return not (is_behind and norm(apart) < REST_REACH * size)
+
+
+@kernel
 def _no_touch(slack: float) -> RidgeTouch:
-    """Return that a pair does not touch, and need not be looked at before ways add up to that."""
+    """Return that a pair does not touch, and need not be looked at before it moves so far [m]."""
     return RidgeTouch(False, slack, 0.0, 0.0, Vec3(0.0, 0.0, 0.0))
 
 

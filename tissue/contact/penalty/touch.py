@@ -59,7 +59,7 @@ _RECAPTURED = 0.08
 """Overlap up to which a node without a contact is taken for one that lost it, per node size, unless
 it lies behind that face in the body at rest. 0: what is lost once sinks in for good."""
 
-_REST_REACH = 2.0
+REST_REACH = 2.0
 """Distance at rest up to which a node behind a face is on the other side of one thin piece of
 tissue, per node size; further off it has nothing to do with it."""
 
@@ -69,8 +69,8 @@ class Touch(NamedTuple):
 
     is_touching: bool
     slack: float
-    """By how much the ways of the four nodes may add up before the pair needs another look [m];
-    0 if that depends on how they move against each other."""
+    """How far node and face may move against each other before the pair needs another look [m]; 0
+    if they may touch at any time."""
     b: Vec3
     """Barycentric weights of the foot in the triangle."""
     normal: Vec3
@@ -81,7 +81,7 @@ class Touch(NamedTuple):
 
 @kernel
 def nothing(slack: float) -> Touch:
-    """Return that a pair does not touch, and need not be looked at before ways add up to that."""
+    """Return that a pair does not touch, and need not be looked at before it moves so far [m]."""
     return Touch(False, slack, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
 
 
@@ -222,7 +222,7 @@ def _came_from_outside(
     area = cross(sub(vec3(rest, b), i), sub(vec3(rest, c), i))
     from_corner = sub(vec3(rest, node), i)
     behind = dot(area, from_corner) < -1e-3 * size * norm(area)
-    reach = _REST_REACH * size
+    reach = REST_REACH * size
     return not (behind and dot(from_corner, from_corner) < reach * reach)
 
 

@@ -126,3 +126,19 @@ def test_ridges_that_pass_beside_each_other_do_not_touch():
     tissue = two_roofs(0.0215)
     assert contacts_of(tissue) == 0
     np.testing.assert_allclose(tissue.snapshot().velocities[4:], [FALLING] * 4)
+
+
+def test_ridges_that_lost_their_contact_and_overlap_come_apart_slowly():
+    tissue, deep = two_roofs(0.0), 3e-4
+    body = tissue._body
+    body.velocities[:] = 0.0
+    body.positions[4:8, 2] -= 5e-4 + deep
+    assert contacts_of(tissue) == 1
+
+    def gap() -> float:
+        return float(body.positions[4:6, 2].min() - body.positions[:2, 2].max())
+
+    assert -deep < gap() < -0.2 * deep, "they come out at one node size per second"
+    for _ in range(400):
+        tissue.step(None, DT)
+    assert gap() > -0.1 * deep
