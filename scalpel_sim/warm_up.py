@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridge import TissueFrame
+from bridge.arithmetic import compiled
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.stroke_follower import StrokeFollower
@@ -214,7 +215,8 @@ def _move_two_pieces(kernels: KernelSet) -> None:
 
 
 def _lead_an_arm() -> None:
-    """Let a hand lead an arm beside any tissue."""
+    """Let a hand lead an arm beside any tissue, and compile what a bridge computes in a frame."""
+    compiled()
     arm = Arm()
     pose = arm.blade.segment()
     stroke = Stroke((0.0, 1.0), (pose, pose))
