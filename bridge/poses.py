@@ -84,12 +84,8 @@ def motion(before: BladeSegment, after: BladeSegment) -> FloatArray:
     The rotation carries edge and flat of the first pose to those of the second, by less than half
     a turn.
     """
-    return np.array(motion_of(pose_of(before), pose_of(after)))
-
-
-def motion_of(before: Pose, after: Pose) -> Six:
-    """Return `motion` in plain numbers."""
-    return motion_between(before.tip, before.axes, after.tip, after.axes)
+    one, other = pose_of(before), pose_of(after)
+    return np.array(motion_between(one.tip, one.axes, other.tip, other.axes))
 
 
 def moved(segment: BladeSegment, by: FloatArray) -> BladeSegment:

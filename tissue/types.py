@@ -4,6 +4,7 @@ SI units. Every vector in this package is in the tissue frame. The suffixes `_t0
 the start and the end of a step.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -81,26 +82,24 @@ class Wrench(NamedTuple):
         return _of_numbers(_LazyWrench, numbers)
 
 
-@lazy_fields(
-    tip=lambda segment: _arrays_of(segment)[0],
-    heel=lambda segment: _arrays_of(segment)[1],
-    forward=lambda segment: _arrays_of(segment)[2],
-)
+def _vector(k: int) -> Callable[[Any], FloatArray]:
+    """Return what makes field `k` of three vectors of numbers."""
+    return lambda vectors: _arrays_of(vectors)[k]
+
+
+def _kept_numbers(vectors: Any) -> Nine:
+    """Return the numbers that vectors were made of, if no array was made of them."""
+    return vectors.__dict__.get("numbers") or _numbers_of(vectors)
+
+
+@lazy_fields(tip=_vector(0), heel=_vector(1), forward=_vector(2))
 class _LazySegment(BladeSegment):
-    @property
-    def numbers(self) -> Nine:
-        return self.__dict__.get("numbers") or _numbers_of(self)
+    numbers = property(_kept_numbers)
 
 
-@lazy_fields(
-    force=lambda wrench: _arrays_of(wrench)[0],
-    torque=lambda wrench: _arrays_of(wrench)[1],
-    point=lambda wrench: _arrays_of(wrench)[2],
-)
+@lazy_fields(force=_vector(0), torque=_vector(1), point=_vector(2))
 class _LazyWrench(Wrench):
-    @property
-    def numbers(self) -> Nine:
-        return self.__dict__.get("numbers") or _numbers_of(self)
+    numbers = property(_kept_numbers)
 
 
 _new: Any = tuple.__new__

@@ -31,17 +31,19 @@ def lazy_fields(**makers: Callable[[Any], Any]) -> Callable[[_C], _C]:
     """Return a decorator of a subclass of a named tuple: these fields are made by functions of it.
 
     In the tuple itself None stands for them. All that looks at a tuple, and copies, also those of
-    `_replace` and `pickle`, get a tuple of the named class with all of its fields.
+    `_replace` and `pickle`, get a tuple of the named class with all of its fields. Where C reads a
+    tuple itself, as in `"%s" % a_tuple`, None is seen.
     """
 
     def decorate(cls: _C) -> _C:
         plain: Any = cls.__mro__[1]
         for name, made_of in makers.items():
             setattr(cls, name, _LazyField(name, made_of))
-        methods: dict[str, Callable[..., Any]] = {
+        methods: dict[str, Any] = {
             "__iter__": lambda self: iter([getattr(self, name) for name in plain._fields]),
             "__reduce__": lambda self: (plain, tuple(self)),
             "__repr__": lambda self: repr(plain(*self)),
+            "__radd__": _added_to,
             "_replace": lambda self, **fields: plain(*self)._replace(**fields),
         } | {name: _on_plain(name) for name in _OF_TUPLES}
         for name, method in methods.items():
@@ -52,8 +54,8 @@ def lazy_fields(**makers: Callable[[Any], Any]) -> Callable[[_C], _C]:
 
 
 _OF_TUPLES = (
-    *(f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "hash", "add", "getitem")),
-    *("__contains__", "count", "index"),
+    *(f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "hash", "add", "mul", "rmul")),
+    *("__getitem__", "__contains__", "count", "index"),
 )
 """Methods of a tuple that look at its fields."""
 
@@ -62,6 +64,10 @@ def _on_plain(name: str) -> Callable[..., Any]:
     """Return a method of a tuple that sees all fields of its arguments."""
     method = getattr(tuple, name)
     return lambda *arguments: method(*map(_plain, arguments))
+
+
+def _added_to(after: Any, before: Any) -> Any:
+    return before + tuple(after)
 
 
 def _plain(value: Any) -> Any:

@@ -53,7 +53,9 @@ def test_all_that_looks_at_a_tuple_sees_all_fields():
     assert [*lazy_pair(3)] == [[1], 3] and tuple(lazy_pair(3)) == plain
     assert lazy_pair(3)[0] == [1] and lazy_pair(3)[:1] == ([1],) and len(lazy_pair(3)) == 2
     rest = (5,)
-    assert lazy_pair(3) + rest == ([1], 3, 5) and [1] in lazy_pair(3)
+    assert lazy_pair(3) + rest == ([1], 3, 5) and rest + lazy_pair(3) == (5, [1], 3)
+    assert lazy_pair(3) * 2 == 2 * lazy_pair(3) == 2 * tuple(plain)
+    assert [1] in lazy_pair(3)
     assert lazy_pair(3).index([1]) == 0 and lazy_pair(3).count(3) == 1
     assert repr(lazy_pair(3)) == repr(plain) and lazy_pair(3)._asdict() == plain._asdict()
     low, high = lazy_pair(3)

@@ -28,8 +28,8 @@ _BEYOND, _HELD_BEYOND = 0.02, 0.1
 the ridges are in contact. Without a difference contacts at a limit come and go."""
 
 _LEAST_SLACK = 0.01
-"""Motion against each other after which ridges that are near are looked at again, per node size.
-Larger: they overlap before they are seen; smaller: they are looked at in each time step."""
+"""Way that the nodes go, per node size, before ridges that are near and do not touch are looked at
+again. Larger: they overlap before they are seen; smaller: they are looked at in each time step."""
 
 
 class RidgeTouch(NamedTuple):
@@ -37,7 +37,7 @@ class RidgeTouch(NamedTuple):
 
     is_touching: bool
     slack: float
-    """How far they may move against each other before the pair needs another look [m]."""
+    """By how much the ways of the four nodes may add up before the pair needs another look [m]."""
     s: float
     """Where along the first, as a fraction."""
     t: float
@@ -99,7 +99,7 @@ def ridge_touch_of(search: SearchState, body: Body, k: int) -> RidgeTouch:
 def _lost_contact(
     ridges: Ridges, body: Body, one: int, other: int, crossing: Crossing, size: float
 ) -> bool:
-    """Whether two ridges that overlap have lost their contact: they do not overlap at rest.
+    """Return whether two ridges that overlap have lost their contact: they do not at rest.
 
     A cut that divides a ridge makes two of it, of which no contact is known. Ridges that lie the
     wrong way round in the body at rest are those on two sides of a thin piece of tissue.
@@ -122,7 +122,7 @@ def _lost_contact(
 
 @kernel
 def _no_touch(slack: float) -> RidgeTouch:
-    """Return that a pair does not touch, and need not be looked at before it moves so far [m]."""
+    """Return that a pair does not touch, and need not be looked at before ways add up to that."""
     return RidgeTouch(False, slack, 0.0, 0.0, Vec3(0.0, 0.0, 0.0))
 
 

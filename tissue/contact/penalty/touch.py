@@ -69,8 +69,8 @@ class Touch(NamedTuple):
 
     is_touching: bool
     slack: float
-    """How far node and face may move against each other before the pair needs another look [m]; 0
-    if they may touch at any time."""
+    """By how much the ways of the four nodes may add up before the pair needs another look [m];
+    0 if that depends on how they move against each other."""
     b: Vec3
     """Barycentric weights of the foot in the triangle."""
     normal: Vec3
@@ -81,7 +81,7 @@ class Touch(NamedTuple):
 
 @kernel
 def nothing(slack: float) -> Touch:
-    """Return that a pair does not touch, and need not be looked at before it moves so far [m]."""
+    """Return that a pair does not touch, and need not be looked at before ways add up to that."""
     return Touch(False, slack, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
 
 
