@@ -1,3 +1,4 @@
+from .arithmetic import compiled_arithmetic as compiled_arithmetic
 from .bridge import Bridge as Bridge
 from .collision.arm_geoms import SIZES_PER_SHAPE as SIZES_PER_SHAPE
 from .collision.arm_geoms import ArmGeom as ArmGeom
@@ -52,6 +53,7 @@ __all__ = [
     "TissueLink",
     "VirtualCoupling",
     "chosen_key",
+    "compiled_arithmetic",
     "serve",
     "write_new_key",
 ]

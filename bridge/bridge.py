@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bridge.arithmetic import PLAIN, Six, compiled
+from bridge.arithmetic import PLAIN, Six, compiled_arithmetic
 from bridge.collision.broad_phase import BroadPhase
 from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
@@ -76,7 +76,7 @@ class Bridge:
         link = link_to(tissue)
         self._frame = frame
         # A process without the tissue starts without its compiler.
-        self._arithmetic = compiled() if isinstance(link, InProcessLink) else PLAIN
+        self._arithmetic = compiled_arithmetic() if isinstance(link, InProcessLink) else PLAIN
         self._coupling = Coupling(
             limits or DeviceLimits(), passivity=passivity, arithmetic=self._arithmetic
         )

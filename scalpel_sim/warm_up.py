@@ -18,8 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridge import TissueFrame
-from bridge.arithmetic import compiled
+from bridge import TissueFrame, compiled_arithmetic
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.stroke_follower import StrokeFollower
@@ -216,7 +215,7 @@ def _move_two_pieces(kernels: KernelSet) -> None:
 
 def _lead_an_arm() -> None:
     """Let a hand lead an arm beside any tissue, and compile what a bridge computes in a frame."""
-    compiled()
+    compiled_arithmetic()
     arm = Arm()
     pose = arm.blade.segment()
     stroke = Stroke((0.0, 1.0), (pose, pose))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridge import DeviceLimits
-from bridge.arithmetic import compiled
+from bridge.arithmetic import compiled_arithmetic
 from bridge.coupling.coupling import Coupling
 from bridge.coupling.passivity import Travel
 from bridge.poses import motion, pose_of, six
@@ -33,7 +33,7 @@ def test_a_motion_is_that_of_the_rotation_matrix(seed):
     expected = naive_motion(before, after)
     assert motion(before, after) == pytest.approx(expected, abs=1e-9)
     one, other = pose_of(before), pose_of(after)
-    again = compiled().motion.call(one.tip, one.axes, other.tip, other.axes)
+    again = compiled_arithmetic().motion.call(one.tip, one.axes, other.tip, other.axes)
     assert again == pytest.approx(expected, abs=1e-9)
 
 
