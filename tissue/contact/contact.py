@@ -32,7 +32,12 @@ class Contact(Protocol):
         ...
 
     def prepare(
-        self, body: Body, frequency_squared: FloatArray, highest: float, seconds: float
+        self,
+        body: Body,
+        frequency_squared: FloatArray,
+        highest: float,
+        room: float,
+        seconds: float,
     ) -> None:
         """Find the contacts that act as forces, unless this was done since `begin`.
 
@@ -40,6 +45,7 @@ class Contact(Protocol):
             body: Where the nodes are.
             frequency_squared: Bound on w^2 of each node without contact [1/s2].
             highest: Bound on w^2 of the body without contact [1/s2].
+            room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
         ...

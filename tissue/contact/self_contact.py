@@ -174,7 +174,12 @@ class SelfContact:
         return 0.0
 
     def prepare(
-        self, body: Body, frequency_squared: FloatArray, highest: float, seconds: float
+        self,
+        body: Body,
+        frequency_squared: FloatArray,
+        highest: float,
+        room: float,
+        seconds: float,
     ) -> None:
         """Do nothing: contacts are found after each substep.
 
@@ -182,6 +187,7 @@ class SelfContact:
             body: Where the nodes are.
             frequency_squared: Bound on w^2 of each node without contact [1/s2].
             highest: Bound on w^2 of the body without contact [1/s2].
+            room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
 

@@ -24,7 +24,7 @@ LARGEST_ADDED_MASS = 0.02
 where a mesh is coarse a cut passes through most of its elements, and what it leaves of them is no
 sliver. At 0.02 the lowest frequencies of the body are at most 1 % lower."""
 
-LIMIT_STEP = 1.1
+LIMIT_STEP = 1.02
 """Factor by which the limit of frequencies is raised at once."""
 
 

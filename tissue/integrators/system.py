@@ -132,11 +132,14 @@ class System:
 
             relax_stress(self.context, seconds)
 
-    def find_contacts(self, seconds: float) -> None:
-        """Find the contacts that act as forces in a time step of that length [s]."""
+    def find_contacts(self, seconds: float, room: float = math.inf) -> None:
+        """Find the contacts that act as forces in a time step of that length [s].
+
+        `room`: what may be added to w^2 of the body without another step [1/s2].
+        """
         elasticity = self.elasticity
         by_node, highest = elasticity.arrays.frequency_squared, elasticity.frequency_squared
-        self.contact.prepare(self.body, by_node, highest, seconds)
+        self.contact.prepare(self.body, by_node, highest, room, seconds)
 
     def find_loose_pieces(self) -> None:
         """Find the pieces that are not held."""

@@ -114,6 +114,7 @@ class PenaltyContact:
             floor_listed_at=np.zeros(n_nodes, np.int64),
             ridge_contact=np.zeros(n_nodes, np.int64),
             ridge_contact_at=np.zeros(n_nodes, np.int64),
+            recovered=np.zeros(n_nodes),
             distance=np.zeros(DIRECTIONS),
             share=np.zeros(n_nodes),
             floor=-np.inf if floor is None else float(floor),
@@ -157,7 +158,12 @@ class PenaltyContact:
         )
 
     def prepare(
-        self, body: Body, frequency_squared: FloatArray, highest: float, seconds: float
+        self,
+        body: Body,
+        frequency_squared: FloatArray,
+        highest: float,
+        room: float,
+        seconds: float,
     ) -> None:
         """Find the contacts of a time step, unless this was done since `begin`.
 
@@ -165,6 +171,7 @@ class PenaltyContact:
             body: Where the nodes are.
             frequency_squared: Bound on w^2 of each node without contact [1/s2].
             highest: Bound on w^2 of the body without contact [1/s2].
+            room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
         if self._is_searched or not self._is_awake:
@@ -172,7 +179,7 @@ class PenaltyContact:
         self._is_searched = True
         while True:
             found = _SEARCH.call(
-                self._search, self.forces, body, frequency_squared, highest, seconds
+                self._search, self.forces, body, frequency_squared, highest, room, seconds
             )
             if found == DONE:
                 break
@@ -204,6 +211,7 @@ class PenaltyContact:
     def incision_ended(self, body: Body) -> None:
         """Let the lips of the incision touch; where the body is in pieces now, their skin too."""
         self._is_awake = self._is_awake or self._search.faces.n_places > 0
+        self._search.recovered[:] = 0.0
         self._find_pieces(body)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
@@ -211,7 +219,8 @@ class PenaltyContact:
         search = self._search
         of_nodes = ("inverted_step", "is_due", "contact", "n_contacts", "listed_at", "calm_until")
         of_floor = ("floor_contact", "floor_listed_at")
-        others = (*of_floor, "ridge_contact", "ridge_contact_at", "share", "normal")
+        of_ridges = ("ridge_contact", "ridge_contact_at")
+        others = (*of_floor, *of_ridges, "recovered", "share", "normal")
         self._search = search.replaced(
             faces=grown_faces(search.faces, n_tetrahedra),
             pairs=grown_near_pairs(search.pairs, n_nodes),

@@ -16,7 +16,7 @@ from tissue.contact.penalty.pair_update import SKIN_WAY, take_faces, update_pair
 from tissue.contact.penalty.ridge_contacts import find_touching_ridges
 from tissue.contact.penalty.ridge_pairs import pair_ridges
 from tissue.contact.penalty.search_state import SearchState
-from tissue.contact.penalty.stiffness import recover, split_masses
+from tissue.contact.penalty.stiffness import limit_stiffness, recover, split_masses
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.mesh.body import Body
@@ -42,6 +42,7 @@ def search_contacts(
     body: Body,
     frequency_squared: FloatArray,
     highest: float,
+    room: float,
     seconds: float,
 ) -> int:
     """Find the contacts of a time step; return DONE, or what needs room, to call again.
@@ -52,6 +53,7 @@ def search_contacts(
         body: Where the nodes are.
         frequency_squared: Bound on w^2 of each node without contact [1/s2].
         highest: Bound on w^2 of the body without contact [1/s2].
+        room: What may be added to that without another step [1/s2].
         seconds: Length of the time step [s].
     """
     pairs, ways = search.pairs, search.ways
@@ -82,11 +84,11 @@ def search_contacts(
         if _most_contacts(search, body) > len(forces.push) // 2:
             return NO_ROOM_FOR_CONTACTS
         list_contacts(search, forces, body)
-        search.limits.highest = highest
+        limit_stiffness(search.limits, highest, room)
         split_masses(forces, search.limits, body, frequency_squared, search.share)
         search.is_listing_due = 0
     look_for_lost_nodes(search, body)
-    recover(forces, search.limits, body, seconds)
+    recover(forces, search.limits, body, search.recovered, seconds)
     note_places(ways, body)
     search.stage = BEGIN
     return DONE

@@ -77,6 +77,9 @@ class SearchState(Arrays):
     (node capacity,)."""
     ridge_contact_at: IntArray
     """Search in which that was written, shape (node capacity,)."""
+    recovered: FloatArray
+    """How far the contacts of each node have come out since the last incision [m], shape (node
+    capacity,)."""
     distance: FloatArray
     """Scratch: squared distance of the contacts that a node was found to have [m2], shape (3,)."""
     share: FloatArray

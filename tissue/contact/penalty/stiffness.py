@@ -29,6 +29,10 @@ _ROOM_SHARE = 0.5
 """Share of the room between a node's own bound on w^2 and the highest that its contacts may use.
 Larger: stiffer contact; at 1 nothing is left for what strain adds."""
 
+_LEAST_SHARE = 0.35
+"""What contact adds to w^2 is lowered to this share, at most, where that saves a step. Lower: what
+is pressed against slivers sinks in; 1: a step more in each time step of a body cut often."""
+
 _LARGEST_DEPTH = 0.2
 """Depth above which a force grows no more, per node size. Larger: what was pinched and is let go is
 thrown; smaller: it sinks in deeper."""
@@ -53,6 +57,11 @@ _RECOVERY = 1.0
 """Speed at which an overlap comes out that had no force as it was found, in node sizes a second.
 Larger: more work on the springs behind; 0: what overlaps does so for good."""
 
+_MOST_RECOVERY = 0.5
+"""How far the contacts of a node come out in all from one incision to the next, per node size: the
+deepest overlap that is looked at. More: where contacts of slivers contradict each other they go on
+pushing, and the slivers snap to and fro without end; less: deep overlaps stay."""
+
 _RECOVERY_FROM_SLACK = 4.0
 """How many times as fast slack is taken back."""
 
@@ -62,8 +71,10 @@ class Limits(Arrays):
 
     highest: FloatCell
     """Bound on w^2 of the whole body that the step is chosen for [1/s2]."""
-    added: float
-    """What contact may add to w^2 of every node [1/s2]."""
+    added: FloatCell
+    """What contact adds to w^2 of every node at most [1/s2]."""
+    most_added: float
+    """What it may add where steps allow [1/s2]."""
     largest_depth: float
     """Depth above which a force grows no more [m]."""
     largest_acceleration: float
@@ -72,6 +83,8 @@ class Limits(Arrays):
     """Gap up to which a contact keeps its force [m]."""
     recovery: float
     """Speed at which an overlap comes out that had no force as it was found [m/s]."""
+    most_recovery: float
+    """How far the contacts of a node come out in all from one incision to the next [m]."""
 
 
 def new_limits(node_size: float, added: float) -> Limits:
@@ -84,11 +97,27 @@ def new_limits(node_size: float, added: float) -> Limits:
     return Limits(
         highest=0.0,
         added=float(added),
+        most_added=float(added),
         largest_depth=float(_LARGEST_DEPTH * node_size),
         largest_acceleration=float(_LARGEST_ACCELERATION * node_size * added),
         slack=float(_SLACK * node_size),
         recovery=float(_RECOVERY * node_size),
+        most_recovery=float(_MOST_RECOVERY * node_size),
     )
+
+
+@kernel
+def limit_stiffness(limits: Limits, highest: float, room: float) -> None:
+    """Let contact add as much to w^2 as steps allow, or a little less where that saves a step.
+
+    Args:
+        limits: Written.
+        highest: Bound on w^2 of the body without contact [1/s2].
+        room: What may be added to that without another step [1/s2].
+    """
+    most = limits.most_added
+    limits.highest = highest
+    limits.added = min(most, room) if room >= _LEAST_SHARE * most else most
 
 
 @kernel
@@ -149,8 +178,18 @@ def _keep_force(
 
 
 @kernel
-def recover(forces: PenaltyForces, limits: Limits, body: Body, seconds: float) -> None:
-    """Let offsets return towards zero by what they may in a time step [s], and forces grow."""
+def recover(
+    forces: PenaltyForces, limits: Limits, body: Body, recovered: FloatArray, seconds: float
+) -> None:
+    """Let offsets return towards zero by what they may in a time step, and forces grow.
+
+    Args:
+        forces: Offsets and greatest depths are written.
+        limits: How fast, and how far.
+        body: Where the nodes are.
+        recovered: How far the contacts of each node have come out [m], shape (capacity,); written.
+        seconds: Length of the time step [s].
+    """
     back = limits.recovery * seconds
     for c in range(forces.first, forces.first + forces.n_contacts):
         most = forces.largest_depth[c]
@@ -166,4 +205,7 @@ def recover(forces: PenaltyForces, limits: Limits, body: Body, seconds: float) -
         if offset > 0.0:
             forces.offset[c] = max(offset - _RECOVERY_FROM_SLACK * back, 0.0)
         else:
-            forces.offset[c] = min(offset + back, 0.0)
+            node = forces.node[c, 0]
+            way = min(back, limits.most_recovery - recovered[node])
+            recovered[node] += min(way, -offset)
+            forces.offset[c] = min(offset + way, 0.0)

@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 
 from tests.tissue.contact.penalty.lists import ADDED, NODE_SIZE, random_contacts, stiffened
 from tissue.contact.penalty.contact_forces import end_contact_substep
-from tissue.contact.penalty.stiffness import new_limits, recover, split_masses
+from tissue.contact.penalty.stiffness import (
+    limit_stiffness,
+    new_limits,
+    recover,
+    split_masses,
+)
 
 pytestmark = pytest.mark.kernel
 
@@ -53,5 +58,28 @@ def test_an_overlap_without_force_comes_out_at_the_speed_of_recovery():
     forces.push[:20] = 0.0
     forces.offset[:20] = -1e-3
     forces.height[:20] = 1.0
-    recover(forces, new_limits(NODE_SIZE, ADDED), body, 1e-3)
+    recover(forces, new_limits(NODE_SIZE, ADDED), body, np.zeros(body.n_nodes), 1e-3)
     np.testing.assert_allclose(forces.offset[:20], -1e-3 + NODE_SIZE * 1e-3)
+
+
+def test_an_overlap_comes_out_by_half_a_node_size_at_most_between_two_incisions():
+    body, forces, _ = stiffened(1, 1)
+    limits, recovered = new_limits(NODE_SIZE, ADDED), np.zeros(body.n_nodes)
+    forces.offset[0] = -NODE_SIZE
+    for _ in range(2000):
+        forces.push[0] = 1.0
+        recover(forces, limits, body, recovered, 1e-3)
+    assert forces.offset[0] == pytest.approx(-0.5 * NODE_SIZE)
+    recovered[:] = 0.0
+    forces.push[0] = 1.0
+    recover(forces, limits, body, recovered, 1e-3)
+    assert forces.offset[0] > -0.5 * NODE_SIZE
+
+
+@pytest.mark.parametrize(("room", "share"), [(10.0, 1.0), (0.5, 0.5), (0.1, 1.0)])
+def test_contact_is_softer_by_a_part_where_that_saves_a_step_and_not_where_it_takes_more(
+    room, share
+):
+    limits = new_limits(NODE_SIZE, ADDED)
+    limit_stiffness(limits, 4e7, room * ADDED)
+    assert limits.added == pytest.approx(share * ADDED)
