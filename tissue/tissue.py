@@ -272,12 +272,14 @@ class Tissue(DrivenBody):
         loads, system = self._loads, self._system
         before = 0.0
         if loads.act:
+            self._global_stepper.wake()
             loads.spread(system.body, system.stages.loads)
             before = loads.virtual_work(system.body)
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
         if loads.act:
             self._audit.work_of_loads += loads.virtual_work(system.body) - before
-        self._audit.forget()
+        if n > 0:
+            self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
         return n
 

@@ -25,6 +25,7 @@ from tissue.integrators.step_choice import (
     begin_increment,
     new_step_choice,
     next_part,
+    room_for_contact,
 )
 from tissue.integrators.step_context import Increment
 from tissue.integrators.substeps import (
@@ -40,6 +41,8 @@ from tissue.integrators.threaded import Threads
 from tissue.material import Law
 from tissue.mesh.body import Body
 from tissue.types import TissueError
+
+_ROOM = SameTypes(room_for_contact)
 
 
 class Method(NamedTuple):
@@ -98,9 +101,11 @@ class GlobalStepper:
         if isinstance(contact, SelfContact):
             return relax_in_stages(self, system, blade, increment, has_blade)
         edge, dt, begin, end = increment
-        if contact.is_awake and increment.span > 0.0:
-            system.find_contacts(increment.span)
         choice = self._choice_for(system)
+        if contact.is_awake and increment.span > 0.0 and not choice.is_at_rest:
+            room = _ROOM.call(choice, system.context, increment.span)
+            system.find_contacts(increment.span, room)
+            choice = self._choice_for(system)
         if self._threads is not None:
             self._threads.join(system.context)
         while True:
@@ -174,7 +179,13 @@ class GlobalStepper:
         return relaxation
 
     def mesh_changed(self, nodes: IntArray) -> None:
-        """Do nothing: `Solid.is_bound_current` says that bounds have changed."""
+        """Move the body again; `Solid.is_bound_current` says that bounds have changed."""
+        self.wake()
+
+    def wake(self) -> None:
+        """Move the body again, which may have been at rest."""
+        if self._choice is not None:
+            self._choice.calm, self._choice.is_at_rest = 0.0, 0
 
     def body_moved(self, body: Body) -> None:
         """Forget the bound on the strained body: it is another one now."""

@@ -26,7 +26,7 @@ from tissue.integrators.advance import (
     advance_by_runge_kutta,
     advance_by_verlet,
 )
-from tissue.integrators.step_choice import StepChoice, begin_increment
+from tissue.integrators.step_choice import StepChoice, begin_increment, note_calm
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.stress_relaxation import relax_stress
 from tissue.mesh.bounding_boxes import write_bounds
@@ -156,6 +156,7 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
         if choice.is_unstable == 1:
             return UNSTABLE
         if choice.done > 0:
+            note_calm(choice)
             if relaxes(step.elastic.solid):
                 relax_stress(step, choice.span)
             if not write_bounds(step.body, relaxation.blade.bounds):

@@ -21,6 +21,7 @@ from tissue.elasticity.neo_hookean import keeps_gradients
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
+from tissue.integrators.rest import CALM_SPEED, TIME_TO_REST, may_rest, rest, stop_nodes
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,
     DISPLACEMENTS_LAST,
@@ -69,6 +70,8 @@ class StepChoice(Arrays):
     """Steps of the increment taken so far."""
     n_steps: IntCell
     """Steps of the part that is taken next."""
+    is_at_rest: IntCell
+    """1 while the body is not moved, as it has been calm and nothing touches it, else 0."""
     is_unstable: IntCell
     """1 if the motion became unstable: it would take more steps than `MOST_STEPS` allows."""
     dt: FloatCell
@@ -99,6 +102,8 @@ class StepChoice(Arrays):
     """Up to which w^2 it was not brought near the truth [1/s2]."""
     moved: FloatCell
     """How far nodes have moved since, at most [m]."""
+    calm: FloatCell
+    """How long no node has been faster than `CALM_SPEED`, and nothing touched the body [s]."""
     speed: FloatCell
     """Speed of the fastest node at the begin of the part [m/s]."""
     node_size: float
@@ -117,6 +122,7 @@ def new_step_choice(
         method=method,
         done=0,
         n_steps=0,
+        is_at_rest=0,
         is_unstable=0,
         dt=0.0,
         begin=0.0,
@@ -132,11 +138,27 @@ def new_step_choice(
         strained=0.0,
         allowed=0.0,
         moved=math.inf,
+        calm=0.0,
         speed=0.0,
         node_size=node_size,
         surroundings=surroundings,
         no_frequency=np.zeros(n_nodes),
     )
+
+
+@kernel
+def room_for_contact(choice: StepChoice, context: StepContext, seconds: float) -> float:
+    """Return what contact may add to w^2 of the body without another step [1/s2].
+
+    Args:
+        choice: The method, and all damping.
+        context: The body at rest.
+        seconds: Time to advance by [s].
+    """
+    elastic = context.elastic
+    longest = stable_step(choice.method, elastic, elastic.highest, choice.surroundings)
+    room: float = _without_another_step(elastic.highest, longest, seconds)[1] - elastic.highest
+    return room
 
 
 @kernel
@@ -162,6 +184,11 @@ def begin_increment(
     if not choice.span > 0.0:
         choice.end = begin  # no steps
         return
+    _find_rest(choice, context)
+    if choice.is_at_rest == 1:
+        choice.end = begin
+        rest(context, choice.span)
+        return
     _limit_mass(choice, context)
     near = limit_frequency_at_blade(context.blade, elastic, body, external)
     added = choice.of_contact
@@ -170,6 +197,25 @@ def begin_increment(
         # Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
         added += frequency_with_blade(context.blade, body, choice.no_frequency, external)
     choice.added = added
+
+
+@kernel
+def _find_rest(choice: StepChoice, context: StepContext) -> None:
+    """Find out whether the body is at rest; nodes that came to rest now are stopped."""
+    if not may_rest(context, choice.surroundings.drag):
+        choice.calm = 0.0
+    if choice.calm < TIME_TO_REST:
+        choice.is_at_rest = 0
+    elif choice.is_at_rest == 0:
+        choice.is_at_rest = 1
+        stop_nodes(context)
+
+
+@kernel
+def note_calm(choice: StepChoice) -> None:
+    """Note, after the steps of an increment, that the body was calm in it, or was not."""
+    is_calm = choice.speed <= CALM_SPEED * choice.node_size
+    choice.calm = choice.calm + choice.span if is_calm else 0.0
 
 
 @kernel
