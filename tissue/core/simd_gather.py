@@ -107,6 +107,19 @@ def _larger_bits(builder: Any, a: Any, b: Any) -> Any:
     return builder.zext(bits, ir.IntType(64))
 
 
+def first_bit(bits: int) -> int:
+    """Return the number of the lowest bit that is 1, from 0; one is."""
+    return int(bits & -bits).bit_length() - 1
+
+
+@_compiled(first_bit, types.Integer, result=types.int64)
+def _first_bit(builder: Any, bits: Any) -> Any:
+    function = _declared(
+        builder.module, "llvm.cttz.i64", ir.FunctionType(_I64, [_I64, ir.IntType(1)])
+    )
+    return builder.call(function, [bits, ir.IntType(1)(1)])
+
+
 def _tree(terms: list[Any], add: Any = operator.add) -> Any:
     """Return the sum of eight, or another fold: neighbours first, so that no operation waits."""
     while len(terms) > 1:

@@ -5,7 +5,14 @@ import pytest
 
 from tissue.core.jit import kernel
 from tissue.core.simd import load_lanes, store_lanes
-from tissue.core.simd_gather import larger, larger_bits, largest, natural, sum_of_eight
+from tissue.core.simd_gather import (
+    first_bit,
+    larger,
+    larger_bits,
+    largest,
+    natural,
+    sum_of_eight,
+)
 
 pytestmark = pytest.mark.kernel
 
@@ -49,6 +56,19 @@ def test_bits_say_in_which_lanes_a_number_is_larger():
     compare_bits(VALUES, expected)
     assert out[0] == expected[0]
     assert expected[0] == sum(1 << k for k in range(8) if VALUES[k] > VALUES[8 + k])
+
+
+def number_bits(numbers, out):
+    for i in range(len(numbers)):
+        out[i] = first_bit(numbers[i])
+
+
+def test_the_first_bit_is_the_lowest_that_is_one():
+    numbers = np.array([1, 2, 3, 8, 12, 96, 128, 1 << 40])
+    out, expected = np.zeros((2, len(numbers)), np.int64)
+    kernel(number_bits)(numbers, out)
+    number_bits(numbers, expected)
+    assert out.tolist() == expected.tolist() == [0, 1, 0, 3, 2, 5, 7, 40]
 
 
 def picked(values, of, out):

@@ -111,7 +111,7 @@ def new_block_tree(capacity: int) -> BlockTree:
 
 @inlined
 def enter(tree: BlockTree, item: int, box: Aabb, direction: Vec3, is_marked: bool) -> None:
-    """Enter a node or a ridge; `arrange` is called after the last.
+    """Enter a thing; `arrange` is called after the last.
 
     Args:
         tree: Written.

@@ -8,11 +8,11 @@ it is not behind in the body at rest; it comes out as slowly as any overlap that
 
 import math
 
-from tissue.contact.penalty.block_tree import find_near
+from tissue.contact.penalty.node_grid import NodeGrid, find_in_box
 from tissue.contact.penalty.node_ways import BALL
 from tissue.contact.penalty.search_state import SearchState
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, cross, dot, sub, vec3
+from tissue.core.vec3 import cross, dot, sub, vec3
 from tissue.geometry.aabb import Aabb, overlap, widened, with_point
 from tissue.geometry.tetrahedron import barycentric_in, smallest_weight
 from tissue.mesh.body import Body, local_index
@@ -54,7 +54,7 @@ def _forget_others(search: SearchState) -> None:
 @kernel
 def _look_into(search: SearchState, body: Body, t: int) -> None:
     """Find the nodes of faces that are lost in tetrahedron `t`."""
-    x, ways, tree = body.positions, search.ways, search.pairs.tree
+    x, ways = body.positions, search.ways
     a, b = vec3(x, body.tetrahedra[t, 0]), vec3(x, body.tetrahedra[t, 1])
     c, d = vec3(x, body.tetrahedra[t, 2]), vec3(x, body.tetrahedra[t, 3])
     box = with_point(with_point(with_point(Aabb(a, a), b), c), d)
@@ -65,11 +65,17 @@ def _look_into(search: SearchState, body: Body, t: int) -> None:
     # Of numbers that are not finite this is not true, either.
     if not (extent.x < largest and extent.y < largest and extent.z < largest):
         return
-    reach = widened(box, BALL * ways.node_size)
-    n = find_near(tree, reach, Vec3(0.0, 0.0, 0.0), math.inf, False)
-    for i in range(n):
-        node = tree.found[i]
-        p = vec3(x, node)
+    _find_lost(search, body, search.pairs.slow, box, t)
+    _find_lost(search, body, search.pairs.fast, box, t)
+
+
+@kernel
+def _find_lost(search: SearchState, body: Body, grid: NodeGrid, box: Aabb, t: int) -> None:
+    """Find the nodes of a grid that are lost in tetrahedron `t`, which is in `box`."""
+    size = search.ways.node_size
+    for i in range(find_in_box(grid, widened(box, BALL * size), size)):
+        node = grid.found[i]
+        p = vec3(body.positions, node)
         if overlap(box, Aabb(p, p)) and _is_lost_in(search, body, node, t):
             _note_lost(search, node)
 

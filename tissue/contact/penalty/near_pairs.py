@@ -7,7 +7,7 @@ anew (`pair_update`). Faces go by their places in `Faces`.
 
 import numpy as np
 
-from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
+from tissue.contact.penalty.node_grid import NodeGrid, new_node_grid
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
@@ -128,9 +128,12 @@ class NearPairs(Arrays):
     relative: FloatArray
     """Displacement of the node against the face as a near pair was last looked at [m], shape
     (2 * capacity, 3)."""
-    tree: BlockTree
-    """All nodes of faces, with the part of their balls by which these are larger than those of slow
-    nodes; those that are paired anew are marked."""
+    slow: NodeGrid
+    """Nodes of faces whose balls are hardly larger than those of slow ones."""
+    fast: NodeGrid
+    """The other nodes of faces."""
+    anew: NodeGrid
+    """Nodes that were paired anew in the last update."""
 
 
 def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
@@ -168,14 +171,19 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         **{name: np.zeros(capacity, np.int64) for name in ("found_node", "found_face")},
         wake=np.zeros(2 * capacity),
         relative=np.zeros((2 * capacity, 3)),
-        tree=new_block_tree(n_nodes),
+        **_new_grids(n_nodes),
     )
 
 
 def grown_near_pairs(pairs: NearPairs, n_nodes: int) -> NearPairs:
     """Return the pairs with room for `n_nodes` of the body."""
     larger = {name: grown(getattr(pairs, name), n_nodes) for name in _OF_NODES}
-    return pairs.replaced(**larger, tree=new_block_tree(n_nodes))
+    return pairs.replaced(**larger, **_new_grids(n_nodes))
+
+
+def _new_grids(n_nodes: int) -> dict[str, NodeGrid]:
+    """Return empty grids for that many nodes."""
+    return {name: new_node_grid(n_nodes) for name in ("slow", "fast", "anew")}
 
 
 @inlined

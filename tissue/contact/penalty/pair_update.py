@@ -4,11 +4,17 @@ A cut, or a lip that the blade drags along, costs its neighbourhood and not the 
 """
 
 import math
-from typing import NamedTuple
 
 from tissue.contact.faces import NO_FACE, Faces, is_face_of_cut
-from tissue.contact.penalty.block_tree import arrange, enter, find_near
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
+from tissue.contact.penalty.node_grid import (
+    Asking,
+    NodeGrid,
+    arrange_grid,
+    enter_node,
+    find_in_box,
+    find_near_face,
+)
 from tissue.contact.penalty.node_ways import (
     BALL,
     LARGEST_BALL,
@@ -32,36 +38,15 @@ from tissue.geometry.aabb import (
 )
 from tissue.mesh.body import Body
 
-DEEPEST = 0.25
-"""Depth below a face up to which a node is paired with it, per node size. Larger: nodes on the far
-side of thin lips are looked at; smaller: what was pressed in deep is lost."""
+_MOST_OF_SLOW = 0.2
+"""Radius of a ball up to which its node is among the slow, per node size."""
 
-_SAME_SHEET = 0.17
-"""Cosine between the normals of node and face above which they are of one sheet, which bends and
-does not touch itself. Larger: more pairs; smaller: lips that lie across each other are missed."""
+_CELL, _LARGE_CELL = 1.4, 3.0
+"""Edges of the cells of slow and of other nodes, per node size."""
 
 SKIN_WAY = 0.5
 """Way of any node after which it is asked again which skin is near another piece, per node size.
 Larger: more skin is paired; smaller: all skin is tested more often."""
-
-
-class _Asking(NamedTuple):
-    """A face as it asks for nodes near it."""
-
-    at: int
-    """Its place."""
-    nodes: tuple[int, int, int]
-    """Its corners."""
-    corner: Vec3
-    """Reference of the first corner [m]."""
-    area: Vec3
-    """Its normal, twice as long as its area [m2]."""
-    length: float
-    """Length of that [m2]."""
-    reach: float
-    """How far a node may be from it, without the ball of the node [m]."""
-    box: Aabb
-    """Box of what touches it, with the ball of a slow node around it."""
 
 
 @kernel
@@ -101,9 +86,10 @@ def update_pairs(
         if pairs.dirty_at[at] == pairs.n_updates:
             asking = _asking(pairs, ways, at)
             store_box(pairs.low, pairs.high, at, asking.box)
-            _ask(pairs, ways, faces, body, normal, asking, False)
-        elif overlap(box_at(pairs.low, pairs.high, at), box):
-            _ask(pairs, ways, faces, body, normal, _asking(pairs, ways, at), True)
+            _ask(pairs, ways, faces, body, pairs.slow, asking)
+            _ask(pairs, ways, faces, body, pairs.fast, asking)
+        elif _is_near_moved(pairs, ways, at, box):
+            _ask(pairs, ways, faces, body, pairs.anew, _asking(pairs, ways, at))
     if pairs.n_kept + pairs.n_found > len(pairs.wake) // 2:
         return False
     _join_pairs(pairs)
@@ -227,7 +213,7 @@ def _box_of_moved(pairs: NearPairs, ways: NodeWays) -> Aabb:
 
 
 @kernel
-def _asking(pairs: NearPairs, ways: NodeWays, at: int) -> _Asking:
+def _asking(pairs: NearPairs, ways: NodeWays, at: int) -> Asking:
     """Return a face as it asks for nodes."""
     x, r = ways.reference, ways.radius
     a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
@@ -236,38 +222,44 @@ def _asking(pairs: NearPairs, ways: NodeWays, at: int) -> _Asking:
     reach = max(r[a], max(r[b], r[c])) + CONTACT_REACH * ways.node_size
     corners = with_point(with_point(Aabb(i, i), j), k)
     box = widened(corners, reach + BALL * ways.node_size)
-    return _Asking(at, (a, b, c), i, area, math.sqrt(dot(area, area)), reach, box)
+    return Asking(at, (a, b, c), i, area, math.sqrt(dot(area, area)), reach, box)
 
 
 @kernel
 def _enter_nodes(pairs: NearPairs, ways: NodeWays, normal: FloatArray) -> None:
-    """Put the nodes of faces into the tree."""
-    tree, now = pairs.tree, pairs.n_updates
-    tree.n_items = 0
+    """Put the nodes of faces into the grids."""
+    slow, fast, anew = pairs.slow, pairs.fast, pairs.anew
+    slow.n_items = fast.n_items = anew.n_items = 0
+    most = _MOST_OF_SLOW * ways.node_size
     for i in range(pairs.n_nodes):
         node = pairs.nodes[i]
-        p, more = vec3(ways.reference, node), ways.radius[node] - BALL * ways.node_size
-        box = widened(Aabb(p, p), max(more, 0.0))
-        enter(tree, node, box, vec3(normal, node), pairs.moved_at[node] == now)
-    arrange(tree, _SAME_SHEET)
+        if ways.radius[node] <= most:
+            enter_node(slow, node)
+        else:
+            enter_node(fast, node)
+        if pairs.moved_at[node] == pairs.n_updates:
+            enter_node(anew, node)
+    arrange_grid(slow, ways, normal, _CELL * ways.node_size)
+    arrange_grid(fast, ways, normal, _LARGE_CELL * ways.node_size)
+    arrange_grid(anew, ways, normal, _LARGE_CELL * ways.node_size)
+
+
+@kernel
+def _is_near_moved(pairs: NearPairs, ways: NodeWays, at: int, box: Aabb) -> bool:
+    """Whether a node that is paired anew is near a face; `box`: that around all of them."""
+    own = box_at(pairs.low, pairs.high, at)
+    return overlap(own, box) and find_in_box(pairs.anew, own, ways.node_size) > 0
 
 
 @kernel
 def _ask(
-    pairs: NearPairs,
-    ways: NodeWays,
-    faces: Faces,
-    body: Body,
-    normal: FloatArray,
-    face: _Asking,
-    only_moved: bool,
+    pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body, grid: NodeGrid, face: Asking
 ) -> None:
-    """Pair a face with the nodes that may touch it; see `update_pairs`."""
-    n = find_near(pairs.tree, face.box, face.area, face.length, only_moved)
+    """Pair a face with the nodes of a grid that may touch it; see `update_pairs`."""
     room = len(pairs.wake) // 2
-    for i in range(n):
-        node = pairs.tree.found[i]
-        if not _may_meet(pairs, ways, faces, body, normal, face, node):
+    for i in range(find_near_face(grid, face, ways.node_size)):
+        node = grid.found[i]
+        if node in face.nodes or _is_same_skin(pairs, faces, body, face.at, node):
             continue
         if pairs.n_found < room:
             pairs.found_node[pairs.n_found] = node
@@ -277,31 +269,12 @@ def _ask(
 
 
 @kernel
-def _may_meet(
-    pairs: NearPairs,
-    ways: NodeWays,
-    faces: Faces,
-    body: Body,
-    normal: FloatArray,
-    face: _Asking,
-    node: int,
-) -> bool:
-    """Whether a node may touch a face while both stay in their balls."""
-    if node in face.nodes:
+def _is_same_skin(pairs: NearPairs, faces: Faces, body: Body, at: int, node: int) -> bool:
+    """Whether a face or a node is only of skin, and both are of one piece."""
+    if pairs.is_of_cut[at] == 1 and pairs.cut_at[node] == pairs.n_updates:
         return False
-    if pairs.is_of_cut[face.at] == 0 or pairs.cut_at[node] != pairs.n_updates:
-        piece = faces.piece[body.node_tetrahedron[node]]
-        if piece >= 0 and piece == faces.piece[pairs.tetrahedron[face.at]]:
-            return False
-    own = vec3(normal, node)
-    along = dot(own, face.area)
-    if along > 0.0 and along * along > (_SAME_SHEET * face.length) ** 2 * dot(own, own):
-        return False
-    height = dot(face.area, sub(vec3(ways.reference, node), face.corner))
-    reach = face.reach + ways.radius[node]
-    if height < 0.0:
-        reach += DEEPEST * ways.node_size
-    return bool(abs(height) <= reach * face.length)
+    piece = faces.piece[body.node_tetrahedron[node]]
+    return bool(piece >= 0 and piece == faces.piece[pairs.tetrahedron[at]])
 
 
 @kernel
