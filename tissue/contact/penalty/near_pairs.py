@@ -50,6 +50,8 @@ class NearPairs(Arrays):
     """Number of nodes that were paired anew in the last update."""
     n_updates: IntCell
     """Number of the last update, from 1."""
+    changed_at: IntCell
+    """Number of the last update before which a face had changed."""
     n_indexed: IntCell
     """Update after which pairs were last sorted by their faces."""
     n_kept: IntCell
@@ -151,6 +153,7 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         n_nodes=0,
         n_moved=0,
         n_updates=1,
+        changed_at=0,
         n_indexed=0,
         n_kept=0,
         n_found=0,

@@ -13,7 +13,7 @@ from tissue.contact.penalty.node_ways import BALL, NodeWays
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, aligned, filled, lanes, load_lanes
-from tissue.core.simd_gather import first_bit, larger, larger_bits
+from tissue.core.simd_gather import first_bit, larger, larger_bits, natural
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, norm, store, vec3
 from tissue.geometry.aabb import Aabb, empty_box, widened, with_point
@@ -212,14 +212,16 @@ def find_near_face(grid: NodeGrid, face: Asking, node_size: float) -> int:
     wide = widened(face.box, grid.most + _ROUNDING)
     x0, y0, z0 = _cell_of(grid, wide.low)
     x1, y1, z1 = _cell_of(grid, wide.high)
-    n = 0
+    n, n_x, n_y = 0, grid.n_x, grid.n_y
+    begin = grid.begin
     for z in range(z0, z1 + 1):
         for y in range(y0, y1 + 1):
-            row = (z * grid.n_y + y) * grid.n_x
-            end = grid.begin[row + x1 + 1]
-            for i in range(grid.begin[row + x0], end, WIDTH):
+            row = (z * n_y + y) * n_x
+            i, end = begin[natural(row + x0)], begin[natural(row + x1 + 1)]
+            while i < end:
                 bits = _in_box(grid, i, face.box, BALL * node_size)
                 n = _note_found(grid, i, end, bits & _at_face(grid, i, face, node_size), n)
+                i += WIDTH
     return n
 
 
@@ -228,7 +230,7 @@ def _note_found(grid: NodeGrid, i: int, end: int, bits: int, n: int) -> int:
     """Write the nodes of the bits that are before `end`; return how many there are then."""
     bits &= (1 << min(end - i, WIDTH)) - 1
     while bits != 0:
-        grid.found[n] = grid.node[i + first_bit(bits)]
+        grid.found[natural(n)] = grid.node[natural(i + first_bit(bits))]
         n += 1
         bits &= bits - 1
     return n

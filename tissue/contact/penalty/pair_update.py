@@ -72,8 +72,11 @@ def update_pairs(
         return False
     take_faces(pairs, ways, faces, body)
     pairs.n_updates += 1
-    find_changed_ridges(ridges, pairs, faces, body)
-    _list_nodes(pairs, ways, faces, body)
+    if pairs.changed_at == pairs.n_updates:
+        find_changed_ridges(ridges, pairs, faces, body)
+        _list_nodes(pairs, ways, faces, body)
+    else:
+        _keep_nodes(pairs, ways, body)
     for at in range(faces.n_places):
         if pairs.is_active[at] == 1 and _has_moved_corner(pairs, at):
             pairs.dirty_at[at] = pairs.n_updates
@@ -119,6 +122,7 @@ def take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> bo
         pairs.seen_generation[at] = faces.generation[at]
         pairs.is_active[at] = is_wanted
         pairs.dirty_at[at] = pairs.n_updates + 1
+        pairs.changed_at = pairs.n_updates + 1
         has_any = True
         if is_wanted:
             pairs.is_of_cut[at] = is_face_of_cut(faces, body, at)
@@ -149,6 +153,20 @@ def _list_nodes(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> N
                 if pairs.cut_at[node] != now - 1 and pairs.moved_at[node] != now:
                     _begin_anew(pairs, ways, body, node)
                 pairs.cut_at[node] = now
+
+
+@kernel
+def _keep_nodes(pairs: NearPairs, ways: NodeWays, body: Body) -> None:
+    """Find the nodes to be paired anew where no face has changed; see `_list_nodes`."""
+    now = pairs.n_updates
+    pairs.n_moved = 0
+    for i in range(pairs.n_nodes):
+        node = pairs.nodes[i]
+        if has_left_middle(ways, body, node):
+            _begin_anew(pairs, ways, body, node)
+        pairs.seen_at[node] = now
+        if pairs.cut_at[node] == now - 1:
+            pairs.cut_at[node] = now
 
 
 @kernel
