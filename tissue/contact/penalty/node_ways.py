@@ -10,6 +10,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
+from tissue.core.simd import room_for_points
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, dot, norm, store, sub, vec3
 from tissue.mesh.body import Body, grown
@@ -81,7 +82,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         quiet_way=0.0,
         largest_way=np.inf,
         before=np.zeros((n_nodes, 3)),
-        reference=np.zeros((n_nodes, 3)),
+        reference=room_for_points(n_nodes),
         displacement=np.zeros((n_nodes, 3)),
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),

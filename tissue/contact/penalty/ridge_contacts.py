@@ -5,9 +5,16 @@ import math
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.contact.penalty.contact_rows import begin_contact, copy_contact, take_over
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, sort_by_ridges
-from tissue.contact.penalty.ridge_touch import ridge_touch_of
+from tissue.contact.penalty.ridge_prefilter import (
+    crossing_ridges,
+    note_ends,
+    note_tips,
+    pushing_ridges,
+)
+from tissue.contact.penalty.ridge_touch import LEAST_SLACK, ridge_touch_of
 from tissue.contact.penalty.search_state import SearchState, are_many_moving
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH
 from tissue.core.vec3 import store, vec3
 from tissue.mesh.body import Body
 
@@ -21,17 +28,17 @@ def find_touching_ridges(search: SearchState, forces: PenaltyForces, body: Body)
         forces: The contacts as they are.
         body: Where the nodes are.
     """
-    found, ways, has_changed = search.ridge_pairs, search.ways, False
+    found, ways, n = search.ridge_pairs, search.ways, 0
     is_calm = ways.quiet_way < found.calm_until
     if not is_calm or are_many_moving(search):
         _measure_ridges(search)
         if search.is_anew == 1:
             _sort_contacts(search, forces)
-        found.calm_until = math.inf
-        for k in range(found.n_pairs):
-            has_changed = _look_if_moved(search, forces, body, k) or has_changed
+        n = _list_asked(search)
     elif ways.n_moving > 0:
-        has_changed = _look_at_moving_ridges(search, forces, body)
+        _measure_ridges(search)
+        n = _list_asked_of_moving(search)
+    has_changed = n > 0 and _look_at_asked(search, forces, body, n)
     return has_changed or bool(found.n_touching < found.n_contacts)
 
 
@@ -45,37 +52,116 @@ def _measure_ridges(search: SearchState) -> None:
 
 
 @kernel
-def _look_at_moving_ridges(search: SearchState, forces: PenaltyForces, body: Body) -> bool:
-    """Look at the pairs of ridges of which an end moved much; see `find_touching_ridges`."""
-    found, ridges, ways, has_changed = search.ridge_pairs, search.ridges, search.ways, False
-    _measure_ridges(search)
+def _list_asked(search: SearchState) -> int:
+    """List the pairs whose nodes moved enough; return how many."""
+    found, n, least = search.ridge_pairs, 0, math.inf
+    for k in range(found.n_pairs):
+        left = found.wake[k] - _way_of(search, k)
+        found.asked[n] = k
+        n += 1 if left < 0.0 else 0
+        least = min(least, left if left >= 0.0 else math.inf)
+    found.calm_until = search.ways.quiet_way + least
+    return n
+
+
+@kernel
+def _list_asked_of_moving(search: SearchState) -> int:
+    """List the pairs of ridges of which an end moved much as `_list_asked` does."""
+    found, ridges, n = search.ridge_pairs, search.ridges, 0
     sort_by_ridges(found, ridges)
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
-        a, b = ridges.node[edge, 0], ridges.node[edge, 1]
-        if ways.moved_at[a] != ways.frame and ways.moved_at[b] != ways.frame:
+        if not _is_moving(search, edge):
             continue
         for e in range(ridges.first_pair[edge], ridges.first_pair[edge + 1]):
             k = found.of_ridge[e]
-            has_changed = _look_if_moved(search, forces, body, k) or has_changed
-    return has_changed
+            if found.ridge[k, 1] == edge and _is_moving(search, found.ridge[k, 0]):
+                continue  # listed with its other ridge
+            left = found.wake[k] - _way_of(search, k)
+            if left < 0.0:
+                found.asked[n] = k
+                n += 1
+            else:
+                found.calm_until = min(found.calm_until, search.ways.quiet_way + left)
+    return n
 
 
-@kernel
-def _look_if_moved(search: SearchState, forces: PenaltyForces, body: Body, k: int) -> bool:
-    """Look at pair `k` if its nodes moved enough; return whether it was, and touches, or did."""
+@inlined
+def _is_moving(search: SearchState, edge: int) -> bool:
+    """Whether an end of a ridge moved much since the last search."""
+    node, moved_at, now = search.ridges.node, search.ways.moved_at, search.ways.frame
+    return bool(moved_at[node[edge, 0]] == now or moved_at[node[edge, 1]] == now)
+
+
+@inlined
+def _way_of(search: SearchState, k: int) -> float:
+    """Return the sum of the ways of the nodes of pair `k` [m]."""
     found, way = search.ridge_pairs, search.ridges.way
-    moved = way[found.ridge[k, 0]] + way[found.ridge[k, 1]]
-    has_changed = moved > found.wake[k] and _look_at_ridges(search, forces, body, k, moved)
-    calm_until = search.ways.quiet_way + (found.wake[k] - moved)
-    found.calm_until = min(found.calm_until, calm_until)
-    return has_changed
+    return float(way[found.ridge[k, 0]] + way[found.ridge[k, 1]])
 
 
 @kernel
-def _look_at_ridges(
-    search: SearchState, forces: PenaltyForces, body: Body, k: int, way: float
-) -> bool:
+def _look_at_asked(search: SearchState, forces: PenaltyForces, body: Body, n: int) -> bool:
+    """Look at the first `n` pairs of `asked`; return whether any touch, or did.
+
+    Args:
+        search: The pairs are written.
+        forces: The contacts as they are.
+        body: Where the nodes are.
+        n: How many.
+    """
+    found, size, has_changed, n_near = search.ridge_pairs, search.ways.node_size, False, 0
+    note_ends(found, search.ridges, n)
+    for first in range(0, n, WIDTH):
+        may_touch = crossing_ridges(found, body, size, first)
+        for q in range(min(WIDTH, n - first)):
+            k = found.asked[first + q]
+            if may_touch >> q & 1 == 1:
+                found.asked[n_near] = k
+                n_near += 1
+            else:
+                has_changed = _leave(search, k, found.slack[q]) or has_changed
+    note_ends(found, search.ridges, n_near)
+    note_tips(found, search.ridges, n_near)
+    for first in range(0, n_near, WIDTH):
+        may_touch = pushing_ridges(found, body, first)
+        for q in range(min(WIDTH, n_near - first)):
+            k = found.asked[first + q]
+            if may_touch >> q & 1 == 1:
+                has_changed = _look_at_ridges(search, forces, body, k) or has_changed
+            else:
+                has_changed = _leave(search, k, LEAST_SLACK * size) or has_changed
+    return has_changed
+
+
+@inlined
+def _leave(search: SearchState, k: int, slack: float) -> bool:
+    """Note that pair `k` does not touch; return whether it did.
+
+    Args:
+        search: The pair is written.
+        k: The pair.
+        slack: By how much the ways of its nodes may add up before it needs another look [m].
+    """
+    found = search.ridge_pairs
+    did_touch = found.is_touching[k]
+    found.is_touching[k] = 0
+    found.n_touching -= did_touch
+    _sleep(search, k, slack)
+    return bool(did_touch == 1)
+
+
+@inlined
+def _sleep(search: SearchState, k: int, slack: float) -> None:
+    """Let pair `k` need no look until the ways of its nodes have added up to `slack` [m]."""
+    found, way = search.ridge_pairs, _way_of(search, k)
+    found.wake[k] = way + slack
+    calm_until = search.ways.quiet_way + (found.wake[k] - way)
+    found.calm_until = min(found.calm_until, calm_until)
+
+
+@kernel
+def _look_at_ridges(search: SearchState, forces: PenaltyForces, body: Body, k: int) -> bool:
     """Look at a pair of ridges; return whether it touches, or did.
 
     Args:
@@ -83,18 +169,17 @@ def _look_at_ridges(
         forces: The contacts as they are.
         body: Where the nodes are.
         k: The pair.
-        way: Sum of the ways of its nodes [m].
     """
     found = search.ridge_pairs
     if found.wake[k] < 0.0:
         found.contact[k] = _contact_of(search, forces, k)
     touch, did_touch = ridge_touch_of(search, body, k), found.is_touching[k]
-    found.wake[k] = way + touch.slack
     found.is_touching[k] = 1 if touch.is_touching else 0
     found.n_touching += found.is_touching[k] - did_touch
     found.is_sought[k] = 1
     found.place[k, 0], found.place[k, 1] = touch.s, touch.t
     store(found.normal, k, touch.normal)
+    _sleep(search, k, touch.slack)
     return touch.is_touching or bool(did_touch == 1)
 
 

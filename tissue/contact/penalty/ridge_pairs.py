@@ -12,13 +12,17 @@ from tissue.contact.distance import distance_of_edges
 from tissue.contact.edge_edge import SAME_SIDE, Edges, face_the_same_side
 from tissue.contact.faces import Faces
 from tissue.contact.penalty.block_tree import arrange, enter, find_near
+from tissue.contact.penalty.eight_contacts import FourPoints
+from tissue.contact.penalty.eight_edges import WIDER, squared_distances
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.contact.penalty.ridges import Ridges
-from tissue.core.array_types import FloatArray, IntArray
-from tissue.core.jit import kernel
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH, aligned, eight_points, filled, lanes, load_lanes
+from tissue.core.simd_gather import larger, larger_bits
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3, add, cross, norm, scale, store, sub, vec3
+from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
 from tissue.geometry.aabb import box_at, segment_box, store_box, widened
 
 NOT_LISTED = -1
@@ -53,6 +57,14 @@ class RidgePairs(Arrays):
     """1 if a pair was looked at since it was listed as a contact, else 0; shape (capacity,)."""
     contact: IntArray
     """Contact of each pair in the list in use, or NOT_LISTED; shape (capacity,)."""
+    asked: IntArray
+    """Scratch: the pairs that need a look, shape (capacity + 8,)."""
+    end: IntArray
+    """Scratch: the ends of both ridges of those, shape (capacity + 8, 4)."""
+    tip: IntArray
+    """Scratch: the tips of the faces beside both, shape (capacity + 8, 4)."""
+    slack: FloatArray
+    """Scratch: what is left before eight pairs need another look [m], shape (8,)."""
     before: IntArray
     """Scratch: the contact before each that begins with the same node, both counted from `first`;
     or NOT_LISTED; shape (capacity,)."""
@@ -76,6 +88,10 @@ def new_ridge_pairs(capacity: int) -> RidgePairs:
         ridge=np.zeros((capacity, 2), np.int64),
         wake=np.zeros(capacity),
         **{name: np.zeros(capacity, np.int64) for name in of_pairs},
+        asked=np.zeros(filled(capacity) + WIDTH, np.int64),
+        end=np.zeros((filled(capacity), 4), np.int64),
+        tip=np.zeros((filled(capacity), 4), np.int64),
+        slack=aligned(WIDTH),
         place=np.zeros((capacity, 2)),
         normal=np.zeros((capacity, 3)),
     )
@@ -159,21 +175,96 @@ def _find_crossing(
 
     Of two that are dirty the first finds none: the second finds it.
     """
-    tree, outward, n = ridges.tree, vec3(ridges.outward, edge), 0
+    tree, outward = ridges.tree, vec3(ridges.outward, edge)
     box = box_at(ridges.low, ridges.high, edge)
+    n_near, n = 0, 0
     for q in range(find_near(tree, box, outward, norm(outward), False)):
         other = tree.found[q]
         if other >= edge and ridges.dirty_at[other] == pairs.n_updates:
             continue
-        if not _may_cross(ridges, pairs, ways, faces, edge, other):
-            continue
-        at = n
-        while at > 0 and tree.found[at - 1] > other:
-            tree.found[at] = tree.found[at - 1]
-            at -= 1
-        tree.found[at] = other
-        n += 1
+        tree.found[n_near] = other
+        n_near += 1 if _may_pair(ridges, pairs, faces, edge, other) else 0
+    for first in range(0, n_near, WIDTH):
+        _note_others(ridges, ways, first, n_near)
+        is_near, is_apart = _eight_near(ridges, ways, edge)
+        for q in range(min(WIDTH, n_near - first)):
+            other = tree.found[first + q]
+            if is_apart >> q & 1 == 1:
+                continue
+            if is_near >> q & 1 == 0 and not _are_near(ridges, ways, edge, other):
+                continue
+            at = n
+            while at > 0 and tree.found[at - 1] > other:
+                tree.found[at] = tree.found[at - 1]
+                at -= 1
+            tree.found[at] = other
+            n += 1
     return n
+
+
+@kernel
+def _note_others(ridges: Ridges, ways: NodeWays, first: int, n: int) -> None:
+    """Write what `_eight_near` reads of ridges `first` to `first + 7` of the `n` in `tree.found`.
+
+    Args:
+        ridges: `eight` and `reach` are written.
+        ways: The balls of the nodes.
+        first: The first of eight.
+        n: How many there are; the last fills up the eight.
+    """
+    for q in range(WIDTH):
+        other = ridges.tree.found[min(first + q, n - 1)]
+        ridges.eight[q] = other
+        ridges.eight[WIDTH + q] = ridges.node[other, 0]
+        ridges.eight[2 * WIDTH + q] = ridges.node[other, 1]
+        ridges.reach[q] = _reach_of(ridges, ways, other)
+
+
+@inlined
+def _reach_of(ridges: Ridges, ways: NodeWays, edge: int) -> float:
+    """Return the radius of the larger ball of the ends of a ridge [m]."""
+    radius, node = ways.radius, ridges.node
+    return float(max(radius[node[edge, 0]], radius[node[edge, 1]]))
+
+
+@inlined
+def _eight_near(ridges: Ridges, ways: NodeWays, edge: int) -> tuple[int, int]:
+    """Return bits for which of eight ridges are near one and face it, and for which do not.
+
+    What is in neither is left to `_are_near`.
+
+    Args:
+        ridges: `eight` and `reach` are written.
+        ways: Where the nodes were when they were paired.
+        edge: The one.
+    """
+    x, node, wider, narrower = ways.reference, ridges.node, 1.0 + WIDER, 1.0 - WIDER
+    a, b = _everywhere(vec3(x, node[edge, 0])), _everywhere(vec3(x, node[edge, 1]))
+    c, d = _eight(x, ridges.eight, WIDTH), _eight(x, ridges.eight, 2 * WIDTH)
+    square = squared_distances(FourPoints(a, b, c, d))
+    reach = lanes(_reach_of(ridges, ways, edge) + CONTACT_REACH * ways.node_size)
+    reach = reach + load_lanes(ridges.reach, 0)
+    own = vec3(ridges.outward, edge)
+    outward, other_outward = _everywhere(own), _eight(ridges.outward, ridges.eight, 0)
+    same = larger(dot(outward, other_outward), lanes(0.0))
+    alike = lanes(SAME_SIDE * SAME_SIDE * dot(own, own)) * dot(other_outward, other_outward)
+    is_apart = larger_bits(square, lanes(wider) * reach * reach)
+    is_apart |= larger_bits(same * same, lanes(wider) * alike)
+    is_near = larger_bits(lanes(narrower) * reach * reach, square)
+    return is_near & ~larger_bits(same * same, lanes(narrower) * alike), is_apart
+
+
+@inlined
+def _everywhere(a: Vec3) -> Vec3:
+    """Return the same vector eight times."""
+    return Vec3(lanes(a.x), lanes(a.y), lanes(a.z))
+
+
+@inlined
+def _eight(points: FloatArray, of: SlotArray, i: int) -> Vec3:
+    """Return rows `of[i]` to `of[i + 7]`."""
+    x, y, z = eight_points(points, of, i)
+    return Vec3(x, y, z)
 
 
 @kernel
@@ -183,18 +274,22 @@ def _keep_pairs(found: RidgePairs, ridges: Ridges, now: int) -> None:
     for k in range(found.n_pairs):
         if ridges.dirty_at[found.ridge[k, 0]] == now or ridges.dirty_at[found.ridge[k, 1]] == now:
             continue
-        for side in range(2):
-            found.ridge[n, side] = found.ridge[k, side]
-            found.place[n, side] = found.place[k, side]
-        for x in range(3):
-            found.normal[n, x] = found.normal[k, x]
-        found.wake[n] = found.wake[k]
-        found.is_touching[n] = found.is_touching[k]
-        found.is_sought[n] = found.is_sought[k]
-        found.contact[n] = found.contact[k]
-        n_touching += found.is_touching[k]
+        if n < k:
+            _move_pair(found, k, n)
+        n_touching += found.is_touching[n]
         n += 1
     found.n_pairs, found.n_touching = n, n_touching
+
+
+@inlined
+def _move_pair(found: RidgePairs, k: int, to: int) -> None:
+    """Copy a pair to another row."""
+    found.ridge[to, 0], found.ridge[to, 1] = found.ridge[k, 0], found.ridge[k, 1]
+    found.wake[to], found.contact[to] = found.wake[k], found.contact[k]
+    found.is_touching[to], found.is_sought[to] = found.is_touching[k], found.is_sought[k]
+    if found.is_touching[k] == 1:
+        found.place[to, 0], found.place[to, 1] = found.place[k, 0], found.place[k, 1]
+        store(found.normal, to, vec3(found.normal, k))
 
 
 @kernel
@@ -231,25 +326,30 @@ def sort_by_ridges(found: RidgePairs, ridges: Ridges) -> None:
             begin[edge + 1] += 1
 
 
-@kernel
-def _may_cross(
-    ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces, edge: int, other: int
-) -> bool:
-    """Whether two ridges may touch while their nodes stay in their balls."""
+@inlined
+def _may_pair(ridges: Ridges, pairs: NearPairs, faces: Faces, edge: int, other: int) -> bool:
+    """Whether two ridges may touch at all: they have no node in common, nor the skin of a piece."""
     a, b = ridges.node[edge, 0], ridges.node[edge, 1]
     c, d = ridges.node[other, 0], ridges.node[other, 1]
     if a in (c, d) or b in (c, d):
         return False
-    if ridges.is_of_cut[edge] == 0 or ridges.is_of_cut[other] == 0:
-        piece = faces.piece[pairs.tetrahedron[edge // 3]]
-        if piece >= 0 and piece == faces.piece[pairs.tetrahedron[other // 3]]:
-            return False
-    x, radius = ways.reference, ways.radius
+    if ridges.is_of_cut[edge] == 1 and ridges.is_of_cut[other] == 1:
+        return True
+    piece = faces.piece[pairs.tetrahedron[edge // 3]]
+    return not (piece >= 0 and piece == faces.piece[pairs.tetrahedron[other // 3]])
+
+
+@kernel
+def _are_near(ridges: Ridges, ways: NodeWays, edge: int, other: int) -> bool:
+    """Whether two ridges face each other, and may touch while their nodes stay in their balls."""
     if face_the_same_side(vec3(ridges.outward, edge), vec3(ridges.outward, other)):
         return False
-    reach = max(radius[a], radius[b]) + max(radius[c], radius[d])
+    x, node = ways.reference, ridges.node
+    reach = _reach_of(ridges, ways, edge) + _reach_of(ridges, ways, other)
     reach += CONTACT_REACH * ways.node_size
-    return bool(distance_of_edges(Edges(vec3(x, a), vec3(x, b), vec3(x, c), vec3(x, d))) <= reach)
+    a, b = vec3(x, node[edge, 0]), vec3(x, node[edge, 1])
+    c, d = vec3(x, node[other, 0]), vec3(x, node[other, 1])
+    return bool(distance_of_edges(Edges(a, b, c, d)) <= reach)
 
 
 @kernel

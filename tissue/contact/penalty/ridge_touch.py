@@ -19,15 +19,15 @@ from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.mesh.body import Body
 
-_PARALLEL = 0.1
+PARALLEL = 0.1
 """Sine of the angle up to which ridges count as parallel: they touch with their nodes. Smaller: the
 direction of the force turns by a right angle as ridges turn by a degree."""
 
-_BEYOND, _HELD_BEYOND = 0.02, 0.1
+_BEYOND, HELD_BEYOND = 0.02, 0.1
 """Sine of the angle by which a direction may lie beyond the normals of the faces; the second where
 the ridges are in contact. Without a difference contacts at a limit come and go."""
 
-_LEAST_SLACK = 0.01
+LEAST_SLACK = 0.01
 """Way that the nodes go, per node size, before ridges that are near and do not touch are looked at
 again. Larger: they overlap before they are seen; smaller: they are looked at in each time step."""
 
@@ -58,7 +58,7 @@ def ridge_touch_of(search: SearchState, body: Body, k: int) -> RidgeTouch:
     found, ridges, size = search.ridge_pairs, search.ridges, search.ways.node_size
     one, other = found.ridge[k, 0], found.ridge[k, 1]
     is_held = found.contact[k] != NOT_LISTED
-    apart = _no_touch(_LEAST_SLACK * size)
+    apart = _no_touch(LEAST_SLACK * size)
     now = _edges(ridges, body.positions, one, other)
     distance = distance_of_edges(now)
     ahead = TIME_AHEAD * (_speed(ridges, body, one) + _speed(ridges, body, other))
@@ -67,7 +67,7 @@ def ridge_touch_of(search: SearchState, body: Body, k: int) -> RidgeTouch:
     crossing = crossing_of(now)
     if not (crossing.is_one and _is_steep(now) and is_inner(crossing.s) and is_inner(crossing.t)):
         return apart
-    beyond = _HELD_BEYOND if is_held else _BEYOND
+    beyond = HELD_BEYOND if is_held else _BEYOND
     normal = _pushing(ridges, body.positions, other, crossing)
     if not (
         _points_out(ridges, body.positions, other, normal, beyond)
@@ -148,7 +148,7 @@ def _speed(ridges: Ridges, body: Body, edge: int) -> float:
 def _is_steep(at: Edges) -> bool:
     """Whether two ridges are far from parallel."""
     u, v = sub(at.b, at.a), sub(at.d, at.c)
-    return bool(norm(cross(u, v)) > _PARALLEL * norm(u) * norm(v))
+    return bool(norm(cross(u, v)) > PARALLEL * norm(u) * norm(v))
 
 
 @kernel

@@ -10,8 +10,9 @@ from tissue.contact.faces import NO_FACE, Faces
 from tissue.contact.feature_edges import face_across, is_ridge
 from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
 from tissue.contact.penalty.near_pairs import NearPairs
-from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
+from tissue.core.simd import WIDTH, aligned, room_for_points
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import CUT, Body
 from tissue.mesh.faces import OUTWARD
@@ -50,6 +51,10 @@ class Ridges(Arrays):
     outward: FloatArray
     """Vector out of the body at each ridge, with its nodes where they were when they were paired:
     the sum of the unit normals of its two faces; shape (3 * face capacity, 3)."""
+    eight: SlotArray
+    """Scratch: eight ridges, their first ends and their second ones; shape (24,)."""
+    reach: FloatArray
+    """Scratch: the radius of the larger ball of the ends of each [m], shape (8,)."""
     tree: BlockTree
     """The ridges by their boxes; those that are paired anew are marked."""
 
@@ -67,7 +72,9 @@ def new_ridges(n_faces: int) -> Ridges:
         tip=np.zeros((n, 2), np.int64),
         low=np.zeros((n, 3)),
         high=np.zeros((n, 3)),
-        outward=np.zeros((n, 3)),
+        outward=room_for_points(n),
+        eight=np.zeros(3 * WIDTH, np.int32),
+        reach=aligned(WIDTH),
         tree=new_block_tree(n),
     )
 

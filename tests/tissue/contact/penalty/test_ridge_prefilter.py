@@ -1,0 +1,50 @@
+"""The prefilter of eight pairs of ridges leaves out none that touch."""
+
+import numpy as np
+import pytest
+
+from tests import strokes
+from tests.test_penalty_contact import pressed_blocks
+from tests.tissue.contact.penalty.test_calm import cut_block
+from tissue.contact.penalty.ridge_prefilter import (
+    crossing_ridges,
+    note_ends,
+    note_tips,
+    pushing_ridges,
+)
+from tissue.contact.penalty.ridge_touch import ridge_touch_of
+from tissue.core.simd import WIDTH
+
+
+def kept(search, body):
+    """Return which pairs the prefilter keeps, and the slack of those that are apart [m]."""
+    found, n = search.ridge_pairs, search.ridge_pairs.n_pairs
+    found.asked[:n] = np.arange(n)
+    note_ends(found, search.ridges, n)
+    note_tips(found, search.ridges, n)
+    bits, slack = [], []
+    for k in range(0, n, WIDTH):
+        near = crossing_ridges(found, body, search.ways.node_size, k)
+        slack += list(found.slack)
+        bits += [(near & pushing_ridges(found, body, k)) >> q & 1 for q in range(WIDTH)]
+    return np.array(bits[:n], np.bool_), np.array(slack[:n])
+
+
+@pytest.mark.parametrize("make", [cut_block, pressed_blocks])
+def test_pairs_that_touch_are_kept_and_the_others_have_their_slack(make):
+    tissue = make()
+    contact, body = tissue._system.contact, tissue._body
+    n_touching, n_left_out = 0, 0
+    for _ in range(100):
+        tissue.step(None, strokes.DT)
+        search = contact._search
+        is_kept, slack = kept(search, body)
+        for k in range(search.ridge_pairs.n_pairs):
+            touch = ridge_touch_of(search, body, k)
+            if is_kept[k]:
+                n_touching += touch.is_touching
+                continue
+            assert not touch.is_touching
+            assert slack[k] == pytest.approx(touch.slack, rel=1e-9)
+            n_left_out += 1
+    assert n_touching > 0 and n_left_out > 500
