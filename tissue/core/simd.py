@@ -52,15 +52,20 @@ def room_for_points(n: int) -> FloatArray:
 
 
 class LanesType(types.Type):
-    """Numba's type of a vector of doubles, or of singles."""
+    """Numba's type of a vector of doubles, or of singles.
 
-    def __init__(self, width: int, *, is_single: bool = False) -> None:
+    A product and a sum of them may become one instruction unless they are unfused.
+    """
+
+    def __init__(self, width: int, *, is_single: bool = False, is_unfused: bool = False) -> None:
         self.width = width
         self.is_single = is_single
-        super().__init__(name=f"Lanes({width}{', single' * is_single})")
+        self.is_unfused = is_unfused
+        super().__init__(name=f"Lanes({width}{', single' * is_single}{', unfused' * is_unfused})")
 
 
 LANES = LanesType(WIDTH)
+UNFUSED = LanesType(WIDTH, is_unfused=True)
 LANES_OF_SINGLES = LanesType(2 * WIDTH, is_single=True)
 POINT = LanesType(4)
 _THREE = cast(Any, types).UniTuple(LANES, 3)
@@ -151,10 +156,11 @@ def _operator(function: _Function, instruction: str, kind: LanesType) -> None:
     def _build(builder: Any, a: Any, b: Any) -> Any:
         # A product and a sum may become one instruction that rounds once: faster, and no less
         # exact. Nothing is reordered.
-        return getattr(builder, instruction)(a, b, flags=("contract",))
+        flags = () if kind.is_unfused else ("contract",)
+        return getattr(builder, instruction)(a, b, flags=flags)
 
 
-for _kind in (LANES, LANES_OF_SINGLES, POINT):
+for _kind in (LANES, UNFUSED, LANES_OF_SINGLES, POINT):
     _operator(operator.add, "fadd", _kind)
     _operator(operator.sub, "fsub", _kind)
     _operator(operator.mul, "fmul", _kind)
@@ -192,8 +198,22 @@ def store_lanes(array: FloatArray, i: int, values: Lanes) -> None:
 
 
 @_compiled(store_lanes, types.Array, types.Integer, LANES, result=types.void)
+@_compiled(store_lanes, types.Array, types.Integer, UNFUSED, result=types.void)
 def _store(builder: Any, array: _Array, i: Any, values: Any) -> None:
     builder.store(values, builder.bitcast(array.at(i), _VECTOR.as_pointer()), align=8)
+
+
+def unfused(a: Lanes) -> Lanes:
+    """Return the same numbers; what is computed from them has the bits of scalars.
+
+    It is unfused, too: a product is rounded before it is added, which takes a little longer.
+    """
+    return a
+
+
+@_compiled(unfused, LANES, result=UNFUSED)
+def _unfused(_: Any, a: Any) -> Any:
+    return a
 
 
 def square_root(a: Lanes) -> Lanes:
@@ -202,6 +222,7 @@ def square_root(a: Lanes) -> Lanes:
 
 
 @_compiled(square_root, LANES)
+@_compiled(square_root, UNFUSED, result=UNFUSED)
 def _square_root(builder: Any, a: Any) -> Any:
     function = _declared(builder.module, "llvm.sqrt.v8f64", ir.FunctionType(_VECTOR, [_VECTOR]))
     return builder.call(function, [a])

@@ -16,6 +16,7 @@ from tissue.core.simd import (
     _I32,
     _I64,
     LANES,
+    UNFUSED,
     WIDTH,
     Lanes,
     _Array,
@@ -59,6 +60,7 @@ def larger(a: Lanes, b: Lanes) -> Lanes:
 
 
 @_compiled(larger, LANES, LANES)
+@_compiled(larger, UNFUSED, UNFUSED, result=UNFUSED)
 def _larger(builder: Any, a: Any, b: Any) -> Any:
     return builder.select(builder.fcmp_ordered(">", a, b), a, b)
 
@@ -69,6 +71,7 @@ def where_larger(a: Lanes, b: Lanes, this: Lanes, other: Lanes) -> Lanes:
 
 
 @_compiled(where_larger, LANES, LANES, LANES, LANES)
+@_compiled(where_larger, UNFUSED, UNFUSED, UNFUSED, UNFUSED, result=UNFUSED)
 def _where_larger(builder: Any, a: Any, b: Any, this: Any, other: Any) -> Any:
     return builder.select(builder.fcmp_ordered(">", a, b), this, other)
 
@@ -102,6 +105,7 @@ def larger_bits(a: Lanes, b: Lanes) -> int:
 
 
 @_compiled(larger_bits, LANES, LANES, result=types.int64)
+@_compiled(larger_bits, UNFUSED, UNFUSED, result=types.int64)
 def _larger_bits(builder: Any, a: Any, b: Any) -> Any:
     bits = builder.bitcast(builder.fcmp_ordered(">", a, b), ir.IntType(WIDTH))
     return builder.zext(bits, ir.IntType(64))

@@ -17,6 +17,7 @@ from tissue.core.simd import (
     _THREE,
     _VECTOR,
     LANES,
+    UNFUSED,
     WIDTH,
     Lanes,
     _Array,
@@ -129,6 +130,7 @@ def store_rows_of_four(rows: FloatArray, i: int, a: Lanes, b: Lanes, c: Lanes, d
 
 
 @_compiled(store_rows_of_four, types.Array, types.Integer, *[LANES] * 4, result=types.void)
+@_compiled(store_rows_of_four, types.Array, types.Integer, *[UNFUSED] * 4, result=types.void)
 def _store_rows_of_four(builder: Any, rows: _Array, i: Any, a: Any, b: Any, c: Any, d: Any) -> None:
     vectors = []
     for order in (_SPREAD, _BEHIND):

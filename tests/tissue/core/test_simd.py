@@ -20,6 +20,7 @@ from tissue.core.simd import (
     store_point,
     summed,
     times,
+    unfused,
 )
 from tissue.integrators.hierarchical.kernels import new_trails
 from tissue.integrators.stages import Stages
@@ -65,6 +66,20 @@ def test_arithmetic_is_done_lane_by_lane():
     arithmetic(VALUES, expected)
     np.testing.assert_array_equal(out, expected)
     np.testing.assert_allclose(out[:8], 3.0 * (VALUES[:8] + VALUES[8:16]), rtol=1e-15)
+
+
+def unfused_arithmetic(values, out):
+    a, b = unfused(load_lanes(values, 0)), unfused(load_lanes(values, 8))
+    store_lanes(out, 0, a * b - square_root(a) * b)
+    store_lanes(out, 8, a * a - b * b)
+
+
+def test_unfused_arithmetic_has_the_bits_of_scalars():
+    out = np.zeros(16)
+    kernel(unfused_arithmetic)(VALUES, out)
+    for k, (a, b) in enumerate(zip(VALUES[:8], VALUES[8:16], strict=True)):
+        assert out[k] == a * b - np.sqrt(a) * b
+        assert out[8 + k] == a * a - b * b
 
 
 def test_eight_points_are_gathered_and_summed_up():

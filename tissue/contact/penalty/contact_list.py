@@ -14,10 +14,11 @@ from tissue.contact.penalty.contact_rows import (
     copy_contact,
     take_over,
 )
+from tissue.contact.penalty.early_rejection import reject_early
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, know_motion, sort_by_faces
 from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState, are_many_moving
-from tissue.contact.penalty.touch import TIME_AHEAD, Touch, touch_of
+from tissue.contact.penalty.touch import STILL, TIME_AHEAD, Touch, look_closely, touch_of
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
 from tissue.mesh.body import Body
@@ -25,13 +26,9 @@ from tissue.mesh.body import Body
 DIRECTIONS = 3
 """Contacts of a node with faces at most: more than three directions do not hold it any firmer."""
 
-_STILL = 0.02
-"""Motion of a node against a face after which their contact is sought again, per node size. Larger:
-cheaper, and normals are out of date; smaller: all is sought in every time step."""
-
-_WAY_NEAR = 0.2
-"""Sum of the ways of its nodes after which a near pair is looked at even if they moved alike, per
-node size: as they turn."""
+_NODES_AT_A_TIME = 32
+"""Nodes whose pairs are looked at together. Larger: what is noted of them fills the cache; smaller:
+more eights have empty lanes."""
 
 
 @kernel
@@ -91,7 +88,7 @@ def _note_moving_faces(search: SearchState) -> None:
 def _least_slack(search: SearchState, node: int) -> float:
     """Return how much way is left before a pair of a node is to be looked at [m]; negative: now."""
     pairs, ways = search.pairs, search.ways
-    still, least = _STILL * ways.node_size, math.inf
+    still, least = STILL * ways.node_size, math.inf
     own = vec3(ways.displacement, node)
     for k in range(pairs.begin[node], pairs.end[node]):
         face = pairs.face[k]
@@ -129,6 +126,10 @@ def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> Non
     pairs, now = search.pairs, search.n_listings + 1
     to, n = len(forces.push) // 2 - forces.first, 0
     for i in range(pairs.n_nodes):
+        if i % _NODES_AT_A_TIME == 0:
+            end = min(i + _NODES_AT_A_TIME, pairs.n_nodes)
+            reject_early(search, forces, body, i, end)
+            look_closely(search, body)
         node = pairs.nodes[i]
         was_listed = search.listed_at[node] == search.n_listings
         n_before = search.n_contacts[node] if was_listed else 0
@@ -152,29 +153,21 @@ def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> Non
 @kernel
 def _seek(search: SearchState, forces: PenaltyForces, body: Body, node: int, to: int) -> int:
     """Write the contacts of a node with faces from row `to` on; return how many."""
-    pairs, ways, n = search.pairs, search.ways, 0
-    near = _WAY_NEAR * ways.node_size
-    least = math.inf
-    for k in range(pairs.begin[node], pairs.end[node]):
-        face = pairs.face[k]
-        know_motion(pairs, ways, face)
-        way = ways.way[node] + pairs.way[face]
-        if pairs.is_near[k] == 1 or way > pairs.wake[k]:
-            touch = touch_of(search, forces, body, node, face)
-            if touch.slack > 0.0:
-                pairs.is_near[k] = 0
-                pairs.wake[k] = way + max(touch.slack, _STILL * ways.node_size)
-            else:
-                pairs.is_near[k] = 1
-                pairs.wake[k] = way + near
-                own = vec3(ways.displacement, node)
-                relative = sub(own, vec3(pairs.displacement, face))
-                store(pairs.relative, k, relative)
-                least = min(least, _STILL * ways.node_size)
-            if touch.is_touching:
-                n = _place(search, forces, (node, face), touch, to, n)
-        least = min(least, pairs.wake[k] - way)
+    pairs, looks, ways, n = search.pairs, search.pairs.looks, search.ways, 0
+    least = search.calm_until[node] - ways.quiet_way
+    while looks.next < looks.n and looks.nodes[looks.next, 0] == node:
+        least = min(least, looks.left[looks.next])
+        looks.next += 1
     search.calm_until[node] = ways.quiet_way + least
+    own = vec3(ways.displacement, node)
+    while looks.next_close < looks.n_close and looks.close_nodes[looks.next_close, 0] == node:
+        i = looks.next_close
+        looks.next_close += 1
+        k = looks.pair[looks.close[i]]
+        store(pairs.relative, k, sub(own, vec3(pairs.displacement, pairs.face[k])))
+        touch = touch_of(search, forces, body, i)
+        if touch.is_touching:
+            n = _place(search, forces, (node, pairs.face[k]), touch, to, n)
     return n
 
 

@@ -7,6 +7,7 @@ anew (`pair_update`). Faces go by their places in `Faces`.
 
 import numpy as np
 
+from tissue.contact.penalty.looks import Looks, new_looks
 from tissue.contact.penalty.node_grid import NodeGrid, new_node_grid
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.core.array_types import FloatArray, IntArray
@@ -136,6 +137,8 @@ class NearPairs(Arrays):
     """The other nodes of faces."""
     anew: NodeGrid
     """Nodes that were paired anew in the last update."""
+    looks: Looks
+    """Scratch: pairs that are looked at together."""
 
 
 def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
@@ -175,6 +178,7 @@ def new_near_pairs(n_nodes: int, n_faces: int, capacity: int) -> NearPairs:
         wake=np.zeros(2 * capacity),
         relative=np.zeros((2 * capacity, 3)),
         **_new_grids(n_nodes),
+        looks=new_looks(capacity),
     )
 
 

@@ -81,7 +81,7 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         n_moving=0,
         quiet_way=0.0,
         largest_way=np.inf,
-        before=np.zeros((n_nodes, 3)),
+        before=room_for_points(n_nodes),
         reference=room_for_points(n_nodes),
         displacement=np.zeros((n_nodes, 3)),
         radius=np.zeros(n_nodes),

@@ -6,15 +6,18 @@ it is interpolated. So it does not matter which of the faces around a corner a n
 nothing jumps as it slides.
 """
 
-import math
 from typing import NamedTuple
 
 from tissue.contact.node_normals import has_inverted
 from tissue.contact.penalty.contact_forces import PenaltyForces, weighted_sum
-from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
+from tissue.contact.penalty.looks import Looks
+from tissue.contact.penalty.near_pairs import CONTACT_REACH
 from tissue.contact.penalty.search_state import SearchState
-from tissue.core.array_types import FloatArray
-from tissue.core.jit import kernel
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import inlined, kernel
+from tissue.core.simd import WIDTH, Lanes, lanes, square_root, store_lanes, unfused
+from tissue.core.simd_gather import larger, where_larger
+from tissue.core.simd_rows import points_of_column, store_rows_of_four
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.mesh.body import Body
 
@@ -22,21 +25,25 @@ TIME_AHEAD = 1.5e-3
 """Time [s] for which contacts are kept ready: a time step of 1 ms, with something to spare. A node
 that comes nearer than that is not seen before it overlaps."""
 
+STILL = 0.02
+"""Motion of a node against a face after which their contact is sought again, per node size. Larger:
+cheaper, and normals are out of date; smaller: all is sought in every time step."""
+
 FACING = -0.1
 """Cosine between the normals of node and face up to which they face each other."""
 
 OVERLAP_DEPTH = 0.5
 """Depth below a face from which on a node is not looked at, per node size."""
 
-_DEPTH_OF_LOST = 1.0
+DEPTH_OF_LOST = 1.0
 """The same for a node that is known to be inside another part. Larger: it is pushed out on the far
 side of thin parts; smaller: it stays where it is."""
 
-_RIM = 0.15
+RIM_OF_TOUCH = 0.15
 """How far outside a triangle a node still touches it, as a barycentric weight. Larger: contacts
 reach beyond rims; 0: a node on a ridge slips between the two faces."""
 
-_HELD_RIM, _HELD_FACING = 0.3, 0.1
+HELD_RIM, HELD_FACING = 0.3, 0.1
 """The same two where the node has a contact with that face. Without a difference contacts at a
 limit come and go, and the node trembles."""
 
@@ -64,13 +71,34 @@ REST_REACH = 2.0
 tissue, per node size; further off it has nothing to do with it."""
 
 
+class NodesAndCorners(NamedTuple):
+    """A vector for the node and for each corner of its face, of eight looks."""
+
+    p: Vec3
+    a: Vec3
+    b: Vec3
+    c: Vec3
+
+
+class OverFaces(NamedTuple):
+    """Eight nodes, seen from a face each."""
+
+    square: Lanes
+    """Square of twice the area of the face [m4]."""
+    length: Lanes
+    """Twice the area [m2]."""
+    outward: Vec3
+    """Unit normal of the face."""
+    height: Lanes
+    """Height of the node over its plane [m]."""
+    weights: Vec3
+    """Barycentric weights of the foot in the plane."""
+
+
 class Touch(NamedTuple):
     """A node and a face."""
 
     is_touching: bool
-    slack: float
-    """By how much the ways of the four nodes may add up before the pair needs another look [m];
-    0 if that depends on how they move against each other."""
     b: Vec3
     """Barycentric weights of the foot in the triangle."""
     normal: Vec3
@@ -79,148 +107,177 @@ class Touch(NamedTuple):
     """Squared distance of the node from the foot, less where it has that contact already [m2]."""
 
 
-@kernel
-def nothing(slack: float) -> Touch:
-    """Return that a pair does not touch, and need not be looked at before ways add up to that."""
-    return Touch(False, slack, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
+_NOTHING = Touch(False, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
 
 
-@kernel
-def touch_of(search: SearchState, forces: PenaltyForces, body: Body, node: int, face: int) -> Touch:
-    """Find whether a node touches the face in a place of `NearPairs`.
+@inlined
+def points_of_looks(values: FloatArray, nodes: IntArray, i: int) -> NodesAndCorners:
+    """Return nodal values at the nodes of eight looks."""
+    return NodesAndCorners(
+        _of_column(values, nodes, i, 0),
+        _of_column(values, nodes, i, 1),
+        _of_column(values, nodes, i, 2),
+        _of_column(values, nodes, i, 3),
+    )
 
-    Args:
-        search: Normals, ways, and the contacts that the node has.
-        forces: The contacts as they are.
-        body: Where the nodes are.
-        node: The node.
-        face: The face.
-    """
-    pairs, x, size = search.pairs, body.positions, search.ways.node_size
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    i = vec3(x, a)
-    ab, ac, ap = sub(vec3(x, b), i), sub(vec3(x, c), i), sub(vec3(x, node), i)
+
+@inlined
+def _of_column(values: FloatArray, nodes: IntArray, i: int, q: int) -> Vec3:
+    """Return nodal values at node `q` of eight looks."""
+    x, y, z = points_of_column(values, nodes, i, q)
+    return Vec3(unfused(x), unfused(y), unfused(z))
+
+
+@inlined
+def everywhere(value: float) -> Lanes:
+    """Return eight times the same number, with the bits of scalars."""
+    return unfused(lanes(value))
+
+
+@inlined
+def over_faces(x: NodesAndCorners) -> OverFaces:
+    """Return where eight nodes are, seen from a face each."""
+    ab, ac, ap = sub(x.b, x.a), sub(x.c, x.a), sub(x.p, x.a)
     area = cross(ab, ac)
     square = dot(area, area)
-    if not square > 0.0:
-        return nothing(0.0)
-    outward = scale(1.0 / math.sqrt(square), area)
-    height = dot(ap, outward)
-    ahead = TIME_AHEAD * (norm(vec3(body.velocities, node)) + 0.1)
-    if height > CONTACT_REACH * size + ahead:
-        return nothing(0.5 * (height - CONTACT_REACH * size))
-    deepest = (_DEPTH_OF_LOST if pairs.is_lost[node] == 1 else OVERLAP_DEPTH) * size
-    if height < -deepest:
-        return nothing(-height - deepest)
-    own, is_held = vec3(search.normal, node), _has_contact(search, forces, node, face)
-    if dot(own, outward) > (_HELD_FACING if is_held else FACING) * norm(own):
-        return nothing(0.2 * CONTACT_REACH * size)
+    length = square_root(square)
+    outward = scale(everywhere(1.0) / length, area)
     wb, wc = dot(cross(ap, ac), area) / square, dot(cross(ab, ap), area) / square
-    rim = _HELD_RIM if is_held else _RIM
-    outside = -rim - min(1.0 - wb - wc, min(wb, wc))
-    if outside > 0.0:
-        return nothing(0.3 * outside * math.sqrt(math.sqrt(square)))
-    foot = _clamped(wb, wc)
-    normal = _interpolated(search.normal, pairs, face, foot, outward)
-    d = _apart(x, pairs, node, face, foot)
+    weights = Vec3(everywhere(1.0) - wb - wc, wb, wc)
+    return OverFaces(square, length, outward, dot(ap, outward), weights)
+
+
+@kernel
+def look_closely(search: SearchState, body: Body) -> None:
+    """Find where close nodes would touch their faces."""
+    for i in range(0, search.pairs.looks.n_close, WIDTH):
+        _look_at_eight(search, body, i)
+
+
+@inlined
+def _look_at_eight(search: SearchState, body: Body, i: int) -> None:
+    """Find where eight close nodes would touch their faces."""
+    looks, size, zero = search.pairs.looks, search.ways.node_size, everywhere(0.0)
+    nodes, x = looks.close_nodes, points_of_looks(body.positions, looks.close_nodes, i)
+    over = over_faces(x)
+    foot = _clamped(over.weights)
+    normal = _interpolated(points_of_looks(search.normal, nodes, i), foot, over.outward)
+    d = _apart(x, foot)
     gap = dot(normal, d)
-    closing = max(-dot(normal, _apart(body.velocities, pairs, node, face, foot)), 0.0)
-    if gap > CONTACT_REACH * size + TIME_AHEAD * closing:
-        return nothing(0.0)
-    if has_inverted(search.inverted_step, search.step, (node, a, b, c)):
-        return nothing(0.0)
-    if not _came_from_outside(search, forces, body, node, face, foot, normal, gap):
-        return nothing(0.0)
-    return Touch(True, 0.0, foot, normal, (_HELD_SHARE if is_held else 1.0) * dot(d, d))
+    velocities = points_of_looks(body.velocities, nodes, i)
+    closing = larger(zero - dot(normal, _apart(velocities, foot)), zero)
+    reach = everywhere(CONTACT_REACH * size) + everywhere(TIME_AHEAD) * closing
+    distance = where_larger(gap, reach, everywhere(-1.0), dot(d, d))
+    distance = where_larger(over.square, zero, distance, everywhere(-1.0))
+    before = points_of_looks(search.ways.before, nodes, i)
+    area = cross(sub(before.b, before.a), sub(before.c, before.a))
+    length = norm_of_eight(area)
+    gap_before = dot(area, _apart(before, foot)) / length
+    gap_before = where_larger(length, zero, gap_before, zero)
+    store_rows_of_four(looks.foot, i, foot.x, foot.y, foot.z, gap_before)
+    store_rows_of_four(looks.push, i, normal.x, normal.y, normal.z, gap)
+    store_lanes(looks.distance, i, distance)
+
+
+@inlined
+def norm_of_eight(a: Vec3) -> Lanes:
+    """Return the lengths of eight vectors."""
+    return square_root(dot(a, a))
 
 
 @kernel
-def _has_contact(search: SearchState, forces: PenaltyForces, node: int, face: int) -> bool:
-    """Whether a node is in contact with a face since the last search."""
-    if search.listed_at[node] != search.n_listings:
-        return False
-    triangle = search.pairs.triangle
-    for c in range(search.contact[node], search.contact[node] + search.n_contacts[node]):
-        if (
-            forces.node[c, 1] == triangle[face, 0]
-            and forces.node[c, 2] == triangle[face, 1]
-            and forces.node[c, 3] == triangle[face, 2]
-        ):
-            return True
-    return False
+def touch_of(search: SearchState, forces: PenaltyForces, body: Body, i: int) -> Touch:
+    """Return whether the node of a close look touches the face.
+
+    Args:
+        search: The contacts that the node has, and where it was.
+        forces: The contacts as they are.
+        body: Where the nodes are.
+        i: The close look.
+    """
+    looks = search.pairs.looks
+    distance = looks.distance[i]
+    if not distance >= 0.0:
+        return _NOTHING
+    nodes = looks.close_nodes
+    four = (nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 3])
+    if has_inverted(search.inverted_step, search.step, four):
+        return _NOTHING
+    if not _came_from_outside(search, forces, body, i):
+        return _NOTHING
+    foot = Vec3(looks.foot[i, 0], looks.foot[i, 1], looks.foot[i, 2])
+    share = _HELD_SHARE if looks.is_held[looks.close[i]] == 1.0 else 1.0
+    return Touch(True, foot, _push(looks, i), share * distance)
 
 
-@kernel
-def _clamped(wb: float, wc: float) -> Vec3:
+@inlined
+def _push(looks: Looks, i: int) -> Vec3:
+    """Return the unit vector in which a close look would push its node."""
+    return Vec3(looks.push[i, 0], looks.push[i, 1], looks.push[i, 2])
+
+
+@inlined
+def _clamped(weights: Vec3) -> Vec3:
     """Return barycentric weights, those below zero set to zero."""
-    a, b, c = max(1.0 - wb - wc, 0.0), max(wb, 0.0), max(wc, 0.0)
-    return scale(1.0 / (a + b + c), Vec3(a, b, c))
+    zero = everywhere(0.0)
+    a = where_larger(zero, weights.x, zero, weights.x)
+    b = where_larger(zero, weights.y, zero, weights.y)
+    c = where_larger(zero, weights.z, zero, weights.z)
+    return scale(everywhere(1.0) / (a + b + c), Vec3(a, b, c))
 
 
-@kernel
-def _apart(values: FloatArray, pairs: NearPairs, node: int, face: int, foot: Vec3) -> Vec3:
-    """Return the value at a node less that at a foot in a face, of values at the nodes."""
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    at = axpy(foot.x, vec3(values, a), scale(foot.y, vec3(values, b)))
-    return sub(vec3(values, node), axpy(foot.z, vec3(values, c), at))
+@inlined
+def _apart(values: NodesAndCorners, foot: Vec3) -> Vec3:
+    """Return the values at nodes less those at feet in their faces."""
+    at = axpy(foot.x, values.a, scale(foot.y, values.b))
+    return sub(values.p, axpy(foot.z, values.c, at))
 
 
-@kernel
-def _interpolated(
-    normal: FloatArray, pairs: NearPairs, face: int, foot: Vec3, outward: Vec3
-) -> Vec3:
-    """Return the unit normal at a foot in a face whose own is `outward`."""
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    total = scale(foot.x, _corner_normal(vec3(normal, a), outward))
-    total = axpy(foot.y, _corner_normal(vec3(normal, b), outward), total)
-    total = axpy(foot.z, _corner_normal(vec3(normal, c), outward), total)
-    return scale(1.0 / norm(total), total)
+@inlined
+def _interpolated(normals: NodesAndCorners, foot: Vec3, outward: Vec3) -> Vec3:
+    """Return the unit normals at feet in faces whose own are `outward`."""
+    total = scale(foot.x, _corner_normal(normals.a, outward))
+    total = axpy(foot.y, _corner_normal(normals.b, outward), total)
+    total = axpy(foot.z, _corner_normal(normals.c, outward), total)
+    return scale(everywhere(1.0) / norm_of_eight(total), total)
 
 
-@kernel
+@inlined
 def _corner_normal(of_node: Vec3, outward: Vec3) -> Vec3:
-    """Blend the normal of a node, of any length, with that of a face."""
-    size = norm(of_node)
-    if not size > 0.0:
-        return outward
-    cosine = dot(of_node, outward) / size
-    share = min(max(_STEEPNESS * (cosine - _SMOOTH), 0.0), 1.0)
-    return axpy(share / size, of_node, scale(1.0 - share, outward))
+    """Blend the normals of nodes, of any length, with those of faces."""
+    zero, one, size = everywhere(0.0), everywhere(1.0), norm_of_eight(of_node)
+    steep = everywhere(_STEEPNESS) * (dot(of_node, outward) / size - everywhere(_SMOOTH))
+    share = larger(steep, zero)
+    share = where_larger(one, share, share, one)
+    blend = axpy(share / size, of_node, scale(one - share, outward))
+    return Vec3(
+        where_larger(size, zero, blend.x, outward.x),
+        where_larger(size, zero, blend.y, outward.y),
+        where_larger(size, zero, blend.z, outward.z),
+    )
 
 
-@kernel
-def _came_from_outside(
-    search: SearchState,
-    forces: PenaltyForces,
-    body: Body,
-    node: int,
-    face: int,
-    foot: Vec3,
-    normal: Vec3,
-    gap: float,
-) -> bool:
+@inlined
+def _came_from_outside(search: SearchState, forces: PenaltyForces, body: Body, i: int) -> bool:
     """Whether a node was outside a face in the last search, or in contact there, or lost contact.
 
     The body at rest does not overlap itself: a node that is behind a face there is on the other
     side of a thin piece of tissue.
     """
-    pairs, size, before = search.pairs, search.ways.node_size, search.ways.before
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
-    i = vec3(before, a)
-    area = cross(sub(vec3(before, b), i), sub(vec3(before, c), i))
-    length = norm(area)
-    gap_before = 0.0
-    if length > 0.0:
-        gap_before = dot(area, _apart(before, pairs, node, face, foot)) / length
-    deepest = ENTRY * size + _CAUGHT * _depth_before(search, forces, node, normal)
+    pairs, looks, size = search.pairs, search.pairs.looks, search.ways.node_size
+    nodes, gap, gap_before = looks.close_nodes, looks.push[i, 3], looks.foot[i, 3]
+    node = nodes[i, 0]
+    if gap_before >= -(ENTRY * size):
+        return True
+    deepest = ENTRY * size + _CAUGHT * _depth_before(search, forces, node, _push(looks, i))
     if gap_before >= -deepest:
         return True
     if pairs.is_lost[node] == 0 and gap < -_RECAPTURED * size:
         return False
     rest = body.rest
-    i = vec3(rest, a)
-    area = cross(sub(vec3(rest, b), i), sub(vec3(rest, c), i))
-    from_corner = sub(vec3(rest, node), i)
+    corner = vec3(rest, nodes[i, 1])
+    area = cross(sub(vec3(rest, nodes[i, 2]), corner), sub(vec3(rest, nodes[i, 3]), corner))
+    from_corner = sub(vec3(rest, node), corner)
     behind = dot(area, from_corner) < -1e-3 * size * norm(area)
     reach = REST_REACH * size
     return not (behind and dot(from_corner, from_corner) < reach * reach)
