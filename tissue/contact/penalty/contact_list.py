@@ -20,6 +20,7 @@ from tissue.contact.penalty.ridge_contacts import list_ridge_contacts
 from tissue.contact.penalty.search_state import SearchState, are_many_moving
 from tissue.contact.penalty.touch import STILL, TIME_AHEAD, Touch, look_closely, touch_of
 from tissue.core.jit import kernel
+from tissue.core.simd_gather import natural
 from tissue.core.vec3 import Vec3, dot, store, sub, vec3
 from tissue.mesh.body import Body
 
@@ -47,7 +48,7 @@ def find_due(search: SearchState, is_anew: bool) -> int:
     if not asks_all:
         _note_moving_faces(search)
     for i in range(pairs.n_nodes):
-        node = pairs.nodes[i]
+        node = natural(pairs.nodes[i])
         search.is_due[node] = 0
         is_calm = not asks_all and ways.quiet_way < search.calm_until[node]
         is_moving = ways.moved_at[node] == ways.frame or pairs.face_moved_at[node] == ways.frame
@@ -88,12 +89,12 @@ def _note_moving_faces(search: SearchState) -> None:
 def _least_slack(search: SearchState, node: int) -> float:
     """Return how much way is left before a pair of a node is to be looked at [m]; negative: now."""
     pairs, ways = search.pairs, search.ways
-    still, least = STILL * ways.node_size, math.inf
+    still, least, own_way = STILL * ways.node_size, math.inf, ways.way[node]
     own = vec3(ways.displacement, node)
-    for k in range(pairs.begin[node], pairs.end[node]):
-        face = pairs.face[k]
+    for k in range(natural(pairs.begin[node]), natural(pairs.end[node])):
+        face = natural(pairs.face[k])
         know_motion(pairs, ways, face)
-        left = pairs.wake[k] - ways.way[node] - pairs.way[face]
+        left = pairs.wake[k] - own_way - pairs.way[face]
         if pairs.is_near[k] == 1:
             relative = sub(own, vec3(pairs.displacement, face))
             moved = sub(relative, vec3(pairs.relative, k))

@@ -12,6 +12,7 @@ from tissue.contact.penalty.node_grid import NodeGrid, new_node_grid
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
+from tissue.core.simd_gather import natural
 from tissue.core.structs import Arrays, IntCell
 from tissue.mesh.body import grown
 
@@ -200,7 +201,8 @@ def know_motion(pairs: NearPairs, ways: NodeWays, face: int) -> None:
         return
     pairs.known_at[face] = ways.frame
     way, d, third = ways.way, ways.displacement, 1.0 / 3.0
-    a, b, c = pairs.triangle[face, 0], pairs.triangle[face, 1], pairs.triangle[face, 2]
+    a, b = natural(pairs.triangle[face, 0]), natural(pairs.triangle[face, 1])
+    c = natural(pairs.triangle[face, 2])
     pairs.way[face] = way[a] + way[b] + way[c]
     for x in range(3):
         pairs.displacement[face, x] = third * (d[a, x] + d[b, x] + d[c, x])
