@@ -103,9 +103,7 @@ class GlobalStepper:
         edge, dt, begin, end = increment
         choice = self._choice_for(system)
         if contact.is_awake and increment.span > 0.0 and not choice.is_at_rest:
-            room = _ROOM.call(choice, system.context, increment.span)
-            system.find_contacts(increment.span, room)
-            choice = self._choice_for(system)
+            choice = self._find_contacts(system, increment)
         if self._threads is not None:
             self._threads.join(system.context)
         while True:
@@ -125,8 +123,7 @@ class GlobalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""
-        system.find_contacts(increment.span)
-        choice, context = self._choice_for(system), system.context
+        choice, context = self._find_contacts(system, increment), system.context
         begin_increment(choice, context, *increment[1:])
         while next_part(choice, context):
             part = increment._replace(begin=choice.begin, end=choice.part_end)
@@ -147,6 +144,12 @@ class GlobalStepper:
             if done == n:
                 return
             contact.make_room()
+
+    def _find_contacts(self, system: System, increment: Increment) -> StepChoice:
+        """Find the contacts of an increment; return the choice of steps with what they add."""
+        room = _ROOM.call(self._choice_for(system), system.context, increment.span)
+        system.find_contacts(increment.span, room)
+        return self._choice_for(system)
 
     def _choice_for(self, system: System) -> StepChoice:
         """Return the choice of steps, with what contact adds to the frequencies now."""

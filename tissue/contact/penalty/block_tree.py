@@ -46,8 +46,6 @@ class Level(Arrays):
     rows: FloatArray
     """The rows, shape (72 * eights,). Where there is nothing, the lowest corner is
     infinite."""
-    mark: FloatArray
-    """1 if something in it is marked, else 0; shape (8 * eights,)."""
     least: FloatArray
     """Least cosine between a direction in it and its middle; -1 if one has no direction. Shape
     (8 * eights,)."""
@@ -62,8 +60,6 @@ class BlockTree(Arrays):
     """Number of things."""
     item: IntArray
     """The things as they were entered, shape (capacity,)."""
-    is_marked: IntArray
-    """1 if a thing is marked, else 0; shape (capacity,)."""
     low: FloatArray
     """Lowest corner of the box of each [m], shape (capacity, 3)."""
     high: FloatArray
@@ -88,14 +84,12 @@ class BlockTree(Arrays):
 def _new_level(n: int) -> Level:
     """Return a level with room for `n` and whole eights."""
     n = filled(n)
-    return Level(
-        rows=aligned(N_ROWS * n), mark=aligned(n), least=np.zeros(n), middle=np.zeros((n, 3))
-    )
+    return Level(rows=aligned(N_ROWS * n), least=np.zeros(n), middle=np.zeros((n, 3)))
 
 
 def new_block_tree(capacity: int) -> BlockTree:
     """Return an empty tree with room for that many things."""
-    of_items = ("item", "is_marked", "order", "key", "spare")
+    of_items = ("item", "order", "key", "spare")
     n_blocks = capacity // WIDTH + 1
     return BlockTree(
         n_items=0,
@@ -110,7 +104,7 @@ def new_block_tree(capacity: int) -> BlockTree:
 
 
 @inlined
-def enter(tree: BlockTree, item: int, box: Aabb, direction: Vec3, is_marked: bool) -> None:
+def enter(tree: BlockTree, item: int, box: Aabb, direction: Vec3) -> None:
     """Enter a thing; `arrange` is called after the last.
 
     Args:
@@ -118,12 +112,10 @@ def enter(tree: BlockTree, item: int, box: Aabb, direction: Vec3, is_marked: boo
         item: Its number.
         box: The box around it [m].
         direction: Where it faces, of any length.
-        is_marked: Whether queries for marked ones find it.
     """
     i = tree.n_items
     tree.n_items += 1
     tree.item[i] = item
-    tree.is_marked[i] = 1 if is_marked else 0
     store_box(tree.low, tree.high, i, box)
     store(tree.direction, i, _unit(direction))
 
@@ -143,7 +135,6 @@ def arrange(tree: BlockTree, alike: float) -> None:
         at = tree.order[i]
         box, direction = box_at(tree.low, tree.high, at), vec3(tree.direction, at)
         _write_hull(tree.things, i, box, direction, 1.0, alike)
-        tree.things.mark[i] = tree.is_marked[at]
     _end_level(tree.things, tree.n_items)
     blocks, groups = _eights(tree.n_items), _eights(_eights(tree.n_items))
     for block in range(blocks):
@@ -161,7 +152,7 @@ def _eights(n: int) -> int:
 
 
 @kernel
-def find_near(tree: BlockTree, box: Aabb, direction: Vec3, length: float, only_marked: bool) -> int:
+def find_near(tree: BlockTree, box: Aabb, direction: Vec3, length: float) -> int:
     """Write what overlaps a box to `found`, less what faces alike; return how many there are.
 
     What faces alike to within rounding may be found, too.
@@ -171,21 +162,20 @@ def find_near(tree: BlockTree, box: Aabb, direction: Vec3, length: float, only_m
         box: Where to search.
         direction: Direction out of the body where it is asked for.
         length: Length of that; inf if it does not matter.
-        only_marked: Whether to find only what is marked.
     """
-    n, least = 0, 0.5 if only_marked else -1.0
+    n = 0
     for first in range(_eights(_eights(_eights(tree.n_items)))):
-        groups = _near(tree.groups, first, box, direction, length, least)
+        groups = _near(tree.groups, first, box, direction, length)
         for i in range(WIDTH * (groups > 0)):
             if groups >> i & 1 == 0:
                 continue
             group = WIDTH * first + i
-            blocks = _near(tree.blocks, group, box, direction, length, least)
+            blocks = _near(tree.blocks, group, box, direction, length)
             for k in range(WIDTH * (blocks > 0)):
                 if blocks >> k & 1 == 0:
                     continue
                 block = WIDTH * group + k
-                things = _near(tree.things, block, box, direction, length, least)
+                things = _near(tree.things, block, box, direction, length)
                 if things == 0:
                     continue
                 for q in range(min(WIDTH, tree.n_items - WIDTH * block)):
@@ -195,7 +185,7 @@ def find_near(tree: BlockTree, box: Aabb, direction: Vec3, length: float, only_m
 
 
 @inlined
-def _near(level: Level, i: int, box: Aabb, direction: Vec3, length: float, least: float) -> int:
+def _near(level: Level, i: int, box: Aabb, direction: Vec3, length: float) -> int:
     """Return bits for what of eight may be asked for; see `find_near`.
 
     Args:
@@ -204,7 +194,6 @@ def _near(level: Level, i: int, box: Aabb, direction: Vec3, length: float, least
         box: Where to search.
         direction: Direction out of the body where it is asked for.
         length: Length of that.
-        least: What the mark is to be larger than.
     """
     rows, at = level.rows, N_ROWS * WIDTH * i
     low, high = box.low, box.high
@@ -218,7 +207,7 @@ def _near(level: Level, i: int, box: Aabb, direction: Vec3, length: float, least
         + lanes(direction.z) * load_lanes(rows, at + (DIRECTION + 2) * WIDTH)
     )
     is_out = larger_bits(apart, lanes(0.0)) | larger_bits(along, lanes(length))
-    return ~is_out & larger_bits(load_lanes(level.mark, WIDTH * i), lanes(least))
+    return ~is_out & (1 << WIDTH) - 1
 
 
 @inlined
@@ -284,17 +273,15 @@ def _sort_by_byte(tree: BlockTree, shift: int) -> None:
 @kernel
 def _enclose_things(tree: BlockTree, block: int, alike: float) -> None:
     """Enclose the things of a block."""
-    box, total, mark = empty_box(), Vec3(0.0, 0.0, 0.0), 0.0
+    box, total = empty_box(), Vec3(0.0, 0.0, 0.0)
     begin, end = WIDTH * block, min(WIDTH * (block + 1), tree.n_items)
     for i in range(begin, end):
         at = tree.order[i]
         box = with_point(with_point(box, vec3(tree.low, at)), vec3(tree.high, at))
         total = add(total, vec3(tree.direction, at))
-        mark = max(mark, tree.things.mark[i])
     middle, least = _unit(total), 1.0
     for i in range(begin, end):
         least = min(least, dot(middle, vec3(tree.direction, tree.order[i])))
-    tree.blocks.mark[block] = mark
     _write_hull(tree.blocks, block, box, middle, least, alike)
 
 
@@ -302,7 +289,7 @@ def _enclose_things(tree: BlockTree, block: int, alike: float) -> None:
 def _enclose_blocks(tree: BlockTree, group: int, n_blocks: int, alike: float) -> None:
     """Enclose the blocks of a group."""
     blocks, rows = tree.blocks, tree.blocks.rows
-    box, total, mark = empty_box(), Vec3(0.0, 0.0, 0.0), 0.0
+    box, total = empty_box(), Vec3(0.0, 0.0, 0.0)
     begin, end = WIDTH * group, min(WIDTH * (group + 1), n_blocks)
     for block in range(begin, end):
         at = N_ROWS * begin + block - begin
@@ -311,14 +298,12 @@ def _enclose_blocks(tree: BlockTree, group: int, n_blocks: int, alike: float) ->
         high = Vec3(rows[at], rows[at + WIDTH], rows[at + 2 * WIDTH])
         box = with_point(with_point(box, low), high)
         total = add(total, vec3(blocks.middle, block))
-        mark = max(mark, blocks.mark[block])
     middle, least = _unit(total), 1.0
     for block in range(begin, end):
         # The angles of a direction to the block's and of that to the group's add up.
         own, beside = blocks.least[block], dot(middle, vec3(blocks.middle, block))
         both = own * beside - _sine_of(own) * _sine_of(beside)
         least = min(least, both if own > 0.0 and beside > 0.0 else -1.0)
-    tree.groups.mark[group] = mark
     _write_hull(tree.groups, group, box, middle, least, alike)
 
 

@@ -156,14 +156,13 @@ def _enter_ridges(ridges: Ridges, ways: NodeWays, now: int) -> None:
     tree.n_items = 0
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
-        is_dirty = ridges.dirty_at[edge] == now
-        if is_dirty:
+        if ridges.dirty_at[edge] == now:
             a, b = ridges.node[edge, 0], ridges.node[edge, 1]
             reach = max(ways.radius[a], ways.radius[b]) + 0.5 * CONTACT_REACH * ways.node_size
             box = widened(segment_box(ways.reference, a, b), reach)
             store_box(ridges.low, ridges.high, edge, box)
         box = box_at(ridges.low, ridges.high, edge)
-        enter(tree, edge, box, vec3(ridges.outward, edge), is_dirty)
+        enter(tree, edge, box, vec3(ridges.outward, edge))
     arrange(tree, SAME_SIDE)
 
 
@@ -178,7 +177,7 @@ def _find_crossing(
     tree, outward = ridges.tree, vec3(ridges.outward, edge)
     box = box_at(ridges.low, ridges.high, edge)
     n_near, n = 0, 0
-    for q in range(find_near(tree, box, outward, norm(outward), False)):
+    for q in range(find_near(tree, box, outward, norm(outward))):
         other = tree.found[q]
         if other >= edge and ridges.dirty_at[other] == pairs.n_updates:
             continue

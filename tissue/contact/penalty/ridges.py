@@ -56,7 +56,7 @@ class Ridges(Arrays):
     reach: FloatArray
     """Scratch: the radius of the larger ball of the ends of each [m], shape (8,)."""
     tree: BlockTree
-    """The ridges by their boxes; those that are paired anew are marked."""
+    """The ridges by their boxes."""
 
 
 def new_ridges(n_faces: int) -> Ridges:

@@ -16,11 +16,11 @@ ALIKE = 0.17
 
 
 @kernel
-def fill(tree, low, high, direction, mark):
+def fill(tree, low, high, direction):
     """Enter things and arrange them."""
     tree.n_items = 0
     for i in range(len(low)):
-        enter(tree, 100 + i, box_at(low, high, i), vec3(direction, i), mark[i] == 1)
+        enter(tree, 100 + i, box_at(low, high, i), vec3(direction, i))
     arrange(tree, ALIKE)
 
 
@@ -39,10 +39,9 @@ def on_two_lips(random, n):
 @pytest.mark.parametrize("n", [1, 8, 9, 70, 700])
 def test_the_tree_finds_what_testing_all_finds(n):
     random, tree = np.random.default_rng(n), new_block_tree(700)
-    fill(tree, *on_two_lips(random, 700), np.zeros(700, np.int64))  # of which nothing is left
+    fill(tree, *on_two_lips(random, 700))  # of which nothing is left
     low, high, direction = on_two_lips(random, n)
-    mark = (random.random(n) < 0.2).astype(np.int64)
-    fill(tree, low, high, direction, mark)
+    fill(tree, low, high, direction)
     cosine = direction / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)[:, None]
     n_found = 0
     for a, b, asking in zip(*on_two_lips(random, 60), strict=True):
@@ -50,12 +49,10 @@ def test_the_tree_finds_what_testing_all_finds(n):
         overlaps = ((low <= b) & (high >= a)).all(axis=1)
         faces_alike = (cosine @ asking > ALIKE * length) & (length > 0.0)
         box, towards = Aabb(Vec3(*a), Vec3(*b)), Vec3(*asking)
-        for only_marked in (False, True):
-            wanted = overlaps & ((mark == 1) | (not only_marked))
-            found = find_near(tree, box, towards, length, only_marked)
-            assert set(tree.found[:found] - 100) == set(np.flatnonzero(wanted & ~faces_alike))
-            assert len(set(tree.found[:found])) == found
-            n_found += found
-            everywhere = find_near(tree, box, towards, math.inf, only_marked)
-            assert set(tree.found[:everywhere] - 100) == set(np.flatnonzero(wanted))
+        found = find_near(tree, box, towards, length)
+        assert set(tree.found[:found] - 100) == set(np.flatnonzero(overlaps & ~faces_alike))
+        assert len(set(tree.found[:found])) == found
+        n_found += found
+        everywhere = find_near(tree, box, towards, math.inf)
+        assert set(tree.found[:everywhere] - 100) == set(np.flatnonzero(overlaps))
     assert n < 70 or n_found > 60
