@@ -156,7 +156,7 @@ def _end(relaxation: Relaxation, edge: Edge, has_blade: bool, end: float) -> int
         if choice.is_unstable == 1:
             return UNSTABLE
         if choice.done > 0:
-            note_calm(choice)
+            note_calm(choice, step)
             if relaxes(step.elastic.solid):
                 relax_stress(step, choice.span)
             if not write_bounds(step.body, relaxation.blade.bounds):

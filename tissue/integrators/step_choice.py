@@ -201,21 +201,19 @@ def begin_increment(
 
 @kernel
 def _find_rest(choice: StepChoice, context: StepContext) -> None:
-    """Find out whether the body is at rest; nodes that came to rest now are stopped."""
+    """Find out whether the body is at rest."""
     if not may_rest(context, choice.surroundings.drag):
         choice.calm = 0.0
-    if choice.calm < TIME_TO_REST:
-        choice.is_at_rest = 0
-    elif choice.is_at_rest == 0:
-        choice.is_at_rest = 1
-        stop_nodes(context)
+    choice.is_at_rest = 1 if choice.calm >= TIME_TO_REST else 0
 
 
 @kernel
-def note_calm(choice: StepChoice) -> None:
-    """Note, after the steps of an increment, that the body was calm in it, or was not."""
+def note_calm(choice: StepChoice, context: StepContext) -> None:
+    """Note, after the steps of an increment, whether the body was calm; stop what comes to rest."""
     is_calm = choice.speed <= CALM_SPEED * choice.node_size
     choice.calm = choice.calm + choice.span if is_calm else 0.0
+    if choice.calm >= TIME_TO_REST:
+        stop_nodes(context)
 
 
 @kernel

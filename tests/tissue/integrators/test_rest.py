@@ -91,3 +91,13 @@ def test_a_loose_piece_that_drifts_slower_than_any_limit_drifts_on():
     np.testing.assert_allclose(
         velocities, np.broadcast_to([1e-6, 0, 0], velocities.shape), atol=1e-12
     )
+
+
+def test_what_is_left_of_a_motion_that_comes_to_rest_is_in_the_account():
+    solver = SolverSettings(relaxation="verlet", audit=True)
+    tissue = Tissue(CUBE, Material(viscous_damping=40.0), floor=-1e-6, solver=solver)
+    result = tissue.step(None, strokes.DT)
+    while result.n_substeps > 0:
+        moving, result = result, tissue.step(None, strokes.DT)
+    assert result.energies.kinetic == moving.energies.kinetic == 0.0
+    assert result.energies.residual == pytest.approx(moving.energies.residual, abs=1e-15)

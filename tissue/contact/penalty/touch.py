@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from tissue.contact.node_normals import has_inverted
 from tissue.contact.penalty.contact_forces import PenaltyForces, weighted_sum
+from tissue.contact.penalty.eight_contacts import points_of_contacts
 from tissue.contact.penalty.looks import Looks
 from tissue.contact.penalty.near_pairs import CONTACT_REACH
 from tissue.contact.penalty.search_state import SearchState
@@ -17,7 +18,7 @@ from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, lanes, square_root, store_lanes, unfused
 from tissue.core.simd_gather import larger, where_larger
-from tissue.core.simd_rows import points_of_column, store_rows_of_four
+from tissue.core.simd_rows import store_rows_of_four
 from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, sub, vec3
 from tissue.mesh.body import Body
 
@@ -113,19 +114,14 @@ _NOTHING = Touch(False, Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0)
 @inlined
 def points_of_looks(values: FloatArray, nodes: IntArray, i: int) -> NodesAndCorners:
     """Return nodal values at the nodes of eight looks."""
-    return NodesAndCorners(
-        _of_column(values, nodes, i, 0),
-        _of_column(values, nodes, i, 1),
-        _of_column(values, nodes, i, 2),
-        _of_column(values, nodes, i, 3),
-    )
+    at = points_of_contacts(nodes, values, i)
+    return NodesAndCorners(_unfused(at.a), _unfused(at.b), _unfused(at.c), _unfused(at.d))
 
 
 @inlined
-def _of_column(values: FloatArray, nodes: IntArray, i: int, q: int) -> Vec3:
-    """Return nodal values at node `q` of eight looks."""
-    x, y, z = points_of_column(values, nodes, i, q)
-    return Vec3(unfused(x), unfused(y), unfused(z))
+def _unfused(a: Vec3) -> Vec3:
+    """Return the same vectors, for arithmetic with the bits of scalars."""
+    return Vec3(unfused(a.x), unfused(a.y), unfused(a.z))
 
 
 @inlined
