@@ -1,6 +1,7 @@
 """One run, from a simulation at its start to a folder of files, however it ends."""
 
 import logging
+import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -73,6 +74,7 @@ def perform(
     outputs.write_mesh(INITIAL, simulation.link.snapshot())
     replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
     simulation.pictures.append(into_replay(replay))
+    _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame)
     status = stopped or (COMPLETE if failure is None else f"failed: {one_line(failure)}")
 
@@ -117,8 +119,6 @@ def _run_frames(
     with StopSignals() as stop:
 
         def after_frame(now: Simulation) -> bool:
-            if len(now.recording) == 1:
-                _warn_if_slow(now)
             outputs.write_forces(now.recording)
             if every_frame is not None:
                 every_frame(now)
@@ -165,12 +165,12 @@ def _facts(
 
 def _warn_if_slow(simulation: Simulation) -> None:
     """Log a warning where a frame takes so many Runge-Kutta steps that the run seems to hang."""
-    n_substeps = simulation.result.n_substeps
-    if n_substeps > MANY_SUBSTEPS:
+    n_steps = math.ceil(simulation.dt / simulation.link.cut_report().now.time_step)
+    if n_steps > MANY_SUBSTEPS:
         _log.warning(
             "a frame takes %s Runge-Kutta steps, because the tissue's elements are small, stiff or "
             "light: the run will take long. Check --scale, or lower --young, or raise --density",
-            f"{n_substeps:,}",
+            f"{n_steps:,}",
         )
 
 

@@ -34,7 +34,7 @@ from tissue.input_checks import (
     warn_of_ratio,
     warn_of_toughness,
 )
-from tissue.integrators.equilibrium import settle
+from tissue.integrators.equilibrium import LONGEST_SETTLING, settle
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
@@ -225,6 +225,8 @@ class Tissue(DrivenBody):
         self._loads.spread(system.body, system.stages.loads)
         n_steps = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
+        if n_steps < LONGEST_SETTLING:
+            self._global_stepper.let_rest(system)
         write_bounds(system.body, self._bounds)
         self._audit.begin(self._system, NOWHERE)
         return n_steps

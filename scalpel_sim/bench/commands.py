@@ -107,7 +107,7 @@ def bench_real_time(
         scenes: organ, incision, slab, grid2, grid7 [default: all].
         materials: Names of materials, or "as shipped" [default: that, and all].
         strokes: After how many random strokes frames are timed [default: 0 10 26 50].
-        quick: Only the begin of each stroke, as shipped, once, without and after one stroke.
+        quick: Only the begin of each stroke, and the middle of a random one, as shipped, once.
     """
     from scalpel_sim.bench.real_time import (
         AS_SHIPPED,

@@ -123,7 +123,8 @@ def measure_real_time(
         scenes: Names of scenes.
         materials: Names of materials; `AS_SHIPPED` for that of the scene.
         strokes: After how many random strokes frames are timed; they are done once.
-        quick: Whether to simulate only the begin of each stroke.
+        quick: Whether to simulate only the begin of each scene's stroke, and to time only the
+            middle of each random one.
         watch: Receives the progress.
     """
     pairs = list(itertools.product(scenes, materials))
@@ -205,11 +206,14 @@ def _random_stroke_frames(
 
 
 def _cut(tissue: Tissue, random: np.random.Generator, seconds: float | None) -> Frames:
-    """Do a random stroke, or the begin of it, and time its frames."""
+    """Do a random stroke and time its frames; for a quick look, those in its middle."""
     edges = random_stroke(tissue, random)
-    if seconds is not None:
-        edges = edges[: round(seconds / STROKE_DT) + 1]
-    return _timed(tissue, [BladeSweep(*pair) for pair in itertools.pairwise(edges)])
+    frames = _timed(tissue, [BladeSweep(*pair) for pair in itertools.pairwise(edges)])
+    if seconds is None:
+        return frames
+    n = round(seconds / STROKE_DT)
+    middle = slice((len(frames.seconds) - n) // 2, (len(frames.seconds) + n) // 2)
+    return frames._replace(seconds=frames.seconds[middle], substeps=frames.substeps[middle])
 
 
 def _timed(tissue: Tissue, sweeps: Sequence[BladeSweep | None]) -> Frames:

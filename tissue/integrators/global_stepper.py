@@ -18,6 +18,7 @@ from tissue.integrators.relaxation import (
     relax_by_runge_kutta,
     relax_by_verlet,
 )
+from tissue.integrators.rest import TIME_TO_REST
 from tissue.integrators.stability import NYSTROEM, STAGE_DAMPED, VERLET
 from tissue.integrators.staged_relaxation import not_finite, relax_in_stages
 from tissue.integrators.step_choice import (
@@ -189,6 +190,14 @@ class GlobalStepper:
         """Move the body again, which may have been at rest."""
         if self._choice is not None:
             self._choice.calm, self._choice.is_at_rest = 0.0, 0
+
+    def let_rest(self, system: System) -> None:
+        """Move a body that has settled only once something acts on it.
+
+        With contact by impulses it is always moved: nothing tells when such a contact begins.
+        """
+        if not isinstance(system.contact, SelfContact):
+            self._choice_for(system).calm = TIME_TO_REST
 
     def body_moved(self, body: Body) -> None:
         """Forget the bound on the strained body: it is another one now."""

@@ -35,7 +35,7 @@ def test_a_quick_look_has_a_row_for_each_mode_and_for_random_strokes(capsys, tmp
         assert frame.n == pytest.approx(50, abs=1)
         assert 0.0 < frame.median <= frame.p99 <= 1.001 * found[case, "p99.9 of a frame"].median
         assert factor.median > 0.0
-        assert found[case, "substeps"].median >= 1.0
+        assert found[case, "substeps"].median >= (1.0 if case.endswith("cutting") else 0.0)
         assert 0.0 <= found[case, "late frames"].median <= 100.0
 
 

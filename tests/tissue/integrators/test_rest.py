@@ -5,6 +5,7 @@ import pytest
 
 from tests import bodies, strokes
 from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, block
+from tissue.integrators.equilibrium import LONGEST_SETTLING
 
 CUBE = block((3, 3, 3), (0.03,) * 3)
 RELAXATIONS = ("global", "verlet")
@@ -15,10 +16,31 @@ def calm_body(relaxation, **options):
     solver = SolverSettings(relaxation=relaxation, audit=True)
     tissue = Tissue(CUBE, Material(), fixed=bodies.sides(CUBE), solver=solver, **options)
     tissue.settle()
+    tissue._global_stepper.wake()
     for _ in range(400):
         result = tissue.step(None, strokes.DT)
     assert result.n_substeps == 0
     return tissue
+
+
+@pytest.mark.parametrize("relaxation", RELAXATIONS)
+def test_a_body_that_has_settled_takes_no_steps_and_stays_as_it_is(relaxation):
+    solver = SolverSettings(relaxation=relaxation)
+    tissue = Tissue(CUBE, Material(), fixed=bodies.sides(CUBE), solver=solver)
+    assert tissue.settle() < LONGEST_SETTLING
+    before = tissue.snapshot().positions
+    assert sum(tissue.step(None, strokes.DT).n_substeps for _ in range(100)) == 0
+    np.testing.assert_array_equal(tissue.snapshot().positions, before)
+
+
+def test_a_body_that_nothing_holds_does_not_settle_and_falls_on():
+    tissue = Tissue(CUBE, Material())
+    tissue.settle()
+    before = tissue.snapshot().velocities[:, 2]
+    assert tissue.step(None, strokes.DT).n_substeps > 0
+    np.testing.assert_allclose(
+        tissue.snapshot().velocities[:, 2], before - 9.81 * strokes.DT, rtol=1e-2
+    )
 
 
 @pytest.mark.parametrize("relaxation", RELAXATIONS)
