@@ -19,6 +19,8 @@ In the order in which they are best read:
     near_pairs         the pairs of node and face
     ridge_pairs        the pairs of ridges
     ridges             the edges that can touch other edges
-    block_tree         nodes, or ridges, by blocks that are near each other and face alike
+    node_grid          nodes by the cells of a grid
+    ridge_grid         ridges by the cells of two grids
+    cells              the cells of a grid
     node_ways          how far nodes have moved
 """

@@ -9,13 +9,24 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.contact.penalty.cells import (
+    Cells,
+    cells_in,
+    count_thing,
+    end_count,
+    lay_cells,
+    new_cells,
+    note_found,
+    row_of,
+    take_place,
+)
 from tissue.contact.penalty.node_ways import BALL, NodeWays
-from tissue.core.array_types import FloatArray, IntArray, SlotArray
+from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import WIDTH, Lanes, aligned, filled, lanes, load_lanes
-from tissue.core.simd_gather import first_bit, larger, larger_bits, natural
+from tissue.core.simd_gather import larger, larger_bits
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3, norm, store, vec3
+from tissue.core.vec3 import Vec3, norm, vec3
 from tissue.geometry.aabb import Aabb, empty_box, widened, with_point
 
 DEEPEST = 0.25
@@ -26,16 +37,9 @@ SAME_SHEET = 0.17
 """Cosine between the normals of node and face above which they are of one sheet, which bends and
 does not touch itself. Larger: more pairs; smaller: lips that lie across each other are missed."""
 
-_MOST_CELLS = 1 << 14
-"""Cells of a grid at most. More: nodes of a body that extends far are told apart better, and each
-update takes longer."""
-
 _N_ROWS = 7
 _RADIUS, _NORMAL = 3, 4
 """The first of the rows for radii and for normals, behind those for places."""
-
-_ROUNDING = 1e-9
-"""By how much a box is widened before its cells are found [m]."""
 
 
 class NodeGrid(Arrays):
@@ -43,22 +47,8 @@ class NodeGrid(Arrays):
 
     n_items: IntCell
     """Number of nodes."""
-    n_x: IntCell
-    """Number of cells along x."""
-    n_y: IntCell
-    """Number of cells along y."""
-    n_z: IntCell
-    """Number of cells along z."""
-    per_metre: FloatCell
-    """Cells in a metre along y and z, half as many as along x [1/m]."""
     most: FloatCell
     """By how much the ball of a node is larger than that of a slow one at most [m]."""
-    corner: FloatArray
-    """Lowest corner of the grid [m], shape (1, 3)."""
-    begin: SlotArray
-    """First node of each cell, shape (cells + 2,)."""
-    cell: SlotArray
-    """Scratch: cell of each node as it was entered, shape (capacity,)."""
     entered: IntArray
     """The nodes as they were entered, shape (capacity,)."""
     node: IntArray
@@ -68,6 +58,7 @@ class NodeGrid(Arrays):
     the body, or 0; row behind row, shape (7 * (capacity + 8),)."""
     found: IntArray
     """What the last question found, shape (capacity,)."""
+    cells: Cells
 
 
 class Asking(NamedTuple):
@@ -94,18 +85,12 @@ def new_node_grid(capacity: int) -> NodeGrid:
     room = filled(capacity + WIDTH)
     return NodeGrid(
         n_items=0,
-        n_x=1,
-        n_y=1,
-        n_z=1,
-        per_metre=0.0,
         most=0.0,
-        corner=np.zeros((1, 3)),
-        begin=np.zeros(_MOST_CELLS + 2, np.int32),
-        cell=np.zeros(capacity, np.int32),
         entered=np.zeros(capacity, np.int64),
         node=np.zeros(room, np.int64),
         rows=aligned(_N_ROWS * room),
         found=np.zeros(capacity, np.int64),
+        cells=new_cells(capacity),
     )
 
 
@@ -125,53 +110,12 @@ def arrange_grid(grid: NodeGrid, ways: NodeWays, normal: FloatArray, edge: float
         box = with_point(box, vec3(ways.reference, node))
         most = max(most, ways.radius[node] - BALL * ways.node_size)
     grid.most = most
-    _lay_cells(grid, box, edge)
-    begin = grid.begin
-    n_cells = grid.n_x * grid.n_y * grid.n_z
-    for cell in range(n_cells + 2):
-        begin[cell] = 0
+    lay_cells(grid.cells, box, edge)
     for i in range(grid.n_items):
-        p = vec3(ways.reference, grid.entered[i])
-        x, y, z = _cell_of(grid, p)
-        grid.cell[i] = (z * grid.n_y + y) * grid.n_x + x
-        begin[grid.cell[i] + 2] += 1
-    for cell in range(2, n_cells + 2):
-        begin[cell] += begin[cell - 1]
+        count_thing(grid.cells, i, vec3(ways.reference, grid.entered[i]))
+    end_count(grid.cells)
     for i in range(grid.n_items):
-        at = begin[grid.cell[i] + 1]
-        begin[grid.cell[i] + 1] += 1
-        _write_rows(grid, at, grid.entered[i], ways, normal)
-
-
-@kernel
-def _lay_cells(grid: NodeGrid, box: Aabb, edge: float) -> None:
-    """Choose the cells."""
-    grid.per_metre = 1.0 / edge
-    grid.n_x = grid.n_y = grid.n_z = 1
-    if grid.n_items == 0:
-        return
-    store(grid.corner, 0, box.low)
-    for _ in range(100):
-        grid.n_x = grid.n_y = grid.n_z = _MOST_CELLS
-        x, y, z = _cell_of(grid, box.high)
-        if (x + 1) * (y + 1) * (z + 1) <= _MOST_CELLS:
-            grid.n_x, grid.n_y, grid.n_z = x + 1, y + 1, z + 1
-            return
-        grid.per_metre *= 0.8
-
-
-@inlined
-def _cell_of(grid: NodeGrid, p: Vec3) -> tuple[int, int, int]:
-    """Return the cell of a point, or that nearest to it."""
-    scale = grid.per_metre
-    x = int(2.0 * scale * (p.x - grid.corner[0, 0]))
-    y = int(scale * (p.y - grid.corner[0, 1]))
-    z = int(scale * (p.z - grid.corner[0, 2]))
-    return (
-        min(max(x, 0), grid.n_x - 1),
-        min(max(y, 0), grid.n_y - 1),
-        min(max(z, 0), grid.n_z - 1),
-    )
+        _write_rows(grid, take_place(grid.cells, i), grid.entered[i], ways, normal)
 
 
 @inlined
@@ -209,30 +153,15 @@ def find_near_face(grid: NodeGrid, face: Asking, node_size: float) -> int:
     """
     if grid.n_items == 0:
         return 0
-    wide = widened(face.box, grid.most + _ROUNDING)
-    x0, y0, z0 = _cell_of(grid, wide.low)
-    x1, y1, z1 = _cell_of(grid, wide.high)
-    n, n_x, n_y = 0, grid.n_x, grid.n_y
-    begin = grid.begin
-    for z in range(z0, z1 + 1):
-        for y in range(y0, y1 + 1):
-            row = (z * n_y + y) * n_x
-            i, end = begin[natural(row + x0)], begin[natural(row + x1 + 1)]
+    n, within = 0, cells_in(grid.cells, widened(face.box, grid.most))
+    for z in range(within.z0, within.z1 + 1):
+        for y in range(within.y0, within.y1 + 1):
+            i, end = row_of(grid.cells, within, y, z)
             while i < end:
                 bits = _in_box(grid, i, face.box, BALL * node_size)
-                n = _note_found(grid, i, end, bits & _at_face(grid, i, face, node_size), n)
+                bits &= _at_face(grid, i, face, node_size)
+                n = note_found(grid.found, grid.node, i, end, bits, n)
                 i += WIDTH
-    return n
-
-
-@inlined
-def _note_found(grid: NodeGrid, i: int, end: int, bits: int, n: int) -> int:
-    """Write the nodes of the bits that are before `end`; return how many there are then."""
-    bits &= (1 << min(end - i, WIDTH)) - 1
-    while bits != 0:
-        grid.found[natural(n)] = grid.node[natural(i + first_bit(bits))]
-        n += 1
-        bits &= bits - 1
     return n
 
 

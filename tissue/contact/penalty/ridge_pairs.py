@@ -11,11 +11,11 @@ import numpy as np
 from tissue.contact.distance import distance_of_edges
 from tissue.contact.edge_edge import SAME_SIDE, Edges, face_the_same_side
 from tissue.contact.faces import Faces
-from tissue.contact.penalty.block_tree import arrange, enter, find_near
 from tissue.contact.penalty.eight_contacts import FourPoints
 from tissue.contact.penalty.eight_edges import WIDER, squared_distances
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.node_ways import NodeWays
+from tissue.contact.penalty.ridge_grid import arrange_ridges, enter_ridge, find_near_ridges
 from tissue.contact.penalty.ridges import Ridges
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import inlined, kernel
@@ -125,7 +125,7 @@ def pair_ridges(
         if found.n_pairs + n > len(found.wake):
             return False
         for q in range(n):
-            _add_pair(found, ridges, edge, ridges.tree.found[q])
+            _add_pair(found, ridges, edge, ridges.grid.found[q])
     return True
 
 
@@ -151,9 +151,9 @@ def _list_ridges(ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces)
 
 @kernel
 def _enter_ridges(ridges: Ridges, ways: NodeWays, now: int) -> None:
-    """Put the ridges into the tree; those that are dirty with the balls as they are now."""
-    tree = ridges.tree
-    tree.n_items = 0
+    """Put the ridges into the grid; those that are dirty with the balls as they are now."""
+    grid = ridges.grid
+    grid.short.n_items = grid.long.n_items = 0
     for i in range(ridges.n_ridges):
         edge = ridges.listed[i]
         if ridges.dirty_at[edge] == now:
@@ -161,49 +161,48 @@ def _enter_ridges(ridges: Ridges, ways: NodeWays, now: int) -> None:
             reach = max(ways.radius[a], ways.radius[b]) + 0.5 * CONTACT_REACH * ways.node_size
             box = widened(segment_box(ways.reference, a, b), reach)
             store_box(ridges.low, ridges.high, edge, box)
-        box = box_at(ridges.low, ridges.high, edge)
-        enter(tree, edge, box, vec3(ridges.outward, edge))
-    arrange(tree, SAME_SIDE)
+        enter_ridge(grid, edge, box_at(ridges.low, ridges.high, edge), ways.node_size)
+    low, high = ridges.low, ridges.high
+    arrange_ridges(grid, low, high, ridges.outward, ridges.dirty_at, now, ways.node_size)
 
 
 @kernel
 def _find_crossing(
     ridges: Ridges, pairs: NearPairs, ways: NodeWays, faces: Faces, edge: int
 ) -> int:
-    """Write the ridges that a dirty one may cross to `tree.found`, in order; return how many.
+    """Write the ridges that a dirty one may cross to `grid.found`, in order; return how many.
 
     Of two that are dirty the first finds none: the second finds it.
     """
-    tree, outward = ridges.tree, vec3(ridges.outward, edge)
+    found, outward = ridges.grid.found, vec3(ridges.outward, edge)
     box = box_at(ridges.low, ridges.high, edge)
+    furthest = (1.0 + WIDER) * SAME_SIDE * norm(outward)
     n_near, n = 0, 0
-    for q in range(find_near(tree, box, outward, norm(outward))):
-        other = tree.found[q]
-        if other >= edge and ridges.dirty_at[other] == pairs.n_updates:
-            continue
-        tree.found[n_near] = other
+    for q in range(find_near_ridges(ridges.grid, edge, box, outward, furthest)):
+        other = found[q]
+        found[n_near] = other
         n_near += 1 if _may_pair(ridges, pairs, faces, edge, other) else 0
     for first in range(0, n_near, WIDTH):
         _note_others(ridges, ways, first, n_near)
         is_near, is_apart = _eight_near(ridges, ways, edge)
         for q in range(min(WIDTH, n_near - first)):
-            other = tree.found[first + q]
+            other = found[first + q]
             if is_apart >> q & 1 == 1:
                 continue
             if is_near >> q & 1 == 0 and not _are_near(ridges, ways, edge, other):
                 continue
             at = n
-            while at > 0 and tree.found[at - 1] > other:
-                tree.found[at] = tree.found[at - 1]
+            while at > 0 and found[at - 1] > other:
+                found[at] = found[at - 1]
                 at -= 1
-            tree.found[at] = other
+            found[at] = other
             n += 1
     return n
 
 
 @kernel
 def _note_others(ridges: Ridges, ways: NodeWays, first: int, n: int) -> None:
-    """Write what `_eight_near` reads of ridges `first` to `first + 7` of the `n` in `tree.found`.
+    """Write what `_eight_near` reads of ridges `first` to `first + 7` of the `n` in `grid.found`.
 
     Args:
         ridges: `eight` and `reach` are written.
@@ -212,7 +211,7 @@ def _note_others(ridges: Ridges, ways: NodeWays, first: int, n: int) -> None:
         n: How many there are; the last fills up the eight.
     """
     for q in range(WIDTH):
-        other = ridges.tree.found[min(first + q, n - 1)]
+        other = ridges.grid.found[min(first + q, n - 1)]
         ridges.eight[q] = other
         ridges.eight[WIDTH + q] = ridges.node[other, 0]
         ridges.eight[2 * WIDTH + q] = ridges.node[other, 1]

@@ -8,8 +8,8 @@ import numpy as np
 
 from tissue.contact.faces import NO_FACE, Faces
 from tissue.contact.feature_edges import face_across, is_ridge
-from tissue.contact.penalty.block_tree import BlockTree, new_block_tree
 from tissue.contact.penalty.near_pairs import NearPairs
+from tissue.contact.penalty.ridge_grid import RidgeGrid, new_ridge_grid
 from tissue.core.array_types import FloatArray, IntArray, SlotArray
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, aligned, room_for_points
@@ -55,7 +55,7 @@ class Ridges(Arrays):
     """Scratch: eight ridges, their first ends and their second ones; shape (24,)."""
     reach: FloatArray
     """Scratch: the radius of the larger ball of the ends of each [m], shape (8,)."""
-    tree: BlockTree
+    grid: RidgeGrid
     """The ridges by their boxes."""
 
 
@@ -75,7 +75,7 @@ def new_ridges(n_faces: int) -> Ridges:
         outward=room_for_points(n),
         eight=np.zeros(3 * WIDTH, np.int32),
         reach=aligned(WIDTH),
-        tree=new_block_tree(n),
+        grid=new_ridge_grid(n),
     )
 
 
