@@ -4,18 +4,32 @@ Until then it takes its steps. It is moved again from the time step in which a b
 support moves, a load acts or its mesh changes.
 """
 
+import math
+
 from tissue.blade.anchors import is_engaged
 from tissue.contact.penalty.contact_forces import add_contact_forces, end_contact_substep
+from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point_of, store_point
+from tissue.core.vec3 import dot, store, sub, vec3
 from tissue.elasticity.energy import kinetic_energy
 from tissue.elasticity.relaxed_stress import relaxes
 from tissue.integrators.step_context import StepContext
+from tissue.mesh.body import Body
 
-CALM_SPEED = 0.06
-"""Speed of the fastest node up to which a body is calm, in node sizes per second: 0.28 mm/s in the
-organ, whose nodes at rest tremble at up to 0.06 mm/s in single precision, and after many cuts at
-0.2 mm/s. Larger: a slow motion stops short of its end; smaller: a body never comes to rest."""
+CALM_SPEED = 0.01
+"""Speed up to which a body is calm, the root of the mean square of its nodes weighted with their
+masses, in node sizes per second: 47 um/s in the organ. Larger: a slow motion of the body stops
+short of its end. Smaller, or the speed of the fastest node instead: a sliver of some milligrams
+that swings by micrometres after many cuts keeps the body from rest for seconds."""
+
+CALM_FASTEST = 4.0
+"""Speed of the fastest node up to which a body is calm, in node sizes per second: 0.02 m/s in the
+organ. Larger: a sliver that snaps is stopped; smaller: as above."""
+
+CALM_WAY = 0.003
+"""How far a node may move while a body is calm, per node size: 14 um in the organ. Larger: what
+creeps stops short of its end; smaller: as above."""
 
 TIME_TO_REST = 0.25
 """How long a body is calm until it is at rest [s]. Shorter: a swing of some micrometres, which is
@@ -39,6 +53,32 @@ def may_rest(context: StepContext, drag: float) -> bool:
     if is_touched or is_drifting or context.supports.is_moving == 1:
         return False
     return drag > 0.0 and not relaxes(context.elastic.solid)
+
+
+@kernel
+def mean_speed(body: Body) -> float:
+    """Return the root of the mean square speed of the nodes, weighted with their masses [m/s]."""
+    total = 0.0
+    for i in range(body.n_nodes):
+        total += body.masses[i]
+    return math.sqrt(2.0 * kinetic_energy(body) / total)
+
+
+@kernel
+def keep_positions(body: Body, kept: FloatArray) -> None:
+    """Write where the nodes are to `kept` [m], shape (capacity, 3)."""
+    for i in range(body.n_nodes):
+        store(kept, i, vec3(body.positions, i))
+
+
+@kernel
+def have_stayed(body: Body, kept: FloatArray, way: float) -> bool:
+    """Return whether no node is farther than `way` [m] from where it was kept."""
+    furthest = 0.0
+    for i in range(body.n_nodes):
+        moved = sub(vec3(body.positions, i), vec3(kept, i))
+        furthest = max(furthest, dot(moved, moved))
+    return bool(furthest <= way * way)
 
 
 @kernel

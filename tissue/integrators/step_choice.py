@@ -21,7 +21,18 @@ from tissue.elasticity.neo_hookean import keeps_gradients
 from tissue.elasticity.stiffening import stiffens
 from tissue.elasticity.strained_frequency import StepLimit, strained_frequency
 from tissue.integrators.damping import FASTEST_DECAY, LONGEST_INTERVAL, SLOW_DAMPING
-from tissue.integrators.rest import CALM_SPEED, TIME_TO_REST, may_rest, rest, stop_nodes
+from tissue.integrators.rest import (
+    CALM_FASTEST,
+    CALM_SPEED,
+    CALM_WAY,
+    TIME_TO_REST,
+    have_stayed,
+    keep_positions,
+    may_rest,
+    mean_speed,
+    rest,
+    stop_nodes,
+)
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,
     DISPLACEMENTS_LAST,
@@ -103,7 +114,9 @@ class StepChoice(Arrays):
     moved: FloatCell
     """How far nodes have moved since, at most [m]."""
     calm: FloatCell
-    """How long no node has been faster than `CALM_SPEED`, and nothing touched the body [s]."""
+    """How long the body has been calm, and nothing has touched it [s]."""
+    calm_positions: FloatArray
+    """Where the nodes were when the body became calm [m], shape (n_nodes, 3)."""
     speed: FloatCell
     """Speed of the fastest node at the begin of the part [m/s]."""
     node_size: float
@@ -139,6 +152,7 @@ def new_step_choice(
         allowed=0.0,
         moved=math.inf,
         calm=0.0,
+        calm_positions=np.zeros((n_nodes, 3)),
         speed=0.0,
         node_size=node_size,
         surroundings=surroundings,
@@ -210,8 +224,18 @@ def _find_rest(choice: StepChoice, context: StepContext) -> None:
 @kernel
 def note_calm(choice: StepChoice, context: StepContext) -> None:
     """Note, after the steps of an increment, whether the body was calm; stop what comes to rest."""
-    is_calm = choice.speed <= CALM_SPEED * choice.node_size
-    choice.calm = choice.calm + choice.span if is_calm else 0.0
+    body, size = context.body, choice.node_size
+    is_free = may_rest(context, choice.surroundings.drag)
+    is_slow = is_free and choice.speed <= CALM_FASTEST * size
+    if not is_slow or mean_speed(body) > CALM_SPEED * size:
+        choice.calm = 0.0
+    elif choice.calm == 0.0:
+        keep_positions(body, choice.calm_positions)
+        choice.calm = choice.span
+    elif have_stayed(body, choice.calm_positions, CALM_WAY * size):
+        choice.calm += choice.span
+    else:
+        choice.calm = 0.0
     if choice.calm >= TIME_TO_REST:
         stop_nodes(context)
 
