@@ -42,7 +42,7 @@ from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
 
 HANDED_ON = -1.0
-"""Value of `PenaltyForces.push` where another contact of the next list has taken over the force."""
+"""Value of `PenaltyForces.push` where a contact of the next list goes on with the force."""
 
 
 class PenaltyForces(Arrays):
@@ -56,6 +56,9 @@ class PenaltyForces(Arrays):
     """First row of the list in use: 0, or the capacity."""
     n_contacts: IntCell
     """Number of contacts in the list in use."""
+    n_fading: IntCell
+    """Number of contacts at the end of that list that were given up while they pressed: their
+    forces fade."""
     n_pressing: IntCell
     """Number of contacts that pressed at the end of the last substep."""
     n_nodes: IntCell
@@ -120,6 +123,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
     return PenaltyForces(
         first=0,
         n_contacts=0,
+        n_fading=0,
         n_pressing=0,
         n_nodes=0,
         has_acted=0,
@@ -149,8 +153,8 @@ def grown_penalty_forces(forces: PenaltyForces, capacity: int) -> PenaltyForces:
     of_rows = ("node", "weight", "normal", "height", "stiffness", "offset", "largest_depth")
     for name in (*of_rows, "push", "anchor"):
         getattr(larger, name)[:n] = getattr(forces, name)[used]
-    cells = ("n_contacts", "n_pressing", "work", "stored", "pressure_impulse", "penetration")
-    for name in cells:
+    cells = ("n_contacts", "n_fading", "n_pressing", "work", "stored", "pressure_impulse")
+    for name in (*cells, "penetration"):
         setattr(larger, name, getattr(forces, name))
     larger.floor_impulse[:] = forces.floor_impulse
     return larger

@@ -146,9 +146,38 @@ def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> Non
         search.n_contacts[node] = n_own
         n += n_own
     n = _list_floor_contacts(search, forces, body, to, n)
-    forces.n_contacts = list_ridge_contacts(search, forces, body, to, n)
-    forces.first = to
+    n = list_ridge_contacts(search, forces, body, to, n)
     search.n_listings = now
+    _list_fading_contacts(search, forces, body, to, n)
+    forces.first = to
+
+
+@kernel
+def _list_fading_contacts(
+    search: SearchState, forces: PenaltyForces, body: Body, to: int, n: int
+) -> None:
+    """List, behind the `n` others, what pressed in the last list and is no longer found.
+
+    A node that has been pushed out on another side, or slid off a face, would snap back if the
+    force that holds it ended at once. Where there is no room the force does end.
+    """
+    first, end = forces.first, forces.first + forces.n_contacts
+    room, n_fading = len(forces.push) // 2 - n, 0
+    for c in range(first, end):
+        if c >= end - forces.n_fading:
+            _hand_to_node(search, forces, body, c)
+        if forces.push[c] > 0.0 and n_fading < room:
+            copy_contact(forces, c, to + n + n_fading)
+            n_fading += 1
+    forces.n_contacts, forces.n_fading = n + n_fading, n_fading
+
+
+@kernel
+def _hand_to_node(search: SearchState, forces: PenaltyForces, body: Body, c: int) -> None:
+    """Let a contact of its node that has just begun go on with the force of fading contact `c`."""
+    node = forces.node[c, 0]
+    if forces.weight[c, 0] == 1.0 and search.listed_at[node] == search.n_listings:
+        take_over(forces, body, (c, 1), (search.contact[node], search.n_contacts[node]))
 
 
 @kernel

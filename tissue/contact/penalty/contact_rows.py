@@ -1,7 +1,7 @@
 """Rows of the list of contacts: how one begins, is copied, or goes on with the force of another."""
 
 from tissue.contact.penalty.contact_forces import HANDED_ON, PenaltyForces, weighted_sum
-from tissue.core.jit import kernel
+from tissue.core.jit import inlined, kernel
 from tissue.core.vec3 import Vec3, axpy, dot, store, sub, vec3
 from tissue.mesh.body import Body
 
@@ -25,25 +25,55 @@ def begin_contact(forces: PenaltyForces, c: int, height: float) -> None:
 def take_over(
     forces: PenaltyForces, body: Body, before: tuple[int, int], now: tuple[int, int]
 ) -> None:
-    """Let the contacts of a node go on with the forces of those before, each by one heir at most.
+    """Let contacts of a node that have just begun go on with the forces of those before.
 
-    `before` and `now`: first contact, and how many.
+    Each takes over one force at most: that of its own face, else that of the nearest direction.
+
+    Args:
+        forces: Written.
+        body: Where the nodes are.
+        before: First contact of the node before, and how many.
+        now: First contact of the node now, and how many.
     """
-    for c in range(now[0], now[0] + now[1]):
-        normal, heir, most = vec3(forces.normal, c), -1, SAME_DIRECTION
-        for old in range(before[0], before[0] + before[1]):
-            cosine = dot(vec3(forces.normal, old), normal)
-            if cosine > most and forces.push[old] != HANDED_ON:
-                heir, most = old, cosine
-        if heir < 0:
-            continue
-        forces.push[c] = forces.push[heir]
-        forces.stiffness[c] = forces.stiffness[heir]
-        forces.offset[c] = forces.offset[heir]
-        forces.push[heir] = HANDED_ON
-        stretch = sub(_across(forces, body, heir), vec3(forces.anchor, heir))
-        stretch = axpy(-dot(stretch, normal), normal, stretch)
-        store(forces.anchor, c, sub(_across(forces, body, c), stretch))
+    for of_same_face in (True, False):
+        for c in range(now[0], now[0] + now[1]):
+            if forces.stiffness[c] > 0.0:
+                continue
+            normal, heir, most = vec3(forces.normal, c), -1, SAME_DIRECTION
+            for old in range(before[0], before[0] + before[1]):
+                cosine = dot(vec3(forces.normal, old), normal)
+                may_take = forces.push[old] != HANDED_ON and (
+                    not of_same_face or _are_of_same_nodes(forces, old, c)
+                )
+                if may_take and cosine > most:
+                    heir, most = old, cosine
+            if heir >= 0:
+                _take_over_from(forces, body, heir, c)
+
+
+@kernel
+def _take_over_from(forces: PenaltyForces, body: Body, old: int, c: int) -> None:
+    """Let contact `c` go on with the force of the contact `old`."""
+    forces.push[c] = forces.push[old]
+    forces.stiffness[c] = forces.stiffness[old]
+    forces.offset[c] = forces.offset[old]
+    forces.push[old] = HANDED_ON
+    normal = vec3(forces.normal, c)
+    stretch = sub(_across(forces, body, old), vec3(forces.anchor, old))
+    stretch = axpy(-dot(stretch, normal), normal, stretch)
+    store(forces.anchor, c, sub(_across(forces, body, c), stretch))
+
+
+@inlined
+def _are_of_same_nodes(forces: PenaltyForces, a: int, b: int) -> bool:
+    """Whether two contacts have the same nodes."""
+    node = forces.node
+    return bool(
+        node[a, 0] == node[b, 0]
+        and node[a, 1] == node[b, 1]
+        and node[a, 2] == node[b, 2]
+        and node[a, 3] == node[b, 3]
+    )
 
 
 @kernel
@@ -55,7 +85,7 @@ def _across(forces: PenaltyForces, body: Body, c: int) -> Vec3:
 
 @kernel
 def copy_contact(forces: PenaltyForces, c: int, to: int) -> None:
-    """Copy a contact to another row."""
+    """Copy a contact to a row of the next list, where it goes on."""
     for q in range(4):
         forces.node[to, q] = forces.node[c, q]
         forces.weight[to, q] = forces.weight[c, q]
@@ -66,3 +96,4 @@ def copy_contact(forces: PenaltyForces, c: int, to: int) -> None:
     forces.stiffness[to] = forces.stiffness[c]
     forces.offset[to] = forces.offset[c]
     forces.push[to] = forces.push[c]
+    forces.push[c] = HANDED_ON

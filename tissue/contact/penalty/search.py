@@ -16,7 +16,7 @@ from tissue.contact.penalty.pair_update import SKIN_WAY, take_faces, update_pair
 from tissue.contact.penalty.ridge_contacts import find_touching_ridges
 from tissue.contact.penalty.ridge_pairs import pair_ridges
 from tissue.contact.penalty.search_state import SearchState
-from tissue.contact.penalty.stiffness import limit_stiffness, recover, split_masses
+from tissue.contact.penalty.stiffness import fade, limit_stiffness, recover, split_masses
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.mesh.body import Body
@@ -60,7 +60,7 @@ def search_contacts(
     if search.stage == BEGIN:
         where = measure_ways(ways, body, pairs.nodes, pairs.n_nodes)
         if where == LOST:
-            forces.n_contacts = 0
+            forces.n_contacts = forces.n_fading = 0
             search.n_listings += 1
             search.is_pairing_due = 1
             return DONE
@@ -89,6 +89,8 @@ def search_contacts(
         search.is_listing_due = 0
     look_for_lost_nodes(search, body)
     recover(forces, search.limits, body, search.recovered, seconds)
+    if fade(forces, search.limits, body, seconds):
+        search.is_listing_due = 1
     note_places(ways, body)
     search.stage = BEGIN
     return DONE

@@ -191,7 +191,7 @@ def recover(
         seconds: Length of the time step [s].
     """
     back = limits.recovery * seconds
-    for c in range(forces.first, forces.first + forces.n_contacts):
+    for c in range(forces.first, forces.first + forces.n_contacts - forces.n_fading):
         most = forces.largest_depth[c]
         if forces.push[c] >= (1.0 - _ROUNDING) * forces.stiffness[c] * most:
             forces.largest_depth[c] = min(_GROWTH * most, limits.largest_depth)
@@ -209,3 +209,28 @@ def recover(
             way = min(back, limits.most_recovery - recovered[node])
             recovered[node] += min(way, -offset)
             forces.offset[c] = min(offset + way, 0.0)
+
+
+@kernel
+def fade(forces: PenaltyForces, limits: Limits, body: Body, seconds: float) -> bool:
+    """Let the forces of contacts that were given up fade, as slowly as overlaps come out.
+
+    They press with less from time step to time step, whichever way their nodes move.
+
+    Args:
+        forces: Offsets and greatest depths are written.
+        limits: How fast.
+        body: Where the nodes are.
+        seconds: Length of the time step [s].
+
+    Returns:
+        Whether any has ended, and is to be listed no more.
+    """
+    end, has_ended = forces.first + forces.n_contacts, False
+    for c in range(end - forces.n_fading, end):
+        along = dot(vec3(forces.normal, c), weighted_sum(forces, c, body.positions))
+        depth = forces.push[c] / forces.stiffness[c] - limits.recovery * seconds
+        has_ended = has_ended or depth <= 0.0
+        forces.largest_depth[c] = max(depth, 0.0)
+        forces.offset[c] = along - forces.height[c] + depth
+    return has_ended

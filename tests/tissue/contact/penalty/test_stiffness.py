@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from tests.tissue.contact.penalty.lists import ADDED, NODE_SIZE, random_contacts, stiffened
 from tissue.contact.penalty.contact_forces import end_contact_substep
 from tissue.contact.penalty.stiffness import (
+    fade,
     limit_stiffness,
     new_limits,
     recover,
@@ -74,6 +75,27 @@ def test_an_overlap_comes_out_by_half_a_node_size_at_most_between_two_incisions(
     forces.push[0] = 1.0
     recover(forces, limits, body, recovered, 1e-3)
     assert forces.offset[0] > -0.5 * NODE_SIZE
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_was_given_up_presses_less_whichever_way_its_nodes_move_and_ends(seed):
+    body, forces, _ = stiffened(seed)
+    limits, scratch = new_limits(NODE_SIZE, ADDED), np.zeros_like(body.positions)
+    random = np.random.default_rng(seed)
+    forces.offset[:20] = 1e-3
+    forces.n_fading = 20
+    end_contact_substep(forces, body.positions, body.velocities, scratch)
+    before = forces.push[:20] / forces.stiffness[:20]
+    most, n = before.copy(), 0
+    assert before.max() > 5e-5
+    while not fade(forces, limits, body, 1e-3) or forces.push[:20].any():
+        body.positions += 1e-5 * random.normal(size=body.positions.shape)
+        end_contact_substep(forces, body.positions, body.velocities, scratch)
+        depth = forces.push[:20] / forces.stiffness[:20]
+        most, n = np.maximum(most - 1e-3 * NODE_SIZE, 0.0), n + 1
+        assert (depth <= most + 1e-12).all()
+        most = np.minimum(most, depth)
+    assert n <= np.ceil(before.max() / (1e-3 * NODE_SIZE)) + 1
 
 
 @pytest.mark.parametrize(("room", "share"), [(10.0, 1.0), (0.5, 0.5), (0.1, 1.0)])
