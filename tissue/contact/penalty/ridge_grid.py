@@ -124,23 +124,21 @@ def arrange_ridges(
             other.
         node_size: Mean node size [m].
     """
-    _lay_boxes(grid.short, low, high, _CELL * node_size)
-    _lay_boxes(grid.long, low, high, _LONG_CELL * node_size)
-    for i in range(grid.short.n_items):
-        ridge = grid.short.entered[i]
-        number = ridge if asked_at[ridge] == now else -1
-        box = box_at(low, high, ridge)
-        _write_rows(grid.short, i, box, vec3(outward, ridge), number)
-    for i in range(grid.long.n_items):
-        ridge = grid.long.entered[i]
-        number = ridge if asked_at[ridge] == now else -1
-        box = box_at(low, high, ridge)
-        _write_rows(grid.long, i, box, vec3(outward, ridge), number)
+    _arrange_boxes(grid.short, low, high, outward, asked_at, now, _CELL * node_size)
+    _arrange_boxes(grid.long, low, high, outward, asked_at, now, _LONG_CELL * node_size)
 
 
 @kernel
-def _lay_boxes(boxes: RidgeBoxes, low: FloatArray, high: FloatArray, edge: float) -> None:
-    """Choose the cells, of that edge [m] if there are not too many, and count what is in each."""
+def _arrange_boxes(
+    boxes: RidgeBoxes,
+    low: FloatArray,
+    high: FloatArray,
+    outward: FloatArray,
+    asked_at: IntArray,
+    now: int,
+    edge: float,
+) -> None:
+    """Put boxes into cells of that edge [m], if there are not too many; see `arrange_ridges`."""
     bounds, half = empty_box(), Vec3(0.0, 0.0, 0.0)
     for i in range(boxes.n_items):
         box = box_at(low, high, boxes.entered[i])
@@ -152,6 +150,10 @@ def _lay_boxes(boxes: RidgeBoxes, low: FloatArray, high: FloatArray, edge: float
     for i in range(boxes.n_items):
         count_thing(boxes.cells, i, _middle(box_at(low, high, boxes.entered[i])))
     end_count(boxes.cells)
+    for i in range(boxes.n_items):
+        ridge = boxes.entered[i]
+        number = ridge if asked_at[ridge] == now else -1
+        _write_rows(boxes, i, box_at(low, high, ridge), vec3(outward, ridge), number)
 
 
 @inlined
