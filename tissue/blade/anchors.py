@@ -9,6 +9,7 @@ the cut, and the work of slipping is the toughness times the area, exactly.
 
 import numpy as np
 
+from tissue.blade.coarse_hold import CoarseHold, new_coarse_hold, weights_of
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement, sample_point
 from tissue.blade.toughness import ToughnessLaw, toughness_at
 from tissue.blade.walls import Walls, new_walls
@@ -16,7 +17,7 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.structs import Arrays
 from tissue.core.vec3 import Vec3, axpy, dot, norm, scale, sub
-from tissue.geometry.tetrahedron import Weights, interpolate
+from tissue.geometry.tetrahedron import interpolate
 from tissue.material import Material
 from tissue.mesh.body import Body
 
@@ -51,6 +52,10 @@ class Anchors(Arrays):
     """The anchor's material point: its position in the body at rest [m], shape (n, 3)."""
     weights: FloatArray
     """Barycentric weights of the material point in its tetrahedron, shape (n, 4)."""
+    nodes: IntArray
+    """Nodes of the tetrahedron when the anchor was set in it, shape (n, 4)."""
+    coarse: CoarseHold
+    """What still holds the anchors of the mesh before it was refined."""
     slipped: BoolArray
     """Whether the anchor has cut since it was set, shape (n,)."""
     at_skin: BoolArray
@@ -103,6 +108,8 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         tetrahedron=np.zeros(n, dtype=np.int64),
         rest=np.zeros((n, 3)),
         weights=np.zeros((n, 4)),
+        nodes=np.zeros((n, 4), dtype=np.int64),
+        coarse=new_coarse_hold(n),
         slipped=np.zeros(n, dtype=np.bool_),
         at_skin=np.zeros(n, dtype=np.bool_),
         is_new=np.zeros(n, dtype=np.bool_),
@@ -128,10 +135,37 @@ def measure_speeds(anchors: Anchors, edge: Edge, dt: float) -> None:
 @kernel
 def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int) -> Vec3:
     """Return the material point of anchor `k` in the deformed body, nodes at `positions` [m]."""
-    w = Weights(
-        anchors.weights[k, 0], anchors.weights[k, 1], anchors.weights[k, 2], anchors.weights[k, 3]
-    )
-    return interpolate(w, positions, body.tetrahedra, anchors.tetrahedron[k])
+    w = weights_of(anchors.weights, k)
+    p = interpolate(w, positions, body.tetrahedra, anchors.tetrahedron[k])
+    coarse = anchors.coarse
+    share = coarse.share[k]
+    if share == 0.0:
+        return p
+    q = interpolate(weights_of(coarse.weights, k), positions, coarse.nodes, k)
+    return axpy(share, sub(q, p), p)
+
+
+@inlined
+def n_held(anchors: Anchors, k: int) -> int:
+    """Return the number of nodes that hold anchor `k`: 4, or 8 where the mesh was just refined."""
+    return 4 if anchors.coarse.share[k] == 0.0 else 8
+
+
+@inlined
+def held_node(anchors: Anchors, body: Body, k: int, i: int) -> int:
+    """Return node `i` of those that hold anchor `k`."""
+    if i < 4:
+        return body.tetrahedra[anchors.tetrahedron[k], i]  # type: ignore[no-any-return]
+    return anchors.coarse.nodes[k, i - 4]  # type: ignore[no-any-return]
+
+
+@inlined
+def held_weight(anchors: Anchors, k: int, i: int) -> float:
+    """Return the weight of node `i` of those that hold anchor `k`."""
+    share: float = anchors.coarse.share[k]
+    if i < 4:
+        return (1.0 - share) * anchors.weights[k, i]  # type: ignore[no-any-return]
+    return share * anchors.coarse.weights[k, i - 4]  # type: ignore[no-any-return]
 
 
 @kernel
@@ -215,11 +249,11 @@ def clear_anchor_forces(anchors: Anchors, body: Body, external: FloatArray) -> N
     before = -1
     for k in range(len(anchors.state)):
         t = anchors.tetrahedron[k]
-        if anchors.state[k] != ANCHORED or t == before:
+        if anchors.state[k] != ANCHORED or (t == before and anchors.coarse.share[k] == 0.0):
             continue
         before = t
-        for q in range(4):
-            node = body.tetrahedra[t, q]
+        for i in range(n_held(anchors, k)):
+            node = held_node(anchors, body, k, i)
             external[node, 0] = external[node, 1] = external[node, 2] = 0.0
 
 
@@ -227,13 +261,17 @@ def clear_anchor_forces(anchors: Anchors, body: Body, external: FloatArray) -> N
 def add_anchor_stiffness(anchors: Anchors, body: Body, stiffness: FloatArray) -> None:
     """Add the anchors' rows to `stiffness` [N/m], shape (capacity, 3), of which x is used.
 
-    Gershgorin's bound: anchor K adds K w_q (w_a + w_b + w_c + w_d) = K w_q to the row of node q.
+    Gershgorin's bound: anchor K adds K |w_i| sum |w| to the row of node i.
     """
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
-            for q in range(4):
-                node = body.tetrahedra[anchors.tetrahedron[k], q]
-                stiffness[node, 0] += anchors.stiffness[k] * abs(anchors.weights[k, q])
+            total = 0.0
+            for i in range(n_held(anchors, k)):
+                total += abs(held_weight(anchors, k, i))
+            for i in range(n_held(anchors, k)):
+                node = held_node(anchors, body, k, i)
+                row = anchors.stiffness[k] * abs(held_weight(anchors, k, i)) * total
+                stiffness[node, 0] += row
 
 
 @kernel
@@ -247,8 +285,8 @@ def highest_anchor_frequency(
     worst = 0.0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
-            for q in range(4):
-                node = body.tetrahedra[anchors.tetrahedron[k], q]
+            for i in range(n_held(anchors, k)):
+                node = held_node(anchors, body, k, i)
                 if not body.fixed[node]:
                     own = frequency_squared[node] + stiffness[node, 0] / body.masses[node]
                     worst = max(worst, own)

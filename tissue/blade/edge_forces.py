@@ -1,6 +1,13 @@
 """Forces of the cutting edge on the nodes."""
 
-from tissue.blade.anchors import ANCHORED, anchor_position, surplus_stretch
+from tissue.blade.anchors import (
+    ANCHORED,
+    anchor_position,
+    held_node,
+    held_weight,
+    n_held,
+    surplus_stretch,
+)
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladeMotion, displacement_of, sample_point
 from tissue.blade.impulse_totals import add_reaction, add_to_node, running_totals, store_totals
@@ -46,9 +53,9 @@ def apply_edge_forces(
             continue  # backed off: an edge pushes, and does not pull
         surplus = surplus_stretch(anchors, k, stretch, pose, blade.toughness)
         force = scale(anchors.stiffness[k], sub(stretch, surplus))
-        for q in range(4):
-            node = body.tetrahedra[anchors.tetrahedron[k], q]
-            running = add_to_node(external, running, node, anchors.weights[k, q], force, seconds)
+        for i in range(n_held(anchors, k)):
+            node, weight = held_node(anchors, body, k, i), held_weight(anchors, k, i)
+            running = add_to_node(external, running, node, weight, force, seconds)
         # The surplus is about to slip and bears no force: without it the force points from the
         # anchor to the blade, so that the torques on the two cancel as well.
         at = sub(b, surplus)

@@ -230,6 +230,7 @@ def _enter(
 @kernel
 def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin: bool) -> None:
     """Anchor sample `k`, which has not cut yet, at rest point `p` [m] of tetrahedron `t`."""
+    anchors.coarse.share[k] = 0.0
     set_anchor(anchors, body, k, t, p)
     anchors.slipped[k] = False
     anchors.is_new[k] = True

@@ -17,6 +17,12 @@ from tissue.blade.anchors import (
     surplus_stretch,
 )
 from tissue.blade.blade_state import SEARCH, BladeState
+from tissue.blade.coarse_hold import (
+    begin_coarse_hold,
+    fade_coarse_hold,
+    move_coarse_hold,
+    store_weights,
+)
 from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.material_frame import to_material
 from tissue.core.array_types import IntArray
@@ -29,7 +35,16 @@ from tissue.geometry.tetrahedron import (
     interpolate,
     smallest_weight,
 )
-from tissue.mesh.body import INSIDE_TOLERANCE, OUTER, Body, behind, is_open, n_behind, walk
+from tissue.mesh.body import (
+    INSIDE_TOLERANCE,
+    OUTER,
+    Body,
+    behind,
+    is_open,
+    local_index,
+    n_behind,
+    walk,
+)
 from tissue.mesh.star import Visits
 
 
@@ -112,11 +127,12 @@ def _hold(anchors: Anchors, body: Body, k: int, t: int, weights: Weights) -> Non
     """Anchor sample `k` at the point of these weights in tetrahedron `t`, or one nearby in it."""
     w = clipped(weights)
     anchors.tetrahedron[k] = t
-    anchors.weights[k, 0] = w.a
-    anchors.weights[k, 1] = w.b
-    anchors.weights[k, 2] = w.c
-    anchors.weights[k, 3] = w.d
-    store(anchors.rest, k, interpolate(w, body.rest, body.tetrahedra, t))
+    for q in range(4):
+        anchors.nodes[k, q] = body.tetrahedra[t, q]
+    store_weights(anchors.weights, k, w)
+    p = interpolate(w, body.rest, body.tetrahedra, t)
+    store(anchors.rest, k, p)
+    move_coarse_hold(anchors.coarse, body, k, p)
     anchors.state[k] = ANCHORED
 
 
@@ -129,8 +145,19 @@ def relocate(blade: BladeState, body: Body, visits: Visits) -> None:
             state = anchors.state[k]
             p = vec3(anchors.rest, k)
             location = locate(body, visits, p, anchors.tetrahedron[k], blade.queue)
+            if not _has_nodes(body, location.tetrahedron, anchors.nodes, k):
+                begin_coarse_hold(anchors.coarse, k, anchors.nodes, anchors.weights)
             set_anchor(anchors, body, k, location.tetrahedron, p)
             anchors.state[k] = state
+
+
+@kernel
+def _has_nodes(body: Body, t: int, nodes: IntArray, k: int) -> bool:
+    """Return whether the nodes of tetrahedron `t` are those of row `k`."""
+    n = 0
+    for q in range(4):
+        n += local_index(body, t, nodes[k, q]) >= 0
+    return n == 4
 
 
 @kernel
@@ -208,6 +235,10 @@ def _slip_anchor(
     left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
     totals.work_of_cutting += cost
     totals.work_of_breaking += before - left - cost
+    if anchors.coarse.share[k] > 0.0:
+        fade_coarse_hold(anchors.coarse, k)
+        at = anchor_position(anchors, body, body.positions, k)
+        totals.released += left - stored_energy(anchors, k, sub(add(a, stretch), at), pose, law)
 
 
 @kernel
