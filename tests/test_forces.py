@@ -111,7 +111,8 @@ class Run:
     ids=["as is", "finer", "faster", "shorter steps"],
 )
 def test_the_steady_force_is_toughness_times_depth(variation):
-    run = Run(**{"poses": upright()} | variation)
+    """In tissue that hardly dents: where a dent is made good, more is cut than the edge travels."""
+    run = Run(**{"poses": upright(), "young_modulus": 30e3} | variation)
     assert run.steady() == pytest.approx(TOUGHNESS * run.anchored(), rel=0.02)
 
 
@@ -124,9 +125,11 @@ LIVER = {"young_modulus": 4.74e3, "toughness": 164.0, "poisson_ratio": 0.45}
 
 @pytest.mark.parametrize("stiffening", [15.0, 20.0])
 def test_liver_as_published_is_cut_where_it_stiffens(stiffening):
-    run = Run(upright(), law="exponential", stiffening=stiffening, **LIVER)
-    assert run.steady() == pytest.approx(164.0 * run.anchored(), rel=0.05)
-    assert run.results[-1].cut_area > 0.0
+    """Ahead of the edge it is squeezed, and swells sideways: what counts is the area at rest."""
+    run = Run(upright(end=0.07), law="exponential", stiffening=stiffening, **LIVER)
+    area = SIZE[1] * SIZE[2]
+    assert run.results[-1].cut_area == pytest.approx(area, rel=0.01)
+    assert run.energies.cutting == pytest.approx(164.0 * area, rel=0.05)
 
 
 @pytest.mark.parametrize("law", ["neo_hookean", "exponential"])
@@ -275,7 +278,7 @@ def test_an_audit_on_two_threads_is_that_on_one():
 
 
 def test_cutting_takes_toughness_times_the_area_swept():
-    run = Run(upright(end=0.055))
+    run = Run(upright(end=0.055), young_modulus=30e3)
     area = 0.04 * 0.02
     assert run.energies.cutting / TOUGHNESS == pytest.approx(area, rel=0.02)
     assert run.results[-1].cut_area == pytest.approx(area, rel=0.1)

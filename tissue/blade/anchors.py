@@ -4,7 +4,7 @@ The cutting edge is sampled at points b_k, each for a length l_k of edge. A samp
 anchored at a material point a_k, and a spring K (b_k - a_k) pulls the two together: the tissue
 dents first. Where the pull exceeds toughness times length, the anchor slips forward through the
 material until it does not (`tissue.blade.return_mapping`). The path of the anchors is the path of
-the cut, and the work of slipping is the toughness times the area, exactly.
+the cut, and the work of slipping is the toughness times the area at rest.
 """
 
 import numpy as np
@@ -66,10 +66,13 @@ class Anchors(Arrays):
     """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
     toughness. With the speed of the anchor itself, from one short step to the next, the anchor
     would stick and slip by turns."""
+    rest_share: FloatArray
+    """Area at rest over area as it is, of what the anchor cuts next; shape (n,). Toughness is an
+    energy per area at rest (Rivlin and Thomas 1953), and tissue ahead of an edge is squeezed."""
     slips: BoolArray
     """Whether the anchor slipped when slip was applied last, shape (n,)."""
     cut: FloatArray
-    """Area that the anchor has cut in this step [m2], shape (n,)."""
+    """Area at rest that the anchor has cut in this step [m2], shape (n,)."""
     length: FloatArray
     """Length of edge that the sample stands for [m], shape (n,)."""
     stiffness: FloatArray
@@ -114,6 +117,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         at_skin=np.zeros(n, dtype=np.bool_),
         is_new=np.zeros(n, dtype=np.bool_),
         speed=np.zeros(n),
+        rest_share=np.ones(n),
         slips=np.zeros(n, dtype=np.bool_),
         cut=np.zeros(n),
         length=length,
@@ -170,10 +174,11 @@ def held_weight(anchors: Anchors, k: int, i: int) -> float:
 
 @kernel
 def held_toughness(anchors: Anchors, k: int, law: ToughnessLaw) -> float:
-    """Return the energy per area at which anchor `k` slips [J/m2]."""
+    """Return the energy per area as it is now at which anchor `k` slips [J/m2]."""
+    share: float = anchors.rest_share[k]
     if anchors.at_skin[k]:
-        return law.skin_toughness
-    return toughness_at(law, anchors.speed[k])
+        return share * law.skin_toughness
+    return share * toughness_at(law, anchors.speed[k])
 
 
 @kernel

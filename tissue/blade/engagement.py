@@ -130,6 +130,7 @@ def anchor_beside(
                 continue
             _begin_anchor(anchors, body, k, t, p, False)
             join_wall(anchors.walls, k, beside)
+            anchors.rest_share[k] = anchors.rest_share[beside]
             blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
@@ -234,6 +235,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     set_anchor(anchors, body, k, t, p)
     anchors.slipped[k] = False
     anchors.is_new[k] = True
+    anchors.rest_share[k] = 1.0
     anchors.at_skin[k] = at_skin
 
 

@@ -25,6 +25,7 @@ from tissue.blade.coarse_hold import (
 )
 from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.material_frame import to_material
+from tissue.blade.rest_area import update_rest_share
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
@@ -216,6 +217,7 @@ def _slip_anchor(
     if surplus == 0.0:
         return
     before = energy_of_spring(anchors.stiffness[k], stretch, beyond)
+    share, rest = anchors.rest_share[k], vec3(anchors.rest, k)
     spent = held_toughness(anchors, k, law) * across * surplus
     slip = surplus
     if anchors.at_skin[k]:
@@ -223,7 +225,7 @@ def _slip_anchor(
         slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
     _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
     if anchors.state[k] == LEFT:
-        anchors.cut[k] += surplus * across
+        anchors.cut[k] += share * surplus * across
         totals.work_of_cutting += spent
         totals.released += before - spent
         return
@@ -231,14 +233,16 @@ def _slip_anchor(
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area
-    anchors.cut[k] += area
+    anchors.cut[k] += share * area
     left = stored_energy(anchors, k, sub(stretch, slipped), pose, law)
     totals.work_of_cutting += cost
     totals.work_of_breaking += before - left - cost
     if anchors.coarse.share[k] > 0.0:
         fade_coarse_hold(anchors.coarse, k)
-        at = anchor_position(anchors, body, body.positions, k)
-        totals.released += left - stored_energy(anchors, k, sub(add(a, stretch), at), pose, law)
+    way = sub(vec3(anchors.rest, k), rest)
+    update_rest_share(anchors, k, way, slipped, pose, blade.reach)
+    at = anchor_position(anchors, body, body.positions, k)
+    totals.released += left - stored_energy(anchors, k, sub(add(a, stretch), at), pose, law)
 
 
 @kernel

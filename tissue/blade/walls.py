@@ -32,7 +32,7 @@ def new_walls(n: int) -> Walls:
     """Return the walls of `n` samples that hold nothing."""
     return Walls(
         first=np.full(n, -1, np.int64),
-        rotation=np.zeros((n, 9)),
+        rotation=np.tile(np.eye(3).ravel(), (n, 1)),
         has_begun=np.zeros(n, np.bool_),
         has_left=np.zeros(n, np.bool_),
     )
