@@ -1,10 +1,13 @@
 """Slicing against pressing: an edge that is drawn along itself needs less normal force."""
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from scalpel_sim.validate.block import (
+    CUT_X,
     THICKNESS,
-    StrokeRecord,
     block_tissue,
     run_stroke,
     soft_material,
@@ -15,6 +18,7 @@ from scalpel_sim.validate.findings import (
     Check,
     Curve,
     Findings,
+    KnownDeviation,
     Plot,
     Reference,
     ValidationScene,
@@ -28,8 +32,16 @@ _STIFFNESS = 30e3
 """Young's modulus [Pa]."""
 _HELD = "left,right,bottom"
 """Sides that are held: the bottom too, so that the block is not drawn down with the edge."""
-_NEAR = 0.10
+_PLACES = (CUT_X, 0.0187, 0.0225)
+"""Positions of the cuts across the block [m]: three places across an element."""
+_NEAR = 0.05
 """Largest relative error of either force."""
+_CHATTERS = KnownDeviation(
+    1.166,
+    "above a ratio of 1 the force along the edge falls as the edge slides faster, so that slow "
+    "slicing of tissue with little damping chatters, here at 75 Hz: the mean normal force is then "
+    "above that of a steady motion",
+)
 _SLOW, SLICING_SPEED = 0.02, 0.05
 """Speeds across the edge [m/s]."""
 
@@ -39,64 +51,77 @@ def _normal_force(toughness: float, ratio: float) -> float:
     return toughness * THICKNESS / (1.0 + ratio**2)
 
 
-def cut_by_slicing(ratio: float, speed: float) -> StrokeRecord:
+class SlicingForces(NamedTuple):
+    """Mean forces of a steady slicing cut."""
+
+    across: float
+    """Force against the motion across the edge [N]."""
+    along: float
+    """Force along the edge [N]."""
+
+
+def cut_by_slicing(ratio: float, speed: float, x: float = CUT_X) -> SlicingForces:
     """Cut through the block with an edge that is drawn down.
 
     Args:
         ratio: Speed along the edge over the speed across it.
         speed: Speed across the edge [m/s].
+        x: Position of the cut across the block [m].
     """
     material = soft_material(young_modulus=_STIFFNESS, toughness=SLICING_TOUGHNESS)
-    return run_stroke(block_tissue(material, held=_HELD), straight_cut(speed, ratio=ratio))
+    poses = straight_cut(speed, ratio=ratio, x=x)
+    record = run_stroke(block_tissue(material, held=_HELD), poses)
+    across, along = (record.steady_rows(f).mean() for f in (record.resistance, record.force[:, 2]))
+    return SlicingForces(float(across), float(along))
 
 
 def check_slicing(
-    ratio: float, speed: float, record: StrokeRecord, toughness: float
+    ratio: float,
+    speed: float,
+    measured: Sequence[SlicingForces],
+    toughness: float,
+    known: KnownDeviation | None = None,
 ) -> list[Check]:
-    """Return the checks of a slicing cut.
+    """Return the checks of the worst of several slicing cuts.
 
     Args:
         ratio: Speed along the edge over the speed across it.
         speed: Speed across the edge [m/s].
-        record: The cut.
+        measured: The cuts.
         toughness: Toughness of the block [J/m2].
+        known: Known deviation of the normal force.
     """
     theory = _normal_force(toughness, ratio)
-    across = float(record.steady_rows(record.resistance).mean())
-    along = float(record.steady_rows(record.force[:, 2]).mean())
     name = f"ratio {ratio:g}, {speed * 1e3:g} mm/s"
-    checks = [
-        Check(
-            f"{name}: normal force over theory", across / theory, *within(_NEAR), basis=REGRESSION
-        )
-    ]
+    across = _worst([each.across / theory for each in measured])
+    normal = f"{name}: normal force over theory"
+    checks = [Check(normal, across, *within(_NEAR), basis=REGRESSION, known=known)]
     if ratio > 0.0:
-        share = along / (ratio * theory)
-        checks.append(
-            Check(
-                f"{name}: force along the edge over theory", share, *within(_NEAR), basis=REGRESSION
-            )
-        )
+        along = _worst([each.along / (ratio * theory) for each in measured])
+        tangential = f"{name}: force along the edge over theory"
+        checks.append(Check(tangential, along, *within(_NEAR), basis=REGRESSION))
     return checks
+
+
+def _worst(shares: Sequence[float]) -> float:
+    """Return the share that is furthest from 1."""
+    return max(shares, key=lambda share: abs(share - 1.0))
 
 
 def _measure(quick: bool) -> Findings:
     """Cut with ratios of 0, 0.5, 1 and 2 of the speed along the edge to that across it."""
     ratios = (0.0, 1.0) if quick else (0.0, 0.5, 1.0, 2.0)
+    places = _PLACES[:1] if quick else _PLACES
     checks: list[Check] = []
-    measured = []
+    at_first = []
     for ratio in ratios:
-        record = cut_by_slicing(ratio, SLICING_SPEED)
-        checks += check_slicing(ratio, SLICING_SPEED, record, SLICING_TOUGHNESS)
-        measured.append(
-            (
-                record.steady_rows(record.resistance).mean(),
-                record.steady_rows(record.force[:, 2]).mean(),
-            )
-        )
+        measured = [cut_by_slicing(ratio, SLICING_SPEED, x) for x in places]
+        checks += check_slicing(ratio, SLICING_SPEED, measured, SLICING_TOUGHNESS)
+        at_first.append(measured[0])
     if not quick:
-        checks += check_slicing(2.0, _SLOW, cut_by_slicing(2.0, _SLOW), SLICING_TOUGHNESS)
-    return Findings(checks, [_plot(np.array(ratios), np.array(measured))])
+        slow = [cut_by_slicing(2.0, _SLOW)]
+        checks += check_slicing(2.0, _SLOW, slow, SLICING_TOUGHNESS, _CHATTERS)
+    return Findings(checks, [_plot(np.array(ratios), np.array(at_first))])
 
 
 def _plot(ratios: FloatArray, measured: FloatArray) -> Plot:
