@@ -69,6 +69,8 @@ class Anchors(Arrays):
     rest_share: FloatArray
     """Area at rest over area as it is, of what the anchor cuts next; shape (n,). Toughness is an
     energy per area at rest (Rivlin and Thomas 1953), and tissue ahead of an edge is squeezed."""
+    rest_area: FloatArray
+    """`rest_share` along the normal of that area at rest, shape (n, 3); 0 before the first slip."""
     slips: BoolArray
     """Whether the anchor slipped when slip was applied last, shape (n,)."""
     cut: FloatArray
@@ -118,6 +120,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         is_new=np.zeros(n, dtype=np.bool_),
         speed=np.zeros(n),
         rest_share=np.ones(n),
+        rest_area=np.zeros((n, 3)),
         slips=np.zeros(n, dtype=np.bool_),
         cut=np.zeros(n),
         length=length,

@@ -19,7 +19,7 @@ from tissue.blade.material_frame import find_walls, rest_offset, to_material
 from tissue.blade.return_mapping import locate, set_anchor
 from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, sub, vec3
+from tissue.core.vec3 import Vec3, add, cross, dot, norm, scale, store, sub, vec3
 from tissue.cutting.blade_path import Path, nearest_on_edge
 from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.geometry.tetrahedron import (
@@ -131,6 +131,7 @@ def anchor_beside(
             _begin_anchor(anchors, body, k, t, p, False)
             join_wall(anchors.walls, k, beside)
             anchors.rest_share[k] = anchors.rest_share[beside]
+            store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
             blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
@@ -236,6 +237,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     anchors.slipped[k] = False
     anchors.is_new[k] = True
     anchors.rest_share[k] = 1.0
+    store(anchors.rest_area, k, Vec3(0.0, 0.0, 0.0))
     anchors.at_skin[k] = at_skin
 
 

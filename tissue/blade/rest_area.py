@@ -7,10 +7,8 @@ ahead of an edge is squeezed, so that more of it is cut than is swept.
 from tissue.blade.anchors import ANCHORED, Anchors
 from tissue.blade.edge import BladePose, sample_point
 from tissue.blade.material_frame import MOST_STRAIN
-from tissue.blade.walls import rotation_of_wall
 from tissue.core.jit import kernel
-from tissue.core.vec3 import Vec3, cross, dot, norm, sub, vec3
-from tissue.geometry.polar_decomposition import apply_transposed
+from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, store, sub, vec3
 
 AVERAGED_OVER = 2.0
 """Distance over which the share is averaged, per `BladeState.reach`: strain jumps from tetrahedron
@@ -47,9 +45,16 @@ def update_rest_share(
         return
     spacing = norm(sub(sample_point(pose, high, n), sample_point(pose, low, n)))
     beside = sub(vec3(anchors.rest, high), vec3(anchors.rest, low))
-    # The surface that opens is smooth: where an anchor is dragged sideways, it is no larger.
-    sideways = apply_transposed(rotation_of_wall(anchors.walls, k), pose.normal)
-    share = abs(dot(cross(way, beside), sideways)) / (swept * spacing)
-    share = min(max(share, 1.0 / LARGEST_SHARE), LARGEST_SHARE)
+    area = scale(1.0 / (swept * spacing), cross(way, beside))
+    size = norm(area)
+    if size == 0.0:
+        return
+    mean = vec3(anchors.rest_area, k)
+    if dot(mean, mean) == 0.0:
+        mean = scale(anchors.rest_share[k] / size, area)
+    # Averaged as a vector: where an anchor is dragged to and fro sideways, no more opens.
+    bounded = scale(min(max(size, 1.0 / LARGEST_SHARE), LARGEST_SHARE) / size, area)
     weight = min(norm(slipped) / (AVERAGED_OVER * reach), 1.0)
-    anchors.rest_share[k] += weight * (share - anchors.rest_share[k])
+    mean = axpy(weight, sub(bounded, mean), mean)
+    store(anchors.rest_area, k, mean)
+    anchors.rest_share[k] = max(norm(mean), 1.0 / LARGEST_SHARE)
