@@ -1,74 +1,14 @@
-"""Scenes against theory that is not in the engine: beam, stretch, returned energy, insertions."""
-
-import math
+"""Scenes against theory that is not in the engine: stretch, returned energy, insertions."""
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import splu
 
-from scalpel_sim.validate import beam, coupling, liver, stretch
+from scalpel_sim.validate import coupling, liver, stretch
 from scalpel_sim.validate.findings import FAIL, PASS, REGRESSION, THEORY
-from tissue import Material, block, fixed_nodes
-from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
 
 def verdicts(checks):
     return [check.verdict for check in checks]
-
-
-# A clamped bar
-
-
-def test_the_period_of_a_slender_beam_is_eulers(monkeypatch):
-    monkeypatch.setattr(beam, "BAR_THICKNESS", 1e-3)
-    side, length = beam.BAR_THICKNESS, beam.BAR_LENGTH
-    bending, per_length = 1e6 * side**4 / 12.0, 1000.0 * side**2
-    euler = 2.0 * math.pi * length**2 / 1.8751041**2 * math.sqrt(per_length / bending)
-    assert beam.beam_theory(0.0).period == pytest.approx(euler, rel=1e-3)
-
-
-def test_the_sag_of_a_slender_beam_is_eulers(monkeypatch):
-    monkeypatch.setattr(beam, "BAR_THICKNESS", 1e-3)
-    side, length = beam.BAR_THICKNESS, beam.BAR_LENGTH
-    bending, weight = 1e6 * side**4 / 12.0, 9.81e3 * side**2 * length
-    theory = beam.beam_theory(0.3)
-    assert theory.sag_of_weight == pytest.approx(weight * length**3 / (8 * bending), rel=1e-3)
-    assert theory.sag_of_load == pytest.approx(weight * length**3 / (3 * bending), rel=1e-3)
-
-
-@pytest.fixture(scope="module")
-def coarse_bar():
-    return beam.swing(0.0, 3)
-
-
-def test_the_bar_sags_as_its_stiffness_matrix_says(coarse_bar):
-    material = Material(1e6, 1000.0, law="neo_hookean", poisson_ratio=0.0)
-    mesh = block((10, 3, 3), (0.1, 0.03, 0.03))
-    is_free = np.repeat(~fixed_nodes(mesh, "left"), 3)
-    matrix = stiffness_matrix(mesh, material, averaged=True)[is_free][:, is_free].tocsc()
-    weight = np.zeros((len(mesh.positions), 3))
-    weight[:, 2] = -9.81 * masses(mesh, material.density)
-    moved = np.zeros(is_free.size)
-    moved[is_free] = splu(matrix).solve(weight.ravel()[is_free])
-    sag = -moved.reshape(-1, 3)[fixed_nodes(mesh, "right"), 2].mean()
-    assert coarse_bar.sag_of_weight == pytest.approx(sag, rel=5e-3)
-
-
-def test_a_bar_swings_with_the_frequency_that_its_sag_implies(coarse_bar):
-    theory = beam.beam_theory(0.0)
-    stiffer = theory.sag_of_weight / coarse_bar.sag_of_weight
-    slower = coarse_bar.period / theory.period
-    assert slower == pytest.approx(math.sqrt(1.0 / stiffer), rel=0.02)
-
-
-def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_the_beam_passes(coarse_bar):
-    theory = beam.beam_theory(0.0)
-    assert verdicts(beam.check_bar("it", coarse_bar, theory)) == [FAIL] * 3
-    right = coarse_bar._replace(**theory._asdict())
-    assert verdicts(beam.check_bar("it", right, theory)) == [PASS] * 3
-    for name in theory._fields:
-        wrong = right._replace(**{name: 1.04 * getattr(theory, name)})
-        assert verdicts(beam.check_bar("it", wrong, theory)).count(FAIL) == 1
 
 
 # Large stretch
