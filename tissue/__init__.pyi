@@ -35,6 +35,7 @@ from .mesh.pieces import pieces_of as pieces_of
 from .mesh.validation import MeshError as MeshError
 from .shapes.block import block as block
 from .shapes.cylinder import cylinder as cylinder
+from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
@@ -102,6 +103,7 @@ __all__ = [
     "fixed_nodes",
     "is_compiling",
     "kernel",
+    "lattice_block",
     "liver_lobe",
     "n_compiled_kernels",
     "pieces_of",

@@ -31,6 +31,7 @@ from tissue import (
     block,
     cylinder,
     fixed_nodes,
+    lattice_block,
     read_mesh,
 )
 
@@ -127,9 +128,10 @@ def assemble(case: CaseFile) -> Assembly:
 
 def _mesh(case: CaseFile, body: BodyTable) -> TetrahedralMesh:
     """Return the mesh of the body."""
-    if body.shape == "block":
+    if body.shape in ("block", "lattice"):
         assert body.cells is not None and body.size is not None
-        return block(body.cells, body.size)
+        make = block if body.shape == "block" else lattice_block
+        return make(body.cells, body.size)
     if body.shape == "cylinder":
         assert body.radius is not None and body.height is not None
         rings = body.rings or _RINGS

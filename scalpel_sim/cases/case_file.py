@@ -18,6 +18,7 @@ TIME = "time"
 
 _KEYS_OF_SHAPE = {
     "block": (("size", "cells"), ()),
+    "lattice": (("size", "cells"), ()),
     "cylinder": (("radius", "height"), ("rings", "layers")),
     "mesh": (("file",), ("scale",)),
 }

@@ -51,7 +51,9 @@ def _one_of(*names: str) -> Meta:
     return Meta(description=" or ".join(f'"{name}"' for name in names))
 
 
-_Shape = Annotated[Literal["block", "cylinder", "mesh"], _one_of("block", "cylinder", "mesh")]
+_Shape = Annotated[
+    Literal["block", "lattice", "cylinder", "mesh"], _one_of("block", "lattice", "cylinder", "mesh")
+]
 _Relaxation = Annotated[Literal["global", "verlet"], _one_of("global", "verlet")]
 _Component = Annotated[Literal["x", "y", "z", "magnitude"], _one_of("x", "y", "z", "magnitude")]
 RecordedQuantity = Literal["reaction", "displacement", "blade_force", "blade_position", "cut_area"]

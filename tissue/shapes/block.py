@@ -10,6 +10,9 @@ import numpy as np
 from tissue.core.array_types import IntArray
 from tissue.types import TetrahedralMesh
 
+TETRAHEDRA_IN_CELL = 6
+"""Tetrahedra of a cell."""
+
 MAX_TETRAHEDRA = 50_000_000
 """Tetrahedra of the largest block: a larger one would take tens of gigabytes."""
 
@@ -31,10 +34,10 @@ def block(
         ValueError: `cells` are not three whole numbers of at least 1, `size` not three finite
             positive numbers, or there would be more than `MAX_TETRAHEDRA`.
     """
-    n_x, n_y, n_z = _checked_cells(cells)
+    n_x, n_y, n_z = checked_cells(cells, TETRAHEDRA_IN_CELL)
     axes = (
         np.linspace(0.0, length, n + 1)
-        for length, n in zip(_checked_size(size), (n_x, n_y, n_z), strict=True)
+        for length, n in zip(checked_size(size), (n_x, n_y, n_z), strict=True)
     )
     positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
@@ -50,7 +53,7 @@ def _kuhn_corners() -> IntArray:
     Each tetrahedron walks from the lowest corner to the highest, one axis at a time.
     """
     steps = np.eye(3, dtype=np.int64)
-    corners = np.zeros((6, 4, 3), dtype=np.int64)
+    corners = np.zeros((TETRAHEDRA_IN_CELL, 4, 3), dtype=np.int64)
     for tetrahedron, order in zip(corners, itertools.permutations(range(3)), strict=True):
         tetrahedron[1:] = np.cumsum(steps[list(order)], axis=0)
         if np.linalg.det(tetrahedron[1:]) < 0.0:  # an odd order of axes turns right
@@ -58,24 +61,37 @@ def _kuhn_corners() -> IntArray:
     return corners
 
 
-def _checked_cells(cells: Sequence[int]) -> tuple[int, int, int]:
-    """Return the numbers of cells, or say what is wrong with them."""
+def checked_cells(cells: Sequence[int], most_in_cell: int) -> tuple[int, int, int]:
+    """Return the numbers of cells.
+
+    Args:
+        cells: Number of cells along x, y and z.
+        most_in_cell: Tetrahedra of a cell.
+
+    Raises:
+        ValueError: they are not three whole numbers of at least 1, or have too many tetrahedra.
+    """
     try:
         n_x, n_y, n_z = (operator.index(n) for n in cells)
     except (TypeError, ValueError):
         raise ValueError(f"cells are {cells!r}; they must be three whole numbers") from None
     if min(n_x, n_y, n_z) < 1:
         raise ValueError(f"cells are {(n_x, n_y, n_z)}; each must be at least 1")
-    if 6 * n_x * n_y * n_z > MAX_TETRAHEDRA:
+    n_tetrahedra = most_in_cell * n_x * n_y * n_z
+    if n_tetrahedra > MAX_TETRAHEDRA:
         raise ValueError(
-            f"{n_x} x {n_y} x {n_z} cells are {6 * n_x * n_y * n_z} tetrahedra; "
+            f"{n_x} x {n_y} x {n_z} cells are {n_tetrahedra} tetrahedra; "
             f"at most {MAX_TETRAHEDRA} are possible"
         )
     return n_x, n_y, n_z
 
 
-def _checked_size(size: Sequence[float]) -> tuple[float, float, float]:
-    """Return the edges of the block [m], or say what is wrong with them."""
+def checked_size(size: Sequence[float]) -> tuple[float, float, float]:
+    """Return the edges of a block along x, y and z [m].
+
+    Raises:
+        ValueError: they are not three finite positive numbers.
+    """
     try:
         x, y, z = (float(length) for length in size)
     except (TypeError, ValueError):

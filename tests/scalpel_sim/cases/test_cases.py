@@ -105,6 +105,14 @@ def test_a_mesh_file_is_found_beside_the_case(tmp_path):
     assert assemble(read_case(path)).tissue.n_nodes == 45
 
 
+def test_a_lattice_has_a_node_in_each_cell(tmp_path):
+    body = 'body = {shape = "lattice", size = [0.02, 0.02, 0.04], cells = [2, 2, 4]}'
+    text = "\n".join(body if line.startswith("body") else line for line in COLUMN.splitlines())
+    path = tmp_path / "case.toml"
+    path.write_text(text, encoding="utf-8")
+    assert assemble(read_case(path)).tissue.n_nodes == 45 + 16
+
+
 @pytest.mark.parametrize("words", [["--only", "steady"], ["--quick"]])
 def test_a_case_goes_with_no_option_of_the_scenes(words, capsys):
     case = str(EXAMPLES / "tension.toml")
