@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import eigh
 
-from tissue import FloatArray, Material, TetrahedralMesh, block
-
 BAR_LENGTH, BAR_THICKNESS = 0.1, 0.03
 """Length of the bar and sides of its section [m]."""
 BAR_STIFFNESS, BAR_DENSITY = 1e6, 1000.0
@@ -35,24 +33,6 @@ class BeamTheory(NamedTuple):
     """Period of the first mode of bending without supports [s]."""
     rigidity: float
     """E I, the couple over the curvature that it makes [N m2]."""
-
-
-def bar_material(poisson_ratio: float) -> Material:
-    """Return what the bar is made of, without damping."""
-    return Material(
-        young_modulus=BAR_STIFFNESS,
-        poisson_ratio=poisson_ratio,
-        density=BAR_DENSITY,
-        law="neo_hookean",
-        viscous_damping=0.0,
-        retardation_time=0.0,
-    )
-
-
-def bar_mesh(across: int) -> TetrahedralMesh:
-    """Return the bar along x, of so many cells through its thickness."""
-    along = round(across * BAR_LENGTH / BAR_THICKNESS)
-    return block((along, across, across), (BAR_LENGTH, BAR_THICKNESS, BAR_THICKNESS))
 
 
 def beam_theory(poisson_ratio: float) -> BeamTheory:
@@ -101,11 +81,3 @@ def _period(bending: float, shear: float, *, is_clamped: bool) -> float:
         subset_by_index=[which, which],
     )  # fmt: skip
     return float(2.0 * math.pi / math.sqrt(squares[0]))
-
-
-def period_of(time: FloatArray, swing: FloatArray) -> float:
-    """Return the mean time between two passages through zero in the same direction [s]."""
-    before = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0))
-    y0, y1 = swing[before], swing[before + 1]
-    passages = time[before] + (time[1] - time[0]) * y0 / (y0 - y1)
-    return float(np.diff(passages).mean()) if len(passages) > 1 else math.nan
