@@ -3,15 +3,15 @@
 Usage: PYTHONPATH=. python benchmarks/mesh_study.py [--finest N] [--out FOLDER]
 
 It writes `mesh_study.md` and `mesh_study.png`. A square bar, 8 times as long as thick, of n cells
-through its thickness (Kuhn's six tetrahedra each), is clamped at one end and sags under its own
-weight. All strains are small, and everything follows from the stiffness matrix of
-`tissue.elasticity.stiffness_matrix`, which `tests/test_mechanics.py` compares with the forces that
-the engine computes.
+through its thickness (Kuhn's six tetrahedra each, or the twelve of a lattice), is clamped at one
+end and sags under its own weight. All strains are small, and everything follows from the stiffness
+matrix of `tissue.elasticity.stiffness_matrix`, which `tests/test_mechanics.py` compares with the
+forces that the engine computes.
 """
 
 import argparse
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh, splu
 
-from tissue import FloatArray, Material, block
+from tissue import FloatArray, Material, TetrahedralMesh, block, lattice_block
 from tissue.elasticity.stiffness_matrix import masses, stiffness_matrix
 
 SLENDERNESS = 8
@@ -37,6 +37,9 @@ N_BEAM_ELEMENTS = 400
 RATIOS = {0.0: "tab:gray", 0.3: "tab:green", 0.45: "tab:blue", 0.49: "tab:purple"}
 """Poisson's ratios of the study, and their colours in the plots."""
 
+ON_LATTICE = (0.0, 0.45)
+"""Poisson's ratios that are studied on a lattice as well."""
+
 MODES = ("bending 1", "bending 2", "torsion 1", "stretching 1")
 
 TORSION_CONSTANT = 0.140577
@@ -50,6 +53,8 @@ class Model(NamedTuple):
     material: Material
     averaged: bool = True
     """Whether dilatation is averaged over nodes, as in the engine."""
+    shape: Callable[..., TetrahedralMesh] = block
+    """How cells are divided into tetrahedra."""
 
 
 def models() -> list[Model]:
@@ -61,6 +66,8 @@ def models() -> list[Model]:
         if nu > 0.0:
             found.append(Model(f"neo-Hookean, nu {nu}, plain", material, averaged=False))
         found.append(Model(f"neo-Hookean, nu {nu}", material))
+        if nu in ON_LATTICE:
+            found.append(Model(f"neo-Hookean, nu {nu}, lattice", material, shape=lattice_block))
     return found
 
 
@@ -82,7 +89,7 @@ class Bar:
         self.material = model.material
         self.thickness = thickness
         self.length = SLENDERNESS * thickness
-        self.mesh = block((SLENDERNESS * n, n, n), (self.length, thickness, thickness))
+        self.mesh = model.shape((SLENDERNESS * n, n, n), (self.length, thickness, thickness))
         x = self.mesh.positions[:, 0]
         self.is_end = x > self.length * (1.0 - 1e-9)
         self.is_free = np.repeat(x > 1e-9 * self.length, 3)
@@ -263,10 +270,11 @@ TEXT = """\
 # Mesh study: a clamped bar against theory
 
 A square bar, 8 times as long as thick, clamped at one end; n cells through its thickness, six
-tetrahedra each. Every figure is divided by its theoretical value: 1 is right, a sag below 1 or a
-frequency above 1 is too stiff. Sag: under the bar's own weight, against Timoshenko's beam. Bending:
-Timoshenko's beam. Torsion: Saint-Venant. Stretching: the rod. "limit" extrapolates the last two
-meshes to elements of zero size, with an error that falls as the square of their size.
+tetrahedra each (`block`), or twelve (lattice: `lattice_block`). Every figure is divided by its
+theoretical value: 1 is right, a sag below 1 or a frequency above 1 is too stiff. Sag: under the
+bar's own weight, against Timoshenko's beam. Bending: Timoshenko's beam. Torsion: Saint-Venant.
+Stretching: the rod. "limit" extrapolates the last two meshes to elements of zero size, with an
+error that falls as the square of their size.
 
 | law | n | tetrahedra | sag | {modes} |
 |---|---|---|---|---|---|---|---|
@@ -281,6 +289,8 @@ meshes to elements of zero size, with an error that falls as the square of their
 - **Plain** linear tetrahedra lock, and the more so the less compressible they are. The engine does
   not use them: it averages the dilatation over nodes, after which Poisson's ratio hardly matters.
   The remaining error is the stiffness of linear tetrahedra in bending.
+- **A lattice** has less of it: a third to a half with as many cells, and 0.6 to 0.7 with as many
+  tetrahedra.
 - **The clamp** keeps the section from narrowing, which beam theory leaves free. So the limit at a
   Poisson's ratio of 0, where nothing narrows, is nearest to 1, and the others are about 1 to 3 %
   stiffer, as they should be.
@@ -301,7 +311,7 @@ def draw(studies: Sequence[Sequence[Row]], path: Path) -> None:
         model = rows[0].model
         of_ratio = [colour for nu, colour in RATIOS.items() if f"nu {nu}" in model.split(",")[1]]
         style = {
-            "ls": ":" if "plain" in model else "-",
+            "ls": ":" if "plain" in model else "--" if "lattice" in model else "-",
             "marker": "o",
             "ms": 4,
             "label": model,
