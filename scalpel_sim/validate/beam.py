@@ -50,6 +50,7 @@ _RATIOS = (0.0, 0.45)
 _SHAPES: dict[str, BlockShape] = {"block": block, "lattice": lattice_block}
 """How cells are divided into tetrahedra."""
 _SOLIDS = "the clamped solid's"
+"""Whose sag and period a bar is compared with, where it is not the beam's."""
 _NEAR = 0.03
 """Largest relative error of sag and period."""
 _N_PERIODS = 2.5

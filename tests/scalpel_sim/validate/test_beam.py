@@ -107,6 +107,11 @@ def test_a_bar_on_a_coarse_mesh_fails_and_one_that_does_as_theory_says_passes(co
         assert verdicts(beam.check_bar("it", wrong, theory)).count(FAIL) == 1
 
 
+def test_a_bar_that_does_not_narrow_is_within_three_percent_on_a_lattice_of_six_cells():
+    found = beam.swing(0.0, 6, lattice_block)
+    assert verdicts(beam.check_bar("it", found, beam_theory.beam_theory(0.0))) == [PASS] * 3
+
+
 # The free bar
 
 
@@ -115,6 +120,11 @@ def test_the_error_of_a_free_bar_falls_with_the_square_of_its_elements():
     order, *limits = free_bar.check_free_bar("it", *bars)[2:]
     assert order.verdict == PASS and verdicts(limits) == [PASS] * 2
     assert limits[0].value == pytest.approx(1.0, abs=0.005)
+
+
+def test_a_free_bar_is_within_three_percent_on_a_lattice_of_six_cells():
+    bars = [free_bar.bent_and_let_go(0.45, across, lattice_block) for across in beam.CELLS_ACROSS]
+    assert verdicts(free_bar.check_free_bar("it", *bars)) == [PASS] * 5
 
 
 def free(across, *, error):
