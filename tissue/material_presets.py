@@ -4,7 +4,7 @@ Values for soft tissue differ by orders of magnitude between methods of measurem
 states how the tissue was loaded. Values that could not be traced to a measurement are marked.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tissue.material import Law, Material
 
@@ -52,19 +52,26 @@ class Preset(NamedTuple):
     """Coulomb's coefficient of friction on the steel of a blade."""
     stiffening: SourcedValue | None = None
     """b of the law `exponential`; None under a law without it."""
+    yeoh_second: SourcedValue | None = None
+    """C20 / C10 of the law `yeoh`; None under a law without it."""
+    toughness_exponent: SourcedValue | None = None
+    """Exponent with which toughness rises with speed; None where no rise was measured."""
+    toughness_speed: SourcedValue | None = None
+    """Speed at which toughness is twice that of a slow cut [m/s]; None where no rise was
+    measured."""
+
+    @property
+    def values(self) -> dict[str, SourcedValue]:
+        """The sourced values that this material has, by the names of their fields."""
+        fields = self._asdict().items()
+        return {name: value for name, value in fields if isinstance(value, SourcedValue)}
 
     @property
     def material(self) -> Material:
         """The material, as `Tissue` takes it."""
-        plain = Material(
-            young_modulus=self.young_modulus.value,
-            poisson_ratio=self.poisson_ratio.value,
-            density=self.density.value,
-            toughness=self.toughness.value,
-            blade_friction=self.blade_friction.value,
-            law=self.law,
-            stiffening=self.stiffening.value if self.stiffening else 0.0,
-        )
+        numbers: dict[str, Any] = {name: sourced.value for name, sourced in self.values.items()}
+        del numbers["damping_ratio"]
+        plain = Material(law=self.law, **numbers)
         low, high = DAMPING_BAND
         return plain.with_damping(self.damping_ratio.value, low, up_to=high)
 
@@ -93,10 +100,19 @@ ON_STEEL = SourcedValue(
 )
 STIFFENING_TISSUE = SourcedValue(
     15.0,
-    "chosen for every tissue: b lies between 12 and 33 for human liver in tension, by a first "
-    "reading of tests to rupture (40 kPa at 34 %)",
+    "chosen for every tissue but fat: b lies between 12 and 33 for human liver in tension, by a "
+    "first reading of tests to rupture (40 kPa at 34 %)",
     "Kemper et al. 2010, not confirmed",
     is_confirmed=False,
+)
+ALKHOULI = "Alkhouli et al. 2013, Am. J. Physiol. Endocrinol. Metab. 305:E1427 (abstract)"
+FORTE = (
+    "Forte et al. 2015, 'Modelling and experimental characterisation of the rate dependent "
+    "fracture properties of gelatine gels' (abstract)"
+)
+MARECHAL = (
+    "Marechal et al., Soft Robotics Materials Database, 'Ecoflex 00-30.csv', "
+    "github.com/LucMarechal/Soft-Robotics-Materials-Database"
 )
 RUBBER_ON_STEEL = SourcedValue(0.2, "assumed to be that of wet tissue", "", is_confirmed=False)
 
@@ -127,7 +143,13 @@ MATERIALS = {
                 "Asbach et al. 2008, Magn. Reson. Med. 60:373",
             ),
             ON_STEEL,
-            STIFFENING_TISSUE,
+            STIFFENING_TISSUE._replace(
+                measured="chosen: b lies between 12 and 33 in tension, human, by a first reading "
+                "of tests to rupture (40 kPa at 34 %). In compression at most 7: 36 human "
+                "specimens broke at 38.9 to 145.9 kPa and strains of 0.48 to 1.15",
+                source="Kemper et al. 2010, not confirmed; Kemper and Duma 2013, "
+                "doi:10.1115/1.4024821 (abstract)",
+            ),
         ),
         Preset(
             "kidney",
@@ -150,8 +172,11 @@ MATERIALS = {
             SourcedValue(
                 100e3,
                 "chosen between in vivo shear wave elastography (forearm 14.8 kPa, 3.5 to 26) and "
-                "tension (MPa); 5 kPa to 140 MPa are reported",
-                "Yang et al. 2018 (90 adults); Kalra et al. 2016, Mechanical behaviour of skin",
+                "tension of 56 excised samples of the back (at first 1.18 ± 0.88 MPa, 21.6 ± 8.4 "
+                "MPa at rupture at 54 ± 17 %); 5 kPa to 140 MPa are reported",
+                "Yang et al. 2018 (90 adults); Ní Annaidh et al. 2012, "
+                "doi:10.1016/j.jmbbm.2011.08.016 (abstract); Kalra et al. 2016, Mechanical "
+                "behaviour of skin",
                 is_confirmed=False,
             ),
             WATERY,
@@ -172,8 +197,11 @@ MATERIALS = {
             SourcedValue(
                 26.1e3,
                 "compression under a probe at 1 N, gluteal, 21 men: 26.1 ± 19.0 kPa; at 30 N "
-                "2,200 kPa; by magnetic resonance elastography, unloaded, some 2.3 kPa",
-                "Isogai et al. 2022, doi:10.1589/jpts.34.777",
+                "2,200 kPa. Unloaded far less: in tension, excised, 1.6 ± 0.8 kPa; by magnetic "
+                "resonance elastography at 50 Hz, 10 women, 3 x 0.75 kPa",
+                f"Isogai et al. 2022, doi:10.1589/jpts.34.777; {ALKHOULI}; 'Strain-dependent shear "
+                "properties of human adipose tissue in vivo', J. Mech. Behav. Biomed. Mater. 2023 "
+                "(abstract)",
             ),
             WATERY,
             SourcedValue(950.0, "table of tissues", ICRU),
@@ -185,7 +213,13 @@ MATERIALS = {
             ),
             LIKE_LIVER,
             ON_STEEL,
-            STIFFENING_TISSUE,
+            SourcedValue(
+                6.8,
+                "tension of excised subcutaneous fat, 44 patients: the slope rises from 1.6 ± 0.8 "
+                "to 11.7 ± 6.4 kPa at 30 %, as that of a bar with this b and a Poisson's ratio of "
+                "0.45 does; omental fat from 2.9 ± 1.5 to 32 ± 15.6 kPa, which is a b of 10",
+                ALKHOULI,
+            ),
         ),
         Preset(
             "muscle",
@@ -202,7 +236,12 @@ MATERIALS = {
             SourcedValue(550.0, "notched tension, porcine: 550 to 8000, the lowest taken", LIU),
             LIKE_LIVER,
             ON_STEEL,
-            STIFFENING_TISSUE,
+            STIFFENING_TISSUE._replace(
+                measured="that of liver; in compression in vivo muscle hardly stiffens, 10 women: "
+                "a b of about 1",
+                source="'Strain-dependent shear properties of human adipose tissue in vivo', J. "
+                "Mech. Behav. Biomed. Mater. 2023 (abstract)",
+            ),
         ),
         Preset(
             "gelatin",
@@ -218,29 +257,36 @@ MATERIALS = {
             SourcedValue(
                 1027.0, "computed from water and protein of 1350 kg/m3", "", is_confirmed=False
             ),
-            SourcedValue(
-                20.0,
-                "wire cutting: 1.1 J/m2 up to 10 mm/min, then as the square root of speed, carried "
-                "on to 60 mm/s",
-                "Forte et al. 2015",
-                is_confirmed=False,
-            ),
+            SourcedValue(1.1, "wire cutting, 10 % by weight: some 1.1 J/m2 up to 10 mm/min", FORTE),
             SourcedValue(
                 0.04,
                 "shear between plates, a softer gel: loss tangent 0.06 to 0.14, 20 to 200 Hz",
                 "Okamoto et al. 2011",
             ),
             ON_STEEL,
+            toughness_exponent=SourcedValue(
+                0.5,
+                "wire cutting above 10 mm/min: the logarithms of toughness and of speed have a "
+                "slope of 0.5; up to which speed is not said",
+                FORTE,
+            ),
+            toughness_speed=SourcedValue(
+                10e-3 / 60.0,
+                "10 mm/min, where the rise begins: the law adds both parts, and lies 10 % above "
+                "the measured line at 1,000 mm/min, 5 % at 60 mm/s",
+                FORTE,
+            ),
         ),
         Preset(
             "silicone",
             "platinum-cured silicone of Shore 00-30",
-            "neo_hookean",
+            "yeoh",
             SourcedValue(
-                118e3,
-                "tension: 69 kPa at 100 % stretch is 118 kPa at small strain (neo-Hookean)",
-                "data sheet of Ecoflex 00-30",
-                is_confirmed=False,
+                46.4e3,
+                "tension of one dumbbell (ASTM D412, 450 mm/min, strain from the grips): fitted by "
+                "us with C20 / C10 to its curve from 25 to 800 %, which it meets within 4 % from "
+                "50 % on; the data sheet has 69 kPa at 100 %, the curve 30 kPa",
+                MARECHAL,
             ),
             SourcedValue(0.45, "chosen: rubber keeps its volume; 0.45 for the time step", ""),
             SourcedValue(
@@ -260,6 +306,7 @@ MATERIALS = {
                 is_confirmed=False,
             ),
             RUBBER_ON_STEEL,
+            yeoh_second=SourcedValue(0.0093, "fitted with Young's modulus to one curve", MARECHAL),
         ),
     )
 }

@@ -18,17 +18,6 @@ _NOT_CONFIRMED = "*"
 
 HEADINGS = ("name", "E, kPa", "b", "nu", "kg/m³", "J, J/m²", "damping", "friction", "J / E, mm")
 
-SOURCED = (
-    "young_modulus",
-    "stiffening",
-    "poisson_ratio",
-    "density",
-    "toughness",
-    "damping_ratio",
-    "blade_friction",
-)
-"""Names of the figures of a preset."""
-
 
 def chosen_presets(name: str | None) -> list[Preset]:
     """Return the preset of that name, or all presets.
@@ -81,15 +70,9 @@ def print_presets(presets: Sequence[Preset]) -> None:
         console.print(
             f"\n[bold]{preset.name}[/bold]: {preset.about}; law {preset.law}", highlight=False
         )
-        for name, figure in _figures(preset).items():
+        for name, figure in preset.values.items():
             line = _line(name, figure)
             console.print(line, markup=False, highlight=False, soft_wrap=True)
-
-
-def _figures(preset: Preset) -> dict[str, SourcedValue]:
-    """Return the figures of a preset by name; its law may have none of a name."""
-    figures = {name: getattr(preset, name) for name in SOURCED}
-    return {name: figure for name, figure in figures.items() if figure is not None}
 
 
 def _marked(figure: SourcedValue, scale: float = 1.0) -> str:
@@ -106,5 +89,5 @@ def _line(name: str, figure: SourcedValue) -> str:
 
 def _as_numbers(preset: Preset) -> dict[str, Any]:
     """Return a preset as numbers and text, for JSON."""
-    figures = {name: figure._asdict() for name, figure in _figures(preset).items()}
+    figures = {name: figure._asdict() for name, figure in preset.values.items()}
     return {"name": preset.name, "about": preset.about, "law": preset.law} | figures

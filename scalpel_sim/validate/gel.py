@@ -1,7 +1,5 @@
 """Gels against published experiments: toughness by speed, and two scalpel blades."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from scalpel_sim.validate.block import (
@@ -25,7 +23,7 @@ from scalpel_sim.validate.findings import (
     ValidationScene,
     within,
 )
-from tissue import MATERIALS, BladeShape, FloatArray, Material
+from tissue import MATERIALS, BladeShape, FloatArray
 
 _SLOW_TOUGHNESS = 1.1
 """Toughness of gelatine of 10 % by weight, cut slowly [J/m2]."""
@@ -55,20 +53,12 @@ def published_toughness(speed: float) -> float:
     return float(_SLOW_TOUGHNESS * max(speed / _SLOW, 1.0) ** _SLOPE)
 
 
-def _gelatine() -> Material:
-    """Return the gelatine of the presets, with the law of toughness of the paper."""
-    return replace(
-        MATERIALS["gelatin"].material,
-        toughness=_SLOW_TOUGHNESS,
-        toughness_exponent=_SLOPE,
-        toughness_speed=_SLOW,
-    )
-
-
 def _force_per_depth(speed: float) -> float:
     """Cut gelatine at a speed [m/s]; return force / depth [N/m]."""
     end = 0.75 * LENGTH if speed > 0.01 else 0.5 * LENGTH
-    record = run_stroke(block_tissue(_gelatine()), straight_cut(speed, begin=-0.001, end=end))
+    record = run_stroke(
+        block_tissue(MATERIALS["gelatin"].material), straight_cut(speed, begin=-0.001, end=end)
+    )
     return float(record.steady_rows(record.resistance).mean() / THICKNESS)
 
 
