@@ -1,6 +1,5 @@
 """Scenes: a body, its material, how it is held, and the stroke through it."""
 
-import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -11,6 +10,16 @@ import numpy as np
 from bridge import MAX_FRAMES_PER_ANSWER, TissueLink, VirtualCoupling
 from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.scene_parts.choices import (
+    ARM_CHOICES,
+    COUPLINGS,
+    can_audit,
+    check_contact,
+    check_precision,
+    check_relaxation,
+    check_scheme,
+)
+from scalpel_sim.scene_parts.specimens import SPECIMENS
 from scalpel_sim.strokes.planning import STROKES
 from scalpel_sim.strokes.stroke import Stroke, from_csv
 from tissue import (
@@ -22,21 +31,6 @@ from tissue import (
     TetrahedralMesh,
     block,
 )
-
-SCHEMES = ("stellar", "paper")
-"""Names of the schemes that `Tissue` takes."""
-
-RELAXATIONS = ("global", "verlet", "hierarchical")
-"""Names of the relaxations that `Tissue` takes."""
-
-_PRECISIONS = ("single", "double")
-"""Precisions that `Tissue` takes."""
-CONTACTS = ("impulses", "penalty")
-"""Names of the contacts that `Tissue` takes."""
-
-COUPLINGS = ("rigid", "virtual")
-
-_ARMS = ("auto", "touch", "premium")
 
 PHANTOM = Material(
     law="springs",
@@ -67,52 +61,6 @@ DEFAULT_MASS_SCALING = SolverSettings().mass_scaling or 0.0
 
 STANDARD_GRAVITY = 9.81
 """Gravity along -z [m/s2]."""
-
-
-def check_scheme(name: str) -> None:
-    """Check that a scheme of cutting exists.
-
-    Raises:
-        UsageError: it does not; the message lists the schemes.
-    """
-    if name not in SCHEMES:
-        raise unknown("scheme", name, SCHEMES)
-
-
-def check_relaxation(name: str, threads: int) -> None:
-    """Check that a relaxation exists, and that it uses threads where there are several.
-
-    Raises:
-        UsageError: it does not; the message says why.
-    """
-    if name not in RELAXATIONS:
-        raise unknown("relaxation", name, RELAXATIONS)
-    if threads != 1 and name == "hierarchical":
-        raise UsageError(
-            f"--threads {threads} is for --relaxation global or verlet; {name} runs on one"
-        )
-    cores = os.cpu_count() or 1
-    if not 1 <= threads <= cores:
-        raise UsageError(
-            f"--threads is {threads}; it must be from 1 to {cores}, the number of cores"
-        )
-
-
-def check_contact(name: str | None, relaxation: str) -> None:
-    """Check that a contact exists, if one was chosen, and that it goes with the relaxation.
-
-    Raises:
-        UsageError: it does not; the message says why.
-    """
-    if name is not None and name not in CONTACTS:
-        raise unknown("contact", name, CONTACTS)
-    if name == "penalty" and relaxation not in ("global", "verlet"):
-        raise UsageError(f"--contact penalty needs --relaxation global or verlet, not {relaxation}")
-
-
-def can_audit(relaxation: str) -> bool:
-    """Whether an energy account can be kept: where all nodes move together."""
-    return relaxation in ("global", "verlet")
 
 
 @dataclass(frozen=True)
@@ -192,8 +140,7 @@ class Scene:
             raise UsageError(
                 f"--relaxation verlet gains energy under law {self.material.law}; use global"
             )
-        if self.precision not in _PRECISIONS:
-            raise unknown("precision", self.precision, _PRECISIONS)
+        check_precision(self.precision)
         if not (self.mass_scaling >= 0.0 and np.isfinite(self.mass_scaling)):
             raise UsageError(
                 f"--mass-scaling is {self.mass_scaling}; it is an angular frequency [1/s], or 0 "
@@ -248,6 +195,21 @@ def _liver_lobe() -> TetrahedralMesh:
     return liver_lobe()
 
 
+def _specimen(name: str) -> Scene:
+    """Return the scene in which the specimen of a material by name is cut in two."""
+    specimen = SPECIMENS[name]
+    return Scene(
+        name,
+        specimen.about,
+        specimen.mesh,
+        material=MATERIALS[name].material,
+        fixed=specimen.fixed,
+        stretch=specimen.stretch,
+        speed=specimen.speed,
+        blade=SCALPEL if specimen.has_scalpel else None,
+    )
+
+
 SCENES = {
     scene.name: scene
     for scene in (
@@ -266,6 +228,7 @@ SCENES = {
             stretch=0.0,
             stroke="incision",
         ),
+        *map(_specimen, SPECIMENS),
         Scene(
             "slab",
             "the paper's Figure 10: 4 x 6 x 4 cells, 576 tetrahedra",
@@ -352,8 +315,8 @@ def check_motion(scene: Scene) -> None:
         UsageError: the stroke is neither a known name nor a CSV file, or the arm is unknown.
     """
     read_stroke(scene)
-    if scene.arm not in _ARMS:
-        raise unknown("arm", scene.arm, _ARMS)
+    if scene.arm not in ARM_CHOICES:
+        raise unknown("arm", scene.arm, ARM_CHOICES)
 
 
 def read_stroke(scene: Scene) -> Stroke | None:

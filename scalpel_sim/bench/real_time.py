@@ -29,7 +29,8 @@ from scalpel_sim.errors import UsageError
 from scalpel_sim.preparation import prepare
 from scalpel_sim.run import run_time
 from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import Scene, can_audit, material_called, scene_called
+from scalpel_sim.scene_parts.choices import can_audit
+from scalpel_sim.scenes import Scene, material_called, scene_called
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
 

@@ -295,7 +295,7 @@ def _figure(
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.run_folder import check_file
-    from scalpel_sim.scenes import check_scheme
+    from scalpel_sim.scene_parts.choices import check_scheme
 
     path = output or Path(f"figure{number}.png")
     with log_to_stderr(printing):

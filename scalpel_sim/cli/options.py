@@ -12,7 +12,10 @@ from cyclopts import Group, Parameter
 
 SceneName = Annotated[
     str | None,
-    Parameter(help="organ (default), incision, slab, grid2 or grid7."),
+    Parameter(
+        help="organ (default), incision, a specimen of a material (liver, kidney, skin, fat, "
+        "muscle, gelatin, silicone), slab, grid2 or grid7."
+    ),
 ]
 
 FigureNumber = Annotated[Literal[10, 11, 12, "organ"], Parameter(help="10, 11, 12 or organ.")]

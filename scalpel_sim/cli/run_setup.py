@@ -32,10 +32,10 @@ from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
 from scalpel_sim.scene_body import check_scene, make_tissue
+from scalpel_sim.scene_parts.choices import can_audit
 from scalpel_sim.scenes import (
     DEFAULT_SCENE,
     Scene,
-    can_audit,
     changed,
     check_motion,
     material_called,

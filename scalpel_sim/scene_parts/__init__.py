@@ -1,0 +1,1 @@
+"""What scenes are made of: the names that their settings may have, and specimens of materials."""
