@@ -17,6 +17,7 @@ from scalpel_sim.validate.spine import SPINE_SCENE
 from scalpel_sim.validate.steady import STEADY_SCENE
 from scalpel_sim.validate.stretch import STRETCH_SCENE
 from scalpel_sim.validate.symmetry import SYMMETRY_SCENE
+from scalpel_sim.validate.tension import TENSION_SCENE
 
 VALIDATION_SCENES: dict[str, ValidationScene] = {
     scene.name: scene
@@ -34,6 +35,7 @@ VALIDATION_SCENES: dict[str, ValidationScene] = {
         COUPLING_SCENE,
         LIVER_SCENE,
         GEL_SCENE,
+        TENSION_SCENE,
     )
 }
 

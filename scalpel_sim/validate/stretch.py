@@ -93,11 +93,15 @@ def uniaxial(material: Material, stretches: FloatArray) -> UniaxialStretch:
     return UniaxialStretch(stretches, np.array(stresses), np.array(widths))
 
 
-def stretched_bar(material: Material) -> UniaxialStretch:
-    """Stretch a bar to twice its length; return its force and the width of its middle.
+def stretched_bar(material: Material, longest: float = _LONGEST) -> UniaxialStretch:
+    """Stretch a bar in ten equal parts; return its force and the width of its middle after each.
 
     Its ends are made as narrow as the theory says, so that all of it is stretched alike if the
     engine agrees. The rest of its width is free.
+
+    Args:
+        material: What it is made of.
+        longest: Length at the end over that at rest.
     """
     mesh = block(_CELLS, _SIZE)
     middle = 0.5 * np.array(_SIZE)
@@ -105,7 +109,7 @@ def stretched_bar(material: Material) -> UniaxialStretch:
     tissue = Tissue(mesh, material, fixed=ends, gravity=(0.0, 0.0, 0.0))
     right, nodes = fixed_nodes(mesh, "right"), np.flatnonzero(ends)
     side = tissue.material_points([(middle[0], 0.0, middle[2]), (middle[0], _SIZE[1], middle[2])])
-    goals = uniaxial(material, np.linspace(1.0, _LONGEST, _N_STEPS + 1))
+    goals = uniaxial(material, np.linspace(1.0, longest, _N_STEPS + 1))
     from_middle = (mesh.positions - middle)[nodes]
     places = [
         middle + from_middle * (along, width, width)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.validate import coupling, liver, stretch
+from scalpel_sim.validate import coupling, liver, stretch, tension
 from scalpel_sim.validate.findings import FAIL, PASS, REGRESSION, THEORY
+from tissue import MATERIALS
 
 
 def verdicts(checks):
@@ -31,6 +32,19 @@ def test_a_bar_passes_with_its_own_law_and_fails_with_another():
     assert all(abs(check.value - 1.0) < 1e-3 for check in checks)
     other = stretch.uniaxial(stretch.BARS["neo_hookean"], found.stretch)
     assert verdicts(stretch.check_stretch("it", found, other)) == [FAIL, FAIL]
+
+
+# A published curve
+
+
+def test_silicone_has_the_shape_of_the_measured_curve_and_no_neo_hookean_has():
+    strains, measured = np.array(list(tension.MEASURED.items())).T
+    silicone = MATERIALS["silicone"].material
+    shares = stretch.uniaxial(silicone, 1.0 + strains).stress / measured
+    assert np.abs(shares - 1.0).max() < 0.04
+    plain = silicone.changed(law="neo_hookean")
+    shares = stretch.uniaxial(plain, 1.0 + strains).stress / measured
+    assert shares.max() / shares.min() > 1.3
 
 
 # Energy that comes back from a coupling
