@@ -8,7 +8,7 @@ import numpy as np
 
 from scalpel_sim.errors import unknown
 from scalpel_sim.strokes.expected_force import is_inside
-from scalpel_sim.strokes.incision import plan_incision
+from scalpel_sim.strokes.incision import DRAG_SHARE, plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
@@ -121,7 +121,8 @@ def plan_stroke(
     if name == "incision":
         if depth is not None:
             _check_positive("depth", depth, "m")
-        return plan_incision(mesh, speed=speed, depth=depth)
+        drag = DRAG_SHARE * material.toughness / material.young_modulus
+        return plan_incision(mesh, speed=speed, depth=depth, drag=drag)
     edges = mesh_edges(mesh.tetrahedra)
     sheet = _sheet(name, mesh, edges)
     cut = section(mesh.positions, edges, sheet.height(mesh.positions))
