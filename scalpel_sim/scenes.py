@@ -206,6 +206,7 @@ def _specimen(name: str) -> Scene:
         fixed=specimen.fixed,
         stretch=specimen.stretch,
         speed=specimen.speed,
+        arm=specimen.arm,
         blade=SCALPEL if specimen.has_scalpel else None,
     )
 

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.errors import unknown
+from scalpel_sim.scene_parts.specimens import SPECIMENS
 from tissue import DAMPING_BAND, MATERIALS, Preset, SourcedValue
 
 _KPA_PER_PA = 1e-3
@@ -59,7 +60,7 @@ def print_presets(presets: Sequence[Preset]) -> None:
     low, high = DAMPING_BAND
     console.print(
         f"{_NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
-        "strain, b: how soon it stiffens, nu: Poisson's ratio, J: toughness. damping: damping "
+        "strain, b: how soon it stiffens, nu: Poisson's ratio, J: toughness of a slow cut. damping: damping "
         f"ratio of bending and of stretching at {low:g} and {high:g} Hz, less between. friction: "
         "on the faces of a blade. J / E: how far a blade drags tissue along before it parts.",
         markup=False,
@@ -70,6 +71,8 @@ def print_presets(presets: Sequence[Preset]) -> None:
         console.print(
             f"\n[bold]{preset.name}[/bold]: {preset.about}; law {preset.law}", highlight=False
         )
+        specimen = SPECIMENS[preset.name].about
+        console.print(f"  run {preset.name}: {specimen}", highlight=False, soft_wrap=True)
         for name, figure in preset.values.items():
             line = _line(name, figure)
             console.print(line, markup=False, highlight=False, soft_wrap=True)
