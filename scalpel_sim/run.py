@@ -13,6 +13,7 @@ from scalpel_sim.output.run_folder import FINAL, INITIAL, Outputs
 from scalpel_sim.output.summary import COMPLETE, RunFacts, Summary, summarise
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
+from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.viewer.pictures import add_to, into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import pieces_of
@@ -71,7 +72,9 @@ def perform(
     """
     seconds = run_time(simulation, seconds)
     body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
-    outputs.write_mesh(INITIAL, simulation.link.snapshot())
+    at_first = simulation.link.snapshot()
+    outputs.write_mesh(INITIAL, at_first)
+    asked = asked_area(simulation.stroke, at_first)
     replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
     simulation.pictures.append(into_replay(replay))
     _warn_if_slow(simulation)
@@ -83,7 +86,7 @@ def perform(
         outputs.write_forces(simulation.recording, all_rows=True)
     summary = summarise(
         simulation.recording,
-        _facts(simulation, body, status, settings, outputs, unwritten),
+        _facts(simulation, body, status, settings, outputs, unwritten, asked),
     )
     with unwritten:
         outputs.write_summary(summary)
@@ -139,6 +142,7 @@ def _facts(
     settings: dict[str, Any],
     outputs: Outputs,
     unwritten: _Attempts,
+    asked: float | None,
 ) -> RunFacts:
     """Write the final mesh, and return the facts of the run; `body` is as it was at the start."""
     link, bridge = simulation.link, simulation.bridge
@@ -157,6 +161,7 @@ def _facts(
         tetrahedra_final=(bridge.result or body).n_tetrahedra,
         pieces=pieces,
         quality=quality,
+        asked_area=asked,
         counters=bridge.counters.as_numbers(),
         touched=simulation.touching.frames,
         settings=settings,

@@ -60,9 +60,10 @@ def print_presets(presets: Sequence[Preset]) -> None:
     low, high = DAMPING_BAND
     console.print(
         f"{_NOT_CONFIRMED} not traced to a measurement: an estimate. E: Young's modulus at small "
-        "strain, b: how soon it stiffens, nu: Poisson's ratio, J: toughness of a slow cut. damping: damping "
-        f"ratio of bending and of stretching at {low:g} and {high:g} Hz, less between. friction: "
-        "on the faces of a blade. J / E: how far a blade drags tissue along before it parts.",
+        "strain, b: how soon it stiffens, nu: Poisson's ratio, J: toughness of a slow cut. "
+        "damping: damping ratio of bending and of stretching at "
+        f"{low:g} and {high:g} Hz, less between. friction: on the faces of a blade. J / E: how "
+        "far a blade drags tissue along before it parts.",
         markup=False,
         highlight=False,
         soft_wrap=True,

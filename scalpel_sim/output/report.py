@@ -162,7 +162,9 @@ def _add_springs(rows: _Rows, springs: dict[str, float]) -> None:
 
 def _add_cut(rows: _Rows, summary: Summary) -> None:
     """Add the area of the cut, the forces, the collisions and the work."""
-    rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²")
+    asked = summary.asked_area_m2
+    share = f", {summary.cut_area_m2 / asked:.0%} of what is asked" if asked else ""
+    rows.add("cut area", f"{summary.cut_area_m2 * _MM2_PER_M2:,.0f} mm²{share}")
     if summary.finished_area_m2 > 0.0:
         finished = f"{summary.finished_area_m2 * _MM2_PER_M2:,.1f} mm² of the cut, at no work"
         rows.add("bridges finished", finished)

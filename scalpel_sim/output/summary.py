@@ -46,6 +46,8 @@ class Summary(NamedTuple):
     """How closely the cut follows the blade, and what it did to the mesh; None where the link was
     lost."""
     cut_area_m2: float
+    asked_area_m2: float | None
+    """The area that the stroke was to cut, in the body at rest; None where that is not known."""
     finished_area_m2: float
     """The part of the cut area that no blade cut: small bridges that were finished."""
     cut_area_paid_m2: float | None
@@ -89,6 +91,8 @@ class RunFacts(NamedTuple):
     """The pieces at the end; None where the link to the tissue was lost."""
     quality: CutReport | None
     """The report on the cut at the end; None where the link to the tissue was lost."""
+    asked_area: float | None
+    """The area that the stroke was to cut [m2]; None where that is not known."""
     counters: dict[str, Any]
     """Counters of the bridge."""
     touched: dict[str, int]
@@ -121,6 +125,7 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
         quality=None if facts.quality is None else quality_figures(facts.quality),
         cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
+        asked_area_m2=facts.asked_area,
         finished_area_m2=float(recording.column("finished_area_m2")[-1]) if n else 0.0,
         cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),

@@ -84,7 +84,9 @@ def plan_incision(
     forward = math.sin(SLOPE) * ahead - math.cos(SLOPE) * up
     length = _REACH * depth / math.sin(SLOPE)
     poses = [BladeSegment(tip, tip + length * edge, forward) for tip in tips]
-    return Stroke(times, poses, "incision")
+    asked_end = low[axis] + WITHDRAWN_AT * extent[axis]
+    asked_until = float(np.interp(asked_end, tips[:, axis], times))
+    return Stroke(times, poses, "incision", asked_until=asked_until)
 
 
 def _surface(mesh: TetrahedralMesh, at: FloatArray, axis: int) -> FloatArray:

@@ -146,7 +146,8 @@ def plan_stroke(
     segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
     if name == "press":
         times, segments = np.append(times, times[-1] + PRESS_DWELL), [*segments, segments[-1]]
-    return Stroke(times, segments, name)
+    asked_until = None if name in ("stop", "press") else float(times[-1])
+    return Stroke(times, segments, name, asked_until=asked_until)
 
 
 def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:

@@ -82,6 +82,7 @@ def summary_of(
             tetrahedra_final=8,
             pieces=PIECES,
             quality=CUT_REPORT,
+            asked_area=2.5e-4,
             counters=counters,
             touched={},
             settings={"stroke": "straight", "material": material or {}},
@@ -254,7 +255,7 @@ def test_the_summary_has_every_documented_key(tmp_path, plotter):
     documented = (
         "scene simulated_seconds wall_seconds real_time_factor frame_rate_median "
         "frame_rate_p99 tetrahedra_initial tetrahedra_final pieces quality cut_area_m2 "
-        "finished_area_m2 force_peak_n "
+        "asked_area_m2 finished_area_m2 force_peak_n "
         "force_mean_n work_of_blade_j share versions"
     )
     assert set(documented.split()) <= set(found)
@@ -334,6 +335,17 @@ def test_the_summary_and_the_table_tell_the_mass_that_slivers_got():
     assert summary.quality["added_mass"] == 1e-3
     assert summary.quality["most_added_mass"] == 2e-3
     assert re.search("mass added to light nodes.* 0.1 %", console.export_text())
+
+
+def test_the_summary_and_the_table_tell_which_share_of_the_area_asked_for_was_cut():
+    recording = zero_recording()
+    recording.column("cut_area_m2")[-1] = 2.4e-4
+    summary = summary_of(recording)
+    assert summary.asked_area_m2 == 2.5e-4
+    for given, expected in ((summary, True), (summary._replace(asked_area_m2=None), False)):
+        console = Console(record=True, width=100)
+        print_summary(given, console)
+        assert ("240 mm², 96% of what is asked" in console.export_text()) == expected
 
 
 @pytest.mark.parametrize(("area", "expected"), [(1.25e-5, "12.5 mm² of the cut"), (0.0, None)])

@@ -1,0 +1,67 @@
+"""The area that a stroke is to cut is that of the section, in the body at rest."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scalpel_sim.scene_parts.specimens import SPECIMENS
+from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.incision import DEPTH, INSERTED_AT, SLOPE, WITHDRAWN_AT, plan_incision
+from scalpel_sim.strokes.planning import plan_stroke
+from tissue import Snapshot, TetrahedralMesh, block
+
+SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
+
+NEAR = 0.01
+"""Largest relative error: of places that are counted."""
+
+
+def lying(mesh, positions=None):
+    """Return a body that lies with its nodes elsewhere than at rest."""
+    n = len(mesh.positions)
+    positions = mesh.positions if positions is None else positions
+    nothing = np.zeros((n, 3)), np.ones(n)
+    return Snapshot(positions, mesh.positions, *nothing, mesh.tetrahedra, np.zeros(n, bool))
+
+
+def planned(name, body, **settings):
+    return plan_stroke(name, TetrahedralMesh(body.positions, body.tetrahedra), **settings)
+
+
+@pytest.mark.parametrize("name", SPECIMENS)
+def test_the_area_of_a_straight_stroke_is_that_of_the_section(name):
+    specimen = SPECIMENS[name]
+    body = lying(specimen.mesh())
+    section = sum(specimen.across) * sum(specimen.layers)
+    assert asked_area(planned("straight", body), body) == pytest.approx(section, rel=NEAR)
+
+
+def test_a_slanted_section_is_larger():
+    body = lying(SLAB)
+    stroke = planned("slanted", body)
+    lean = stroke.pose(0.0).tip - stroke.pose(0.0).heel
+    wanted = 0.06 * 0.04 / math.cos(math.atan2(abs(lean[0]), math.hypot(lean[1], lean[2])))
+    assert asked_area(stroke, body) == pytest.approx(wanted, rel=0.03)
+    assert asked_area(stroke, body) > 1.02 * 0.06 * 0.04
+
+
+def test_it_is_that_of_the_body_at_rest_and_not_as_it_lies():
+    body = lying(SLAB, SLAB.positions * (1.1, 0.8, 0.9))
+    assert asked_area(planned("straight", body), body) == pytest.approx(0.06 * 0.04, rel=NEAR)
+
+
+def test_an_incision_asks_for_its_depth_over_its_length_and_not_for_what_it_is_drawn_on():
+    body, length = lying(SLAB), (WITHDRAWN_AT - INSERTED_AT) * 0.06
+    wanted = DEPTH * length + 0.5 * DEPTH**2 / math.tan(SLOPE)
+    for drag in (0.0, 5e-3):
+        stroke = plan_incision(SLAB, speed=0.06, drag=drag)
+        assert asked_area(stroke, body) == pytest.approx(wanted, rel=NEAR)
+
+
+def test_a_press_and_a_stop_do_not_say_and_a_miss_asks_for_nothing():
+    body = lying(SLAB)
+    assert asked_area(planned("press", body), body) is None
+    assert asked_area(planned("stop", body), body) is None
+    away = lying(SLAB, SLAB.positions + np.array([1.0, 0.0, 0.0]))
+    assert asked_area(planned("straight", body), away) == 0.0
