@@ -85,14 +85,12 @@ def test_there_is_no_result_before_the_first_frame():
         _ = prepare(GRID2).result
 
 
-def test_the_scenes_are_those_of_the_paper_and_an_organ():
+def test_the_scenes_have_those_of_the_paper_and_an_organ():
     counts = {name: len(scene.mesh().tetrahedra) for name, scene in SCENES.items()}
     assert (counts["slab"], counts["grid2"], counts["grid7"]) == (576, 48, 2058)
     assert 4500 <= counts["organ"] <= 5500
     assert DEFAULT_SCENE == "organ"
-    with pytest.raises(
-        UsageError, match=r"Did you mean 'grid7'. Known: organ, incision, slab, grid2"
-    ):
+    with pytest.raises(UsageError, match=r"Did you mean 'grid7'. Known: organ, .*, slab, grid2"):
         scene_called("grid77")
 
 
