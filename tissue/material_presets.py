@@ -233,7 +233,12 @@ MATERIALS = {
             ),
             WATERY,
             SourcedValue(1050.0, "table of tissues", ICRU),
-            SourcedValue(550.0, "notched tension, porcine: 550 to 8000, the lowest taken", LIU),
+            SourcedValue(
+                550.0,
+                "notched tension, porcine: 550 to 8000, the lowest taken; such tests of muscle "
+                "found its strength rather than its toughness",
+                f"{LIU}; Taylor et al. 2012 (abstract)",
+            ),
             LIKE_LIVER,
             ON_STEEL,
             STIFFENING_TISSUE._replace(
