@@ -211,14 +211,14 @@ def test_steady_cutting_force_is_toughness_times_anchored_length(cells, toughnes
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert anchored == pytest.approx(SLAB[2], rel=0.05)
-    assert force == pytest.approx(toughness * anchored, rel=0.05)
+    assert force == pytest.approx(toughness * SLAB[2], rel=0.05)
 
 
 @pytest.mark.parametrize(
     ("law", "relaxation"), [(ONLY_SPRINGS, "verlet"), (SOLID, "global"), (SOLID, "verlet")]
 )
 @pytest.mark.parametrize(
-    ("cells", "toughness"), [(COARSE, 5.0), (FINE, 5.0), (FINE, 20.0), (COARSE, 60.0)]
+    ("cells", "toughness"), [(COARSE, 5.0), (FINE, 5.0), (FINE, 20.0), (COARSE, 40.0)]
 )
 def test_the_steady_cutting_force_holds_under_either_law_and_either_relaxation(
     cells, toughness, relaxation, law
@@ -227,7 +227,7 @@ def test_the_steady_cutting_force_holds_under_either_law_and_either_relaxation(
     force = -np.mean([r.wrench.force[1] for r in middle])
     anchored = np.mean([r.anchored_length for r in middle])
     assert anchored == pytest.approx(SLAB[2], rel=0.05)
-    assert force == pytest.approx(toughness * anchored, rel=0.05)
+    assert force == pytest.approx(toughness * SLAB[2], rel=0.05)
 
 
 @pytest.mark.parametrize("relaxation", ["global", "verlet"])
@@ -235,8 +235,7 @@ def test_tetrahedra_are_accurate_at_a_toughness_that_strains_springs_too_far(rel
     """Toughness over Young's modulus is 6 mm here, 1.27 times the mean node size."""
     _, middle, _ = steady_cut(FINE, 60.0, 0.1, relaxation=relaxation, **SOLID)
     force = -np.mean([r.wrench.force[1] for r in middle])
-    anchored = np.mean([r.anchored_length for r in middle])
-    assert force == pytest.approx(60.0 * anchored, rel=0.05)
+    assert force == pytest.approx(60.0 * SLAB[2], rel=0.05)
 
 
 def test_springs_are_refused_at_a_toughness_that_folds_them():
