@@ -240,7 +240,7 @@ def test_tetrahedra_are_accurate_at_a_toughness_that_strains_springs_too_far(rel
 
 def test_springs_are_refused_at_a_toughness_that_folds_them():
     """Toughness over Young's modulus is 6 mm here, 1.27 times the mean node size."""
-    with pytest.raises(ValueError, match="springs fold ahead of the blade above 0.6"):
+    with pytest.raises(ValueError, match=r"springs fold ahead of the blade above 0\.6"):
         steady_cut(FINE, 60.0, 0.05, **ONLY_SPRINGS)
 
 
