@@ -126,16 +126,19 @@ def work_on_tissue(forces: FloatArray, torques: FloatArray, poses: FloatArray) -
     """Return the work that the arm has done on the tissue so far, in each frame [J].
 
     It follows from what was applied to the arm and where MuJoCo moved the blade, without anything
-    that the bridge adds up.
+    that the bridge adds up. MuJoCo applies a force at the begin of a frame and moves on at the
+    velocity that results: the energy that the arm gets is that of the mean of the velocities before
+    and after.
 
     Args:
         forces: Force on the blade in each frame [N], shape (n, 3).
         torques: Torque on it about its tip [N m], shape (n, 3).
         poses: Tip, heel and forward at the begin of each frame, shape (n, 3, 3).
     """
-    moved = np.diff(poses[:, 0], axis=0)
+    means = 0.5 * (poses + np.concatenate((poses[:1], poses[:-1])))
+    moved = np.diff(means[:, 0], axis=0)
     linear = np.einsum("ij,ij->i", forces[:-1], moved)
-    turns = np.array([_turn(t0, t1) for t0, t1 in itertools.pairwise(poses)])
+    turns = np.array([_turn(t0, t1) for t0, t1 in itertools.pairwise(means)])
     angular = np.einsum("ij,ij->i", torques[:-1], turns)
     return np.asarray(-np.cumsum(linear + angular))
 
