@@ -286,35 +286,53 @@ def checked_solver(solver: SolverSettings, material: Material) -> IntegratorOpti
     return options
 
 
-def check_toughness(material: Material, node_size: float) -> None:
-    """Refuse springs that the blade would fold; warn where it strains tetrahedra too far.
+def expect_toughness_in_range(material: Material, node_size: float) -> None:
+    """Check that a blade would not fold the springs of a body.
 
     Args:
         material: What the body is made of.
         node_size: Mean node size of its mesh [m].
 
     Raises:
-        ValueError: springs of that toughness give no force that can be relied on.
+        ValueError: it would, and the force would be that of the fold.
     """
+    if material.law == "springs" and _is_too_tough(material, node_size):
+        raise ValueError(
+            f"{_toughness_in_nodes(material, node_size)}: springs fold ahead of the blade above "
+            f"{TOUGHEST['springs']:g}, and the force would be that of the fold. Use law "
+            "neo_hookean, a lower toughness, a stiffer material or a coarser mesh"
+        )
+
+
+def warn_of_toughness(material: Material, node_size: float) -> None:
+    """Log a warning if the blade will strain tetrahedra beyond the range of their law.
+
+    Args:
+        material: What the body is made of.
+        node_size: Mean node size of its mesh [m].
+    """
+    if material.law != "springs" and _is_too_tough(material, node_size):
+        _log.warning(
+            "%s: tetrahedra ahead of the blade are strained beyond the range of law %s, and the "
+            "force of the first centimetres drops to some 60 %% where elements open. Use a lower "
+            "toughness, a stiffer material, or a law that stiffens, exponential",
+            _toughness_in_nodes(material, node_size),
+            material.law,
+        )
+
+
+def _is_too_tough(material: Material, node_size: float) -> bool:
+    """Return whether toughness over Young's modulus is beyond the range of the law."""
     length = material.toughness / material.young_modulus
-    if length <= TOUGHEST.get(material.law, math.inf) * node_size:
-        return
-    what = (
+    return length > TOUGHEST.get(material.law, math.inf) * node_size
+
+
+def _toughness_in_nodes(material: Material, node_size: float) -> str:
+    """Return toughness over Young's modulus, in words."""
+    length = material.toughness / material.young_modulus
+    return (
         f"toughness / young_modulus is {length * 1e3:.1f} mm, {length / node_size:.1f} times the "
         f"mean node size of {node_size * 1e3:.1f} mm"
-    )
-    if material.law == "springs":
-        raise ValueError(
-            f"{what}: springs fold ahead of the blade above {TOUGHEST['springs']:g}, and the force "
-            "would be that of the fold. Use law neo_hookean, a lower toughness, a stiffer material "
-            "or a coarser mesh"
-        )
-    _log.warning(
-        "%s: tetrahedra ahead of the blade are strained beyond the range of law %s, and the force "
-        "of the first centimetres drops to some 60 %% where elements open. Use a lower toughness, "
-        "a stiffer material, or a law that stiffens, exponential",
-        what,
-        material.law,
     )
 
 

@@ -21,7 +21,6 @@ from tissue.cutting.snapping import EXPLAINED
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.energy_audit import Audit
 from tissue.input_checks import (
-    check_toughness,
     checked_contact,
     checked_edges,
     checked_fixed,
@@ -32,7 +31,9 @@ from tissue.input_checks import (
     checked_time_step,
     edge_of,
     edge_or_error,
+    expect_toughness_in_range,
     warn_of_ratio,
+    warn_of_toughness,
 )
 from tissue.integrators.equilibrium import LONGEST_SETTLING, settle
 from tissue.integrators.global_stepper import GlobalStepper, method_of
@@ -122,7 +123,7 @@ class Tissue(DrivenBody):
         how = Numerics(contact, solver.mass_scaling, method.damps_between_steps, single)
         self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
-        check_toughness(self.material, self.node_size)
+        warn_of_toughness(self.material, self.node_size)
         warn_of_ratio(self.material)
         checked_floor(floor, float(self.bounds[0, 2]))
         scheme = scheme_of(solver.scheme, solver.cut, body, self.material.density, self.node_size)
@@ -376,6 +377,7 @@ class Tissue(DrivenBody):
         if interaction.is_other_edge(length):
             if edge is not None:
                 interaction.expect_usable_edge(length)
+                expect_toughness_in_range(self.material, self.node_size)
             self._end_incision()
             interaction.replace_edge(length, self._system.body, *self._edge_now)
             self._incision.take_edge(interaction.n_samples)
