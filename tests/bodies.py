@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from tissue import BoolArray, FloatArray, TetrahedralMesh, block, read_mesh
+from tissue.geometry.connected_components import components
 from tissue.mesh.validation import checked, quality
 from tissue.shapes.isosurface_stuffing import stuff
 
@@ -81,7 +82,20 @@ def half_shell(wall: float, spacing: float, diameter: float = 0.06) -> Tetrahedr
         return np.minimum(np.minimum(outer - radius, radius - (outer - wall)), -points[:, 2])
 
     reach = outer + 2.0 * spacing
-    return checked(stuff(inside, [[-reach] * 3, [reach] * 3], spacing)).mesh
+    return _largest_piece(checked(stuff(inside, [[-reach] * 3, [reach] * 3], spacing)).mesh)
+
+
+def _largest_piece(mesh: TetrahedralMesh) -> TetrahedralMesh:
+    """Return the piece of most tetrahedra.
+
+    Of a bowl with elements as large as its wall, corners of the rim share no face with the rest.
+    """
+    corners = mesh.tetrahedra
+    edges = np.stack([np.repeat(corners[:, 0], 3), corners[:, 1:].ravel()], axis=1)
+    _, piece_of_node = components(len(mesh.positions), edges)
+    piece = piece_of_node[corners[:, 0]]
+    used, kept = np.unique(corners[piece == np.bincount(piece).argmax()], return_inverse=True)
+    return TetrahedralMesh(mesh.positions[used], kept.reshape(-1, 4))
 
 
 def sides(mesh: TetrahedralMesh, axis: int = 0, share: float = 0.0) -> BoolArray:

@@ -22,6 +22,10 @@ class Contact(Protocol):
         """Whether there is anything that could touch."""
         ...
 
+    def wakes(self, body: Body) -> bool:
+        """Look whether there is anything that could touch now."""
+        ...
+
     @property
     def added_frequency_squared(self) -> float:
         """What contact adds at most to w^2 of the body [1/s2]."""

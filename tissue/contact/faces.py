@@ -96,12 +96,29 @@ def with_pieces(faces: Faces, piece: IntArray, n_pieces: int) -> Faces:
 
 
 def with_found_pieces(faces: Faces, body: Body) -> Faces | None:
-    """Return the faces of a body in several pieces, skin among them; None where it is one piece."""
-    piece, queue = np.empty((2, body.n_tetrahedra), np.int64)
-    n_pieces = label_pieces(body, piece, queue)
-    if n_pieces == 1:
+    """Return the faces of a body in several pieces, skin among them.
+
+    None where it is one piece and skin is not among them.
+    """
+    piece, n_pieces = _labelled(body)
+    if n_pieces == 1 and not faces.has_skin:
         return None
-    faces = with_pieces(faces, piece, n_pieces)
+    return _with_skin(with_pieces(faces, piece, n_pieces), body)
+
+
+def with_skin(faces: Faces, body: Body) -> Faces:
+    """Return the faces, skin among them, whether the body is in pieces or not."""
+    return faces if faces.has_skin else _with_skin(with_pieces(faces, *_labelled(body)), body)
+
+
+def _labelled(body: Body) -> tuple[IntArray, int]:
+    """Return the piece that each tetrahedron is in, shape (n_tets,), and how many there are."""
+    piece, queue = np.empty((2, body.n_tetrahedra), np.int64)
+    return piece, label_pieces(body, piece, queue)
+
+
+def _with_skin(faces: Faces, body: Body) -> Faces:
+    """Return the faces with the skin among them; their pieces are known."""
     if not faces.has_skin:
         faces = with_room(faces, count_faces(body, True))
         faces.has_skin = 1

@@ -126,6 +126,10 @@ class SelfContact:
         """Whether there is anything that could touch."""
         return bool(self.arrays.is_awake)
 
+    def wakes(self, body: Body) -> bool:
+        """Return `is_awake`: folds are not looked for."""
+        return self.is_awake
+
     def begin(self) -> None:
         """Clear the totals."""
         arrays = self.arrays

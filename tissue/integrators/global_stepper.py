@@ -103,7 +103,7 @@ class GlobalStepper:
             return relax_in_stages(self, system, blade, increment, has_blade)
         edge, dt, begin, end = increment
         choice = self._choice_for(system)
-        if contact.is_awake and increment.span > 0.0 and not choice.is_at_rest:
+        if increment.span > 0.0 and not choice.is_at_rest and contact.wakes(system.body):
             choice = self._find_contacts(system, increment)
         if self._threads is not None:
             self._threads.join(system.context)

@@ -22,5 +22,6 @@ In the order in which they are best read:
     node_grid          nodes by the cells of a grid
     ridge_grid         ridges by the cells of two grids
     cells              the cells of a grid
+    folds              skin that has come near skin of the same piece
     node_ways          how far nodes have moved
 """

@@ -69,6 +69,9 @@ class NodeWays(Arrays):
     """How far each node has gone so far [m], shape (node capacity,)."""
     moved_at: IntArray
     """Search in which each node last moved much, shape (node capacity,)."""
+    is_folded: IntArray
+    """1 for a node of skin that has come near skin of its piece that is far from it at rest, else 0
+    (`folds`); shape (node capacity,)."""
     node_size: float
     """Mean node size [m]."""
 
@@ -87,13 +90,14 @@ def new_node_ways(n_nodes: int, node_size: float) -> NodeWays:
         radius=np.zeros(n_nodes),
         way=np.zeros(n_nodes),
         moved_at=np.zeros(n_nodes, np.int64),
+        is_folded=np.zeros(n_nodes, np.int64),
         node_size=float(node_size),
     )
 
 
 def grown_node_ways(ways: NodeWays, n_nodes: int) -> NodeWays:
     """Return the motion with room for `n_nodes`."""
-    of_nodes = ("before", "reference", "displacement", "radius", "way", "moved_at")
+    of_nodes = ("before", "reference", "displacement", "radius", "way", "moved_at", "is_folded")
     return ways.replaced(**{name: grown(getattr(ways, name), n_nodes) for name in of_nodes})
 
 

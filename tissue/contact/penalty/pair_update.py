@@ -44,6 +44,10 @@ _MOST_OF_SLOW = 0.2
 _CELL, _LARGE_CELL = 1.4, 3.0
 """Edges of the cells of slow and of other nodes, per node size."""
 
+OF_ONE_SHEET = 4.0
+"""Distance at rest between a node and a corner of a face up to which they are skin of one sheet
+that does not touch itself, per node size: about an edge of a tetrahedron."""
+
 SKIN_WAY = 0.5
 """Way of any node after which it is asked again which skin is near another piece, per node size.
 Larger: more skin is paired; smaller: all skin is tested more often."""
@@ -101,7 +105,7 @@ def update_pairs(
 
 @kernel
 def take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> bool:
-    """Note faces that changed, and skin that came near another piece or left it; return if any.
+    """Note faces that changed, and skin that came near other skin or left it; return if any.
 
     They are dirty in the next update.
     """
@@ -116,7 +120,9 @@ def take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> bo
         if not (has_changed or has_skin_moved):
             continue
         face = faces.face[at]
-        is_wanted = face != NO_FACE and may_touch(faces, body, at, reach, has_skin_moved)
+        is_wanted = face != NO_FACE and (
+            may_touch(faces, body, at, reach, has_skin_moved) or _is_folded(ways, faces, at)
+        )
         if not has_changed and is_wanted == (pairs.is_active[at] == 1):
             continue
         pairs.seen_generation[at] = faces.generation[at]
@@ -130,6 +136,14 @@ def take_faces(pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body) -> bo
             for q in range(3):
                 pairs.triangle[at, q] = faces.node[at, q]
     return has_any
+
+
+@kernel
+def _is_folded(ways: NodeWays, faces: Faces, at: int) -> bool:
+    """Whether a corner of a face is in a fold."""
+    node, is_folded = faces.node, ways.is_folded
+    a, b, c = is_folded[node[at, 0]], is_folded[node[at, 1]], is_folded[node[at, 2]]
+    return bool(a + b + c > 0)
 
 
 @kernel
@@ -277,7 +291,9 @@ def _ask(
     room = len(pairs.wake) // 2
     for i in range(find_near_face(grid, face, ways.node_size)):
         node = grid.found[i]
-        if node in face.nodes or _is_same_skin(pairs, faces, body, face.at, node):
+        if node in face.nodes or _is_same_skin(
+            pairs, faces, body, face.at, node, OF_ONE_SHEET * ways.node_size
+        ):
             continue
         if pairs.n_found < room:
             pairs.found_node[pairs.n_found] = node
@@ -287,12 +303,26 @@ def _ask(
 
 
 @kernel
-def _is_same_skin(pairs: NearPairs, faces: Faces, body: Body, at: int, node: int) -> bool:
-    """Whether a face or a node is only of skin, and both are of one piece."""
+def _is_same_skin(
+    pairs: NearPairs, faces: Faces, body: Body, at: int, node: int, apart: float
+) -> bool:
+    """Whether a face or a node is only of skin, and both are of one sheet of one piece.
+
+    Args:
+        pairs: Which faces and nodes are of cuts.
+        faces: The piece that each face is of.
+        body: The body at rest.
+        at: Place of the face.
+        node: The node.
+        apart: Distance at rest up to which they are of one sheet [m].
+    """
     if pairs.is_of_cut[at] == 1 and pairs.cut_at[node] == pairs.n_updates:
         return False
     piece = faces.piece[body.node_tetrahedron[node]]
-    return bool(piece >= 0 and piece == faces.piece[pairs.tetrahedron[at]])
+    if piece < 0 or piece != faces.piece[pairs.tetrahedron[at]]:
+        return False
+    d = sub(vec3(body.rest, node), vec3(body.rest, pairs.triangle[at, 0]))
+    return dot(d, d) <= apart * apart
 
 
 @kernel

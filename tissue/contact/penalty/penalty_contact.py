@@ -14,6 +14,7 @@ from tissue.contact.faces import (
     update_changed_faces,
     with_found_pieces,
     with_room,
+    with_skin,
 )
 from tissue.contact.penalty.contact_forces import (
     clear_contact_totals,
@@ -22,6 +23,7 @@ from tissue.contact.penalty.contact_forces import (
     new_penalty_forces,
 )
 from tissue.contact.penalty.contact_list import DIRECTIONS
+from tissue.contact.penalty.folds import grown_folds, look_for_folds, new_folds
 from tissue.contact.penalty.near_pairs import grown_near_pairs, new_near_pairs
 from tissue.contact.penalty.node_ways import grown_node_ways, new_node_ways
 from tissue.contact.penalty.ridge_pairs import NOT_LISTED, new_ridge_pairs
@@ -58,7 +60,7 @@ CAPACITY_OF_PAIRS = 1 << 12
 """Pairs that there is room for at first."""
 
 
-_SEARCH = SameTypes(search_contacts)
+_SEARCH, _FOLDS = SameTypes(search_contacts), SameTypes(look_for_folds)
 
 _NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, np.zeros(3))
 _NOTHING_TOUCHES.force_of_floor.setflags(write=False)  # many results share it
@@ -106,6 +108,7 @@ class PenaltyContact:
             ridges=new_ridges(len(faces.face)),
             ridge_pairs=new_ridge_pairs(CAPACITY_OF_PAIRS),
             ways=new_node_ways(n_nodes, node_size),
+            folds=new_folds(n_nodes),
             limits=new_limits(node_size, added),
             normal=room_for_points(n_nodes),
             **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
@@ -122,7 +125,7 @@ class PenaltyContact:
         time = RETARDATION_TIME / np.sqrt(added)
         self.forces = new_penalty_forces(n_nodes, friction, time)
         self._is_awake = floor is not None
-        self._is_searched = False
+        self._is_searched = self._has_looked = False
         self._n_contacts = 0
         self._has_touched = False
         self._find_pieces(body)
@@ -137,12 +140,22 @@ class PenaltyContact:
         """What contact adds at most to w^2 of the body [1/s2]."""
         return self._search.limits.added if self._n_contacts else 0.0
 
+    def wakes(self, body: Body) -> bool:
+        """Look for folds, whose skin may touch itself; return whether anything could touch."""
+        if not self._has_looked:
+            self._has_looked = True
+            search = self._search
+            has_folds = _FOLDS.call(search.folds, search.ways, search.faces, body)
+            if has_folds and not search.faces.has_skin:
+                self._take_skin(with_skin(search.faces, body))
+        return self._is_awake
+
     def begin(self) -> None:
         """Clear the totals, and search before the next substep."""
         if self._has_touched:
             clear_contact_totals(self.forces)
         self._has_touched = self._n_contacts > 0
-        self._is_searched = False
+        self._is_searched = self._has_looked = False
 
     def report(self, dt: float) -> BodyContacts:
         """Return the contacts since `begin`; `dt` is the time that has passed [s]."""
@@ -174,7 +187,7 @@ class PenaltyContact:
             room: What may be added to that without another step [1/s2].
             seconds: Length of the time step [s].
         """
-        if self._is_searched or not self._is_awake:
+        if self._is_searched or not self.wakes(body):
             return
         self._is_searched = True
         while True:
@@ -225,6 +238,7 @@ class PenaltyContact:
             faces=grown_faces(search.faces, n_tetrahedra),
             pairs=grown_near_pairs(search.pairs, n_nodes),
             ways=grown_node_ways(search.ways, n_nodes),
+            folds=grown_folds(search.folds, n_nodes),
             **{name: grown(getattr(search, name), n_nodes) for name in (*of_nodes, *others)},
         )
 
@@ -232,10 +246,14 @@ class PenaltyContact:
         """Find out whether the body is in pieces; their skin may touch then, too."""
         faces = with_found_pieces(self._search.faces, body)
         if faces is not None:
-            self._take_faces(faces)
-            self._is_awake = True
-            self._search.is_pairing_due = 1
-            self._search.ways.largest_way = np.inf
+            self._take_skin(faces)
+
+    def _take_skin(self, faces: Faces) -> None:
+        """Take faces with skin among them; what may touch is asked anew."""
+        self._take_faces(faces)
+        self._is_awake = True
+        self._search.is_pairing_due = 1
+        self._search.ways.largest_way = np.inf
 
     def _take_faces(self, faces: Faces) -> None:
         """Take these faces, which may be in other arrays than before."""

@@ -1,6 +1,7 @@
 """`SearchState`: all that the search for contacts reads and writes, beside the body."""
 
 from tissue.contact.faces import Faces
+from tissue.contact.penalty.folds import Folds
 from tissue.contact.penalty.near_pairs import NearPairs
 from tissue.contact.penalty.node_ways import NodeWays
 from tissue.contact.penalty.ridge_pairs import RidgePairs
@@ -50,6 +51,7 @@ class SearchState(Arrays):
     ridges: Ridges
     ridge_pairs: RidgePairs
     ways: NodeWays
+    folds: Folds
     limits: Limits
     normal: FloatArray
     """Outward normal of each node of a face, weighted by area [m2]; shape (node capacity, 3)."""
