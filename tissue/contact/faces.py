@@ -1,6 +1,6 @@
 """`Faces`: the boundary faces that may touch something, updated as the mesh is cut.
 
-While the body is whole these are the faces of cuts; once it is in pieces, the skin too.
+While the body is whole these are the faces of cuts; once it is in pieces or folds, the skin too.
 """
 
 import numpy as np

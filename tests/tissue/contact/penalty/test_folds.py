@@ -1,0 +1,124 @@
+"""A fold is skin near skin of the same piece that is far from it in the body at rest."""
+
+import numpy as np
+import pytest
+
+from tests.test_contact import joined
+from tissue import block
+from tissue.contact.faces import new_faces, with_found_pieces
+from tissue.contact.penalty.folds import APART, NEAR, look_for_folds, new_folds
+from tissue.contact.penalty.node_ways import new_node_ways
+from tissue.mesh.body import build_body
+
+pytestmark = pytest.mark.kernel
+
+SIZE = 0.004
+"""Size of a node, and edge of a cell [m]."""
+N = 24
+"""Cells along the strip."""
+
+
+class Strip:
+    """A flat strip of a row of cells, and the folds that are found in it."""
+
+    def __init__(self, mesh=None):
+        mesh = mesh or block((N, 1, 1), (N * SIZE, SIZE, SIZE))
+        self.body = build_body(mesh, None, None)
+        faces = new_faces(self.body.n_tetrahedra)
+        self.faces = with_found_pieces(faces, self.body) or faces
+        self.ways = new_node_ways(self.body.n_nodes, SIZE)
+        self.folds = new_folds(self.body.n_nodes)
+
+    def look(self) -> bool:
+        return look_for_folds(self.folds, self.ways, self.faces, self.body)
+
+    def fold(self, gap: float) -> None:
+        """Turn the upper half of the strip about its middle, back over the rest, `gap` above it."""
+        x, z = self.body.rest[:, 0], self.body.rest[:, 2]
+        over = x > (N // 2 + 0.5) * SIZE
+        self.body.positions[over, 0] = N * SIZE - x[over]
+        self.body.positions[over, 2] = 2.0 * SIZE + gap - z[over]
+
+    @property
+    def marked(self) -> np.ndarray:
+        """The nodes of folds."""
+        return np.flatnonzero(self.ways.is_folded)
+
+
+def test_a_flat_strip_has_no_folds():
+    strip = Strip()
+    assert not strip.look()
+    assert len(strip.marked) == 0
+
+
+def test_a_strip_squeezed_to_half_its_length_has_no_folds():
+    strip = Strip()
+    strip.look()
+    strip.body.positions[:, 0] *= 0.5
+    assert not strip.look()
+
+
+def test_a_strip_that_is_folded_over_is_a_fold_but_where_it_bends():
+    strip = Strip()
+    strip.look()
+    strip.fold(0.5 * SIZE)
+    assert strip.look()
+    from_bend = np.abs(strip.body.rest[:, 0] - 0.5 * N * SIZE)
+    assert set(np.flatnonzero(from_bend > 0.5 * APART * SIZE + SIZE)) <= set(strip.marked)
+    assert from_bend[strip.marked].min() > (0.5 * APART - NEAR) * SIZE
+
+
+def test_halves_that_are_farther_apart_than_near_are_no_fold():
+    strip = Strip()
+    strip.look()
+    strip.fold((NEAR + 0.1) * SIZE)
+    assert not strip.look()
+
+
+def test_a_fold_that_opens_is_none():
+    strip = Strip()
+    strip.fold(0.5 * SIZE)
+    assert strip.look()
+    strip.body.positions[:] = strip.body.rest
+    assert not strip.look()
+    assert len(strip.marked) == 0
+
+
+def test_all_skin_is_asked_again_where_a_fold_is_new():
+    strip = Strip()
+    strip.look()
+    strip.ways.largest_way = 0.0
+    strip.look()
+    assert strip.ways.largest_way == 0.0
+    strip.fold(0.5 * SIZE)
+    strip.look()
+    assert strip.ways.largest_way == np.inf
+
+
+def test_what_has_moved_little_is_not_looked_at_again():
+    strip = Strip()
+    strip.look()
+    strip.body.positions[:, 1] += 0.4 * SIZE
+    strip.look()
+    assert strip.folds.n_looks == 1
+    strip.body.positions[:, 1] += 0.4 * SIZE
+    strip.look()
+    assert strip.folds.n_looks == 2
+
+
+def test_skin_of_two_pieces_is_no_fold():
+    """Their skin is asked for contacts in any case."""
+    half = block((N // 2, 1, 1), (0.5 * N * SIZE, SIZE, SIZE))
+    strip = Strip(joined(half, half, (0.5 * N * SIZE, 0.0, 0.0)))
+    strip.look()
+    strip.fold(0.5 * SIZE)
+    assert not strip.look()
+
+
+def test_a_body_that_has_exploded_is_not_looked_at():
+    strip = Strip()
+    strip.look()
+    strip.body.positions[3] = [np.nan, 0.0, 0.0]
+    strip.body.positions[5] = [1e9, 0.0, 0.0]
+    assert not strip.look()
+    assert strip.folds.n_looks == 1
