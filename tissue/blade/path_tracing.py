@@ -6,7 +6,7 @@ the body or at a real end of the blade; their offset from the anchored neighbour
 blade.
 """
 
-from tissue.blade.anchors import FREE, LEFT, Anchors
+from tissue.blade.anchors import ANCHORED, FREE, LEFT, RETRACTED, Anchors
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import BladePose, Edge, pose_at, sample_displacement
 from tissue.blade.material_frame import find_walls, rest_offset
@@ -60,6 +60,7 @@ def trace_path(
     pose = pose_at(edge, when)
     find_walls(anchors, body, blade.reach)
     _note_progress(anchors)
+    _note_passage(anchors, path)
     for k in range(n):
         store(path.t0, k, vec3(path.t1, k))
         path.member[k] = anchors.state[k] != FREE
@@ -95,6 +96,18 @@ def _note_progress(anchors: Anchors) -> None:
         if wall >= 0:
             walls.has_begun[wall] = walls.has_begun[wall] or anchors.slipped[k]
             walls.has_left[wall] = walls.has_left[wall] and anchors.state[k] == LEFT
+
+
+@kernel
+def _note_passage(anchors: Anchors, path: Path) -> None:
+    """Note whether an end of the edge holds tissue, and whether the edge leaves all of it ahead."""
+    state = anchors.state
+    if state[0] != FREE or state[len(state) - 1] != FREE:
+        path.has_end_in = 1
+    path.is_through = 1
+    for k in range(len(state)):
+        if state[k] == ANCHORED or state[k] == RETRACTED:
+            path.is_through = 0
 
 
 @kernel
@@ -160,7 +173,7 @@ def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: 
 @kernel
 def forget_path(path: Path) -> None:
     """Forget where the edge has been: the next path begins at the next contact."""
-    path.has_left = 0
+    path.has_left = path.has_end_in = path.is_through = 0
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False

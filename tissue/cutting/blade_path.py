@@ -45,6 +45,10 @@ class Path(Arrays):
     """Whether each sample and the next one span a piece of the sheet, shape (n,)."""
     has_left: IntCell
     """1 if the edge has left a wall ahead in this incision, through the skin; else 0."""
+    has_end_in: IntCell
+    """1 if the tip or the heel has held tissue in this incision; else 0."""
+    is_through: IntCell
+    """1 if all tissue that the edge holds is left ahead in this step, through the skin; else 0."""
     boxes: IntArray
     """Lowest and highest lattice point of the quad from each sample to the next, and last those of
     all quads that are linked, coordinate by coordinate: shape (6, n). Where samples are not linked
@@ -65,6 +69,8 @@ def new_path(n: int) -> Path:
         known=np.zeros(n, np.bool_),
         linked=np.zeros(n, np.bool_),
         has_left=0,
+        has_end_in=0,
+        is_through=0,
         boxes=np.zeros((6, n), np.int64),
     )
 

@@ -12,7 +12,7 @@ from tissue import TetrahedralMesh, block
 from tissue.blade.anchors import FREE, LEFT, new_anchors
 from tissue.blade.edge import Edge
 from tissue.blade.material_frame import find_walls
-from tissue.blade.path_tracing import trace_path
+from tissue.blade.path_tracing import forget_path, trace_path
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
@@ -188,3 +188,29 @@ def test_the_sheet_ends_outside_the_wall_that_is_left_and_goes_on_in_the_other()
     assert path.t1[2, 1] == pytest.approx(0.018 + MARGIN)
     assert path.t1[17, 1] == pytest.approx(0.318)
     assert (held.anchors.state[1:4] == FREE).all()
+
+
+def test_an_edge_is_through_once_all_that_it_holds_is_left_ahead():
+    held = TwoWalls()
+    held.hold_both()
+    assert held.trace().is_through == 0
+    for k in (1, 2, 3):
+        held.anchors.state[k] = LEFT
+    assert held.trace().is_through == 0
+    for k in (16, 17, 18):
+        held.anchors.state[k] = LEFT
+    path = held.trace()
+    assert path.is_through == 1
+    assert path.has_end_in == 0
+
+
+@pytest.mark.parametrize("end", [0, N - 1])
+def test_an_end_of_the_edge_that_once_held_tissue_is_remembered_until_the_path_is_forgotten(end):
+    held = TwoWalls()
+    held.hold(end, 0.01, 0.01, 0.01)
+    assert held.trace().has_end_in == 1
+    held.anchors.state[end] = FREE
+    held.hold(2, 0.01, 0.01, 0.01)
+    assert held.trace().has_end_in == 1
+    forget_path(held.path)
+    assert held.trace().has_end_in == 0

@@ -10,7 +10,7 @@ import pytest
 from tests import soundness
 from tissue import Tissue, block
 from tissue.blade.prescribed_cut import cut_along
-from tissue.cutting.finishing import MOST_FINISHED, finish_sheet
+from tissue.cutting.finishing import MOST_FINISHED, MOST_PASSED, finish_sheet
 from tissue.mesh.body import CUT
 from tissue.mesh.changes import clear_changes
 
@@ -46,6 +46,28 @@ def test_a_bridge_of_a_third_of_the_sheet_stays():
     tissue._end_incision()
     assert MOST_FINISHED < 0.015 / 0.045
     assert tissue._incision.finished_area == 0.0
+    assert tissue.n_pieces() == 1
+
+
+@pytest.mark.parametrize(
+    ("is_through", "has_end_in", "pieces"), [(1, 0, 2), (1, 1, 1), (0, 0, 1), (0, 1, 1)]
+)
+def test_a_bridge_of_a_quarter_is_parted_where_the_edge_has_passed_through_all_tissue(
+    is_through, has_end_in, pieces
+):
+    """11.5 mm of 60 are left, 24 % of what was cut."""
+    tissue = cut_to(0.0485)
+    tissue._incision.path.is_through = is_through
+    tissue._incision.path.has_end_in = has_end_in
+    tissue._end_incision()
+    assert tissue.n_pieces() == pieces
+
+
+def test_a_bridge_of_a_third_stays_whatever_the_edge_has_passed():
+    tissue = cut_to(0.045)
+    tissue._incision.path.is_through = 1
+    tissue._end_incision()
+    assert MOST_PASSED < 0.015 / 0.045
     assert tissue.n_pieces() == 1
 
 
