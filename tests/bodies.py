@@ -88,7 +88,7 @@ def half_shell(wall: float, spacing: float, diameter: float = 0.06) -> Tetrahedr
 def _largest_piece(mesh: TetrahedralMesh) -> TetrahedralMesh:
     """Return the piece of most tetrahedra.
 
-    Of a bowl with elements as large as its wall, corners of the rim share no face with the rest.
+    Of a bowl with elements as large as its wall, parts of the rim share no face with the rest.
     """
     corners = mesh.tetrahedra
     edges = np.stack([np.repeat(corners[:, 0], 3), corners[:, 1:].ravel()], axis=1)
