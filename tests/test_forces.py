@@ -164,9 +164,8 @@ def test_slicing_lowers_the_normal_force_as_theory_says(slice_ratio):
 
 
 def test_toughness_rises_with_the_speed_of_the_edge():
-    speedy = {"toughness": 10.0, "toughness_exponent": 0.5, "toughness_speed": 0.1}
-    run = Run(upright(0.1), young_modulus=30e3, **speedy)
-    assert run.steady() == pytest.approx(2.0 * 10.0 * run.anchored(), rel=0.03)
+    run = Run(upright(0.1), toughness=10.0, toughness_exponent=0.5, toughness_speed=0.1)
+    assert run.steady() == pytest.approx(2.0 * 10.0 * run.anchored(), rel=0.05)
 
 
 def test_a_blunt_edge_costs_twice_its_radius_times_the_work_to_rupture():
