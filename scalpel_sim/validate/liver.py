@@ -125,8 +125,7 @@ LIVER_SCENE = ValidationScene(
         "and tools, and were not put in. The force rises with depth until the capsule breaks, and "
         "then stays constant, as in experiments; at the second insertion only the uncut rest and "
         "friction resist. Not reproduced: the saw-tooth of real liver, which loads and unloads by "
-        "turns (Chanthasopeephan et al.); a continuum of one toughness has its mean, and the dips "
-        "here are those of the mesh, where the blade passes from element to element. No published "
+        "turns (Chanthasopeephan et al.); a continuum of one toughness has its mean. No published "
         "curve is compared point by point: only figures from texts that could be looked up."
     ),
     measure=_measure,
