@@ -5,6 +5,7 @@ In reading order:
 - `edge`: the cutting edge over a step, and the pose of the blade at an instant.
 - `toughness`: the energy that cutting takes, per area.
 - `impulse_totals`: impulses and works that blade and tissue exchanged.
+- `coarse_hold`: what a tetrahedron that was cut still holds of the anchors.
 - `anchors`: the springs between edge and material, and their energy.
 - `side_contact`: the law of pressure and friction on the side faces.
 - `blunt_contact`: the law of pressure, friction and piercing at the back and the ends.
@@ -12,6 +13,7 @@ In reading order:
 - `edge_forces`: forces of the edge on the nodes.
 - `side_forces`: forces of the side faces on the nodes, and sliding.
 - `material_frame`: vectors mapped to the body at rest.
+- `rest_area`: the area at rest that an anchor cuts, for the area that it sweeps.
 - `return_mapping`: plastic slip of the anchors.
 - `engagement`: which samples of the edge are anchored.
 - `side_search`: which faces of the tissue are near the blade.
