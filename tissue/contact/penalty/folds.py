@@ -39,7 +39,7 @@ WAY = 0.5
 inside each other before they are seen; smaller: each look at all skin takes its time."""
 
 FARTHEST = 1.0
-"""Way of a node [m] from which on a body has exploded, and nothing is looked for."""
+"""Way of a node [m] from which on the motion has diverged, and nothing is looked for."""
 
 
 class Folds(Arrays):
