@@ -46,7 +46,7 @@ N_STEPS = 40
 _DT = 1e-3
 _SECONDS_PER_LOOK = 0.1
 """How often the progress of the processes is looked at [s]."""
-USUAL_NUMBER = 827
+USUAL_NUMBER = 838
 """How many kernels a set has, about: the end of the progress bar, unless there are more."""
 
 Progress = Callable[[int, int], None]
