@@ -51,7 +51,7 @@ def validate(
             out/ and the name of its file.
         only: Only this scene; may be given several times. beam, stretch, steady,
             symmetry, rate, slicing, puncture, reaction, audit, coupling, liver, gel.
-        quick: A few checks of each scene, in about half a minute instead of five.
+        quick: A few checks of each scene, in a minute or two instead of seven.
     """
     if case is not None:
         if only or quick:
