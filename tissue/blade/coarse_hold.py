@@ -17,9 +17,10 @@ from tissue.mesh.body import Body
 
 OVERHANG = 0.5
 """How far outside the tetrahedron the anchor is where it is held by the new mesh alone, as a share
-of the tetrahedron's altitude there. Where the hold ends at the face, at 0.25 or at 0.5, cutting
-pays for 94, 97 and 98 % of the area that opens at 60 J/m2 and 30 kPa; much further out the field of
-the tetrahedron is not that of the tissue."""
+of the tetrahedron's altitude there. At 0.01, 0.25, 0.5 and 1 the force of steady cuts (60 J/m2,
+30 kPa) falls to 0.88, 0.92, 0.94 and 0.96 of its mean at the lowest, and the mean is 1.01, 1.00,
+0.985 and 0.97 of toughness times depth: far out the field of the tetrahedron is not that of the
+tissue."""
 
 
 class CoarseHold(Arrays):
