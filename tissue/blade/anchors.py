@@ -153,13 +153,13 @@ def anchor_position(anchors: Anchors, body: Body, positions: FloatArray, k: int)
 
 
 @inlined
-def n_held(anchors: Anchors, k: int) -> int:
+def n_holding_nodes(anchors: Anchors, k: int) -> int:
     """Return the number of nodes that hold anchor `k`: 4, or 8 where the mesh was just refined."""
     return 4 if anchors.coarse.share[k] == 0.0 else 8
 
 
 @inlined
-def held_node(anchors: Anchors, body: Body, k: int, i: int) -> int:
+def holding_node(anchors: Anchors, body: Body, k: int, i: int) -> int:
     """Return node `i` of those that hold anchor `k`."""
     if i < 4:
         return body.tetrahedra[anchors.tetrahedron[k], i]  # type: ignore[no-any-return]
@@ -167,7 +167,7 @@ def held_node(anchors: Anchors, body: Body, k: int, i: int) -> int:
 
 
 @inlined
-def held_weight(anchors: Anchors, k: int, i: int) -> float:
+def holding_weight(anchors: Anchors, k: int, i: int) -> float:
     """Return the weight of node `i` of those that hold anchor `k`."""
     share: float = anchors.coarse.share[k]
     if i < 4:
@@ -260,8 +260,8 @@ def clear_anchor_forces(anchors: Anchors, body: Body, external: FloatArray) -> N
         if anchors.state[k] != ANCHORED or (t == before and anchors.coarse.share[k] == 0.0):
             continue
         before = t
-        for i in range(n_held(anchors, k)):
-            node = held_node(anchors, body, k, i)
+        for i in range(n_holding_nodes(anchors, k)):
+            node = holding_node(anchors, body, k, i)
             external[node, 0] = external[node, 1] = external[node, 2] = 0.0
 
 
@@ -274,11 +274,11 @@ def add_anchor_stiffness(anchors: Anchors, body: Body, stiffness: FloatArray) ->
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
             total = 0.0
-            for i in range(n_held(anchors, k)):
-                total += abs(held_weight(anchors, k, i))
-            for i in range(n_held(anchors, k)):
-                node = held_node(anchors, body, k, i)
-                row = anchors.stiffness[k] * abs(held_weight(anchors, k, i)) * total
+            for i in range(n_holding_nodes(anchors, k)):
+                total += abs(holding_weight(anchors, k, i))
+            for i in range(n_holding_nodes(anchors, k)):
+                node = holding_node(anchors, body, k, i)
+                row = anchors.stiffness[k] * abs(holding_weight(anchors, k, i)) * total
                 stiffness[node, 0] += row
 
 
@@ -293,8 +293,8 @@ def highest_anchor_frequency(
     worst = 0.0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
-            for i in range(n_held(anchors, k)):
-                node = held_node(anchors, body, k, i)
+            for i in range(n_holding_nodes(anchors, k)):
+                node = holding_node(anchors, body, k, i)
                 if not body.fixed[node]:
                     own = frequency_squared[node] + stiffness[node, 0] / body.masses[node]
                     worst = max(worst, own)

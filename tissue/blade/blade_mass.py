@@ -5,7 +5,7 @@ Runge-Kutta step takes energy from these, and damping after a Verlet step is cou
 (`tissue.integrators.stability`). So they are kept further from the limit than the rest of the body.
 """
 
-from tissue.blade.anchors import ANCHORED, add_anchor_stiffness, held_node, n_held
+from tissue.blade.anchors import ANCHORED, add_anchor_stiffness, holding_node, n_holding_nodes
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import PRESSING
 from tissue.blade.blunt_forces import add_blunt_stiffness
@@ -46,8 +46,8 @@ def limit_frequency_at_blade(
     worst = 0.0
     for k in range(len(anchors.state)):
         if anchors.state[k] == ANCHORED:
-            for i in range(n_held(anchors, k)):
-                node = held_node(anchors, body, k, i)
+            for i in range(n_holding_nodes(anchors, k)):
+                node = holding_node(anchors, body, k, i)
                 worst = max(worst, _limited(elastic, body, scratch, node))
     for i in range(sides.n_faces):
         for corner in range(3):

@@ -3,9 +3,9 @@
 from tissue.blade.anchors import (
     ANCHORED,
     anchor_position,
-    held_node,
-    held_weight,
-    n_held,
+    holding_node,
+    holding_weight,
+    n_holding_nodes,
     surplus_stretch,
 )
 from tissue.blade.blade_state import BladeState
@@ -53,8 +53,8 @@ def apply_edge_forces(
             continue  # backed off: an edge pushes, and does not pull
         surplus = surplus_stretch(anchors, k, stretch, pose, blade.toughness)
         force = scale(anchors.stiffness[k], sub(stretch, surplus))
-        for i in range(n_held(anchors, k)):
-            node, weight = held_node(anchors, body, k, i), held_weight(anchors, k, i)
+        for i in range(n_holding_nodes(anchors, k)):
+            node, weight = holding_node(anchors, body, k, i), holding_weight(anchors, k, i)
             running = add_to_node(external, running, node, weight, force, seconds)
         # The surplus is about to slip and bears no force: without it the force points from the
         # anchor to the blade, so that the torques on the two cancel as well.

@@ -5,7 +5,13 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import Material, block
-from tissue.blade.anchors import anchor_position, held_node, held_weight, n_held, new_anchors
+from tissue.blade.anchors import (
+    anchor_position,
+    holding_node,
+    holding_weight,
+    n_holding_nodes,
+    new_anchors,
+)
 from tissue.blade.coarse_hold import OVERHANG, fade_coarse_hold, move_coarse_hold
 from tissue.blade.return_mapping import relocate, set_anchor
 from tissue.core.vec3 import Vec3
@@ -73,9 +79,9 @@ def test_an_anchor_does_not_follow_a_node_that_was_just_inserted(held):
 def test_the_weights_of_the_nodes_that_hold_an_anchor_add_up_to_its_position(held):
     held.refine()
     held.slip_to([0.9, -0.1, 0.1, 0.1])
-    n = n_held(held.anchors, 0)
-    nodes = [held_node(held.anchors, held.body, 0, i) for i in range(n)]
-    weights = np.array([held_weight(held.anchors, 0, i) for i in range(n)])
+    n = n_holding_nodes(held.anchors, 0)
+    nodes = [holding_node(held.anchors, held.body, 0, i) for i in range(n)]
+    weights = np.array([holding_weight(held.anchors, 0, i) for i in range(n)])
     assert n == 8
     assert weights.sum() == pytest.approx(1.0)
     np.testing.assert_allclose(weights @ held.body.positions[nodes], held.position, rtol=1e-12)
@@ -99,9 +105,9 @@ def test_a_hold_that_has_faded_does_not_come_back(held):
 def test_a_tetrahedron_that_the_anchor_has_left_far_behind_holds_nothing(held):
     held.refine()
     held.slip_to([1.0 + 2.0 * OVERHANG, -2.0 * OVERHANG, 0.0, 0.0])
-    assert n_held(held.anchors, 0) == 4
+    assert n_holding_nodes(held.anchors, 0) == 4
 
 
 def test_an_anchor_whose_tetrahedron_stays_is_held_by_four_nodes(held):
     relocate(held.blade, held.body, held.visits)
-    assert n_held(held.anchors, 0) == 4
+    assert n_holding_nodes(held.anchors, 0) == 4

@@ -1,6 +1,6 @@
 """The focus of the relaxation, where the tip of the blade is (paper, section 5.2)."""
 
-from tissue.blade.anchors import ANCHORED, held_node, n_held
+from tissue.blade.anchors import ANCHORED, holding_node, n_holding_nodes
 from tissue.blade.blade_state import BladeState
 from tissue.blade.blunt_contact import PRESSING
 from tissue.core.array_types import IntArray
@@ -32,8 +32,8 @@ def find_held(held: Rings, body: Body, blade: BladeState) -> None:
             if n == 0:
                 begin_search(held)
             n += 1
-            for i in range(n_held(anchors, k)):
-                add_focus(held, held_node(anchors, body, k, i))
+            for i in range(n_holding_nodes(anchors, k)):
+                add_focus(held, holding_node(anchors, body, k, i))
     for i in range(sides.n_faces):
         if n == 0:
             begin_search(held)
