@@ -38,7 +38,7 @@ class PeerBody(NamedTuple):
     masses: _Array
     """Masses of the nodes [kg], shape (n_nodes,)."""
     held: _Array
-    """Indices of the nodes that do not move, shape (n_holding_nodes,)."""
+    """Indices of the nodes that do not move, shape (n_held,)."""
     young_modulus: float
     """Young's modulus [Pa]."""
     poisson_ratio: float
