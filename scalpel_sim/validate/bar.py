@@ -1,7 +1,6 @@
 """The bar of the validation in the engine: its mesh, its material, and how it comes to rest."""
 
 import math
-from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -12,7 +11,15 @@ from scalpel_sim.validate.beam_theory import (
     BAR_THICKNESS,
     GRAVITY,
 )
-from tissue import BoolArray, FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import (
+    BoolArray,
+    FloatArray,
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    lattice_block,
+)
 
 _PERIODS_TO_REST = 3.0
 """Periods of the slowest mode in which a bar whose damping is critical for it comes to rest: within
@@ -20,19 +27,15 @@ _PERIODS_TO_REST = 3.0
 _STEPS_TO_REST = 100
 """Calls of the engine in that time."""
 
-BlockShape = Callable[[Sequence[int], Sequence[float]], TetrahedralMesh]
-"""Makes a block of cells, of that size [m]: `tissue.block` or `tissue.lattice_block`."""
 
-
-def bar_mesh(across: int, shape: BlockShape = block) -> TetrahedralMesh:
-    """Return the bar along x, of so many cells through its thickness.
+def bar_mesh(across: int) -> TetrahedralMesh:
+    """Return the bar along x, of so many cells of a body-centred lattice through its thickness.
 
     Args:
         across: Number of cells.
-        shape: How cells are divided into tetrahedra.
     """
     along = round(across * BAR_LENGTH / BAR_THICKNESS)
-    return shape((along, across, across), (BAR_LENGTH, BAR_THICKNESS, BAR_THICKNESS))
+    return lattice_block((along, across, across), (BAR_LENGTH, BAR_THICKNESS, BAR_THICKNESS))
 
 
 def bar_material(poisson_ratio: float, drag: float = 0.0) -> Material:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from scalpel_sim.validate.bar import (
-    BlockShape,
     bar_material,
     bar_mesh,
     bar_tissue,
@@ -21,7 +20,7 @@ from scalpel_sim.validate.bar import (
 )
 from scalpel_sim.validate.beam_theory import BAR_LENGTH, BAR_THICKNESS, beam_theory
 from scalpel_sim.validate.findings import THEORY, Check, within
-from tissue import FloatArray, TetrahedralMesh, block, boundary_faces, fixed_nodes
+from tissue import FloatArray, TetrahedralMesh, boundary_faces, fixed_nodes
 
 _STRAIN = 0.005
 """Strain of the top and the bottom of the bent bar: so small that the theory is linear."""
@@ -49,18 +48,17 @@ class FreeBar(NamedTuple):
     """Period of the swing over Timoshenko's."""
 
 
-def bent_and_let_go(poisson_ratio: float, across: int, shape: BlockShape = block) -> FreeBar:
+def bent_and_let_go(poisson_ratio: float, across: int) -> FreeBar:
     """Bend a bar by couples at its ends, let it go, and follow its swing.
 
     Args:
         poisson_ratio: Poisson's ratio of the bar.
         across: Cells through its thickness.
-        shape: How cells are divided into tetrahedra.
     """
     theory = beam_theory(poisson_ratio)
     curvature = 2.0 * _STRAIN / BAR_THICKNESS
     couple = theory.rigidity * curvature
-    mesh = bar_mesh(across, shape)
+    mesh = bar_mesh(across)
     forces = forces_of_couple(mesh, "right", couple) - forces_of_couple(mesh, "left", couple)
 
     def turned(positions: FloatArray) -> float:
