@@ -86,14 +86,16 @@ def trace_path(
 
 @kernel
 def _note_progress(anchors: Anchors) -> None:
-    """Note of each wall whether an anchor in it has cut, and whether all have left it."""
+    """Note of each wall whether an anchor in it has cut, whether one pulls, and if all left."""
     walls = anchors.walls
     for k in range(len(anchors.state)):
         wall = walls.first[k]
         if wall == k:
-            walls.has_begun[k] = False
+            walls.has_begun[k] = walls.is_cut[k] = False
             walls.has_left[k] = True
         if wall >= 0:
+            pulls = anchors.state[k] == ANCHORED or anchors.state[k] == LEFT
+            walls.is_cut[wall] = walls.is_cut[wall] or pulls
             walls.has_begun[wall] = walls.has_begun[wall] or anchors.slipped[k]
             walls.has_left[wall] = walls.has_left[wall] and anchors.state[k] == LEFT
 
@@ -164,7 +166,8 @@ def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: 
         store(path.t1, k, axpy(margin, ahead, vec3(path.t1, k)))
     if path.known[k]:
         _limit_step(path, k)
-    elif walls.has_begun[wall]:  # a new member begins outside the skin, behind where it is now
+    elif walls.has_begun[wall] and walls.is_cut[wall]:
+        # A new member begins outside the skin, behind where it is now.
         store(path.t0, k, _behind(body, vec3(path.t1, k), margin, ahead, path.seed[k]))
     else:
         store(path.t0, k, vec3(path.t1, k))

@@ -24,6 +24,9 @@ class Walls(Arrays):
     """Rotation of the wall from the body at rest to the body now, column by column; (n, 9)."""
     has_begun: BoolArray
     """Whether an anchor in the wall has cut, entry `first`; shape (n,)."""
+    is_cut: BoolArray
+    """Whether an anchor in the wall pulls, or left it in this step, entry `first`; shape (n,). From
+    the others the blade has backed off."""
     has_left: BoolArray
     """Whether all samples left the wall in this step, entry `first`; shape (n,)."""
 
@@ -34,6 +37,7 @@ def new_walls(n: int) -> Walls:
         first=np.full(n, -1, np.int64),
         rotation=np.tile(np.eye(3).ravel(), (n, 1)),
         has_begun=np.zeros(n, np.bool_),
+        is_cut=np.zeros(n, np.bool_),
         has_left=np.zeros(n, np.bool_),
     )
 

@@ -9,7 +9,7 @@ import pytest
 
 from tests.tissue.kernels_of import line_blade
 from tissue import TetrahedralMesh, block
-from tissue.blade.anchors import FREE, LEFT, new_anchors
+from tissue.blade.anchors import FREE, LEFT, RETRACTED, new_anchors
 from tissue.blade.edge import Edge
 from tissue.blade.material_frame import find_walls
 from tissue.blade.path_tracing import forget_path, trace_path
@@ -176,6 +176,16 @@ def test_a_wall_that_the_edge_only_presses_has_not_begun_though_another_is_cut()
     path = held.trace()
     assert held.anchors.walls.has_begun[[1, 16]].tolist() == [True, False]
     np.testing.assert_array_equal(path.t1[17], path.t0[17])
+
+
+def test_nothing_begins_beside_samples_from_which_the_blade_has_backed_off():
+    """Where the edge pulls, a free sample that was placed nowhere yet begins outside the skin."""
+    held = TwoWalls(np.eye(3))
+    held.hold_both()
+    held.anchors.state[1:4] = RETRACTED
+    path = held.trace()
+    np.testing.assert_array_equal(path.t0[5], path.t1[5])
+    np.testing.assert_allclose(path.t1[14] - path.t0[14], MARGIN * Y, atol=1e-12)
 
 
 def test_the_sheet_ends_outside_the_wall_that_is_left_and_goes_on_in_the_other():
