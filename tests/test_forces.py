@@ -292,9 +292,13 @@ def test_action_is_reaction_in_every_step_with_cuts_friction_and_side_load(strok
         np.testing.assert_allclose(result.force_on_tissue, -result.wrench.force, atol=1e-12)
 
 
-def test_a_symmetric_cut_has_no_side_force():
-    run = Run(upright(x=0.02), blade=SCALPEL, mesh=mirrored((8, 8, 4)), blade_friction=0.3)
-    assert abs(run.steady(axis=0)) < 0.05 * run.steady()
+@pytest.mark.parametrize("law", ["neo_hookean", "springs"])
+def test_a_symmetric_cut_has_no_side_force(law):
+    tissue = {"law": law, "young_modulus": 30e3, "blade_friction": 0.3}
+    if law == "springs":
+        tissue["poisson_ratio"] = 0.25
+    run = Run(upright(x=0.02), blade=SCALPEL, mesh=mirrored((8, 8, 4)), **tissue)
+    assert abs(run.steady(axis=0)) < 0.02 * run.steady()
 
 
 def test_a_blade_pressed_sideways_into_tissue_gets_a_force_and_a_torque():
@@ -312,10 +316,12 @@ def test_a_blade_pressed_sideways_into_tissue_gets_a_force_and_a_torque():
     assert results[-1].cut_area == 0.0
 
 
-def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
-    """The lips are a blade thickness apart at the blade, and close together behind it."""
-    thick = BladeShape(thickness=1e-3, bevel_angle=0.2, height=8e-3)
-    run = Run(upright(end=0.035), blade=thick)
+THICK = BladeShape(thickness=1e-3, bevel_angle=0.2, height=8e-3)
+
+
+def test_the_tissue_opens_around_the_blade():
+    """The lips are a blade thickness apart. Elements are smaller than the blade is high."""
+    run = Run(upright(end=0.035), blade=THICK, cells=(16, 16, 4))
     gaps = []
     for result in run.results[-50:]:  # lips come and go where the faces meet them
         contacts = result.contacts
@@ -325,6 +331,11 @@ def test_the_tissue_opens_around_the_blade_and_closes_behind_it():
     tip = run.poses[-1].tip[1]
     assert (touching[:, 1] < tip).all()
     assert (touching[:, 1] > tip - 8e-3).all()
+
+
+def test_the_tissue_closes_behind_the_blade():
+    run = Run(upright(end=0.035), blade=THICK)
+    tip = run.poses[-1].tip[1]
     surface = run.tissue.surface()
     lips = surface.positions[np.unique(surface.triangles[surface.is_cut])]
     behind = lips[(lips[:, 1] < tip - 0.012) & (lips[:, 1] > 0.002)]

@@ -24,7 +24,7 @@ from tissue.blade.coarse_hold import (
     store_weights,
 )
 from tissue.blade.edge import BladePose, sample_point
-from tissue.blade.material_frame import to_material
+from tissue.blade.material_frame import way_at_rest
 from tissue.blade.rest_area import update_rest_share
 from tissue.core.array_types import IntArray
 from tissue.core.jit import kernel
@@ -223,7 +223,7 @@ def _slip_anchor(
     if anchors.at_skin[k]:
         anchors.at_skin[k] = False  # once broken, the skin is no tougher than the rest
         slip = norm(surplus_stretch(anchors, k, stretch, pose, law))
-    _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane))
+    _move_anchor(blade, body, visits, k, scale(slip / distance, in_plane), pose)
     if anchors.state[k] == LEFT:
         anchors.cut[k] += share * surplus * across
         totals.work_of_cutting += spent
@@ -246,12 +246,15 @@ def _slip_anchor(
 
 
 @kernel
-def _move_anchor(blade: BladeState, body: Body, visits: Visits, k: int, step: Vec3) -> None:
+def _move_anchor(
+    blade: BladeState, body: Body, visits: Visits, k: int, step: Vec3, pose: BladePose
+) -> None:
     """Move anchor `k` through the material by `step` [m], a vector in the deformed body."""
     anchors = blade.anchors
     anchors.slipped[k] = True
     t = anchors.tetrahedron[k]
-    p = add(vec3(anchors.rest, k), to_material(body, t, step))
+    way = way_at_rest(anchors, body, k, step, pose.normal, blade.reach)
+    p = add(vec3(anchors.rest, k), way)
     weights = barycentric_in(p, body.rest, body.tetrahedra, t)
     if smallest_weight(weights) >= -INSIDE_TOLERANCE:  # most often it stays in its tetrahedron
         _hold(anchors, body, k, t, weights)
