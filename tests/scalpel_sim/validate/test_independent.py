@@ -85,12 +85,22 @@ def test_the_work_of_forces_and_torques_is_that_of_a_spring():
 
 
 def test_two_insertions_pass_with_the_toughness_put_in_and_fail_with_another():
-    found = liver.Insertions(None, None, force=164.0, toughness=164.0)
+    found = liver.Insertions(None, None, force=164.0, cut=1.0, toughness=164.0)
     checks = liver.check_two_insertions(0.0, found)
     assert verdicts(checks) == [PASS, PASS]
-    assert {check.basis for check in checks} == {REGRESSION}
+    assert [check.basis for check in checks] == [REGRESSION, THEORY]
     low = found._replace(toughness=0.75 * 164.0, force=0.94 * 164.0)
     assert verdicts(liver.check_two_insertions(0.0, low)) == [FAIL, FAIL]
+
+
+def test_the_blade_pays_for_half_of_what_is_cut_more_than_swept():
+    found = liver.Insertions(None, None, force=1.1 * 164.0, cut=1.2, toughness=164.0)
+    assert liver.check_two_insertions(0.0, found)[1].value == pytest.approx(1.0)
+
+
+def test_a_deep_insertion_that_is_not_steady_fails():
+    assert verdicts(liver.check_deep_insertion(164.0, 1.0)) == [PASS, PASS]
+    assert verdicts(liver.check_deep_insertion(1.06 * 164.0, 1.12)) == [FAIL, FAIL]
 
 
 def test_the_observer_of_the_bridge_is_a_regression():
