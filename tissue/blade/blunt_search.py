@@ -21,6 +21,7 @@ from tissue.blade.blunt_contact import (
     BluntContacts,
     BluntSide,
     blunt_side,
+    fit_stiffness,
     press_energy,
     press_of,
     touched_point,
@@ -165,6 +166,7 @@ def _take_point(
     """
     blunt = blade.blunt
     _set_point(blunt, body, k, skin.face // 4, skin.weights)
+    fit_stiffness(blunt, body, k, pose.normal)
     point = touched_point(blunt, body, body.positions, k)
     press = press_of(blunt, k, side, pose.normal, point, blade.toughness)
     blunt.energy[k] = press_energy(blunt, k, press)

@@ -17,11 +17,13 @@ from tissue.blade.blunt_contact import (
     STIFFEST,
     TIP_END,
     blunt_side,
-    blunt_stiffness,
+    fit_stiffness,
     new_blunt_contacts,
     press_energy,
     press_force,
     press_of,
+    strip_law_of,
+    strip_stiffness,
     touched_point,
 )
 from tissue.blade.blunt_forces import (
@@ -203,11 +205,23 @@ def test_the_samples_cover_the_back_and_both_ends():
 
 def test_a_thinner_blade_sinks_in_farther_and_a_thick_one_is_as_stiff_as_may_be():
     thin, thick = replace(SHAPE, thickness=0.1e-3), replace(SHAPE, thickness=0.4e-3)
-    one, other = (blunt_stiffness(shape, MATERIAL, NODE_SIZE) for shape in (thin, thick))
+    one, other = (
+        strip_stiffness(strip_law_of(shape, MATERIAL, NODE_SIZE), 0.0) for shape in (thin, thick)
+    )
     unit = 2.0 * (1.0 - 0.45**2) / (math.pi * 10e3)
     assert 1.0 / one - 1.0 / other == pytest.approx(unit * math.log(4.0))
     wide = BladeShape(thickness=0.05, bevel_angle=1.0, height=0.06)
-    assert blunt_stiffness(wide, MATERIAL, NODE_SIZE) == STIFFEST * 10e3
+    assert strip_stiffness(strip_law_of(wide, MATERIAL, NODE_SIZE), 0.0) == STIFFEST * 10e3
+
+
+def test_a_sample_between_rows_of_nodes_is_softer_than_on_a_row():
+    """Nodes of the skin are 10 mm apart: 1 mm from a row it is 9 and 1 mm from two of them."""
+    held = PressingBlade(BACK)
+    pose = pose_at(edge_of(BACK, 0.0), 1.0)
+    fit_stiffness(held.blunt, held.body, held.k, pose.normal)
+    law, length = held.blunt.law, held.blunt.length[held.k]
+    assert held.blunt.stiffness[held.k] == pytest.approx(strip_stiffness(law, 9e-6) * length)
+    assert strip_stiffness(law, 9e-6) < strip_stiffness(law, 0.0)
 
 
 def test_a_touched_point_moves_with_its_face():
