@@ -128,7 +128,8 @@ def anchor_beside(
             ahead = add(p, scale(slit_reach, apply_transposed(rotation, pose.forward)))
             if _runs_in_slit(blade, body, visits, pose, t, p, ahead, slit_reach):
                 continue
-            _begin_anchor(anchors, body, k, t, p, False)
+            # Beside skin that is not broken it is skin too, else the edge broke in unopposed there.
+            _begin_anchor(anchors, body, k, t, p, anchors.at_skin[beside])
             join_wall(anchors.walls, k, beside)
             anchors.rest_share[k] = anchors.rest_share[beside]
             store(anchors.rest_area, k, vec3(anchors.rest_area, beside))

@@ -77,6 +77,22 @@ def test_samples_beside_an_anchored_one_that_are_in_the_slit_stay_free(slit_body
     assert (blade.anchors.state[height > 0.0205] == FREE).all()
 
 
+@pytest.mark.parametrize("is_whole", [True, False])
+def test_samples_beside_one_that_has_not_broken_the_skin_have_it_to_break_too(is_whole):
+    body = Tissue(block((2, 2, 2), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))._body
+    tip, heel = Vec3(0.019, 0.0, 0.011), Vec3(0.019, 0.0, 0.031)
+    blade = line_blade(new_anchors(11, 0.02, 1e3)).replaced(reach=EDGE)
+    visits = no_visits(len(body.positions), len(body.tetrahedra))
+    grid = build_grid(body, body.rest, 0.0)
+    set_anchor(blade.anchors, body, 0, tetrahedron_at(body, grid, body.rest, tip), tip)
+    blade.anchors.at_skin[0] = is_whole
+    anchor_beside(
+        blade, body, visits, pose_at(Edge(tip, heel, AHEAD, tip, heel, AHEAD), 1.0), REACH
+    )
+    assert (blade.anchors.state == ANCHORED).all()
+    assert (blade.anchors.at_skin == is_whole).all()
+
+
 def test_a_body_without_a_cut_has_no_slit():
     body = Tissue(block((2, 2, 2), (EDGE,) * 3), gravity=(0.0, 0.0, 0.0))._body
     assert not in_slit(body, 0.019, 0.011, 0.033)
