@@ -35,7 +35,8 @@ from tissue.input_checks import (
     warn_of_ratio,
     warn_of_toughness,
 )
-from tissue.integrators.equilibrium import LONGEST_SETTLING, settle
+from tissue.integrators.equilibrium import SETTLED, settle
+from tissue.integrators.equilibrium_checks import expect_support, warn_of_motion
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
@@ -105,8 +106,8 @@ class Tissue(DrivenBody):
         options = checked_solver(solver, self.material)
         surroundings = Surroundings(
             gravity=checked_gravity(gravity),
-            drag=self.material.viscous_damping,
-            retardation_time=self.material.retardation_time,
+            drag=float(self.material.viscous_damping),
+            retardation_time=float(self.material.retardation_time),
         )
         body = build_body(
             mesh,
@@ -217,20 +218,27 @@ class Tissue(DrivenBody):
     def settle(self) -> int:
         """Relax to equilibrium under gravity, loads and supports; return the steps it took.
 
-        Dynamic relaxation with kinetic damping: the nodes are stopped whenever their kinetic energy
-        has passed a peak. All nodes are moved together, whatever the integrator. Stress that
-        relaxes (`Material.prony`) has relaxed wholly: this is where the body comes to rest at last.
+        Dynamic relaxation (`tissue.integrators.equilibrium`): all nodes are moved together,
+        whatever the integrator. Stress that relaxes (`Material.prony`) has relaxed wholly: this is
+        where the body comes to rest at last. A body that has not come to rest gets a warning.
+
+        Raises:
+            TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
+                or its motion became unstable. It is then where it was.
         """
         self._take_edge(None)
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
-        n_steps = settle(self._global_stepper, system, NOWHERE)
+        expect_support(system, self.floor)
+        found = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
-        if n_steps < LONGEST_SETTLING:
+        if found.is_at_rest:
             self._global_stepper.let_rest(system)
+        else:
+            warn_of_motion(system, found.n_steps, found.accelerations, SETTLED)
         write_bounds(system.body, self._bounds)
         self._audit.begin(self._system, NOWHERE)
-        return n_steps
+        return found.n_steps
 
     def cut_report(self) -> CutReport:
         """Return the path error of the cuts so far, and what they did to elements and time step."""

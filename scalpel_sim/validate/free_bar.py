@@ -14,8 +14,6 @@ from scalpel_sim.validate.bar import (
     bar_material,
     bar_mesh,
     bar_tissue,
-    come_to_rest,
-    critical_drag,
     period_of,
 )
 from scalpel_sim.validate.beam_theory import BAR_LENGTH, BAR_THICKNESS, beam_theory
@@ -65,11 +63,10 @@ def bent_and_let_go(poisson_ratio: float, across: int) -> FreeBar:
         """Return by how much one end is turned against the other [rad]: work over couple."""
         return float((forces * (positions - mesh.positions)).sum()) / couple
 
-    drag = critical_drag(theory.free_period)
-    bent = bar_tissue(mesh, bar_material(poisson_ratio, drag), weighs=False)
+    bent = bar_tissue(mesh, bar_material(poisson_ratio), weighs=False)
     nodes = np.flatnonzero(forces.any(axis=1))
     bent.push(nodes, forces[nodes])
-    come_to_rest(bent, theory.free_period)
+    bent.settle()
     positions = bent.snapshot().positions
     swinging = bar_tissue(mesh, bar_material(poisson_ratio), positions=positions, weighs=False)
     dt = theory.free_period / _STEPS_IN_PERIOD

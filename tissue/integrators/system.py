@@ -1,6 +1,8 @@
 """`System`: a body with everything that acts on it, as integrators advance it."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
@@ -117,6 +119,18 @@ class System:
                 team=new_team(),
             )
         return context
+
+    @contextmanager
+    def without_drag(self) -> Iterator[None]:
+        """Let nothing drag the nodes for a while; what damping dissipates then is not counted."""
+        in_stages, damping = self._in_stages, self.damping
+        self._in_stages = in_stages.replaced(drag=0.0)
+        self.damping = damping.replaced(drag=0.0)
+        self._context = None
+        try:
+            yield
+        finally:
+            self._in_stages, self.damping, self._context = in_stages, damping, None
 
     @property
     def hard_contact(self) -> SelfContact:

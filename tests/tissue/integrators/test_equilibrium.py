@@ -1,12 +1,40 @@
 """Bodies settle: to where forces balance, also where forces are rounded."""
 
+import re
+
 import numpy as np
+import pytest
 
 from tests import bodies
-from tissue import Material, SolverSettings, Tissue, liver_lobe
+from tissue import (
+    Material,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    TissueError,
+    block,
+    fixed_nodes,
+    liver_lobe,
+)
+from tissue.integrators import equilibrium
 from tissue.integrators.equilibrium import LONGEST_SETTLING
 
 STRETCH = np.array([1.05, 1.0, 1.0])
+CUBE = block((4, 4, 4), (0.04,) * 3)
+BAR = block((8, 2, 2), (0.08, 0.02, 0.02))
+NEAR = 1e-3
+"""Distance from rest over the largest displacement up to which a body is at rest: twice what was
+measured at worst."""
+
+
+def way_to_rest(tissue, seconds):
+    """Return how far the nodes move in a time [s] over the largest displacement from rest."""
+    settled = tissue.snapshot().positions
+    sag = np.abs(settled - tissue._body.rest[: tissue.n_nodes]).max()
+    tissue._global_stepper.wake()
+    for _ in range(round(seconds / 1e-2)):
+        tissue.step(None, 1e-2)
+    return np.abs(tissue.snapshot().positions - settled).max() / sag
 
 
 def test_single_precision_settles_where_double_does_and_as_soon():
@@ -24,3 +52,110 @@ def test_single_precision_settles_where_double_does_and_as_soon():
     (steps, positions), (steps_double, positions_double) = found["single"], found["double"]
     assert steps < 2 * steps_double < LONGEST_SETTLING
     np.testing.assert_allclose(positions, positions_double, atol=2e-5)
+
+
+@pytest.mark.parametrize("drag", [0, 5.0, 400.0], ids="drag {}".format)
+def test_drag_of_the_tissue_changes_neither_the_steps_nor_the_rest(drag):
+    """A drag of 400 /s stops the slow bending of the bar ten times as hard as is critical."""
+    fixed = fixed_nodes(BAR, "left")
+
+    def settled(drag):
+        tissue = Tissue(BAR, Material(young_modulus=1e5, viscous_damping=drag), fixed=fixed)
+        return tissue.settle(), tissue.snapshot().positions
+
+    steps, positions = settled(drag)
+    steps_at_40, positions_at_40 = settled(40.0)
+    assert steps == steps_at_40 < LONGEST_SETTLING
+    np.testing.assert_allclose(positions, positions_at_40, atol=1e-9)
+
+
+@pytest.mark.parametrize("law", ["neo_hookean", "springs"])
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
+def test_a_bar_that_has_settled_stays_where_it_is(law, relaxation):
+    ratio = 0.25 if law == "springs" else 0.45
+    material = Material(young_modulus=1e5, law=law, poisson_ratio=ratio, viscous_damping=60.0)
+    solver = SolverSettings(relaxation=relaxation)
+    tissue = Tissue(BAR, material, fixed=fixed_nodes(BAR, "left"), solver=solver)
+    assert tissue.settle() < LONGEST_SETTLING
+    assert way_to_rest(tissue, 1.0) < NEAR
+
+
+def test_motion_that_nothing_damps_settles_too():
+    """The bar of the validation: at peaks of its kinetic energy fast modes stop the slow ones."""
+    mesh = block((7, 2, 2), (0.1, 0.03, 0.03))
+    material = Material(young_modulus=1e6, viscous_damping=0.0, retardation_time=0.0)
+    solver = SolverSettings(relaxation="verlet")
+    tissue = Tissue(mesh, material, fixed=fixed_nodes(mesh, "left"), solver=solver)
+    assert tissue.settle() < 2000
+
+
+@pytest.mark.parametrize(("contact", "near"), [("penalty", 5 * NEAR), ("impulses", 0.05)])
+def test_what_lies_on_a_floor_settles_there(contact, near):
+    """Contact by impulses lets it sink in, deeper where steps are longer."""
+    solver = SolverSettings(contact=contact)
+    tissue = Tissue(CUBE, Material(), floor=-1e-6, solver=solver)
+    assert tissue.settle() < LONGEST_SETTLING
+    assert way_to_rest(tissue, 1.0) < near
+    assert tissue.snapshot().positions[:, 2].min() > -1e-3
+
+
+def test_a_body_that_nothing_holds_is_not_settled_and_stays_as_it_is():
+    tissue = Tissue(CUBE, Material())
+    with pytest.raises(TissueError, match=r"nothing holds it against \(0, 0, -0\.6"):
+        tissue.settle()
+    np.testing.assert_array_equal(tissue.snapshot().positions, CUBE.positions)
+    raised = Tissue(CUBE, Material(), floor=-1e-6, gravity=(0.0, 0.0, 9.81))
+    with pytest.raises(TissueError, match="nothing holds it"):
+        raised.settle()
+
+
+def test_a_load_on_a_body_that_nothing_holds_is_refused_unless_it_balances():
+    tissue = Tissue(CUBE, Material(), gravity=(0.0, 0.0, 0.0))
+    tissue.settle()
+    load = tissue.push("right", (0.1, 0.0, 0.0))
+    with pytest.raises(TissueError, match=r"against \(0\.1, "):
+        tissue.settle()
+    tissue.push("left", (-0.1, 0.0, 0.0))
+    tissue.settle()
+    assert np.ptp(tissue.snapshot().positions[:, 0]) > 0.0401
+    tissue.release(load)
+
+
+def test_a_piece_that_falls_away_is_named_and_the_body_is_where_it_was():
+    other = CUBE.positions + np.array([0.1, 0.0, 0.0])
+    n = len(CUBE.positions)
+    two = TetrahedralMesh(
+        np.concatenate((CUBE.positions, other)),
+        np.concatenate((CUBE.tetrahedra, CUBE.tetrahedra + n)),
+    )
+    fixed = np.arange(2 * n) < n  # the first piece alone is held
+    tissue = Tissue(two, Material(), fixed=fixed)
+    with pytest.raises(TissueError, match=r"node \d+, at \(0\.1.*Nothing holds the piece"):
+        tissue.settle()
+    np.testing.assert_array_equal(tissue.snapshot().positions, two.positions)
+    assert (tissue.snapshot().velocities == 0.0).all()
+
+
+def test_a_body_of_which_every_node_is_fixed_is_settled():
+    fixed = np.ones(len(CUBE.positions), bool)
+    tissue = Tissue(CUBE, Material(), fixed=fixed, positions=CUBE.positions * 1.01)
+    assert tissue.settle() == 0
+    np.testing.assert_array_equal(tissue.snapshot().positions, CUBE.positions * 1.01)
+    tissue.step(None, 1e-3)
+    assert (tissue.snapshot().velocities == 0.0).all()
+
+
+def test_a_body_that_does_not_come_to_rest_gets_a_warning_that_says_where(monkeypatch, caplog):
+    monkeypatch.setattr(equilibrium, "LONGEST_SETTLING", 40)
+    tissue = Tissue(BAR, Material(), fixed=fixed_nodes(BAR, "left"))
+    assert tissue.settle() == 40
+    found = re.search(
+        r"not come to rest in 40 steps: node (\d+), at .* by ([\d.]+) m/s2", caplog.text
+    )
+    assert found is not None
+    assert int(found[1]) < len(BAR.positions)
+    assert float(found[2]) > equilibrium.SETTLED
+    monkeypatch.undo()
+    caplog.clear()
+    assert tissue.settle() < LONGEST_SETTLING
+    assert caplog.text == ""

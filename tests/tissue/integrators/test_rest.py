@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests import bodies, strokes
-from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, block
+from tissue import BladeSegment, BladeSweep, Material, SolverSettings, Tissue, TissueError, block
 from tissue.integrators.equilibrium import LONGEST_SETTLING
 
 CUBE = block((3, 3, 3), (0.03,) * 3)
@@ -35,7 +35,8 @@ def test_a_body_that_has_settled_takes_no_steps_and_stays_as_it_is(relaxation):
 
 def test_a_body_that_nothing_holds_does_not_settle_and_falls_on():
     tissue = Tissue(CUBE, Material())
-    tissue.settle()
+    with pytest.raises(TissueError, match="nothing holds it"):
+        tissue.settle()
     before = tissue.snapshot().velocities[:, 2]
     assert tissue.step(None, strokes.DT).n_substeps > 0
     np.testing.assert_allclose(
