@@ -6,7 +6,15 @@ import numpy as np
 
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import Scene, check_motion
-from tissue import FloatArray, Material, SolverSettings, Tissue, fixed_nodes, toughness_law_of
+from tissue import (
+    FloatArray,
+    Material,
+    SolverSettings,
+    Tissue,
+    expect_toughness_in_range,
+    fixed_nodes,
+    toughness_law_of,
+)
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -32,7 +40,9 @@ def make_tissue(scene: Scene) -> Tissue:
 
     Raises:
         MeshError: the mesh cannot be cut.
-        ValueError: the material or the fixed nodes make no sense for this mesh.
+        ValueError: the material or the fixed nodes make no sense for this mesh, or the blade would
+            fold its springs.
+        TissueError: the body cannot come to rest.
     """
     mesh = scene.mesh()
     fixed = fixed_nodes(mesh, scene.fixed)
@@ -55,6 +65,7 @@ def make_tissue(scene: Scene) -> Tissue:
             precision=scene.precision,
         ),
     )
+    expect_toughness_in_range(scene.material, tissue.node_size)  # a blade will come
     if fixed.any():
         tissue.settle()
         _warn_of_collapse(tissue, scene.material)

@@ -17,6 +17,7 @@ from .elasticity.spring_calibration import SpringError as SpringError
 from .elasticity.spring_calibration import calibrated as calibrated
 from .elasticity.spring_calibration import spring_error as spring_error
 from .geometry.connected_components import components as components
+from .input_checks import expect_toughness_in_range as expect_toughness_in_range
 from .integrators.options import Global as Global
 from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
@@ -100,6 +101,7 @@ __all__ = [
     "calibrated",
     "components",
     "cylinder",
+    "expect_toughness_in_range",
     "fixed_nodes",
     "is_compiling",
     "kernel",

@@ -54,6 +54,22 @@ class _Amounts(NamedTuple):
     """Energy of contacts with the blade that ended."""
 
 
+class MeshChanges(NamedTuple):
+    """What changes of the mesh added to each energy [J]. No time passes in them.
+
+    Tests bound each in sign and size (`tests/test_energy_account.py`).
+    """
+
+    elastic: float = 0.0
+    """Elastic energy: finer tetrahedra, or springs, resist the same strain by more."""
+    kinetic: float = 0.0
+    """Kinetic energy, which nodes lose that are put on edges and that part."""
+    potential: float = 0.0
+    """Energy in gravity; rounding alone."""
+    edge: float = 0.0
+    """Energy of anchors whose tetrahedron was divided."""
+
+
 @kernel
 def _write_amounts(
     context: StepContext, edge: Edge, when: float, is_known: bool, out: FloatArray
@@ -94,7 +110,9 @@ class Audit:
 
     def __init__(self, *, is_kept: bool) -> None:
         self._is_kept = is_kept
-        self._topology = self._before_cut = 0.0
+        self.changes = MeshChanges()
+        """What changes of the mesh added since the account began."""
+        self._before_cut = self.changes
         self.work_of_loads = 0.0
         """Work of the loads since the account began [J]."""
         self._is_known = False
@@ -107,7 +125,8 @@ class Audit:
         if not self._is_kept:
             return
         system.contact_loss.is_counted = 1
-        system.damping.dissipated = system.contact_loss.dissipated = self._topology = 0.0
+        system.damping.dissipated = system.contact_loss.dissipated = 0.0
+        self.changes = MeshChanges()
         clear_works(system.interaction.state.totals)
         system.supports.work = self.work_of_loads = 0.0
         system.elasticity.arrays.scaling.lost = 0.0
@@ -121,12 +140,15 @@ class Audit:
     def before_cut(self, system: System, edge: Edge, when: float) -> None:
         """Note the energy before the mesh changes."""
         if self._is_kept:
-            self._before_cut = self._all(system, edge, when)
+            self._before_cut = self._parts(system, edge, when)
 
     def after_cut(self, system: System, edge: Edge, when: float) -> None:
         """Count the energy that the change of the mesh took; where it has not changed, none."""
         if self._is_kept and not self._is_known:
-            self._topology += self._before_cut - self._all(system, edge, when)
+            parts = zip(
+                self.changes, self._before_cut, self._parts(system, edge, when), strict=True
+            )
+            self.changes = MeshChanges(*(sum_ + after - before for sum_, before, after in parts))
 
     def energies(self, system: System, edge: Edge) -> Energies | None:
         """Return the account at the end of a step; None where none is kept."""
@@ -149,7 +171,7 @@ class Audit:
             breaking=now.breaking,
             friction=now.friction,
             contact=now.contact + lost_in_contacts,
-            topology=self._topology + now.mass,
+            topology=now.mass - sum(self.changes),
             released=now.released,
         )
 
@@ -161,7 +183,7 @@ class Audit:
             self._is_known = True
         return self._now
 
-    def _all(self, system: System, edge: Edge, when: float) -> float:
-        """Return the energy of the body and of the anchors [J]."""
+    def _parts(self, system: System, edge: Edge, when: float) -> MeshChanges:
+        """Return the energies of the body and of the anchors [J]."""
         now = self._amounts(system, edge, when)
-        return now.elastic + now.kinetic + now.potential + now.edge
+        return MeshChanges(now.elastic, now.kinetic, now.potential, now.edge)

@@ -13,7 +13,7 @@ from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, Outputs
 from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
 from scalpel_sim.scenes import DEFAULT_SCENE, changed, mesh_scene, scene_called, scene_of
-from tissue import block, write_vtu
+from tissue import Tissue, block, write_vtu
 
 GRID2 = SCENES["grid2"]
 UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
@@ -212,12 +212,18 @@ def test_a_run_that_ends_by_a_bug_keeps_its_files_too(tmp_path):
 def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(caplog):
     make_tissue(GRID2)
     assert "inside out" not in caplog.text
-    make_tissue(changed(GRID2, young_modulus=200.0, gravity=50.0))
+    make_tissue(changed(GRID2, young_modulus=200.0, toughness=0.1, gravity=50.0))
     assert re.search(
         r"[\d.]+ % of the tetrahedra are inside out, and the body has [\d.]+ % of its volume.*"
         r"--law neo_hookean, --poisson-ratio 0.45, a larger --young",
         caplog.text,
     )
+
+
+def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(monkeypatch):
+    monkeypatch.setattr(Tissue, "settle", lambda tissue: pytest.fail("it settles"))
+    with pytest.raises(ValueError, match=r"springs fold ahead of the blade above 0\.6"):
+        make_tissue(changed(GRID2, young_modulus=1e3, toughness=60.0))
 
 
 def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.tissue.kernels_of import elastic_of, line_blade, springs_of
-from tissue import Material, block
+from tissue import Material, TetrahedralMesh, block
 from tissue.blade.anchors import (
     ANCHORED,
     FREE,
@@ -13,6 +13,7 @@ from tissue.blade.anchors import (
     anchor_position,
     anchor_stiffness,
     anchored_length,
+    anchors_energy,
     clear_anchor_forces,
     is_engaged,
     measure_speeds,
@@ -344,6 +345,44 @@ def test_a_search_goes_around_the_rim_of_a_cut(held):
     place = locate(body, held.visits, beyond, start, held.blade.queue)
     assert place.inside
     assert body.rest[body.tetrahedra[place.tetrahedron], 1].mean() > 0.02
+
+
+def gaping_block(way):
+    """Return a block whose left half is cut at y = 20 mm; the far lip has moved by `way` [m]."""
+    x, tetrahedra = BLOCK.positions, BLOCK.tetrahedra.copy()
+    on_lip = np.flatnonzero(np.isclose(x[:, 1], 0.02) & (x[:, 0] < 0.0099))
+    own = np.arange(len(x))
+    own[on_lip] = len(x) + np.arange(len(on_lip))
+    is_beyond = x[tetrahedra].mean(axis=1)[:, 1] > 0.02
+    tetrahedra[is_beyond] = own[tetrahedra[is_beyond]]
+    body = build_body(TetrahedralMesh(np.concatenate((x, x[on_lip])), tetrahedra), None, None)
+    for t, f in np.argwhere(body.links == OUTER):
+        face = np.delete(body.rest[tetrahedra[t]], f, axis=0)
+        if np.allclose(face[:, 1], 0.02):
+            body.links[t, f] = CUT
+    body.positions[len(x) :] += way
+    return body
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.004])
+def test_an_anchor_that_slips_to_the_other_lip_of_an_open_cut_lets_go(held, gap):
+    """On a closed lip it goes on; across a gap the slip would store energy in its spring."""
+    body = gaping_block(np.array([gap, 0.0, 0.0]))
+    for k in range(N):
+        at = Vec3(0.003, 0.0195, 0.001 + 0.004 * k)
+        set_anchor(held.anchors, body, k, walk(body, at, 0).tetrahedron, at)
+    edge = pose_at(edge_at(0.021, x=0.003), 1.0)
+    stored = anchors_energy(held.anchors, body, edge, held.blade.toughness)
+    slip_anchors(held.blade, body, no_visits(len(body.rest), len(body.tetrahedra)), edge)
+    if gap == 0.0:
+        assert (held.anchors.state == ANCHORED).all()
+        assert (held.anchors.rest[:, 1] > 0.02).all()
+        return
+    assert (held.anchors.state == LEFT).all()
+    np.testing.assert_allclose(held.anchors.rest[:, 1], 0.0195, atol=1e-9)
+    totals = held.blade.totals
+    assert totals.work_of_cutting == totals.work_of_breaking == 0.0
+    assert totals.released == pytest.approx(stored, rel=1e-9)
 
 
 def test_a_search_that_ends_at_the_skin_reports_it(held):
