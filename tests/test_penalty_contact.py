@@ -354,3 +354,31 @@ def test_a_scene_refuses_a_contact_that_it_cannot_have(options):
 def test_an_unknown_contact_is_refused_by_name():
     with pytest.raises(ValueError, match="'soft'"):
         Tissue(block((1, 1, 1), (0.01,) * 3), solver=SolverSettings(contact="soft"))
+
+
+@pytest.mark.parametrize("gravity", [0.0, 9.81])
+def test_a_cut_body_neither_gains_energy_nor_creeps_as_it_rests_in_motion(gravity):
+    """The body takes its steps all the time. In a finer block 0.02 nJ and 0.2 um were measured in
+    nineteen seconds; with contact by impulses, 2.6 uJ a second that contact gave."""
+    mesh = block((4, 4, 2), (0.04, 0.04, 0.02))
+    tissue = Tissue(
+        mesh,
+        Material(30e3, toughness=20.0),
+        fixed=bodies.sides(mesh),
+        gravity=(0.0, 0.0, -gravity),
+        solver=SolverSettings(relaxation="verlet", audit=True),
+    )
+    strokes.make(tissue, strokes.upright(0.0201, -0.003, 0.043, 0.008, 0.03))
+
+    def after(seconds):
+        """Return the energy stored, the residual and the loss in contact [J], and positions."""
+        for _ in range(round(seconds / strokes.DT)):
+            tissue._global_stepper.wake()
+            energies = tissue.step(None, strokes.DT).energies
+        stored = energies.elastic + energies.kinetic + energies.potential + energies.held
+        return (stored, energies.residual, energies.contact), tissue.snapshot().positions
+
+    energies, positions = after(2.0)  # until it has swung out
+    energies_at_last, positions_at_last = after(20.0)
+    np.testing.assert_allclose(energies_at_last, energies, rtol=0.0, atol=1e-9)
+    assert np.abs(positions_at_last - positions).max() < 1e-6

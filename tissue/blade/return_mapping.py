@@ -49,9 +49,9 @@ from tissue.mesh.body import (
 from tissue.mesh.star import Visits
 
 MOST_STORED = 1.1
-"""Energy of an anchor after a slip over that before, at most. In sheared tissue a lip drags it aside
-as it slips, which stores some percent; without the limit jumps across gaps stored up to 1 mJ each,
-a sixth of the work of the stroke."""
+"""Energy of an anchor after a slip over that before, at most. In sheared tissue a lip drags it
+aside as it slips, which stores some percent; without the limit jumps across gaps stored up to 1 mJ
+each, a sixth of the work of the stroke."""
 
 
 class Location(NamedTuple):

@@ -92,6 +92,8 @@ class PenaltyForces(Arrays):
     """Gap below which the spring pushes [m], shape (2 * capacity,)."""
     largest_depth: FloatArray
     """Depth above which the force grows no more [m], shape (2 * capacity,)."""
+    damping_time: FloatArray
+    """Damping per stiffness tau [s], shape (2 * capacity,)."""
     push: FloatArray
     """Elastic part of the pressure at the end of the last substep [N], or HANDED_ON; shape
     (2 * capacity,)."""
@@ -113,7 +115,7 @@ class PenaltyForces(Arrays):
     friction: float
     """Coefficient of friction."""
     retardation_time: float
-    """Damping per stiffness tau [s]."""
+    """Longest damping per stiffness [s]."""
 
 
 def new_penalty_forces(capacity: int, friction: float, retardation_time: float) -> PenaltyForces:
@@ -139,6 +141,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         normal=np.zeros((rows, 3)),
         **{name: np.zeros(rows) for name in of_floats},
         **{name: np.zeros((rows, 3)) for name in ("anchor", "impulse", "velocity")},
+        damping_time=np.full(rows, float(retardation_time)),
         acting=np.zeros((WIDTH, 4)),
         place=np.arange(float(WIDTH)),
         friction=float(friction),
@@ -151,7 +154,7 @@ def grown_penalty_forces(forces: PenaltyForces, capacity: int) -> PenaltyForces:
     n, used = forces.n_contacts, slice(forces.first, forces.first + forces.n_contacts)
     larger = new_penalty_forces(capacity, forces.friction, forces.retardation_time)
     of_rows = ("node", "weight", "normal", "height", "stiffness", "offset", "largest_depth")
-    for name in (*of_rows, "push", "anchor"):
+    for name in (*of_rows, "damping_time", "push", "anchor"):
         getattr(larger, name)[:n] = getattr(forces, name)[used]
     cells = ("n_contacts", "n_fading", "n_pressing", "work", "stored", "pressure_impulse")
     for name in (*cells, "penetration"):
@@ -249,7 +252,7 @@ def _eight_forces(
         seconds: Weight of this evaluation in the integral over time [s].
         c: The first of them.
     """
-    zero, tau = lanes(0.0), lanes(forces.retardation_time)
+    zero, tau = lanes(0.0), load_lanes(forces.damping_time, c)
     x, w = points_of_contacts(forces.node, positions, c), four_of(forces.weight, c)
     across, normal = combined(w, x), three_of(forces.normal, c)
     along = dot(normal, across)

@@ -14,6 +14,8 @@ Source: Tonge et al. (2012), Mass splitting for jitter-free parallel rigid body 
 shares.
 """
 
+import math
+
 from tissue.contact.penalty.contact_forces import (
     PenaltyForces,
     list_touching_nodes,
@@ -32,6 +34,14 @@ Larger: stiffer contact; at 1 nothing is left for what strain adds."""
 _LEAST_SHARE = 0.35
 """What contact adds to w^2 is lowered to this share, at most, where that saves a step. Lower: what
 is pressed against slivers sinks in; 1: a step more in each time step of a body cut often."""
+
+_FASTEST_DAMPING = 0.45
+"""Highest rate at which contacts together stop a motion, over the highest frequency of the body
+with contact. Damping acts at the velocity before the step: Verlet is stable up to h rate =
+2 - (w h)^2 / 2, so that its steps allow 0.45 where w is that of contacts alone, and 0.85 where they
+have half of w^2. Without the limit two contacts on nodes of 21 and 42 mg, in a cut block of springs
+with stiff slivers elsewhere, turned an approach of 0.7 m/s into a rebound of 1.2 every 2 ms:
+contact gave the body 12 % of the work of the blade."""
 
 _LARGEST_DEPTH = 0.2
 """Depth above which a force grows no more, per node size. Larger: what was pinched and is let go is
@@ -131,8 +141,8 @@ def split_masses(
     """Write the stiffness of every contact; what has a force keeps it by its offset.
 
     Args:
-        forces: Stiffness, offset, greatest depth and anchors are written. `stiffness` is as it was
-            in the last list, or 0.
+        forces: Stiffness, damping, offset, greatest depth and anchors are written. `stiffness` is
+            as it was in the last list, or 0.
         limits: How stiff contact may be.
         body: Masses and positions.
         frequency_squared: Bound on w^2 of each node without contact [1/s2], shape (capacity,).
@@ -140,17 +150,21 @@ def split_masses(
     """
     rows = range(forces.first, forces.first + forces.n_contacts)
     list_touching_nodes(forces, share)
+    fastest = _FASTEST_DAMPING * math.sqrt(limits.highest + limits.added)
     for c in rows:
-        softness, mobility = 0.0, 0.0
+        softness, mobility, squared = 0.0, 0.0, 0.0
         for q in range(4):
             node, weight = forces.node[c, q], abs(forces.weight[c, q])
             room = max(limits.highest - frequency_squared[node], 0.0)
-            bearable = body.masses[node] * (limits.added + _ROOM_SHARE * room)
-            softness += weight * share[node] / bearable
+            added = limits.added + _ROOM_SHARE * room
+            squared = max(squared, added)
+            softness += weight * share[node] / (body.masses[node] * added)
             mobility += weight * weight / body.masses[node]
         before = forces.stiffness[c]
         k = 1.0 / softness
         forces.stiffness[c] = k
+        # Shares as above: the rates at a node add up to that of its stiffest contact at most.
+        forces.damping_time[c] = min(forces.retardation_time, fastest / squared)
         most = max(limits.largest_acceleration / mobility, forces.push[c])
         forces.largest_depth[c] = min(limits.largest_depth, most / k)
         _keep_force(forces, limits, body, c, before)

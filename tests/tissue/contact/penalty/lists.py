@@ -8,7 +8,7 @@ from tissue.contact.penalty.stiffness import new_limits, split_masses
 from tissue.mesh.body import Body, build_body
 
 NODE_SIZE = 0.01
-ADDED = 2e7
+ADDED, HIGHEST = 2e7, 4e7
 FRICTION = 0.3
 
 
@@ -44,7 +44,7 @@ def stiffened(seed: int, n: int = 20) -> tuple[Body, PenaltyForces, np.ndarray]:
     random = np.random.default_rng(seed + 1)
     frequency_squared = random.uniform(0.0, 5e7, body.n_nodes)
     limits = new_limits(NODE_SIZE, ADDED)
-    limits.highest = 4e7
+    limits.highest = HIGHEST
     split_masses(forces, limits, body, frequency_squared, np.zeros(body.n_nodes))
     room = np.maximum(limits.highest - frequency_squared, 0.0)
     return body, forces, body.masses * (ADDED + 0.5 * room)

@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.tissue.contact.penalty.lists import ADDED, NODE_SIZE, random_contacts, stiffened
+from tests.tissue.contact.penalty.lists import (
+    ADDED,
+    HIGHEST,
+    NODE_SIZE,
+    random_contacts,
+    stiffened,
+)
 from tissue.contact.penalty.contact_forces import end_contact_substep
 from tissue.contact.penalty.stiffness import (
     fade,
@@ -28,6 +34,21 @@ def test_contacts_together_are_never_stiffer_than_what_their_nodes_may_bear(seed
     stiffness = weights.T @ (forces.stiffness[:n, None] * weights)
     scaled = stiffness / np.sqrt(bearable[:, None] * bearable[None, :])
     assert np.linalg.eigvalsh(scaled).max() <= 1.0 + 1e-12
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 60))
+def test_contacts_together_stop_no_motion_faster_than_a_step_allows(seed, n):
+    """Also where their nodes may bear far more than contact adds: beside stiffer slivers."""
+    body, forces, _ = stiffened(seed, n)
+    weights = np.zeros((n, body.n_nodes))
+    for c in range(n):
+        np.add.at(weights[c], forces.node[c], forces.weight[c])
+    damping = forces.stiffness[:n] * forces.damping_time[:n]
+    assert (forces.damping_time[:n] <= forces.retardation_time).all()
+    rates = weights.T @ (damping[:, None] * weights)
+    rates /= np.sqrt(body.masses[:, None] * body.masses[None, :])
+    assert np.linalg.eigvalsh(rates).max() <= 0.45 * np.sqrt(HIGHEST + ADDED) * (1.0 + 1e-12)
 
 
 def test_a_single_contact_of_one_node_bears_all_that_its_mass_allows():
