@@ -13,7 +13,7 @@ from tissue.blade.material_frame import find_walls, rest_offset
 from tissue.blade.walls import join_wall, rotation_of_wall
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
-from tissue.cutting.blade_path import Path
+from tissue.cutting.blade_path import Path, note_way
 from tissue.geometry.polar_decomposition import apply_transposed
 from tissue.mesh.body import OUTER, Body, walk
 
@@ -76,6 +76,7 @@ def trace_path(
     for k in range(n):
         if path.member[k]:
             _begin_or_go_on(blade, body, k, margin, path)
+    note_way(path, blade.reach)
     for k in range(n):
         path.known[k] = path.member[k]
         if anchors.walls.first[k] == k and anchors.walls.has_left[k]:
@@ -177,6 +178,8 @@ def _begin_or_go_on(blade: BladeState, body: Body, k: int, margin: float, path: 
 def forget_path(path: Path) -> None:
     """Forget where the edge has been: the next path begins at the next contact."""
     path.has_left = path.has_end_in = path.is_through = 0
+    for end in range(2):
+        store(path.way, end, Vec3(0.0, 0.0, 0.0))
     for k in range(len(path.member)):
         path.member[k] = False
         path.known[k] = False

@@ -33,7 +33,7 @@ def cut_along(
     body, _ = hooks.mesh()
     grid = build_grid(body, body.rest, 0.0)
     begin_path(path, rows[0])
-    prescribe_path(path, body, grid, rows[0], Vec3(*forward[0].tolist()))
+    prescribe_path(path, body, grid, rows[0], Vec3(*forward[0].tolist()), node_size)
     incision.has_begun = True
     incision.open_to_edge(hooks)  # where the edge begins within the body, so does the cut
     for i in range(1, len(rows)):
@@ -45,6 +45,6 @@ def cut_along(
             body, visits = hooks.mesh()  # after a cut perhaps another body, with more room
             if not list_appended(body, body.rest, grid):
                 grid = build_grid(body, body.rest, 0.0)
-            prescribe_path(path, body, grid, points, direction)
+            prescribe_path(path, body, grid, points, direction, node_size)
             if incision.detect(body, visits, path_travel(incision.path)):
                 incision.cut(hooks)

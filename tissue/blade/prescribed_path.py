@@ -3,7 +3,7 @@
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, norm, scale, store, sub, vec3
-from tissue.cutting.blade_path import Path
+from tissue.cutting.blade_path import Path, note_way
 from tissue.mesh.body import Body, walk
 from tissue.mesh.point_location import tetrahedron_at, tetrahedron_in_box
 from tissue.mesh.tetrahedron_grid import TetrahedronGrid
@@ -23,7 +23,12 @@ def begin_path(path: Path, points: FloatArray) -> None:
 
 @kernel
 def prescribe_path(
-    path: Path, body: Body, grid: TetrahedronGrid, points: FloatArray, forward: Vec3
+    path: Path,
+    body: Body,
+    grid: TetrahedronGrid,
+    points: FloatArray,
+    forward: Vec3,
+    node_size: float,
 ) -> None:
     """Advance the edge to given points.
 
@@ -35,6 +40,7 @@ def prescribe_path(
         grid: Where its tetrahedra are at rest.
         points: Points of the edge in the body at rest [m], shape (n, 3).
         forward: Unit vector in which the edge cuts, in the body at rest.
+        node_size: Mean node size of the body [m].
     """
     n = len(path.member)
     along = sub(vec3(points, n - 1), vec3(points, 0))
@@ -48,6 +54,7 @@ def prescribe_path(
         store(path.forward, k, forward)
         if dot(sub(p, start), forward) > 0.0:
             store(path.t1, k, p)
+    note_way(path, node_size)
     for k in range(n):
         path.seed[k] = _find_seed(path, body, grid, k)
 

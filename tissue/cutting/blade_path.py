@@ -7,13 +7,16 @@ import numpy as np
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, sub, vec3
+from tissue.core.vec3 import Vec3, axpy, cross, dot, norm, scale, store, sub, vec3
 from tissue.geometry.exact_predicates import Lattice, nearest
 from tissue.geometry.tetrahedron import nearest_on_segment, normalised
 
 LEAST_ALIGNMENT = 0.7
 """Cosine of the angle between the normal of the path and that of the blade's flat; below it the
 blade's is used."""
+
+LEAST_WAY = 0.5
+"""Length of `Path.way`, at least, where it says which way an end of the edge went."""
 
 _FARTHEST = 1 << 62
 """Steps of the lattice beyond any of its points."""
@@ -34,6 +37,9 @@ class Path(Arrays):
     """Unit vector in which the edge cuts, in the body at rest, shape (n, 3)."""
     sideways: FloatArray
     """Unit normal of the blade's flat, in the body at rest: the side +1; shape (n, 3)."""
+    way: FloatArray
+    """Direction in which the tip and the heel went last, averaged over a node size, shape (2, 3).
+    It is shorter than 1 at first, and where the direction changes; 0 outside the tissue."""
     seed: IntArray
     """Tetrahedron at or beside each sample, or -1; shape (n,)."""
     member: BoolArray
@@ -64,6 +70,7 @@ def new_path(n: int) -> Path:
         lattice_t1=np.zeros((n, 3), np.int64),
         forward=np.zeros((n, 3)),
         sideways=np.zeros((n, 3)),
+        way=np.zeros((2, 3)),
         seed=np.full(n, -1, np.int64),
         member=np.zeros(n, np.bool_),
         known=np.zeros(n, np.bool_),
@@ -124,6 +131,60 @@ def nearest_on_edge(path: Path, p: Vec3) -> Nearest:
             best = dot(d, d)
             found = Nearest(k, along)
     return found
+
+
+@kernel
+def is_unswept(path: Path, p: Vec3, margin: float) -> bool:
+    """Return whether a point of the body at rest is where the edge has not been.
+
+    It is ahead of where the edge is at the end of the step, or beyond the way of tip or heel.
+
+    Args:
+        path: Path of the edge.
+        p: The point, on the sheet or near it [m].
+        margin: Distance by which it is so at least [m].
+    """
+    k = nearest_on_edge(path, p).segment
+    if k < 0:
+        return False
+    at = nearest_on_segment(vec3(path.t1, k), vec3(path.t1, k + 1), p)
+    if dot(sub(p, at), vec3(path.forward, k)) > margin:
+        return True
+    last = len(path.linked) - 1
+    first, stop = k, k + 1
+    while first > 0 and path.linked[first - 1]:
+        first -= 1
+    while stop < last and path.linked[stop]:
+        stop += 1
+    return (first == 0 and _is_beyond_end(path, 0, 0, p, margin)) or (
+        stop == last and _is_beyond_end(path, 1, last, p, margin)
+    )
+
+
+@kernel
+def _is_beyond_end(path: Path, end: int, sample: int, p: Vec3, margin: float) -> bool:
+    """Return whether a point is beyond the way of the tip, `end` 0, or of the heel, `end` 1."""
+    outwards = cross(vec3(path.way, end), vec3(path.sideways, sample))
+    if end == 1:
+        outwards = scale(-1.0, outwards)
+    size = norm(outwards)
+    return size > LEAST_WAY and dot(sub(p, vec3(path.t1, sample)), outwards) > margin * size
+
+
+@kernel
+def note_way(path: Path, over: float) -> None:
+    """Average the directions in which tip and heel go, over a distance `over` [m]."""
+    for end in range(2):
+        sample = 0 if end == 0 else len(path.member) - 1
+        way = vec3(path.way, end)
+        if not path.member[sample]:
+            store(path.way, end, scale(0.0, way))
+            continue
+        step = sub(vec3(path.t1, sample), vec3(path.t0, sample))
+        distance = norm(step)
+        if distance > 0.0:
+            share = min(distance / over, 1.0)
+            store(path.way, end, axpy(share, sub(scale(1.0 / distance, step), way), way))
 
 
 @kernel

@@ -3,11 +3,12 @@
 Every edge that the blade crosses gets a node on the sheet. An edge between the two sides can only
 remain where the sheet turns within an element, so that a node was on one side of it at first and on
 the other later. Such edges are found when a tetrahedron leaves the list of active ones, and cut.
+An edge of the mesh ahead of the sheet, or beyond the way of its ends, is no bridge.
 """
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, dot, lerp, sub, vec3
-from tissue.cutting.blade_path import Path, Plane, nearest_on_edge, plane_at
+from tissue.cutting.blade_path import Path, Plane, is_unswept, nearest_on_edge, plane_at
 from tissue.cutting.cut_surface import note_side, on_sheet, side_of
 from tissue.cutting.snapping import insert_crossing, snap_distance
 from tissue.cutting.workspace import Cut, flag
@@ -79,12 +80,15 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     height_a = _height(plane_at(cut.path, segment, pa), pa)
     height_b = _height(plane_at(cut.path, segment, pb), pb)
     if height_a * height_b < 0.0:
-        insert_crossing(cut, a, b, segment, height_a / (height_a - height_b))
+        t = height_a / (height_a - height_b)
+        if not is_unswept(cut.path, lerp(t, pa, pb), cut.limits.floor):
+            insert_crossing(cut, a, b, segment, t)
         return
     side = 1 if height_a + height_b >= 0.0 else -1
     wrong = a if side_of(sheet, a) != side else b
     height = abs(height_a) if wrong == a else abs(height_b)
-    if height < snap_distance(cut, wrong):
+    snap = snap_distance(cut, wrong)
+    if height < snap and not is_unswept(cut.path, vec3(body.rest, wrong), snap):
         flag(cut, wrong)
     else:
         note_side(sheet, wrong, side, True)

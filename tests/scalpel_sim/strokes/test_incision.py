@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, prepare
+from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scenes import changed
 from scalpel_sim.strokes.asked_area import asked_area
@@ -76,14 +77,17 @@ def test_a_body_with_a_gap_along_its_middle_is_refused():
 
 
 def test_liver_as_published_is_cut_with_toughness_times_depth_and_pays_for_it():
-    """4.74 kPa and 164 J/m2, by an arm: 1.31 N."""
+    """4.74 kPa and 164 J/m2, by an arm: 1.31 N. It ends in the organ, within an element."""
     simulation = prepare(changed(SCENES["incision"], audit=True))
-    simulation.run(simulation.stroke.duration)
+    asked = asked_area(simulation.stroke, simulation.link.snapshot())
+    simulation.run(simulation.stroke.duration + REST_AFTER_STROKE)
     x = simulation.recording.vector("tip")[:, 0]
     middle = np.abs(x - x.mean()) < 0.25 * np.ptp(x)
     drawn = -simulation.recording.vector("tissue_force")[middle, 0].mean()
     assert drawn == pytest.approx(164.0 * DEPTH, rel=0.05)
-    energies = simulation.result.energies
+    energies, opened = simulation.result.energies, simulation.result.cut_area
+    assert opened == pytest.approx(asked, rel=0.05)
+    assert energies.cutting / 164.0 == pytest.approx(opened, rel=0.05)
     assert abs(energies.residual) < 0.01 * energies.work_of_blade
     assert simulation.link.cut_report().now.inverted == 0.0
     assert len(pieces_of(simulation.link.snapshot())) == 1

@@ -32,7 +32,7 @@ def started():
 def test_samples_move_to_the_given_points(started):
     cut, cells = started
     there = at(0.3)
-    prescribe_path(cut.path, cut.body, cells, there, AHEAD)
+    prescribe_path(cut.path, cut.body, cells, there, AHEAD, 0.5)
     np.testing.assert_array_equal(cut.path.t0, at(0.2))
     np.testing.assert_array_equal(cut.path.t1, there)
     np.testing.assert_array_equal(cut.path.linked, [True, True, False])
@@ -41,13 +41,13 @@ def test_samples_move_to_the_given_points(started):
 def test_a_sample_that_moves_back_waits_until_it_is_ahead_of_its_earlier_path(started):
     cut, cells = started
     for y in (0.3, 0.1, 0.25, 0.4):
-        prescribe_path(cut.path, cut.body, cells, at(y), AHEAD)
+        prescribe_path(cut.path, cut.body, cells, at(y), AHEAD, 0.5)
         assert cut.path.t1[0, 1] == pytest.approx(max(y, 0.3))
 
 
 def test_samples_inside_have_a_seed_tetrahedron_that_contains_them(started):
     cut, cells = started
-    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD, 0.5)
     for k in range(2):
         corners = cut.body.rest[cut.body.tetrahedra[cut.path.seed[k]]]
         assert (corners.min(axis=0) <= cut.path.t1[k]).all()
@@ -57,7 +57,7 @@ def test_samples_inside_have_a_seed_tetrahedron_that_contains_them(started):
 
 def test_the_normal_of_the_blade_is_across_its_edge_and_its_motion(started):
     cut, cells = started
-    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD)
+    prescribe_path(cut.path, cut.body, cells, at(0.3), AHEAD, 0.5)
     np.testing.assert_allclose(cut.path.sideways[0], [1.0, 0.0, 0.0], atol=1e-15)
 
 
@@ -84,5 +84,5 @@ def test_a_jittered_body_gives_every_sample_inside_a_seed():
     cut = cut_of(mesh, n_samples=20)
     points = np.random.default_rng(0).uniform(0.01, 0.99, (20, 3))
     begin_path(cut.path, points - [0.0, 1e-3, 0.0])
-    prescribe_path(cut.path, cut.body, build_grid(cut.body, cut.body.rest, 0.0), points, AHEAD)
+    prescribe_path(cut.path, cut.body, build_grid(cut.body, cut.body.rest, 0.0), points, AHEAD, 0.5)
     assert (cut.path.seed >= 0).all()

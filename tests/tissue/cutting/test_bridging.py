@@ -50,6 +50,17 @@ def test_the_wrong_side_of_a_node_far_from_the_cut_surface_is_corrected():
     assert side_of(cut.sheet, 0) == 1
 
 
+def test_an_edge_that_the_blade_has_not_reached_is_no_bridge():
+    cut = corner(0.5)
+    cut.path.t1[:, 1] = -0.2  # edge 0-1 is at y = 0
+    note_side(cut.sheet, 0, -1, True)
+    note_side(cut.sheet, 1, 1, True)
+    resolve_bridges(cut)
+    assert cut.body.n_nodes == 4
+    assert not on_sheet(cut.sheet, 0)
+    assert not on_sheet(cut.sheet, 1)
+
+
 def test_a_node_on_the_wrong_side_but_near_the_cut_surface_is_put_on_it():
     cut = corner(-0.05)
     note_side(cut.sheet, 0, -1, True)
