@@ -74,6 +74,13 @@ def test_the_organ_has_the_size_of_a_liver_lobe_and_is_at_the_origin():
     assert mesh.positions.max(axis=0) == pytest.approx([0.090, 0.060, 0.033], abs=1.5e-3)
 
 
+def test_an_organ_of_a_finer_spacing_has_the_same_shape():
+    mesh, finer = liver_lobe(), liver_lobe(0.75)
+    assert 2.0 < len(finer.tetrahedra) / len(mesh.tetrahedra) < 2.6
+    volumes = [signed_volumes(*each).sum() for each in (mesh, finer)]
+    assert volumes[1] == pytest.approx(volumes[0], rel=0.01)
+
+
 def test_the_organ_is_one_sound_piece_with_good_angles():
     mesh = liver_lobe()
     assert checked(mesh).warnings == ()
