@@ -8,6 +8,7 @@ from scalpel_sim.validate.beam import BEAM_SCENE
 from scalpel_sim.validate.coupling import COUPLING_SCENE
 from scalpel_sim.validate.findings import ValidationScene
 from scalpel_sim.validate.gel import GEL_SCENE
+from scalpel_sim.validate.incision import INCISION_SCENE
 from scalpel_sim.validate.liver import LIVER_SCENE
 from scalpel_sim.validate.puncture import PUNCTURE_SCENE
 from scalpel_sim.validate.rate import RATE_SCENE
@@ -34,6 +35,7 @@ VALIDATION_SCENES: dict[str, ValidationScene] = {
         AUDIT_SCENE,
         COUPLING_SCENE,
         LIVER_SCENE,
+        INCISION_SCENE,
         GEL_SCENE,
         TENSION_SCENE,
     )
