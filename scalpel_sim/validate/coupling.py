@@ -184,12 +184,12 @@ COUPLING_SCENE = ValidationScene(
     name="coupling",
     title="Coupling of an arm and tissue that answers late",
     about=(
-        "A Touch arm at 1 kHz presses the edge against a block of 10 kPa and then holds, lets go, "
-        "or taps. The tissue answers every 1, 5, 10 or 33 ms; between answers the bridge "
-        "extrapolates from its last wrench and stiffness. The work at the blade is added up from "
-        "what was applied to the arm and where MuJoCo moved it: what comes back is less than what "
-        "was put in, else a hand would feel buzzing. The bridge's own observer is a regression: "
-        "its controller keeps it above zero. "
+        "A Touch arm at 1 kHz presses the edge against a block of 10 kPa, the stiffness of the "
+        "scene grid2, and then holds, lets go, or taps. The tissue answers every 1, 5, 10 or 33 "
+        "ms; between answers the bridge extrapolates from its last wrench and stiffness. The work "
+        "at the blade is added up from what was applied to the arm and where MuJoCo moved it: what "
+        "comes back is less than what was put in, else a hand would feel buzzing. The bridge's own "
+        "observer is a regression: its controller keeps it above zero. "
         "`tests/test_passive_coupling.py` has walls of up to 25 kN/m, and what happens without any "
         "of this."
     ),

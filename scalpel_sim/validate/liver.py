@@ -184,7 +184,7 @@ LIVER_SCENE = ValidationScene(
     about=(
         "A scalpel with an edge of 20 mm is pushed 35 mm into a piece of liver, withdrawn, and "
         "pushed in again at the same place: the difference of the forces is the share of cutting, "
-        "as Azar and Hayward measured it. The material is that of scene incision: Young's modulus "
+        "as Azar and Hayward measured it. The material is the preset's own: Young's modulus "
         "4.74 kPa and toughness 164 J/m² as published, of an exponential law. The toughness comes "
         "back, which is a regression. The published ranges in the plot are of other livers and "
         "tools, and were not put in. The force rises with depth until the capsule breaks, and then "

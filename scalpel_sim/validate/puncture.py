@@ -196,12 +196,13 @@ PUNCTURE_SCENE = ValidationScene(
     name="puncture",
     title="Puncture and withdrawal",
     about=(
-        "A level edge goes 12 mm into the block from above and out again. The tissue dents "
-        "while the force rises; where it reaches the toughness of the skin × the edge, the skin "
-        "breaks and the force drops to that of the tissue below and the friction of the faces. In "
-        "the withdrawal the force changes its sign, nothing is cut, and the work is that of "
-        "friction. That nothing is cut then, and where the work goes, is theory; the other lines "
-        "are regressions of the law of skin and friction."
+        "A level edge goes 12 mm into the block from above and out again. The tissue dents while "
+        "the force rises; where it reaches the toughness of the skin × the edge, the skin breaks "
+        "and the force drops to that of the tissue below and the friction of the faces. In the "
+        "withdrawal the force changes its sign, nothing is cut, and the work is that of friction. "
+        "That nothing is cut then, and where the work goes, is theory; the other lines are "
+        "regressions of the law of skin and friction. Young's modulus is 10 kPa, that of a soft "
+        "phantom or organ."
     ),
     measure=_measure,
     references=[

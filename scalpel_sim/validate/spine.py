@@ -158,9 +158,10 @@ SPINE_SCENE = ValidationScene(
     about=(
         "The back of a blade is pressed 2 mm into a block that lies on a held underside. It must "
         "cut nothing, and meet the force of a rigid strip as wide as the blade is thick. That "
-        "force comes from a mesh whose cells at the strip are half as wide as the strip, where "
-        "the nodes under the strip are moved down as supports: no blade and no contact take part. "
-        "In a mesh that is finer still that force falls by another 2 to 3 %."
+        "force comes from a mesh whose cells at the strip are half as wide as the strip, where the "
+        "nodes under the strip are moved down as supports: no blade and no contact take part. In a "
+        "mesh that is finer still that force falls by another 2 to 3 %. Young's modulus is 10 kPa, "
+        "that of a soft phantom or organ; both forces are proportional to it."
     ),
     measure=_measure,
     references=[

@@ -167,9 +167,10 @@ STRETCH_SCENE = ValidationScene(
     about=(
         "A bar is stretched to twice its length. The force on its support and the width of its "
         "middle are compared with those that follow from the energy of the law by hand, at ten "
-        "stretches of which the worst is shown. Law springs has no such formula. An "
-        "exponential law with b = 1.5 in place of 1, thirty times as stiff at the end, became "
-        "unstable on the way."
+        "stretches of which the worst is shown. Young's modulus is 10 kPa, as soft as an organ; "
+        "each force is compared relative to it. Law springs has no such formula. An exponential "
+        "law with b = 1.5 in place of 1, thirty times as stiff at the end, became unstable on the "
+        "way."
     ),
     measure=_measure,
     references=[

@@ -1,5 +1,7 @@
 """Scenes judge the physics: the right theory passes, and a wrong one fails."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,11 @@ TOUGHNESS = 20.0
 
 def verdicts(checks):
     return {check.verdict for check in checks}
+
+
+@pytest.mark.parametrize("scene", VALIDATION_SCENES.values(), ids=VALIDATION_SCENES)
+def test_every_scene_says_which_stiffness_it_takes(scene):
+    assert re.search(r"\d [kM]Pa", scene.about)
 
 
 @pytest.fixture(scope="module")
