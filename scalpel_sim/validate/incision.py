@@ -219,7 +219,7 @@ def _measure(quick: bool) -> Findings:
         Plot("Area of the incision", x, "area [mm²]", areas),
     ]
     ahead = " and ".join(f"{each.steady_ahead * _MM_PER_M:.1f}" for each in found)
-    return Findings(checks, plots, [f"The blade is {ahead} mm ahead of its material."])
+    return Findings(checks, plots, [f"The blade is {ahead} mm ahead of its material"])
 
 
 INCISION_SCENE = ValidationScene(

@@ -88,7 +88,7 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     wrong = a if side_of(sheet, a) != side else b
     height = abs(height_a) if wrong == a else abs(height_b)
     snap = snap_distance(cut, wrong)
-    if height < snap and not is_unswept(cut.path, vec3(body.rest, wrong), snap):
+    if height < snap:
         flag(cut, wrong)
     else:
         note_side(sheet, wrong, side, True)

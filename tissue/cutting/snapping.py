@@ -1,16 +1,14 @@
 """Snapping: at each crossing of the sheet use a node that is there, or insert one.
 
 The rule is one of distance, not of the fraction along the edge, so that the result does not depend
-on the order of crossings and no thin tetrahedron has its four nodes on the sheet. A node where the
-blade has not been is used only where no split is good: an edge that lies nearly in the sheet is
-crossed far from its ends, and with these a whole element ahead of the blade would open.
+on the order of crossings and no thin tetrahedron has its four nodes on the sheet.
 """
 
 import math
 
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, cross, dot, lerp, norm, sub, vec3
-from tissue.cutting.blade_path import LEAST_ALIGNMENT, is_unswept, nearest_on_edge, plane_at
+from tissue.cutting.blade_path import LEAST_ALIGNMENT, nearest_on_edge, plane_at
 from tissue.cutting.cut_surface import note_side, on_sheet, past_offset
 from tissue.cutting.stellar_subdivision import (
     edge_split_is_good,
@@ -147,14 +145,9 @@ def insert_crossing(cut: Cut, a: int, b: int, segment: int, t: float) -> None:
         return
     note_side(sheet, a, side, True)
     note_side(sheet, b, -side, True)
-    snap_a, snap_b = snap_distance(cut, a), snap_distance(cut, b)
-    near_a, near_b = t * height / snap_a, (1.0 - t) * height / snap_b
-    may_a = near_a < 1.0 and not is_unswept(cut.path, pa, snap_a)
-    may_b = near_b < 1.0 and not is_unswept(cut.path, pb, snap_b)
-    if may_a or may_b:
-        flag(cut, a if may_a and (near_a <= near_b or not may_b) else b)
-        return
-    if not edge_split_is_good(cut, a, b, t):
+    near_a = t * height / snap_distance(cut, a)
+    near_b = (1.0 - t) * height / snap_distance(cut, b)
+    if min(near_a, near_b) < 1.0 or not edge_split_is_good(cut, a, b, t):
         flag(cut, a if near_a <= near_b else b)
         return
     node = split_edge(cut, a, b, t)

@@ -68,23 +68,6 @@ def test_a_split_that_would_break_the_guard_uses_the_nearest_node():
     assert on_sheet(cut.sheet, 0)
 
 
-@pytest.mark.parametrize(("y", "splits"), [(0.5, True), (0.9, False)])
-def test_a_node_that_the_edge_has_not_reached_is_not_used(y, splits):
-    """Edge 1-2 nearly lies in the sheet at its end 2, which is at y = 1."""
-    cut = corner(0.1, snap=0.3)
-    cut.path.t1[:, 1] = y
-    insert_crossing(cut, 1, 2, 0, 0.9)
-    assert (cut.body.n_nodes == 5) == splits
-    assert on_sheet(cut.sheet, 2) != splits
-
-
-def test_a_node_that_the_edge_has_not_reached_is_used_where_no_split_is_good():
-    cut = corner(0.1, snap=0.3, guard=0.5)
-    insert_crossing(cut, 1, 2, 0, 0.9)
-    assert cut.body.n_nodes == 4
-    assert on_sheet(cut.sheet, 2)
-
-
 def test_the_offset_of_a_node_is_its_distance_from_the_cut_surface():
     cut = corner(0.1)
     insert_crossing(cut, 0, 1, 0, 0.1)
