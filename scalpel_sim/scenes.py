@@ -266,17 +266,6 @@ def scene_called(name: str) -> Scene:
     return SCENES[name]
 
 
-def material_called(name: str) -> Material:
-    """Return the material of that name.
-
-    Raises:
-        UsageError: there is none; the message lists them.
-    """
-    if name not in MATERIALS:
-        raise unknown("material", name, MATERIALS)
-    return MATERIALS[name].material
-
-
 def mesh_scene(path: Path, scale: float = 1.0) -> Scene:
     """Return a scene around a mesh from a file, named after it. The file is read once, here.
 

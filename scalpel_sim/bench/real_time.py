@@ -30,8 +30,9 @@ from scalpel_sim.preparation import prepare
 from scalpel_sim.run import run_time
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scenes import Scene, material_called, scene_called
+from scalpel_sim.scenes import Scene, scene_called
 from scalpel_sim.simulation import Simulation, no_garbage_collection
+from scalpel_sim.tables.material import material_called
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError
 
 if TYPE_CHECKING:

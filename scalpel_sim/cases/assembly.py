@@ -2,44 +2,34 @@
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-import msgspec
 import numpy as np
 
 from scalpel_sim.cases.case_file import CaseFile
 from scalpel_sim.cases.tables import (
-    BodyTable,
     CaseBladeTable,
-    CaseMaterialTable,
     LoadTable,
     SupportTable,
 )
 from scalpel_sim.cases.time_table import TimeTable
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scenes import material_called
+from scalpel_sim.tables.body import mesh_of
+from scalpel_sim.tables.material import material_of
 from tissue import (
     BladeSegment,
     BladeShape,
     BoolArray,
     FloatArray,
     Load,
-    Material,
     SolverSettings,
     TetrahedralMesh,
     Tissue,
-    block,
-    cylinder,
     fixed_nodes,
-    lattice_block,
-    read_mesh,
 )
 
 Made = TypeVar("Made")
 """What `_naming` returns."""
-
-_RINGS = 5
-"""Rings of elements of a cylinder, from its axis to its side, where a case does not say."""
 
 
 class Support:
@@ -111,11 +101,11 @@ def assemble(case: CaseFile) -> Assembly:
         UsageError: a region holds no node, or numbers make no sense together.
     """
     content = case.content
-    mesh = _naming("[body]", lambda: _mesh(case, content.body))
+    mesh = _naming("[body]", lambda: mesh_of(content.body, case.path.parent))
     supports = {table.name: Support(table) for table in content.support}
     tissue = Tissue(
         mesh,
-        _naming("[material]", lambda: _material(content.material)),
+        _naming("[material]", lambda: material_of(content.material)),
         fixed=_fixed(mesh, list(supports.values())),
         gravity=content.run.gravity,
         blade=None if content.blade is None else _blade_shape(content.blade),
@@ -124,34 +114,6 @@ def assemble(case: CaseFile) -> Assembly:
     pushes = [_push(tissue, table) for table in content.load]
     blade = None if content.blade is None else BladePath(content.blade)
     return Assembly(tissue, supports, pushes, blade)
-
-
-def _mesh(case: CaseFile, body: BodyTable) -> TetrahedralMesh:
-    """Return the mesh of the body."""
-    if body.shape in ("block", "lattice"):
-        assert body.cells is not None and body.size is not None
-        make = block if body.shape == "block" else lattice_block
-        return make(body.cells, body.size)
-    if body.shape == "cylinder":
-        assert body.radius is not None and body.height is not None
-        rings = body.rings or _RINGS
-        layers = body.layers or max(1, round(body.height * rings / body.radius))
-        return cylinder((rings, layers), body.radius, body.height)
-    assert body.file is not None
-    return read_mesh(case.file(body.file), scale=body.scale or 1.0)
-
-
-def _material(table: CaseMaterialTable) -> Material:
-    """Return the material: figures that are given, those of a preset, and the usual ones."""
-    given: dict[str, Any] = {
-        key: value for key, value in msgspec.structs.asdict(table).items() if value is not None
-    }
-    preset = given.pop("preset", None)
-    if preset is not None:
-        return material_called(preset).changed(**given)
-    if "law" not in given or "young_modulus" not in given:
-        raise UsageError("it needs a preset, or a law and a young_modulus")
-    return Material(**given)
 
 
 def _fixed(mesh: TetrahedralMesh, supports: Sequence[Support]) -> BoolArray:

@@ -1,28 +1,19 @@
 """Reads a case from a TOML file, and checks what one table says about another."""
 
-import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import msgspec
-
-from scalpel_sim.cases.tables import BodyTable, CaseContent, ExpectedTable, RecordTable
-from scalpel_sim.cases.toml_errors import problem_of
+from scalpel_sim.cases.tables import CaseContent, ExpectedTable, RecordTable
 from scalpel_sim.errors import UsageError, unknown
+from scalpel_sim.tables.body import KEYS_OF_SHAPE
+from scalpel_sim.tables.kinds import check_keys
+from scalpel_sim.tables.toml import as_tables, read_toml
 
 HOW_TO_BEGIN = "docs/cases.md describes case files, and docs/examples has two to start from"
 
 TIME = "time"
 """What a record may be compared against, besides another record."""
-
-_KEYS_OF_SHAPE = {
-    "block": (("size", "cells"), ()),
-    "lattice": (("size", "cells"), ()),
-    "cylinder": (("radius", "height"), ("rings", "layers")),
-    "mesh": (("file",), ("scale",)),
-}
-"""Keys of `[body]` that each shape needs, and those that it may have besides."""
 
 _OF_BLADE = ("blade_force", "blade_position", "cut_area")
 """Quantities that need a blade."""
@@ -46,21 +37,9 @@ def read_case(path: Path) -> CaseFile:
     Raises:
         UsageError: the file cannot be read, or a table, key or value is wrong.
     """
+    content = read_toml(path, HOW_TO_BEGIN)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise UsageError(
-            f"{path} cannot be read: {error.strerror or error}; {HOW_TO_BEGIN}"
-        ) from error
-    except UnicodeDecodeError as error:
-        raise UsageError(f"{path} is not a text file; {HOW_TO_BEGIN}") from error
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{path} is not valid TOML: {error}") from error
-    try:
-        case = CaseFile(path, msgspec.convert(content, CaseContent))
-    except msgspec.ValidationError as error:
-        raise UsageError(f"{path}: {problem_of(content, CaseContent) or error}") from error
-    try:
+        case = CaseFile(path, as_tables(content, CaseContent))
         _check(case.content)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
@@ -69,7 +48,7 @@ def read_case(path: Path) -> CaseFile:
 
 def _check(content: CaseContent) -> None:
     """Check what one table says about another."""
-    _check_body(content.body)
+    check_keys(content.body, "[body]", "shape", KEYS_OF_SHAPE)
     run = content.run
     if not run.dt <= run.record_every <= run.seconds:
         raise UsageError(
@@ -104,21 +83,6 @@ def _check(content: CaseContent) -> None:
         _check_record(record, content)
     for expected in content.expected:
         _check_expected(expected, [TIME, *(each.name for each in content.record)])
-
-
-def _check_body(body: BodyTable) -> None:
-    """Check that the keys of the body are those of its shape."""
-    needed, possible = _KEYS_OF_SHAPE[body.shape]
-    for key in body.__struct_fields__:
-        is_given = getattr(body, key) is not None
-        if key in needed and not is_given:
-            raise UsageError(f'[body] of shape "{body.shape}" has no {key}')
-        if key != "shape" and key not in (*needed, *possible) and is_given:
-            owner = next(s for s, keys in _KEYS_OF_SHAPE.items() if key in (*keys[0], *keys[1]))
-            raise UsageError(
-                f'[body] of shape "{body.shape}" has the key {key}, which belongs to shape '
-                f'"{owner}"; it has {", ".join((*needed, *possible))}'
-            )
 
 
 def _check_record(record: RecordTable, content: CaseContent) -> None:

@@ -4,10 +4,10 @@ import textwrap
 from pathlib import Path
 
 from scalpel_sim.arm.scalpel import SCALPEL
-from scalpel_sim.cli.material_file import SUFFIX
 from scalpel_sim.cli.materials import chosen_presets
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.scenes import PHANTOM
+from scalpel_sim.tables.toml import SUFFIX
 from tissue import BladeShape, Material, Preset, SourcedValue
 
 _WIDTH = 96

@@ -11,12 +11,7 @@ from typing import Any, NamedTuple
 from bridge import InProcessLink, TcpLink, TissueLink, chosen_key
 from scalpel_sim.arm.scalpel import chosen_blade, expect_faces
 from scalpel_sim.cli.console import compiling
-from scalpel_sim.cli.material_file import (
-    is_material_file,
-    read_blade,
-    read_material,
-    warn_of_unused_tables,
-)
+from scalpel_sim.cli.material_file import read_blade, read_material, warn_of_unused_tables
 from scalpel_sim.cli.options import (
     ArmOptions,
     BladeOptions,
@@ -38,12 +33,13 @@ from scalpel_sim.scenes import (
     Scene,
     changed,
     check_motion,
-    material_called,
     mesh_scene,
     scene_called,
     scene_of,
 )
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.tables.material import material_called
+from scalpel_sim.tables.toml import is_toml_file
 from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
 from tissue import BladeShape, Material
 
@@ -289,7 +285,7 @@ def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> 
 def _warn_of_unused_tables(options: TissueOptions) -> None:
     """Log a warning where a file has a table that no option asks for."""
     name = options.material.material
-    is_file = name is not None and is_material_file(name)
+    is_file = name is not None and is_toml_file(name)
     # A material by name is a choice, which a `[material]` beside the blade does not question.
     if name is None or is_file:
         warn_of_unused_tables(Path(name) if name is not None else None, options.blade.blade)
@@ -323,7 +319,7 @@ def _material_as_asked(usual: Material, options: MaterialOptions) -> Material:
     name = options.material
     if name is None:
         return replace(usual, **given)
-    if not is_material_file(name):
+    if not is_toml_file(name):
         return replace(material_called(name), **given)
     in_file = read_material(Path(name))
     try:

@@ -25,7 +25,7 @@ WRONG = {
     "a wrong type": ("young_modulus = 10e3", 'young_modulus = "soft"', "[material] young_modulus"),
     "a wrong sign": ("seconds = 0.5", "seconds = -0.5", "it must be a number above 0"),
     "infinity": ("seconds = 0.5", "seconds = inf", "it must be a number above 0"),
-    "a wrong choice": ('"block"', '"blok"', 'must be "block" or "lattice" or "cylinder" or "mesh"'),
+    "a wrong choice": ('"block"', '"blok"', 'must be "organ" or "block" or'),
     "a wrong vector": ("[0.04, 0.005, 0.005]", "[0.04, 0.005]", "point is [0.04, 0.005]; it must"),
     "a name with a space": ('name = "grip"', 'name = "the grip"', "letters, digits"),
     "a key of another shape": ("cells = [16, 4, 4]", "radius = 0.01", "has no cells"),

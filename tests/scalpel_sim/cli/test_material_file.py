@@ -9,12 +9,13 @@ import pytest
 
 from scalpel_sim import SCALPEL
 from scalpel_sim.cli.app import command_line
-from scalpel_sim.cli.material_file import BladeTable, MaterialTable, read_blade, read_material
+from scalpel_sim.cli.material_file import read_blade, read_material
 from scalpel_sim.cli.material_template import BLADE_COMMENTS, MATERIAL_COMMENTS, template
 from scalpel_sim.cli.options import BladeOptions, MaterialOptions, TissueOptions
 from scalpel_sim.cli.run_setup import chosen_scene
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import PHANTOM
+from scalpel_sim.tables.material import BladeTable, MaterialTable
 from tissue import MATERIALS, BladeShape, Material
 
 WRONG_FILES = {

@@ -10,27 +10,58 @@ import msgspec
 from scalpel_sim.errors import unknown
 
 
-def problem_of(content: Mapping[str, Any], table: type[msgspec.Struct], where: str = "") -> str:
-    """Return what is wrong with the content of a table, for people; empty if nothing is.
+def problem_of(content: Mapping[str, Any], table: type[msgspec.Struct]) -> str:
+    """Return what is wrong with the content of a file, for people; empty if nothing is.
+
+    Args:
+        content: What the file has.
+        table: What it should be.
+    """
+    return _problem(content, table, "", table)
+
+
+def _problem(
+    content: Mapping[str, Any], table: type[msgspec.Struct], where: str, whole: type[msgspec.Struct]
+) -> str:
+    """Return what is wrong with the content of a table.
 
     Args:
         content: What the file has.
         table: What it should be.
         where: Name of the table, as a file writes it: "[body]"; empty for the whole file.
+        whole: What the whole file should be.
     """
     kinds = get_type_hints(table, include_extras=True)
-    of = f" of {where}" if where else ""
-    for key in content:
+    for key, value in content.items():
         if key not in kinds:
-            return str(unknown(f"key{of}", key, kinds))
+            return _unknown_key(key, value, kinds, where, whole)
     for field in msgspec.structs.fields(table):
         if field.required and field.name not in content:
             return f"{where or 'the file'} has no {_as_header(field.name, kinds[field.name])}"
     for key, value in content.items():
-        problem = _problem_of_value(key, value, kinds[key], where)
+        problem = _problem_of_value(key, value, kinds[key], where, whole)
         if problem:
             return problem
     return ""
+
+
+def _unknown_key(
+    key: str, value: object, kinds: Mapping[str, Any], where: str, whole: type[msgspec.Struct]
+) -> str:
+    """Return what is wrong with a key that a table does not have."""
+    tables = {
+        name: inner
+        for name, kind in get_type_hints(whole, include_extras=True).items()
+        if (inner := _table_of(kind)) is not None
+    }
+    owner = next((name for name, table in tables.items() if key in table.__struct_fields__), None)
+    if owner is not None and not isinstance(value, Mapping):
+        if not where:
+            return f"{key} stands in no table; write [{owner}] on a line above it"
+        return f"{where} has the key {key}, which belongs to [{owner}]"
+    if where:
+        return str(unknown(f"key of {where}", key, kinds))
+    return str(unknown("table" if isinstance(value, Mapping) else "key", key, kinds))
 
 
 def as_toml(value: object) -> str:
@@ -41,7 +72,9 @@ def as_toml(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _problem_of_value(key: str, value: object, kind: Any, where: str) -> str:
+def _problem_of_value(
+    key: str, value: object, kind: Any, where: str, whole: type[msgspec.Struct]
+) -> str:
     """Return what is wrong with a value of that type."""
     row = _row_of(kind)
     if row is not None:
@@ -50,14 +83,14 @@ def _problem_of_value(key: str, value: object, kind: Any, where: str) -> str:
         if not value:
             return f"the file has no [[{key}]]"
         problems = (
-            problem_of(each, row, f"[[{key}]] number {i + 1}") for i, each in enumerate(value)
+            _problem(each, row, f"[[{key}]] number {i + 1}", whole) for i, each in enumerate(value)
         )
         return next((problem for problem in problems if problem), "")
     inner = _table_of(kind)
     if inner is not None:
         if not isinstance(value, Mapping):
             return f"{key} is {as_toml(value)}; it must be a table: [{key}], then a key a line"
-        return problem_of(value, inner, f"[{key}]")
+        return _problem(value, inner, f"[{key}]", whole)
     try:
         msgspec.convert(value, kind)
     except msgspec.ValidationError:

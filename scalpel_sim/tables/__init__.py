@@ -1,0 +1,8 @@
+"""Tables of TOML files, which cases, scenes and files of materials share.
+
+values    what a key may hold
+material  [material] and the measures of [blade]
+body      [body]: the geometry
+problems  says what is wrong with a value, and where
+toml      reads a file
+"""
