@@ -10,10 +10,11 @@ from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.placement import place
 from scalpel_sim.scene_body import highest_toughness, make_tissue
-from scalpel_sim.scenes import Scene, read_stroke
+from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
-from scalpel_sim.strokes.planning import check_meets, plan_stroke
+from scalpel_sim.strokes.planning import check_meets
+from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import TetrahedralMesh
 
@@ -42,9 +43,7 @@ def prepare(
         link = InProcessLink(make_tissue(scene), scene.name)
     body = link.snapshot()
     mesh = TetrahedralMesh(body.positions, body.tetrahedra)
-    stroke = read_stroke(scene) or plan_stroke(
-        scene.stroke, mesh, speed=scene.speed, material=link.describe().material
-    )
+    stroke = stroke_through(mesh, scene.strokes, link.describe().material)
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
     placement = place(stroke, link.describe().bounds, scene.arm, force=needed.force)

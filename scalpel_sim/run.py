@@ -9,8 +9,10 @@ from typing import Any
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.output.export import export_surface
-from scalpel_sim.output.run_folder import FINAL, INITIAL, Outputs
+from scalpel_sim.output.run_folder import FINAL, INITIAL, SCENE, Outputs
 from scalpel_sim.output.summary import COMPLETE, RunFacts, Summary, summarise
+from scalpel_sim.scene_file.writing import scene_text
+from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area
@@ -49,6 +51,7 @@ def perform(
     outputs: Outputs,
     *,
     settings: dict[str, Any],
+    scene: Scene | None = None,
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
     exports: Sequence[Path] = (),
@@ -62,6 +65,7 @@ def perform(
         simulation: At its start.
         outputs: The folder of the files.
         settings: Settings to keep in the summary.
+        scene: What `scene.toml` is to hold, if its body is in a table; None: no such file.
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
         exports: Files for the body's surface after the run; see `output.export`.
@@ -73,6 +77,9 @@ def perform(
     seconds = run_time(simulation, seconds)
     body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
     at_first = simulation.link.snapshot()
+    text = None if scene is None else scene_text(scene, outputs.path(SCENE))
+    if text is not None:
+        outputs.write_scene(text)
     outputs.write_mesh(INITIAL, at_first)
     asked = asked_area(simulation.stroke, at_first)
     replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)

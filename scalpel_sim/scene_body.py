@@ -5,7 +5,8 @@ import logging
 import numpy as np
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scenes import Scene, check_motion
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.strokes.stroke import from_csv
 from tissue import (
     FloatArray,
     Material,
@@ -98,9 +99,12 @@ def check_scene(scene: Scene) -> None:
 
     Raises:
         MeshError: the mesh cannot be cut.
-        ValueError: stroke or arm are unknown, or no nodes are where they are to be held.
+        StrokeError: the file of a stroke cannot be used.
+        ValueError: no nodes are where they are to be held.
     """
-    check_motion(scene)
+    for stroke in scene.strokes:
+        if stroke.file is not None:
+            from_csv(stroke.file)
     mesh = scene.mesh()
     fixed_nodes(mesh, scene.fixed)
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)

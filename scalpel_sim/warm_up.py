@@ -24,7 +24,8 @@ from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
-from scalpel_sim.scenes import PARENCHYMA, PHANTOM, Scene
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scenes import PARENCHYMA, PHANTOM
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     BladeSegment,

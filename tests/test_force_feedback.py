@@ -9,7 +9,7 @@ import pytest
 from bridge.poses import motion
 from scalpel_sim import SCENES, Scene, Simulation, prepare
 from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import changed
+from scalpel_sim.scene_parts.scene import changed
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult
 
 ACTION_IS_REACTION = 1e-9

@@ -15,7 +15,7 @@ from bridge.counters import Counters
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.hand import ACTUATORS
-from scalpel_sim.scenes import changed
+from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.coupling import work_on_tissue
 from tests.bridge.coupling.walls import Wall

@@ -7,7 +7,7 @@ import pytest
 
 from scalpel_sim import SCENES
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scenes import GEL
+from scalpel_sim.scene_parts.scene import GEL
 from tests import bodies, strokes
 from tests.materials import SPRINGS
 from tests.test_contact import NO_GRAVITY, SLAB, frame_speed, joined, overlap_depth, speed

@@ -22,6 +22,7 @@ HELPS = (
     "key",
     "materials",
     "figure",
+    "new",
     "validate",
     "bench peers",
     "bench real-time",

@@ -30,7 +30,8 @@ from scalpel_sim.preparation import prepare
 from scalpel_sim.run import run_time
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.choices import can_audit
-from scalpel_sim.scenes import Scene, scene_called
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.scenes import scene_called
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from scalpel_sim.tables.material import material_called
 from tissue import MATERIALS, BladeSweep, FloatArray, Tissue, TissueError

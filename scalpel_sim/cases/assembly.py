@@ -1,8 +1,8 @@
 """The tissue, the loads, the supports and the blade of a case."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from scalpel_sim.cases.time_table import TimeTable
 from scalpel_sim.errors import UsageError
 from scalpel_sim.tables.body import mesh_of
 from scalpel_sim.tables.material import material_of
+from scalpel_sim.tables.problems import naming_table
 from tissue import (
     BladeSegment,
     BladeShape,
@@ -27,9 +28,6 @@ from tissue import (
     Tissue,
     fixed_nodes,
 )
-
-Made = TypeVar("Made")
-"""What `_naming` returns."""
 
 
 class Support:
@@ -101,11 +99,11 @@ def assemble(case: CaseFile) -> Assembly:
         UsageError: a region holds no node, or numbers make no sense together.
     """
     content = case.content
-    mesh = _naming("[body]", lambda: mesh_of(content.body, case.path.parent))
+    mesh = naming_table("[body]", lambda: mesh_of(content.body, case.path.parent))
     supports = {table.name: Support(table) for table in content.support}
     tissue = Tissue(
         mesh,
-        _naming("[material]", lambda: material_of(content.material)),
+        naming_table("[material]", lambda: material_of(content.material)),
         fixed=_fixed(mesh, list(supports.values())),
         gravity=content.run.gravity,
         blade=None if content.blade is None else _blade_shape(content.blade),
@@ -121,7 +119,7 @@ def _fixed(mesh: TetrahedralMesh, supports: Sequence[Support]) -> BoolArray:
     owner = np.full(len(mesh.positions), -1)
     for i, support in enumerate(supports):
         where = f"[[support]] {support.name}"
-        nodes = _naming(where, partial(fixed_nodes, mesh, support.region))
+        nodes = naming_table(where, partial(fixed_nodes, mesh, support.region))
         if not nodes.any():
             raise UsageError(f"{where}: its region '{support.region}' holds no node")
         shared = nodes & (owner >= 0)
@@ -140,7 +138,7 @@ def _push(tissue: Tissue, table: LoadTable) -> Push:
     where = f"[[load]] {table.name}"
     force = TimeTable(table.times, table.force, where)
     place = table.region if table.region is not None else np.array(table.points, dtype=np.float64)
-    load = _naming(where, lambda: tissue.push(place, force.at(0.0)))
+    load = naming_table(where, lambda: tissue.push(place, force.at(0.0)))
     return Push(load, force)
 
 
@@ -157,12 +155,4 @@ def _blade_shape(table: CaseBladeTable) -> BladeShape | None:
         if len(numbers) > ("thickness" in numbers):
             raise UsageError("[blade] has a shape and no thickness; a blade without one is a line")
         return None
-    return _naming("[blade]", lambda: BladeShape(**numbers))
-
-
-def _naming(where: str, make: Callable[[], Made]) -> Made:
-    """Return what a function makes; an error of its input says where in the file that stands."""
-    try:
-        return make()
-    except ValueError as error:
-        raise UsageError(f"{where}: {error}") from error
+    return naming_table("[blade]", lambda: BladeShape(**numbers))

@@ -30,7 +30,7 @@ _Quantity = Annotated[
 ]
 
 
-class RunTable(TomlTable, kw_only=True):
+class RunTable(TomlTable, kw_only=True, frozen=True):
     """`[run]`: how long, and with which method."""
 
     seconds: Positive
@@ -41,7 +41,7 @@ class RunTable(TomlTable, kw_only=True):
     relaxation: _Relaxation = "global"
 
 
-class SupportTable(TomlTable, kw_only=True):
+class SupportTable(TomlTable, kw_only=True, frozen=True):
     """`[[support]]`: a region that is held, or moved over time."""
 
     name: Name
@@ -50,7 +50,7 @@ class SupportTable(TomlTable, kw_only=True):
     displacement: RowsOfThree | None = None
 
 
-class LoadTable(TomlTable, kw_only=True):
+class LoadTable(TomlTable, kw_only=True, frozen=True):
     """`[[load]]`: a force over time on a region or on points of the body at rest."""
 
     name: Name
@@ -60,7 +60,7 @@ class LoadTable(TomlTable, kw_only=True):
     force: RowsOfThree
 
 
-class CaseBladeTable(BladeTable, kw_only=True):
+class CaseBladeTable(BladeTable, kw_only=True, frozen=True):
     """`[blade]`: the path of a cutting edge, and its shape; without a thickness it is a line."""
 
     times: Times
@@ -69,7 +69,7 @@ class CaseBladeTable(BladeTable, kw_only=True):
     forward: ThreeNumbers
 
 
-class RecordTable(TomlTable, kw_only=True):
+class RecordTable(TomlTable, kw_only=True, frozen=True):
     """`[[record]]`: a quantity that becomes a column of the table."""
 
     name: Name
@@ -79,7 +79,7 @@ class RecordTable(TomlTable, kw_only=True):
     point: ThreeNumbers | None = None
 
 
-class ExpectedTable(TomlTable, kw_only=True):
+class ExpectedTable(TomlTable, kw_only=True, frozen=True):
     """`[[expected]]`: a curve or a value that a record should have."""
 
     record: Name
@@ -92,7 +92,7 @@ class ExpectedTable(TomlTable, kw_only=True):
     to_time: NotNegative | None = None
 
 
-class CaseContent(TomlTable, kw_only=True):
+class CaseContent(TomlTable, kw_only=True, frozen=True):
     """The whole file."""
 
     title: Text

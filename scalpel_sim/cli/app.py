@@ -1,7 +1,6 @@
 """The command line: `scalpel-sim run`, `view`, `serve`, `bench`, `validate`, and the others."""
 
 import gc
-import json
 import sys
 import time
 import traceback
@@ -20,7 +19,6 @@ from scalpel_sim.cli.options import (
     PAGE,
     ArmOptions,
     ClientOptions,
-    FigureNumber,
     Flag,
     OutputOptions,
     PrintOptions,
@@ -36,7 +34,9 @@ from scalpel_sim.errors import (
     exit_code,
     one_line,
 )
+from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.scene_file.command import new
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
@@ -176,7 +176,8 @@ def _serve(
     """
     from bridge import chosen_key
     from bridge import serve as serve_tissue
-    from scalpel_sim.cli.run_setup import chosen_scene, load_kernels, springs_as_asked
+    from scalpel_sim.cli.run_setup import load_kernels, springs_as_asked
+    from scalpel_sim.cli.scene_options import chosen_scene
     from scalpel_sim.scene_body import check_scene, make_tissue
 
     with log_to_stderr(printing):
@@ -222,6 +223,8 @@ def _key(file: Path, /, *, printing: PrintOptions = PrintOptions()) -> None:
 
 app.command(warm_up, name="warm-up")
 app.command(bench)
+app.command(figure)
+app.command(new)
 app.command(validate)
 
 
@@ -268,53 +271,6 @@ def _materials(
             print_presets(presets)
 
 
-@app.command(name="figure")
-def _figure(
-    number: FigureNumber,
-    /,
-    *,
-    output: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
-    scheme: str = "stellar",
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
-
-    Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
-    the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
-    frames of a cut through the organ, which is the picture of the README.
-
-    For example:
-
-    ```console
-    scalpel-sim figure 12 --scheme paper --output paper12.png
-    ```
-
-    Args:
-        number: 10, 11, 12 or organ.
-        output: The file [default: figure10.png (11, 12, organ) in this folder].
-        scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
-    """
-    from scalpel_sim.output.run_folder import check_file
-    from scalpel_sim.scene_parts.choices import check_scheme
-
-    path = output or Path(f"figure{number}.png")
-    with log_to_stderr(printing):
-        check_scheme(scheme)
-        check_file(path, ".png", "--output")
-        from scalpel_sim.cli.run_setup import load_kernels
-        from scalpel_sim.figures.figures import draw_figure
-        from scalpel_sim.figures.organ import draw_organ
-
-        load_kernels(printing)
-        if not printing.quiet:
-            say(f"cutting and drawing figure {number}: about half a minute")
-        drawn = draw_organ(path, scheme) if number == "organ" else draw_figure(number, path, scheme)
-        if printing.json:
-            print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
-        elif not printing.quiet:
-            print(f"{path}: {drawn.caption}")
-
-
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line, and end the process with its exit code."""
     # What is loaded lives as long as the process: to look for cycles in it took 0.13 s of a start.
@@ -357,11 +313,12 @@ def _perform(
     from scalpel_sim.output.run_folder import Outputs
     from scalpel_sim.run import perform, run_time
 
-    seconds = run_time(prepared.simulation, options.arm.seconds)
+    seconds = run_time(prepared.simulation, prepared.scene.seconds)
     with progress(seconds, options.printing) as advance:
         return perform(
             prepared.simulation,
             Outputs(prepared.folder, plotter),
+            scene=prepared.scene,
             settings=prepared.settings,
             seconds=seconds,
             every_frame=_paced(advance) if at_most_real_time else advance,

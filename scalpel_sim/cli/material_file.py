@@ -14,7 +14,7 @@ from scalpel_sim.tables.values import TomlTable
 HOW_TO_WRITE_ONE = "`scalpel-sim materials --write FILE.toml` writes a file to start from"
 
 
-class _File(TomlTable, kw_only=True):
+class _File(TomlTable, kw_only=True, frozen=True):
     """The whole file."""
 
     material: MaterialTable | None = None

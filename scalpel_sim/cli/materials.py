@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from scalpel_sim.errors import unknown
-from scalpel_sim.scene_parts.specimens import SPECIMENS
+from scalpel_sim.scenes import SCENES
 from tissue import DAMPING_BAND, MATERIALS, Preset, SourcedValue
 
 _KPA_PER_PA = 1e-3
@@ -72,7 +72,7 @@ def print_presets(presets: Sequence[Preset]) -> None:
         console.print(
             f"\n[bold]{preset.name}[/bold]: {preset.about}; law {preset.law}", highlight=False
         )
-        specimen = SPECIMENS[preset.name].about
+        specimen = SCENES[preset.name].about
         console.print(f"  run {preset.name}: {specimen}", highlight=False, soft_wrap=True)
         for name, figure in preset.values.items():
             line = _line(name, figure)

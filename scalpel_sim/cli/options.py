@@ -14,7 +14,8 @@ SceneName = Annotated[
     str | None,
     Parameter(
         help="organ (default), incision, a specimen of a material (liver, kidney, skin, fat, "
-        "muscle, gelatin, silicone), slab, grid2 or grid7."
+        "muscle, gelatin, silicone), slab, grid2 or grid7; or a FILE.toml, which the command `new` "
+        "writes."
     ),
 ]
 
@@ -23,6 +24,7 @@ FigureNumber = Annotated[Literal[10, 11, 12, "organ"], Parameter(help="10, 11, 1
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option that is given or not, and has no value."""
 
+_SCENE = Group("Scene", sort_key=0)
 _BODY = Group("Body", sort_key=1)
 _MATERIAL = Group("Material", sort_key=2)
 _BLADE = Group("Blade", sort_key=3)
@@ -161,7 +163,8 @@ class ArmOptions:
     """The arm, the path of its blade, and how it is coupled to the tissue."""
 
     stroke: str | None = None
-    "Path of the blade: straight, slanted, curved, stop, press, or a CSV file of poses over time."
+    """Path of the blade: straight, slanted, curved, stop, incision, press, or a CSV file of poses
+    over time. A scene file has others, and several in turn."""
     speed: float | None = None
     "Speed of the blade along the stroke [m/s]."
     arm: str | None = None
@@ -179,7 +182,7 @@ class ArmOptions:
     passivity: bool | None = None
     "Damp motion by which the coupling would create energy [default: yes]. It is counted anyway."
     seconds: float | None = None
-    "How long to simulate [s; default: the stroke and 0.3 s more]."
+    "How long to simulate [s; default: the strokes and 0.3 s more]."
 
 
 @Parameter(name="*", group=CONNECTION)
@@ -227,3 +230,9 @@ class TissueOptions:
     material: MaterialOptions = MaterialOptions()
     blade: BladeOptions = BladeOptions()
     solver: SolverOptions = SolverOptions()
+    settings: Annotated[
+        tuple[str, ...],
+        Parameter(name="--set", negative="", show_default=False, group=_SCENE),
+    ] = ()
+    """A key of the scene file, such as material.toughness=50 or stroke.0.depth=0.01. May be given
+    several times. The options below override it."""

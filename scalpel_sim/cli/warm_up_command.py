@@ -59,7 +59,7 @@ def _sets(names: Sequence[str | None], tissue: TissueOptions) -> list["KernelSet
     Raises:
         UsageError: there is no such scene, or options that make no sense together.
     """
-    from scalpel_sim.cli.run_setup import chosen_scene
+    from scalpel_sim.cli.scene_options import chosen_scene
     from scalpel_sim.scene_parts.choices import can_audit
     from scalpel_sim.warm_up import KernelSet
 

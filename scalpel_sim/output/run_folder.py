@@ -25,7 +25,8 @@ ENERGY_PLOT = "energy.png"
 INITIAL = "initial.vtu"
 FINAL = "final.vtu"
 REPLAY = "replay.html"
-RUN_FILES = (SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
+SCENE = "scene.toml"
+RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write."""
 
 FRAMES_PER_FLUSH = 25
@@ -60,6 +61,10 @@ class Outputs:
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
         return self.folder / name
+
+    def write_scene(self, text: str) -> None:
+        """Write `scene.toml`."""
+        _naming_path(self.path(SCENE), lambda path: path.write_text(text, encoding="utf-8"))
 
     def write_mesh(self, name: str, snapshot: Snapshot) -> None:
         """Write the body as `initial.vtu` or `final.vtu`."""

@@ -28,9 +28,14 @@ def asked_area(stroke: Stroke, body: Snapshot) -> float | None:
         stroke: In the tissue frame.
         body: The body as it lies before the stroke, tissue frame.
     """
-    if stroke.asked_until is None:
+    if stroke.asked is None:
         return None
-    poses = [stroke.pose(t) for t in np.linspace(0.0, stroke.asked_until, _POSES)]
+    return sum(_area_between(stroke, body, *interval) for interval in stroke.asked)
+
+
+def _area_between(stroke: Stroke, body: Snapshot, start: float, end: float) -> float:
+    """Return the area that a stroke is to cut between two instants [m2]."""
+    poses = [stroke.pose(t) for t in np.linspace(start, end, _POSES)]
     places, areas = [], []
     for i, (before, after) in enumerate(itertools.pairwise(poses)):
         shares = (np.arange(_PLACES) + i * _GOLDEN % 1.0) / _PLACES

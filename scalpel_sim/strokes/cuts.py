@@ -7,7 +7,7 @@ import numpy as np
 from bridge import InProcessLink, TissueFrame
 from scalpel_sim.arm.placement import place
 from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import Scene
+from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray, Tissue

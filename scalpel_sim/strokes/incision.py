@@ -86,7 +86,7 @@ def plan_incision(
     poses = [BladeSegment(tip, tip + length * edge, forward) for tip in tips]
     asked_end = low[axis] + WITHDRAWN_AT * extent[axis]
     asked_until = float(np.interp(asked_end, tips[:, axis], times))
-    return Stroke(times, poses, "incision", asked_until=asked_until)
+    return Stroke(times, poses, "incision", asked=[(0.0, asked_until)])
 
 
 def _surface(mesh: TetrahedralMesh, at: FloatArray, axis: int) -> FloatArray:

@@ -12,20 +12,8 @@ from scalpel_sim.strokes.incision import DRAG_SHARE, plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
+from scalpel_sim.tables.stroke import DEFAULT_SPEED, PLANNED_STROKES
 from tissue import FloatArray, IntArray, Material, TetrahedralMesh, boundary_faces
-
-STROKES = {
-    "straight": "a plane across the middle of the body, clean through",
-    "slanted": "a plane that leans by 25 degrees, with the blade raked by 15, clean through",
-    "curved": "a bent sheet across the middle of the body, clean through",
-    "stop": "the straight stroke, ended inside the body: a slit",
-    "incision": "the tip goes in from above, is drawn along the body, and is lifted out",
-    "press": "the blade pushed against the body, not far enough to cut",
-}
-"""The strokes that have a name, and what each does."""
-
-DEFAULT_SPEED = 0.06
-"""Speed of an unhurried incision [m/s]."""
 
 TILT = math.radians(25.0)
 """Angle by which the slanted sheet leans [rad], where the body is wide enough for it."""
@@ -103,7 +91,7 @@ def plan_stroke(
     else from front to back with the tip down.
 
     Args:
-        name: One of `STROKES`.
+        name: One of `PLANNED_STROKES`.
         mesh: The body as it lies before the stroke, tissue frame [m].
         speed: Speed of the blade between its ramps [m/s].
         material: What the body is made of: how far the blade displaces it, and how deep a press may
@@ -115,8 +103,8 @@ def plan_stroke(
         UsageError: no stroke has this name.
         StrokeError: the speed or the depth is not a positive number, or the body has no section.
     """
-    if name not in STROKES:
-        raise unknown("stroke", name, STROKES)
+    if name not in PLANNED_STROKES:
+        raise unknown("stroke", name, PLANNED_STROKES)
     _check_positive("speed", speed, "m/s")
     if name == "incision":
         if depth is not None:
@@ -146,8 +134,8 @@ def plan_stroke(
     segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
     if name == "press":
         times, segments = np.append(times, times[-1] + PRESS_DWELL), [*segments, segments[-1]]
-    asked_until = None if name in ("stop", "press") else float(times[-1])
-    return Stroke(times, segments, name, asked_until=asked_until)
+    asked = None if name in ("stop", "press") else [(0.0, float(times[-1]))]
+    return Stroke(times, segments, name, asked=asked)
 
 
 def check_meets(stroke: Stroke, mesh: TetrahedralMesh) -> None:
@@ -204,7 +192,7 @@ def _sheet_at(name: str, cut: FloatArray, width: float, strength: float) -> Plan
     """Return the sheet of a stroke through the middle of a section that is normal to x.
 
     Args:
-        name: One of `STROKES`.
+        name: One of `PLANNED_STROKES`.
         cut: Points of the section [m], shape (n, 3).
         width: Width of the body along x [m]; tilt and bend stay within a share of it.
         strength: Fraction of the full tilt or bend.

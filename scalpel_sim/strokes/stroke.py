@@ -38,7 +38,7 @@ class Stroke:
             stroke starts at the first.
         segments: The n poses, n >= 2. `forward` is made orthogonal to the edge.
         name: For messages and reports.
-        asked_until: Until when the edge passes what it is to cut [s]; None where it is not known.
+        asked: Intervals in which the edge passes what it is to cut [s]; None where it is not known.
 
     Raises:
         StrokeError: fewer than two poses; a number that is not finite; times that do not increase;
@@ -52,10 +52,11 @@ class Stroke:
         segments: Sequence[BladeSegment],
         name: str = "",
         *,
-        asked_until: float | None = None,
+        asked: Sequence[tuple[float, float]] | None = None,
     ) -> None:
         self.name = name
-        self.asked_until = asked_until
+        self.asked = asked
+        """Intervals in which the edge passes what it is to cut [s]; None where it is not known."""
         given = np.array(times, np.float64)
         if given.shape != (len(segments),) or len(given) < 2:
             raise StrokeError(

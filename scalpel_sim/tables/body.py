@@ -1,5 +1,7 @@
 """The table `[body]`: the geometry of a body."""
 
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -30,7 +32,7 @@ KEYS_OF_SHAPE = {
 """Keys of `[body]` that each shape has."""
 
 
-class BodyTable(TomlTable, kw_only=True):
+class BodyTable(TomlTable, kw_only=True, frozen=True):
     """`[body]`: the geometry. Which keys there are depends on the shape."""
 
     shape: Annotated[BodyShape, one_of("organ", "block", "lattice", "graded", "cylinder", "mesh")]
@@ -45,6 +47,28 @@ class BodyTable(TomlTable, kw_only=True):
     layers: Whole | None = None
     file: Text | None = None
     scale: Positive | None = None
+
+
+@dataclass(frozen=True)
+class BodySource:
+    """Makes the mesh of a `[body]`, once."""
+
+    table: BodyTable
+    folder: Path = Path()
+    """Where a file is whose path is relative."""
+
+    def __call__(self) -> TetrahedralMesh:
+        """Return the mesh.
+
+        Raises:
+            MeshError: the file holds no mesh that could be cut.
+            ValueError: there can be no such body.
+        """
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> TetrahedralMesh:
+        return mesh_of(self.table, self.folder)
 
 
 def mesh_of(body: BodyTable, folder: Path) -> TetrahedralMesh:

@@ -17,7 +17,7 @@ from scalpel_sim.tables.values import (
 from tissue import MATERIALS, Material
 
 
-class MaterialTable(TomlTable, kw_only=True):
+class MaterialTable(TomlTable, kw_only=True, frozen=True):
     """The table `[material]`, with the fields of `tissue.Material`; None for what is not given."""
 
     law: LawName | None = None
@@ -41,13 +41,13 @@ class MaterialTable(TomlTable, kw_only=True):
     spring_calibration: Positive | None = None
 
 
-class PresetMaterialTable(MaterialTable, kw_only=True):
+class PresetMaterialTable(MaterialTable, kw_only=True, frozen=True):
     """`[material]`: a preset and single figures that replace its own, or figures alone."""
 
     preset: Text | None = None
 
 
-class BladeTable(TomlTable, kw_only=True):
+class BladeTable(TomlTable, kw_only=True, frozen=True):
     """The measures of `[blade]`, as `tissue.BladeShape` has them; None for what is not given.
 
     The angle of the bevels is in degrees, as on the command line.

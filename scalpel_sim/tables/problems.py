@@ -2,12 +2,15 @@
 
 import types
 import typing
-from collections.abc import Mapping, Sequence
-from typing import Any, get_args, get_origin, get_type_hints
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
-from scalpel_sim.errors import unknown
+from scalpel_sim.errors import UsageError, unknown
+
+Made = TypeVar("Made")
+"""What `naming_table` returns."""
 
 
 def problem_of(content: Mapping[str, Any], table: type[msgspec.Struct]) -> str:
@@ -62,6 +65,22 @@ def _unknown_key(
     if where:
         return str(unknown(f"key of {where}", key, kinds))
     return str(unknown("table" if isinstance(value, Mapping) else "key", key, kinds))
+
+
+def naming_table(where: str, make: Callable[[], Made]) -> Made:
+    """Return what a function makes; an error of its input says where in the file that stands.
+
+    Args:
+        where: Name of a table, as a file writes it.
+        make: The function.
+
+    Raises:
+        UsageError: the input is wrong.
+    """
+    try:
+        return make()
+    except ValueError as error:
+        raise UsageError(f"{where}: {error}") from error
 
 
 def as_toml(value: object) -> str:

@@ -19,7 +19,7 @@ def one_of(*names: str) -> Meta:
     return Meta(description=" or ".join(f'"{name}"' for name in names))
 
 
-class TomlTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+class TomlTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
     """Base of the tables: an unknown key is an error."""
 
 
@@ -36,6 +36,7 @@ Finite = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST, description="a number"
 Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST, description="a number above 0")]
 NotNegative = Annotated[float, Meta(ge=0.0, le=_LARGEST, description="a number, 0 or more")]
 Ratio = Annotated[float, Meta(ge=0.0, lt=0.5, description="a number from 0 to below 0.5")]
+Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a number from 0 to 1")]
 Whole = Annotated[int, Meta(ge=1, le=10_000, description="a whole number from 1 to 10000")]
 _Three = tuple[Finite, Finite, Finite]
 ThreeNumbers = Annotated[_Three, Meta(description="three numbers: [x, y, z]")]

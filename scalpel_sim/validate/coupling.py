@@ -7,7 +7,8 @@ import numpy as np
 
 from scalpel_sim.arm.hand import ACTUATORS
 from scalpel_sim.preparation import prepare
-from scalpel_sim.scenes import SCENES, changed
+from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.validate.findings import (

@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from scalpel_sim import SCENES
-from scalpel_sim.scenes import changed
+from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.tables.material import material_called
 
 GRID2 = SCENES["grid2"]

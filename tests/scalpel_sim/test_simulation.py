@@ -6,17 +6,20 @@ import pytest
 
 from bridge import InProcessLink, LinkError
 from scalpel_sim import SCENES, Simulation, prepare
+from scalpel_sim.cli.options import BodyOptions, TissueOptions
+from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS, read_forces
-from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, Outputs
+from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES, SCENE, Outputs
 from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
-from scalpel_sim.scenes import DEFAULT_SCENE, changed, mesh_scene, scene_called, scene_of
+from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.scenes import DEFAULT_SCENE, scene_called, scene_of
 from tissue import Tissue, block, write_vtu
 
 GRID2 = SCENES["grid2"]
-UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT}
+UNAUDITED = set(RUN_FILES) - {ENERGY_PLOT, SCENE}
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
 
@@ -229,7 +232,7 @@ def test_springs_that_the_blade_would_fold_are_refused_before_the_body_settles(m
 def test_a_mesh_from_a_file_hardly_changes_its_volume_unless_told_otherwise(tmp_path):
     path = tmp_path / "body.vtu"
     write_vtu(path, make_tissue(GRID2).snapshot())
-    scene = mesh_scene(path)
+    scene = chosen_scene(None, TissueOptions(body=BodyOptions(mesh=path)))
     assert (scene.material.law, scene.material.poisson_ratio) == ("neo_hookean", 0.45)
     assert changed(scene, law="springs").material.law == "springs"
 

@@ -3,7 +3,8 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
-from scalpel_sim.strokes.planning import STROKES, plan_stroke
+from scalpel_sim.strokes.planning import plan_stroke
+from scalpel_sim.tables.stroke import PLANNED_STROKES
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -22,7 +23,7 @@ def in_world(pose, placement):
 
 @pytest.mark.parametrize("preset", ARMS)
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", STROKES)
+@pytest.mark.parametrize("name", PLANNED_STROKES)
 def test_both_arms_lead_the_blade_along_every_stroke(preset, mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh), preset)
@@ -55,7 +56,7 @@ def test_the_blade_begins_exactly_at_the_start_of_the_stroke(preset):
 
 
 @pytest.mark.parametrize("mesh", [SLAB, ON_EDGE], ids=["slab", "on edge"])
-@pytest.mark.parametrize("name", STROKES)
+@pytest.mark.parametrize("name", PLANNED_STROKES)
 def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(mesh, name):
     stroke = plan_stroke(name, mesh)
     placement = place(stroke, bounds(mesh))
@@ -65,7 +66,7 @@ def test_the_body_and_the_blade_are_above_the_table_and_the_base_stands_on_it(me
 
 
 @pytest.mark.parametrize("preset", ARMS)
-@pytest.mark.parametrize("name", STROKES)
+@pytest.mark.parametrize("name", PLANNED_STROKES)
 def test_base_and_links_stay_out_of_the_body(preset, name):
     stroke = plan_stroke(name, SLAB)
     placement = place(stroke, bounds(SLAB), preset)

@@ -55,7 +55,7 @@ WRONG_USE = {
     ),
     "a coupling of negative stiffness": (
         ["run", "slab", "--coupling", "virtual", "--coupling-stiffness", "-1"],
-        "stiffness is -1.0; it must be positive",
+        "--coupling-stiffness is -1.0; it must be a number above 0",
     ),
     "a coupling without damping": (
         ["run", "slab", "--coupling", "virtual", "--coupling-damping", "0"],
@@ -63,10 +63,13 @@ WRONG_USE = {
     ),
     "a tissue that is never queried": (
         ["run", "slab", "--tissue-every", "0"],
-        "it must be 1 to 100",
+        "--tissue-every is 0; it must be a whole number from 1 to 100",
     ),
     "a tissue that is queried too seldom": (["run", "slab", "--tissue-every", "999"], "1 to 100"),
-    "a negative modulus": (["run", "slab", "--young", "-1"], "young_modulus"),
+    "a negative modulus": (
+        ["run", "slab", "--young", "-1"],
+        "--young is -1.0; it must be a number above 0",
+    ),
     "an unknown material": (["run", "slab", "--material", "livr"], "Did you mean 'liver'"),
     "a list of an unknown material": (["materials", "lung"], "Known: liver"),
     "springs of a law that has none": (
@@ -77,7 +80,10 @@ WRONG_USE = {
         ["run", "--connect", "127.0.0.1:1", "--spring-error"],
         "--spring-error belongs to the tissue",
     ),
-    "an unknown law": (["run", "slab", "--law", "hooke"], "Known: springs, neo_hookean"),
+    "an unknown law": (
+        ["run", "slab", "--law", "hooke"],
+        '--law is hooke; it must be "springs" or "neo_hookean"',
+    ),
     "a Prony series of springs": (
         ["run", "slab", "--prony", "0.3:0.1"],
         "prony is given with law springs",
@@ -122,14 +128,14 @@ WRONG_USE = {
         ["run", "organ", "--work-to-rupture", "1e4", "--blade-edge-radius", "0"],
         "add --blade-edge-radius",
     ),
-    "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "blade_friction is -0.1"),
+    "negative friction": (["run", "organ", "--blade-friction", "-0.1"], "--blade-friction is -0.1"),
     "a skin of negative toughness": (
         ["run", "slab", "--skin-toughness", "-1"],
-        "skin_toughness is -1",
+        "--skin-toughness is -1",
     ),
     "a toughness speed of 0": (
         ["run", "slab", "--toughness-speed", "0"],
-        "toughness_speed is 0",
+        "--toughness-speed is 0",
     ),
     "an audit of a hierarchical relaxation": (
         ["run", "slab", "--audit", "--relaxation", "hierarchical"],
@@ -137,7 +143,7 @@ WRONG_USE = {
     ),
     "fewer threads than one": (
         ["run", "slab", "--threads", "0"],
-        "--threads is 0; it must be from 1",
+        "--threads is 0; it must be a whole number",
     ),
     "the hierarchy on two threads": (
         ["run", "slab", "--relaxation", "hierarchical", "--threads", "2"],
@@ -145,7 +151,7 @@ WRONG_USE = {
     ),
     "a negative mass scaling": (
         ["run", "slab", "--mass-scaling", "-1"],
-        "--mass-scaling is -1.0; it is an angular frequency",
+        "--mass-scaling is -1.0; it must be a number, 0 or more",
     ),
     "a blade for a tissue elsewhere": (
         ["run", "--connect", "127.0.0.1:1", "--blade-thickness", "0.001"],

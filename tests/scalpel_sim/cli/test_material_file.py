@@ -12,7 +12,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.cli.material_file import read_blade, read_material
 from scalpel_sim.cli.material_template import BLADE_COMMENTS, MATERIAL_COMMENTS, template
 from scalpel_sim.cli.options import BladeOptions, MaterialOptions, TissueOptions
-from scalpel_sim.cli.run_setup import chosen_scene
+from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import PHANTOM
 from scalpel_sim.tables.material import BladeTable, MaterialTable
@@ -49,11 +49,11 @@ WRONG_FILES = {
     "a text for a series": ('[material]\nprony = "0.3:0.1"', '"0.3:0.1"; .* pairs of numbers'),
     "a series that leaves nothing": (
         '[material]\nlaw = "neo_hookean"\nprony = [[0.6, 0.1], [0.5, 1]]',
-        "mine.toml: prony has g whose sum is 1.1",
+        r"mine.toml: \[material\]: prony has g whose sum is 1.1",
     ),
     "a series of springs": (
         '[material]\nlaw = "springs"\npoisson_ratio = 0.3\nprony = [[0.6, 0.1]]',
-        "mine.toml: prony is given with law springs",
+        r"mine.toml: \[material\]: prony is given with law springs",
     ),
     "an unknown law": ('[material]\nlaw = "hooke"', '"hooke"; .*"springs" or "neo_hook'),
     "a number for a law": ("[material]\nlaw = 1", 'law is 1; .*"springs" or "neo_hookean"'),

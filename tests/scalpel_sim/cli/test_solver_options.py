@@ -10,7 +10,8 @@ from scalpel_sim.cli.options import (
     SolverOptions,
     TissueOptions,
 )
-from scalpel_sim.cli.run_setup import RunOptions, chosen_scene, prepared_run
+from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+from scalpel_sim.cli.scene_options import chosen_scene
 from scalpel_sim.scene_body import make_tissue
 from tissue import SolverSettings
 

@@ -4,7 +4,7 @@ import pytest
 from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
 from scalpel_sim.output.force_parts import EDGE_COSINE, force_parts
 from scalpel_sim.output.recording import COLUMNS
-from scalpel_sim.scenes import changed
+from scalpel_sim.scene_parts.scene import changed
 from tissue import BladeContacts
 
 FORWARD = np.array([0.0, 1.0, 0.0])

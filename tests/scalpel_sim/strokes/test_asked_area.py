@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from scalpel_sim.scene_parts.specimens import SPECIMENS
+from scalpel_sim import SCENES
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.strokes.incision import DEPTH, INSERTED_AT, SLOPE, WITHDRAWN_AT, plan_incision
 from scalpel_sim.strokes.planning import plan_stroke
-from tissue import Snapshot, TetrahedralMesh, block
+from tissue import MATERIALS, Snapshot, TetrahedralMesh, block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
 
@@ -29,11 +29,11 @@ def planned(name, body, **settings):
     return plan_stroke(name, TetrahedralMesh(body.positions, body.tetrahedra), **settings)
 
 
-@pytest.mark.parametrize("name", SPECIMENS)
+@pytest.mark.parametrize("name", MATERIALS)
 def test_the_area_of_a_straight_stroke_is_that_of_the_section(name):
-    specimen = SPECIMENS[name]
-    body = lying(specimen.mesh())
-    section = sum(specimen.across) * sum(specimen.layers)
+    body = lying(SCENES[name].mesh())
+    _, width, height = body.rest_positions.max(axis=0)
+    section = width * height
     assert asked_area(planned("straight", body), body) == pytest.approx(section, rel=NEAR)
 
 

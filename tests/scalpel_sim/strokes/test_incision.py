@@ -8,7 +8,7 @@ import pytest
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_body import make_tissue
-from scalpel_sim.scenes import changed
+from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.strokes.incision import (
     DEPTH,

@@ -6,8 +6,9 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from scalpel_sim.strokes.planning import STROKES, check_meets, plan_stroke
+from scalpel_sim.strokes.planning import check_meets, plan_stroke
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.tables.stroke import PLANNED_STROKES
 from tissue import BladeSegment, Material, TetrahedralMesh, block, liver_lobe, read_mesh
 
 THROUGH = ("straight", "slanted", "curved")
@@ -106,7 +107,7 @@ def near_body(mesh, point, clearance=0.003):
     return inside.any() or np.linalg.norm(mesh.positions - point, axis=1).min() < clearance
 
 
-@pytest.mark.parametrize("name", STROKES)
+@pytest.mark.parametrize("name", PLANNED_STROKES)
 @pytest.mark.parametrize("speed", [0.02, 0.06, 0.3])
 def test_the_blade_starts_and_ends_at_rest_and_keeps_to_its_speed(name, speed):
     stroke = plan_stroke(name, BODIES["slab"](), speed=speed)
@@ -215,7 +216,7 @@ def test_an_invalid_speed_is_refused(speed):
 
 
 @pytest.mark.parametrize("body", ["slab", "organ", "sheet on edge"])
-@pytest.mark.parametrize("name", STROKES)
+@pytest.mark.parametrize("name", PLANNED_STROKES)
 def test_planned_strokes_meet_the_body(body, name):
     mesh = BODIES[body]()
     check_meets(plan_stroke(name, mesh), mesh)

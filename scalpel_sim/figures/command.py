@@ -1,0 +1,56 @@
+"""The command `figure`: draws the paper's figures and that of the organ."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from scalpel_sim.cli.console import log_to_stderr, say
+from scalpel_sim.cli.options import OUTPUT, FigureNumber, PrintOptions
+
+
+def figure(
+    number: FigureNumber,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(group=OUTPUT)] = None,
+    scheme: str = "stellar",
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Do the cuts of the paper's Figure 10, 11 or 12 and draw them as a PNG; no screen is needed.
+
+    Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
+    the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
+    frames of a cut through the organ, which is the picture of the README.
+
+    For example:
+
+    ```console
+    scalpel-sim figure 12 --scheme paper --output paper12.png
+    ```
+
+    Args:
+        number: 10, 11, 12 or organ.
+        output: The file [default: figure10.png (11, 12, organ) in this folder].
+        scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
+    """
+    from scalpel_sim.output.run_folder import check_file
+    from scalpel_sim.scene_parts.choices import check_scheme
+
+    path = output or Path(f"figure{number}.png")
+    with log_to_stderr(printing):
+        check_scheme(scheme)
+        check_file(path, ".png", "--output")
+        from scalpel_sim.cli.run_setup import load_kernels
+        from scalpel_sim.figures.figures import draw_figure
+        from scalpel_sim.figures.organ import draw_organ
+
+        load_kernels(printing)
+        if not printing.quiet:
+            say(f"cutting and drawing figure {number}: about half a minute")
+        drawn = draw_organ(path, scheme) if number == "organ" else draw_figure(number, path, scheme)
+        if printing.json:
+            print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
+        elif not printing.quiet:
+            print(f"{path}: {drawn.caption}")

@@ -1,0 +1,54 @@
+"""The command `new`: writes a scene file to start from."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from scalpel_sim.cli.console import log_to_stderr
+from scalpel_sim.cli.options import OUTPUT, Flag, PrintOptions
+from scalpel_sim.errors import RunError, UsageError
+
+
+def new(
+    file: Path,
+    /,
+    *,
+    scene: Annotated[str, Parameter(name="--from")] = "organ",
+    force: Annotated[Flag, Parameter(group=OUTPUT)] = False,
+    printing: PrintOptions = PrintOptions(),
+) -> None:
+    """Write a scene to a file, to be changed and run.
+
+    For example:
+
+    ```console
+    scalpel-sim new mine.toml --from incision
+    scalpel-sim run mine.toml --set stroke.0.depth=0.01
+    ```
+
+    Args:
+        file: The file; .toml is added to its name where it is missing.
+        scene: The scene that is written: one that comes with the project.
+        force: Replace the file if it exists.
+    """
+    from scalpel_sim.scene_file.reading import shipped_path, shipped_scene
+    from scalpel_sim.tables.toml import SUFFIX
+
+    with log_to_stderr(printing):
+        shipped_scene(scene)  # refuses an unknown one
+        path = file if file.suffix.lower() == SUFFIX else file.with_name(file.name + SUFFIX)
+        text = shipped_path(scene).read_text(encoding="utf-8")
+        try:
+            with path.open("w" if force else "x", encoding="utf-8") as stream:
+                stream.write(text)
+        except FileExistsError as error:
+            raise UsageError(
+                f"{path} exists already; choose another file, or add --force to replace it"
+            ) from error
+        except OSError as error:
+            raise RunError(
+                f"{path}: cannot be written ({error.strerror or error}); choose another file"
+            ) from error
+        if not printing.quiet:
+            print(f"{path}: written; run it with `scalpel-sim run {path}`")

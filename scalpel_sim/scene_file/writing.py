@@ -1,0 +1,131 @@
+"""From a scene to a file that gives the same run."""
+
+import math
+import os
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.tables.body import BodySource, BodyTable
+from scalpel_sim.tables.material import given_in
+from tissue import BladeShape
+
+_HEAD = """\
+# The scene of a run, with every number as it was. `scalpel-sim run` and this file do it again.
+"""
+
+
+def scene_text(scene: Scene, path: Path) -> str | None:
+    """Return the text of a scene file; None where the scene's body is in no table.
+
+    Args:
+        scene: The scene.
+        path: Where the file will be: files that the scene names are relative to it.
+    """
+    if not isinstance(scene.mesh, BodySource):
+        return None
+    return f"{_HEAD}\n{tomlkit.dumps(content_of(scene, path.parent))}"
+
+
+def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
+    """Return the tables of a scene, with every number that decides what it does.
+
+    Args:
+        scene: A scene whose mesh is a `BodySource`.
+        folder: What its relative paths shall be relative to.
+    """
+    assert isinstance(scene.mesh, BodySource)
+    strokes = [given_in(stroke) for stroke in scene.strokes]
+    for stroke in strokes:
+        if "file" in stroke:
+            stroke["file"] = _relative(Path(stroke["file"]), folder)
+    run = {} if scene.seconds is None else {"seconds": scene.seconds}
+    return {
+        "name": scene.name,
+        "about": scene.about,
+        **run,
+        "body": _body(scene, folder),
+        "material": {
+            field.name: _as_list(getattr(scene.material, field.name))
+            for field in fields(scene.material)
+        },
+        "blade": _blade(scene.blade),
+        "world": _given({"gravity": scene.gravity, "floor": scene.floor}),
+        "solver": _given(
+            {
+                "scheme": scene.scheme,
+                "relaxation": scene.relaxation,
+                "mass_scaling": scene.mass_scaling,
+                "precision": scene.precision,
+                "contact": scene.contact,
+                "threads": scene.threads,
+                "snap": scene.cut.snap,
+                "snap_floor": scene.cut.floor,
+                "guard": scene.cut.guard,
+                "crumb": scene.cut.crumb,
+                "audit": scene.audit,
+            }
+        ),
+        "arm": _given(
+            {
+                "preset": scene.arm,
+                "tissue_every": scene.tissue_every,
+                "coupling": scene.coupling,
+                "coupling_stiffness": scene.coupling_stiffness,
+                "coupling_damping": scene.coupling_damping,
+                "passivity": scene.passivity,
+            }
+        ),
+        "stroke": strokes,
+    }
+
+
+def _body(scene: Scene, folder: Path) -> dict[str, Any]:
+    """Return the table `[body]`."""
+    assert isinstance(scene.mesh, BodySource)
+    table = scene.mesh.table
+    given = _given({key: getattr(table, key) for key in BodyTable.__struct_fields__})
+    if table.file is not None:
+        given["file"] = _relative(scene.mesh.folder / table.file, folder)
+    return given | {"fixed": scene.fixed, "stretch": scene.stretch}
+
+
+def _blade(blade: BladeShape | None) -> dict[str, float]:
+    """Return the table `[blade]`."""
+    if blade is None:
+        return {"thickness": 0.0}
+    return {
+        "thickness": blade.thickness,
+        "bevel_degrees": _in_degrees(blade.bevel_angle),
+        "height": blade.height,
+        "edge_radius": blade.edge_radius,
+    }
+
+
+def _in_degrees(angle: float) -> float:
+    """Return an angle in degrees that gives the same bits in radians again, if one does."""
+    degrees = math.degrees(angle)
+    near = [round(degrees, 9), degrees]
+    near += [math.nextafter(degrees, to) for to in (-math.inf, math.inf)]
+    return next((each for each in near if math.radians(each) == angle), degrees)
+
+
+def _relative(path: Path, folder: Path) -> str:
+    """Return a path seen from a folder, with slashes; as it is where they share no root."""
+    try:
+        return Path(os.path.relpath(path, folder)).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()
+
+
+def _given(table: dict[str, Any]) -> dict[str, Any]:
+    """Return a table without what is not given."""
+    return {key: _as_list(value) for key, value in table.items() if value is not None}
+
+
+def _as_list(value: Any) -> Any:
+    """Return nested tuples as lists."""
+    return [_as_list(each) for each in value] if isinstance(value, tuple) else value

@@ -1,0 +1,156 @@
+"""Strokes that are given point by point: along lines, along a spline, in and out, or recorded."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from scalpel_sim.strokes.stroke import Stroke, StrokeError, from_csv
+from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
+from scalpel_sim.tables.stroke import StrokeTable
+from tissue import BladeSegment, FloatArray
+
+_UP = (0.0, 0.0, 1.0)
+
+_TURN_RATE = 2.0 * math.pi
+"""How fast the blade turns about its tip where a path has a corner [rad/s]: half a second for a
+right angle and a ramp would be slow, a tenth would throw the tissue about."""
+
+_PER_LEG = 200
+"""Points of a spline between two of those that it is given by."""
+
+_PER_SAW = 40
+"""Poses in a period of a saw: a line between two of them is within 0.4 % of the amplitude."""
+
+_SAME_POINT = 1e-9
+"""Distance [m] below which two points of a path in turn are one, and give no direction."""
+
+
+def drawn_stroke(table: StrokeTable, speed: float) -> Stroke:
+    """Return the stroke of a table whose kind is one of `DRAWN_STROKES`.
+
+    Args:
+        table: The table, which `check_stroke` has passed.
+        speed: Speed of the tip between its ramps [m/s].
+
+    Raises:
+        StrokeError: no blade can follow it; the message says why.
+    """
+    if table.kind == "recorded":
+        assert table.file is not None
+        return from_csv(table.file)
+    assert table.points is not None and table.length is not None
+    points = np.array(table.points)
+    edge = np.array(table.edge or _UP)
+    if not edge.any():
+        raise StrokeError("the edge of the stroke is [0, 0, 0]; it is the direction tip to heel")
+    edge = edge / np.linalg.norm(edge)
+    if table.kind == "stab":
+        assert table.depth is not None
+        points = np.array([points[0], points[0] - table.depth * edge, points[0]])
+    elif table.kind == "spline":
+        points = _spline(points)
+    forwards = _forwards(points, edge, table.forward)
+    rests = table.kind != "spline"
+    times, tips, directions = _led(points, forwards, speed, rests=rests)
+    times, tips, directions = _along_edge(table, edge, times, tips, directions)
+    poses = [
+        BladeSegment(tip, tip + table.length * edge, forward)
+        for tip, forward in zip(tips, directions, strict=True)
+    ]
+    asked = None if table.kind == "stab" else [(0.0, float(times[-1]))]
+    return Stroke(times, poses, table.kind, asked=asked)
+
+
+def _spline(points: FloatArray) -> FloatArray:
+    """Return points close together on a cubic spline through some, by chord length [m]."""
+    from scipy.interpolate import CubicSpline  # 0.2 s, and only here
+
+    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if (chords <= _SAME_POINT).any():
+        raise StrokeError("two points of the spline in turn are the same; leave one out")
+    at = np.append(0.0, np.cumsum(chords))
+    fine = np.unique(np.concatenate([np.linspace(a, b, _PER_LEG + 1) for a, b in pairwise(at)]))
+    return np.asarray(CubicSpline(at, points)(fine))
+
+
+def _forwards(
+    points: FloatArray, edge: FloatArray, given: tuple[float, float, float] | None
+) -> FloatArray:
+    """Return the direction in which the edge cuts on each leg of a path, shape (n - 1, 3)."""
+    if given is not None:
+        return np.tile(np.array(given), (len(points) - 1, 1))
+    moves = np.diff(points, axis=0)
+    across = moves - np.outer(moves @ edge, edge)
+    lengths = np.linalg.norm(across, axis=1)
+    still = lengths <= _SAME_POINT
+    if still.any():
+        leg = int(np.argmax(still))
+        raise StrokeError(
+            f"from point {leg + 1} to point {leg + 2} the blade does not move across its edge; "
+            "give the direction in which it cuts as forward, or another edge"
+        )
+    return np.asarray(across / lengths[:, None])
+
+
+def _led(
+    points: FloatArray, forwards: FloatArray, speed: float, *, rests: bool
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return times [s], positions of the tip [m] and directions of the cut along a path.
+
+    Args:
+        points: Corners of the path [m], shape (n, 3).
+        forwards: Direction of the cut on each leg, shape (n - 1, 3).
+        speed: Speed between the ramps [m/s].
+        rests: Whether the blade rests at each corner, and turns there; else it passes.
+    """
+    if not rests:
+        along = np.append(0.0, np.linalg.norm(np.diff(points, axis=0), axis=1).cumsum())
+        times, done = timed(float(along[-1]), speed)
+        at_points = np.vstack([forwards[:1], 0.5 * (forwards[:-1] + forwards[1:]), forwards[-1:]])
+        return times, _interpolated(done, along, points), _interpolated(done, along, at_points)
+    legs = [(np.zeros(1), points[:1], forwards[:1])]
+    for (start, end), forward in zip(pairwise(points), forwards, strict=True):
+        now, tip, before = (part[-1:] for part in legs[-1])
+        turn = _angle(before[0], forward)
+        if turn > 0.0:
+            now = now + max(turn / _TURN_RATE, SAMPLE)
+            legs.append((now, tip, forward[None]))
+        when, done = timed(float(np.linalg.norm(end - start)), speed)
+        tips = start + done[1:, None] / done[-1] * (end - start)
+        legs.append((now + when[1:], tips, np.tile(forward, (len(tips), 1))))
+    times, tips, directions = (np.concatenate(parts) for parts in zip(*legs, strict=True))
+    return times, tips, directions
+
+
+def _along_edge(
+    table: StrokeTable, edge: FloatArray, times: FloatArray, tips: FloatArray, forwards: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Add the motion along the edge of a slice or a saw."""
+    if table.slicing_ratio is not None:
+        steps = np.diff(tips, axis=0)
+        along = np.append(
+            0.0, np.linalg.norm(steps - np.outer(steps @ edge, edge), axis=1).cumsum()
+        )
+        # In the middle of its way the tip is where the points say.
+        tips = tips + np.outer(table.slicing_ratio * (along - 0.5 * along[-1]), edge)
+    if table.saw_amplitude is not None and table.saw_frequency is not None:
+        n = math.ceil((times[-1] - times[0]) * max(1.0 / SAMPLE, _PER_SAW * table.saw_frequency))
+        fine = np.union1d(times, np.linspace(times[0], times[-1], n + 1))
+        fine = fine[np.append(True, np.diff(fine) > 1e-9)]
+        tips, forwards = _interpolated(fine, times, tips), _interpolated(fine, times, forwards)
+        to_ends = np.minimum(fine - fine[0], fine[-1] - fine)
+        grown = np.minimum(to_ends / SPEED_UP_TIME, 1.0)
+        saw = table.saw_amplitude * grown * np.sin(2.0 * np.pi * table.saw_frequency * fine)
+        tips, times = tips + np.outer(saw, edge), fine
+    return times, tips, forwards
+
+
+def _interpolated(at: FloatArray, known: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return rows at places between those where they are known, shape (n, 3)."""
+    return np.stack([np.interp(at, known, rows[:, k]) for k in range(3)], axis=1)
+
+
+def _angle(a: FloatArray, b: FloatArray) -> float:
+    """Return the angle between two vectors [rad]."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))

@@ -1,0 +1,121 @@
+"""Several strokes in turn, with pauses, and the way of the blade through the air between them."""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.timing import timed
+from tissue import BladeSegment, FloatArray, TetrahedralMesh
+
+_SPEED = 0.1
+"""Speed of the middle of the blade through the air [m/s]."""
+
+_CLEARANCE = 5e-3
+"""How far from the body the blade stays on its way [m]: tissue that was cut may stand out."""
+
+_POSES_A_METRE = 1000.0
+"""Poses on the way, for each metre: between them the blade turns evenly."""
+
+Poses = list[tuple[float, BladeSegment]]
+"""Instants [s] and poses."""
+
+
+def in_turn(strokes: Sequence[Stroke], pauses: Sequence[float], mesh: TetrahedralMesh) -> Stroke:
+    """Return one stroke that does several, and rests after each.
+
+    From stroke to stroke the blade is drawn out along its edge if it is in the body, raised above
+    it, led over, and let down. It is as long as the longest of the strokes needs; its tip is where
+    each says.
+
+    Args:
+        strokes: At least one.
+        pauses: How long the blade rests after each [s].
+        mesh: The body as it lies before the first, tissue frame [m].
+
+    Raises:
+        StrokeError: a blade would be too fast.
+    """
+    if len(strokes) == 1 and pauses[0] == 0.0:
+        return strokes[0]
+    length = max(stroke.blade_length for stroke in strokes)
+    box = mesh.positions.min(axis=0) - _CLEARANCE, mesh.positions.max(axis=0) + _CLEARANCE
+    poses: Poses = []
+    asked = []
+    for stroke, pause in zip(strokes, pauses, strict=True):
+        own = [(t, _lengthened(stroke.pose(t), length)) for t in stroke.times.tolist()]
+        start = 0.0
+        if poses:
+            start, last = poses[-1]
+            way = _way(last, own[0][1], box)
+            poses += [(start + t, pose) for t, pose in way[1:]]
+            start = poses[-1][0]
+            own = own[1:]
+        poses += [(start + t, pose) for t, pose in own]
+        asked += [(start + a, start + b) for a, b in stroke.asked or ()]
+        if pause > 0.0:
+            poses.append((poses[-1][0] + pause, poses[-1][1]))
+    times, segments = zip(*poses, strict=True)
+    name = ", ".join(stroke.name for stroke in strokes)
+    return Stroke(np.array(times), segments, name, asked=asked or None)
+
+
+def _lengthened(pose: BladeSegment, length: float) -> BladeSegment:
+    """Return the pose of a blade of another length, whose tip is at the same place."""
+    edge = pose.heel - pose.tip
+    return pose._replace(heel=pose.tip + length / np.linalg.norm(edge) * edge)
+
+
+def _way(start: BladeSegment, end: BladeSegment, box: tuple[FloatArray, FloatArray]) -> Poses:
+    """Return instants from 0 and poses on the way through the air, at rest at each corner."""
+    out, above = _withdrawn(start, box)
+    back, over = _withdrawn(end, box)
+    corners = [start, out, above, over, back, end]
+    poses: Poses = [(0.0, start)]
+    for a, b in itertools.pairwise(corners):
+        distance = max(float(np.linalg.norm(b.tip - a.tip)), float(np.linalg.norm(b.heel - a.heel)))
+        if distance == 0.0:
+            continue
+        times, done = timed(distance, _SPEED)
+        leg = Stroke([0.0, distance / _SPEED], [a, b])
+        begun = poses[-1][0]
+        poses += [
+            (begun + float(t), leg.pose(s / _SPEED))
+            for t, s in zip(times[1:], done[1:], strict=True)
+        ]
+    return poses
+
+
+def _withdrawn(
+    pose: BladeSegment, box: tuple[FloatArray, FloatArray]
+) -> tuple[BladeSegment, BladeSegment]:
+    """Return a pose drawn out of a box along its edge, where it is in it, and one raised above."""
+    low, high = box
+    edge = pose.heel - pose.tip
+    edge = edge / np.linalg.norm(edge)
+    out = pose
+    if _meets(pose, low, high):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ways = np.where(edge > 0.0, (high - pose.tip) / edge, (low - pose.tip) / edge)
+        out = _moved(pose, max(float(np.nanmin(np.where(edge == 0.0, np.inf, ways))), 0.0) * edge)
+    lowest = min(out.tip[2], out.heel[2])
+    return out, _moved(out, np.array([0.0, 0.0, max(float(high[2] - lowest), 0.0)]))
+
+
+def _moved(pose: BladeSegment, by: FloatArray) -> BladeSegment:
+    """Return a pose that is moved [m]."""
+    return pose._replace(tip=pose.tip + by, heel=pose.heel + by)
+
+
+def _meets(pose: BladeSegment, low: FloatArray, high: FloatArray) -> bool:
+    """Whether an edge meets a box: the slabs of Kay and Kajiya."""
+    direction = pose.heel - pose.tip
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ends = np.stack([(low - pose.tip) / direction, (high - pose.tip) / direction])
+    is_along = direction == 0.0
+    if ((pose.tip < low) | (pose.tip > high))[is_along].any():
+        return False
+    near = ends.min(axis=0)[~is_along].max()
+    far = ends.max(axis=0)[~is_along].min()
+    return bool(max(near, 0.0) <= min(far, 1.0))

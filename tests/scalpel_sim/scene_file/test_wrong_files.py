@@ -1,0 +1,117 @@
+"""Forty wrong scene files: each gets an error that says where, what is wrong, and what to do."""
+
+import pytest
+
+from scalpel_sim.cli.app import command_line
+
+FILE = """\
+about = "a block"
+[body]
+shape = "block"
+size = [0.04, 0.04, 0.04]
+cells = [2, 2, 2]
+fixed = "left,right"
+[material]
+law = "neo_hookean"
+young_modulus = 1e4
+[blade]
+thickness = 4e-4
+[world]
+gravity = 9.81
+[solver]
+relaxation = "global"
+[arm]
+preset = "touch"
+[[stroke]]
+kind = "points"
+points = [[0.02, -0.01, 0.01], [0.02, 0.05, 0.01]]
+length = 0.05
+"""
+
+WRONG = {
+    "no toml": ("[body]", "[body", "is not valid TOML"),
+    "no body": (FILE[FILE.index("[body]") : FILE.index("[material]")], "", "has no [body]"),
+    "no shape": ('shape = "block"\n', "", "[body] has no shape"),
+    "an unknown table": ("[world]", "[wrld]", "Did you mean 'world'"),
+    "an unknown key": ("gravity", "gravty", "key of [world] is called 'gravty'. Did you mean"),
+    "an unknown key of a stroke": ("length =", "lenght =", "number 1 is called 'lenght'. Did you"),
+    "a key in the wrong table": ("gravity = 9.81", "toughness = 5", "which belongs to [material]"),
+    "a key in no table": ("about", "toughness = 5\nabout", "stands in no table; write [material]"),
+    "an unknown shape": ('"block"\nsize', '"blok"\nsize', 'must be "organ" or "block" or'),
+    "a block without cells": ("cells = [2, 2, 2]\n", "", "has no cells"),
+    "a block with a radius": ("cells =", "radius = 0.1\ncells =", 'belongs to shape "cylinder"'),
+    "two cells": ("[2, 2, 2]", "[2, 2]", "three whole numbers of at least 1"),
+    "half a cell": ("[2, 2, 2]", "[2, 2, 0.5]", "three whole numbers of at least 1"),
+    "a flat body": ("0.04, 0.04, 0.04", "0.04, 0.04, 0.0", "three numbers above 0"),
+    "an infinite body": ("0.04, 0.04, 0.04", "0.04, 0.04, inf", "three numbers above 0"),
+    "a mesh without a file": (
+        'shape = "block"\nsize = [0.04, 0.04, 0.04]\ncells = [2, 2, 2]',
+        'shape = "mesh"',
+        "has no file",
+    ),
+    "a mesh that is not there": (
+        'shape = "block"\nsize = [0.04, 0.04, 0.04]\ncells = [2, 2, 2]',
+        'shape = "mesh"\nfile = "no.msh"',
+        "no.msh",
+    ),
+    "an unknown side": ('"left,right"', '"left,rigth"', "rigth"),
+    "a box without nodes": ('"left,right"', '"1,1,1:2,2,2"', "no node"),
+    "a stretch of nothing": ('"left,right"', '"bottom"\nstretch = 0.1', "opposite sides"),
+    "a law of nobody": ('"neo_hookean"', '"hooke"', 'must be "springs" or "neo_hookean"'),
+    "a negative modulus": ("1e4", "-1e4", "young_modulus is -10000.0; it must be a number above"),
+    "a modulus as text": ("1e4", '"10 kPa"', 'young_modulus is "10 kPa"; it must be a number'),
+    "no stiffness": ("young_modulus = 1e4\n", "", "needs a preset, or a law and a young_modulus"),
+    "an unknown preset": ('law = "neo_hookean"', 'preset = "livr"', "Did you mean 'liver'"),
+    "a ratio of a half": ("1e4", "1e4\npoisson_ratio = 0.5", "from 0 to below 0.5"),
+    "relaxation of springs": (
+        '"neo_hookean"',
+        '"springs"\nprony = [[0.3, 0.1]]',
+        "[material]: prony is given with law springs",
+    ),
+    "a line with a height": ("4e-4", "0.0\nheight = 0.01", "[blade]: it has thickness 0"),
+    "a thick blade": ("4e-4", "4e-4\nbevel_degrees = 80", "80 degrees"),
+    "an unknown relaxation": ('"global"', '"globl"', "Did you mean 'global'"),
+    "a snap of two": ('"global"', '"global"\nsnap = 2.0', "a number from 0 to 1"),
+    "a guard of one": ('"global"', '"global"\nguard = 1.0', "[solver]: guard is 1.0"),
+    "an unknown arm": ('"touch"', '"tuch"', "Did you mean 'touch'"),
+    "a rigid coupling with a spring": (
+        '"touch"',
+        '"touch"\ncoupling_stiffness = 5.0',
+        "coupling virtual",
+    ),
+    "an unknown stroke": ('"points"', '"point"', "Did you mean 'points'"),
+    "a key of another stroke": ("length =", "depth = 0.01\nlength =", 'belongs to kind "incision"'),
+    "a stroke without a length": ("length = 0.05\n", "", 'of kind "points" has no length'),
+    "one point": (", [0.02, 0.05, 0.01]]", "]", "has one point"),
+    "a saw that does not move": (
+        "length =",
+        "saw_frequency = 5.0\nlength =",
+        "has one of saw_amplitude and saw_frequency",
+    ),
+    "a stroke at the speed of sound": ("length =", "speed = 340.0\nlength =", "at most 1"),
+    "a stroke along its edge": ("[0.02, 0.05, 0.01]", "[0.02, -0.01, 0.03]", "give the direction"),
+    "a stroke beside the body": ("0.02, -0.01, 0.01], [0.02", "0.2, -0.01, 0.01], [0.2", "mm away"),
+    "an hour and more": ("about", "seconds = 4000.0\nabout", "at most 3600"),
+}
+
+
+def test_the_file_that_they_are_made_from_is_right(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE, encoding="utf-8")
+    words = ["run", str(path), "--seconds", "0.01", "-q", "--out", str(tmp_path / "out")]
+    assert command_line(words) == 0
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_wrong_file_gets_one_line_that_names_it_and_a_remedy(name, tmp_path, capsys):
+    old, new, expected = WRONG[name]
+    assert FILE.count(old) == 1
+    path = tmp_path / "scene.toml"
+    path.write_text(FILE.replace(old, new), encoding="utf-8")
+    assert command_line(["run", str(path), "--out", str(tmp_path / "out")]) == 2
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
+    assert len(lines) == 1 and expected in lines[0]
+
+
+def test_there_are_forty():
+    assert len(WRONG) >= 40
