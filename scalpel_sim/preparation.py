@@ -1,20 +1,27 @@
 """From a scene to a simulation: the tissue, a stroke through it, and an arm that reaches."""
 
 import logging
+import math
 from collections.abc import Iterable
+from pathlib import Path
 
+import mujoco
 import numpy as np
 
-from bridge import Fixture, InProcessLink, TissueFrame, TissueLink
-from scalpel_sim.arm.arm import ARMS
+from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
+from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.own_arm import move_to_start, own_arm
 from scalpel_sim.arm.placement import place
+from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_body import highest_toughness, make_tissue
+from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
+from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import TetrahedralMesh
 
@@ -46,9 +53,16 @@ def prepare(
     stroke = stroke_through(mesh, scene.strokes, link.describe().material)
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
-    placement = place(stroke, link.describe().bounds, scene.arm, force=needed.force)
-    _warn_of_weakness(needed, placement.preset)
-    frame = TissueFrame(origin=placement.tissue_origin)
+    bounds = link.describe().bounds
+    if scene.own_arm is None:
+        placement = place(stroke, bounds, scene.arm, force=needed.force)
+        arm: LedArm = placement.arm()
+        frame = TissueFrame(origin=placement.tissue_origin)
+    else:
+        arm, frame = _own(scene.own_arm)
+        stroke = lengthened(stroke, arm.blade.length)
+        move_to_start(arm, stroke, frame)
+    _warn_of_weakness(needed, arm)
     tissue = link.describe()
     floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
     world = TissueFrame(
@@ -56,7 +70,7 @@ def prepare(
     )  # as the tissue sees it
     standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
     return Simulation(
-        placement.arm(),
+        arm,
         stroke,
         link,
         frame,
@@ -74,9 +88,20 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _warn_of_weakness(needed: ExpectedForce, preset: str) -> None:
+def _own(own: OwnArm) -> tuple[LedArm, TissueFrame]:
+    """Return an arm of the user's own, and where the tissue lies in its world."""
+    limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
+    arm = own_arm(Path(own.model), limits, heel=own.heel, tip=own.tip, forward=own.forward)
+    quaternion, axes = np.array(own.quat), np.empty(9)
+    if not quaternion.any():
+        raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
+    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
+    return arm, TissueFrame(axes.reshape(3, 3), np.array(own.pos))
+
+
+def _warn_of_weakness(needed: ExpectedForce, arm: LedArm) -> None:
     """Say before the start that an arm cannot do what it is asked to."""
-    most = ARMS[preset].force
+    most = arm.limits.force
     if needed.force > most:
         _log.warning(
             "the cut will take some %.2g N (%.3g J/m2 over %.2g mm of edge), and the arm '%s' "
@@ -85,6 +110,6 @@ def _warn_of_weakness(needed: ExpectedForce, preset: str) -> None:
             needed.force,
             needed.force / needed.width,
             1e3 * needed.width,
-            preset,
+            arm.preset,
             most,
         )

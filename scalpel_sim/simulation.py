@@ -8,8 +8,8 @@ from contextlib import contextmanager
 import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
-from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
+from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.output.recording import Recording
@@ -45,7 +45,7 @@ class Simulation:
 
     def __init__(
         self,
-        arm: Arm,
+        arm: LedArm,
         stroke: Stroke,
         link: TissueLink,
         frame: TissueFrame,

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from bridge import Collisions, Fixture, FixtureBox
-from scalpel_sim.arm.arm import Arm
 from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, tables
+from scalpel_sim.arm.led_arm import LedArm
 from tissue import FloatArray
 
 FLOOR_MARGIN = 0.02
@@ -39,7 +39,7 @@ class CollisionMonitor:
         ValueError: two fixtures have one name.
     """
 
-    def __init__(self, arm: Arm, fixtures: Iterable[Fixture] = ()) -> None:
+    def __init__(self, arm: LedArm, fixtures: Iterable[Fixture] = ()) -> None:
         self._arm = arm
         self._parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
         self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])

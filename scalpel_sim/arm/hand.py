@@ -1,6 +1,7 @@
 """A virtual hand: a six-dimensional spring and damper that leads a blade along a path."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from tissue import BladeSegment, FloatArray, kernel
 
 HAND = "hand"
 """Name of the body that shows where the hand wants the middle of the edge, and of its site."""
-_EDGE = "edge"
+EDGE = "edge"
 """Name of the site in the middle of the edge, where the hand holds the blade."""
 ACTUATORS = ("hand_x", "hand_y", "hand_z", "hand_turn")
 
@@ -59,10 +60,11 @@ def add_hand(
     impedance: Impedance = Impedance(),
     heel: str = "heel",
     tip: str = "tip",
+    forward: Sequence[float] = (0.0, 0.0, -1.0),
 ) -> None:
     """Add a hand that holds the blade between two sites of a model that is yet to be compiled.
 
-    The blade cuts towards -z of its body. Afterwards `Hand(model, data)` moves it.
+    Afterwards `Hand(model, data)` moves it.
 
     Args:
         spec: Has the two sites, on one body. It gains a mocap body, two sites and four actuators,
@@ -70,6 +72,7 @@ def add_hand(
         impedance: How firm the hand is.
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
+        forward: Direction in which the edge cuts, in the frame of its body.
 
     Raises:
         ValueError: the model has no such site.
@@ -80,8 +83,8 @@ def add_hand(
             raise ValueError(f"the model has no site '{name}'. It has: {there}")
     ends = np.array(spec.site(heel).pos), np.array(spec.site(tip).pos)
     along = tuple((ends[1] - ends[0]).tolist())
-    quaternion = quaternion_of(_axes(along, (0.0, 0.0, -1.0)))
-    spec.site(tip).parent.add_site(name=_EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=quaternion)
+    quaternion = quaternion_of(_axes(along, _numbers(np.array(forward, np.float64))))
+    spec.site(tip).parent.add_site(name=EDGE, pos=(ends[0] + ends[1]) / 2.0, quat=quaternion)
     hand = spec.worldbody.add_body(name=HAND, mocap=True)
     hand.add_site(name=HAND)
     hand.add_geom(
@@ -139,7 +142,7 @@ class Hand:
         self._quaternion = data.mocap_quat[mocap]
         self._control = data.ctrl[controls : controls + 6]
         self._output = data.actuator_force[outputs : outputs + 6]
-        self._edge = data.site_xpos[model.site(_EDGE).id]
+        self._edge = data.site_xpos[model.site(EDGE).id]
         turn = model.actuator(ACTUATORS[3]).id
         bias, dt = model.actuator_biasprm, model.opt.timestep
         of_motion, of_turning = (bias[i, 2] / bias[i, 1] / dt for i in (first, turn))
@@ -188,9 +191,7 @@ class Hand:
 
 def _actuator(spec: mujoco.MjSpec, name: str) -> "mujoco.MjsActuator":
     """Add an actuator that acts on the middle of the edge as seen from the hand."""
-    return spec.add_actuator(
-        name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=_EDGE, refsite=HAND
-    )
+    return spec.add_actuator(name=name, trntype=mujoco.mjtTrn.mjTRN_SITE, target=EDGE, refsite=HAND)
 
 
 def _numbers(vector: FloatArray) -> Vector:

@@ -9,6 +9,7 @@ import msgspec
 from scalpel_sim.arm.scalpel import SCALPEL, chosen_blade
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_file.reading import SceneFile
+from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import DEFAULT_CUT_SETTINGS, GEL, Scene
 from scalpel_sim.tables.body import KEYS_OF_SHAPE, BodySource
 from scalpel_sim.tables.kinds import check_keys
@@ -25,6 +26,13 @@ _OF_CUT = {"snap": "snap", "snap_floor": "floor", "guard": "guard", "crumb": "cr
 """Keys of `[solver]` that are fields of `tissue.CutSettings`, and their names there."""
 
 
+_OF_OWN_ARM = ("model", "heel", "tip", "forward", "force", "torque")
+"""Keys of `[arm]` that describe an arm of the user's own."""
+
+_OF_PLACE = ("pos", "quat")
+"""Keys of `[world]` that say where the tissue lies in its world."""
+
+
 def scene_in(file: SceneFile) -> Scene:
     """Return the scene that a file describes.
 
@@ -38,13 +46,13 @@ def scene_in(file: SceneFile) -> Scene:
     if stretch is None:
         stretch = USUAL_STRETCH if body.fixed == USUAL_FIXED else 0.0
     name = tables.name or file.name
-    solver = given_in(tables.solver)
+    solver, world = given_in(tables.solver), given_in(tables.world)
     material = tables.material
     given = {
         "seconds": tables.seconds,
-        **given_in(tables.world),
+        **{key: value for key, value in world.items() if key not in _OF_PLACE},
         **{key: value for key, value in solver.items() if key not in _OF_CUT},
-        **_of_arm(tables),
+        **_of_arm(tables, file.folder),
     }
     return Scene(
         name,
@@ -62,9 +70,20 @@ def scene_in(file: SceneFile) -> Scene:
     )
 
 
-def _of_arm(tables: SceneContent) -> dict[str, Any]:
-    """Return the fields of a scene that `[arm]` gives."""
-    given = given_in(tables.arm)
+def _of_arm(tables: SceneContent, folder: Path) -> dict[str, Any]:
+    """Return the fields of a scene that `[arm]` gives, and those of `[world]` that place it."""
+    given, world = given_in(tables.arm), given_in(tables.world)
+    own = {key: given.pop(key) for key in _OF_OWN_ARM if key in given}
+    own |= {key: world[key] for key in _OF_PLACE if key in world}
+    if "model" in own:
+        if "preset" in given:
+            raise UsageError("[arm] has a preset and a model; choose one")
+        own["model"] = str(folder / own["model"])
+        given["own_arm"] = OwnArm(**own)
+    elif own:
+        key = next(iter(own))
+        table = "world" if key in _OF_PLACE else "arm"
+        raise UsageError(f"[{table}] {key} is for an arm of your own; add [arm] model, or omit it")
     if "preset" in given:
         given["arm"] = given.pop("preset")
     return given

@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import fields
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
             for field in fields(scene.material)
         },
         "blade": _blade(scene.blade),
-        "world": _given({"gravity": scene.gravity, "floor": scene.floor}),
+        "world": _given({"gravity": scene.gravity, "floor": scene.floor} | _place(scene)),
         "solver": _given(
             {
                 "scheme": scene.scheme,
@@ -71,7 +71,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         ),
         "arm": _given(
             {
-                "preset": scene.arm,
+                **_arm(scene, folder),
                 "tissue_every": scene.tissue_every,
                 "coupling": scene.coupling,
                 "coupling_stiffness": scene.coupling_stiffness,
@@ -81,6 +81,21 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         ),
         "stroke": strokes,
     }
+
+
+def _arm(scene: Scene, folder: Path) -> dict[str, Any]:
+    """Return the keys of `[arm]` that say which arm it is."""
+    if scene.own_arm is None:
+        return {"preset": scene.arm}
+    found = _given(asdict(scene.own_arm))
+    found["model"] = _relative(Path(found["model"]), folder)
+    return {key: value for key, value in found.items() if key not in ("pos", "quat")}
+
+
+def _place(scene: Scene) -> dict[str, Any]:
+    """Return the keys of `[world]` that say where the tissue lies in the world of an own arm."""
+    own = scene.own_arm
+    return {} if own is None else {"pos": own.pos, "quat": own.quat}
 
 
 def _body(scene: Scene, folder: Path) -> dict[str, Any]:

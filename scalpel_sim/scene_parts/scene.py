@@ -19,6 +19,7 @@ from scalpel_sim.scene_parts.choices import (
     check_relaxation,
     check_scheme,
 )
+from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.tables.material import given_in
 from scalpel_sim.tables.stroke import DEFAULT_SPEED, StrokeTable, check_stroke, stroke_called
 from tissue import (
@@ -93,6 +94,8 @@ class Scene:
     """What is done with the blade, in turn."""
     arm: str = "auto"
     """`touch`, `premium`, or `auto`: the first of them that reaches."""
+    own_arm: OwnArm | None = None
+    """An arm of the user's own, in place of those."""
     tissue_every: int = 1
     """Number of frames after which the tissue is asked again."""
     coupling: str = "rigid"
@@ -192,6 +195,7 @@ class Scene:
             "material": asdict(self.material),
             "cut": asdict(self.cut),
             "blade": None if self.blade is None else asdict(self.blade),
+            "own_arm": None if self.own_arm is None else asdict(self.own_arm),
         }
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.strokes.stroke import Stroke, StrokeError
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh
 
@@ -17,6 +17,9 @@ _CLEARANCE = 5e-3
 
 _POSES_A_METRE = 1000.0
 """Poses on the way, for each metre: between them the blade turns evenly."""
+
+_ROUNDING = 1e-6
+"""Share by which a blade may be shorter than a stroke needs: rounding of a file's digits."""
 
 Poses = list[tuple[float, BladeSegment]]
 """Instants [s] and poses."""
@@ -59,6 +62,27 @@ def in_turn(strokes: Sequence[Stroke], pauses: Sequence[float], mesh: Tetrahedra
     times, segments = zip(*poses, strict=True)
     name = ", ".join(stroke.name for stroke in strokes)
     return Stroke(np.array(times), segments, name, asked=asked or None)
+
+
+def lengthened(stroke: Stroke, length: float) -> Stroke:
+    """Return the stroke of a longer blade, whose tip is at the same places.
+
+    Args:
+        stroke: The stroke.
+        length: Length of the blade [m].
+
+    Raises:
+        StrokeError: the blade is shorter than the stroke needs.
+    """
+    if length < stroke.blade_length * (1.0 - _ROUNDING):
+        raise StrokeError(
+            f"the blade is {1e3 * length:.3g} mm long, and the stroke '{stroke.name}' needs "
+            f"{1e3 * stroke.blade_length:.3g} mm; give the arm a longer blade, or choose a "
+            "shallower stroke"
+        )
+    times = stroke.times.tolist()
+    poses = [_lengthened(stroke.pose(t), length) for t in times]
+    return Stroke(times, poses, stroke.name, asked=stroke.asked)
 
 
 def _lengthened(pose: BladeSegment, length: float) -> BladeSegment:

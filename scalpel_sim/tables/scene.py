@@ -15,6 +15,7 @@ from scalpel_sim.tables.values import (
     Region,
     Share,
     Text,
+    ThreeNumbers,
     TomlTable,
     TrueOrFalse,
     Whole,
@@ -39,6 +40,11 @@ _Every = Annotated[
 ]
 
 
+_Quaternion = Annotated[
+    tuple[Finite, Finite, Finite, Finite], Meta(description="four numbers: [w, x, y, z]")
+]
+
+
 class SceneBodyTable(BodyTable, kw_only=True, frozen=True):
     """`[body]`: the geometry, and how it is held."""
 
@@ -54,6 +60,10 @@ class WorldTable(TomlTable, kw_only=True, frozen=True):
 
     gravity: NotNegative | None = None
     floor: Finite | None = None
+    pos: ThreeNumbers | None = None
+    """Where the origin of the tissue is in the world of an arm of the user's own [m]."""
+    quat: _Quaternion | None = None
+    """How the tissue is turned there: w, x, y, z."""
 
 
 class SolverTable(TomlTable, kw_only=True, frozen=True):
@@ -76,6 +86,13 @@ class ArmTable(TomlTable, kw_only=True, frozen=True):
     """`[arm]`: the arm, and how it is coupled to the tissue; None: the usual."""
 
     preset: Text | None = None
+    model: Text | None = None
+    """MJCF file of an arm of the user's own, which then stands where the file has it."""
+    heel: Text | None = None
+    tip: Text | None = None
+    forward: ThreeNumbers | None = None
+    force: Positive | None = None
+    torque: Positive | None = None
     tissue_every: _Every | None = None
     coupling: Text | None = None
     coupling_stiffness: Positive | None = None

@@ -1,0 +1,131 @@
+"""An arm of MuJoCo whose blade a virtual hand leads: what every arm of a run has."""
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from bridge import DeviceLimits
+from scalpel_sim.arm.blade import Blade
+from scalpel_sim.arm.hand import Hand, Impedance, add_hand
+from scalpel_sim.arm.mujoco_warnings import route_warnings
+from tissue import FloatArray
+
+
+class ArmError(RuntimeError):
+    """MuJoCo's state can no longer be trusted: the arm must stop."""
+
+
+class LedArm:
+    """An arm, its blade, and the virtual hand that leads it. World frame.
+
+    A frame is `step1`, then `blade.segment` and `blade.apply`, then `step2` and `check`.
+
+    Args:
+        spec: A model that is yet to be compiled, with a site at each end of the edge. It gains the
+            hand.
+        name: Name of the arm, for reports.
+        limits: Largest force and torque that it can render.
+        impedance: How firmly the hand holds the blade.
+        heel: Site at the handle's end of the edge.
+        tip: Site at the sharp end.
+        forward: Direction in which the edge cuts, in the frame of its body.
+
+    Raises:
+        ValueError: the model has no such sites, or cannot be compiled.
+    """
+
+    def __init__(
+        self,
+        spec: mujoco.MjSpec,
+        name: str,
+        limits: DeviceLimits,
+        impedance: Impedance = Impedance(),
+        *,
+        heel: str = "heel",
+        tip: str = "tip",
+        forward: Sequence[float] = (0.0, 0.0, -1.0),
+    ) -> None:
+        route_warnings()
+        add_hand(spec, impedance, heel, tip, forward)
+        self.preset = name
+        self.limits = limits
+        self.model = spec.compile()
+        """MuJoCo's model."""
+        self.data = mujoco.MjData(self.model)
+        """MuJoCo's data."""
+        self.blade = Blade(self.model, self.data, heel, tip, forward=forward)
+        self.hand = Hand(self.model, self.data)
+        self.joints = tuple(
+            self.model.joint(i).name or f"joint {i}" for i in range(self.model.njnt)
+        )
+        """Names of the joints."""
+        # Views of MuJoCo's arrays: they stay valid for the life of `data`.
+        self._qpos, self._qvel = self.data.qpos, self.data.qvel
+        self._n_warnings = self.data.warning.number
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self.data.time)
+
+    def reset(self, qpos: Sequence[float] | FloatArray) -> None:
+        """Start again at time 0, at rest in a joint configuration, where the hand then is too.
+
+        Args:
+            qpos: Angles of the joints [rad], or where they slide to [m], shape (nq,).
+
+        Raises:
+            ValueError: not as many finite numbers, or one beyond its joint's range.
+        """
+        angles, n = np.array(qpos, np.float64), self.model.nq
+        if angles.shape != (n,) or not np.isfinite(angles).all():
+            raise ValueError(f"qpos is {angles.tolist()}; it must be {n} finite angles [rad]")
+        low, high = self.ranges()
+        if ((angles < low) | (angles > high)).any():
+            i = int(np.argmax((angles < low) | (angles > high)))
+            raise ValueError(
+                f"joint '{self.joints[i]}' is set to {angles[i]:.3f} rad; its range is "
+                f"{low[i]:.3f} to {high[i]:.3f}"
+            )
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = angles
+        mujoco.mj_kinematics(self.model, self.data)
+        self.hand.hold(self.blade.segment())
+        mujoco.mj_forward(self.model, self.data)
+
+    def ranges(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and the highest position of each joint; infinite where unlimited."""
+        limited = self.model.jnt_limited.astype(bool)
+        low, high = self.model.jnt_range.T
+        return np.where(limited, low, -np.inf), np.where(limited, high, np.inf)
+
+    def step1(self) -> None:
+        """Do the first half of a step: afterwards the blade is where the joints say."""
+        mujoco.mj_step1(self.model, self.data)
+
+    def step2(self) -> None:
+        """Do the second half of a step, with the wrench that is applied to the blade."""
+        mujoco.mj_step2(self.model, self.data)
+
+    def check(self) -> None:
+        """Refuse to continue from a bad state. For every frame: it costs some 1 us.
+
+        MuJoCo's own answer, a silent reset to the start, is switched off in the model.
+
+        Raises:
+            ArmError: a joint's angle or speed is not finite, or MuJoCo has warned.
+        """
+        data = self.data
+        # A sum is finite only if all its parts are, and costs less than asking each.
+        if not math.isfinite(sum(self._qpos.tolist()) + sum(self._qvel.tolist())):
+            bad = ~(np.isfinite(data.qpos) & np.isfinite(data.qvel))
+            names = ", ".join(np.array(self.joints)[bad]) or "all, by overflow"
+            raise ArmError(
+                f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
+            )
+        if any(self._n_warnings.tolist()):
+            kind = mujoco.mjtWarning(int(np.argmax(self._n_warnings)))
+            text = mujoco.mju_warningText(kind, int(data.warning.lastinfo[kind]))
+            raise ArmError(f"at t = {data.time:.4f} s MuJoCo warned: {text}")
