@@ -23,6 +23,7 @@ from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .loads.attachment import Attachment as Attachment
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
 from .material import Law as Law
@@ -73,6 +74,7 @@ __all__ = [
     "Hierarchical",
     "IntArray",
     "Law",
+    "Attachment",
     "Load",
     "MATERIALS",
     "Material",

@@ -41,6 +41,7 @@ from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import Numerics, assembled
+from tissue.loads.attachment import AttachmentList
 from tissue.loads.driven_body import DrivenBody
 from tissue.loads.load import Loads
 from tissue.material import Material
@@ -131,6 +132,7 @@ class Tissue(DrivenBody):
         self._incision = Incision(scheme, self.node_size)
         self._system.find_loose_pieces()
         self._loads = Loads()
+        self._attachments = AttachmentList()
         self._audit = Audit(is_kept=solver.audit)
         self._global_stepper = GlobalStepper(method, solver.threads)
         self._at_first = self._system.measures(method.limit)
@@ -159,6 +161,7 @@ class Tissue(DrivenBody):
         dt = checked_time_step(dt)
         interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
+        self._attachments.begin_step(self._system.body)
         travel = edge.travel if has_blade else 0.0
         n, n_substeps = incision.n_increments(travel), 0
         collision = topology = relaxation = 0.0  # wall times
@@ -184,6 +187,9 @@ class Tissue(DrivenBody):
             incision.open_to_edge(self._hooks)
             topology += perf_counter() - now
         stage_times = StageTimes(collision, topology, relaxation)
+        if self._attachments.act:
+            self._attachments.end_step(self._system.body, dt)
+            self._take_attachments()
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
@@ -229,7 +235,10 @@ class Tissue(DrivenBody):
         self._take_edge(None)
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
-        expect_support(system, self.floor)
+        if self._attachments.act:
+            self._attachments.stop(system.body)
+        else:
+            expect_support(system, self.floor)
         found = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
         if found.is_at_rest:
@@ -286,9 +295,14 @@ class Tissue(DrivenBody):
             self._global_stepper.wake()
             loads.spread(system.body, system.stages.loads)
             before = loads.virtual_work(system.body)
+        if self._attachments.act:
+            self._global_stepper.wake()
+            system.attachments.work = 0.0
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
         if loads.act:
             self._audit.work_of_loads += loads.virtual_work(system.body) - before
+        if self._attachments.act:
+            self._audit.work_of_loads += system.attachments.work
         if n > 0:
             self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
@@ -364,6 +378,9 @@ class Tissue(DrivenBody):
             nodes = self._touched[:n]
             system.mesh_changed(change, nodes)
             self._integrator.mesh_changed(nodes)
+            if self._attachments.act:
+                self._attachments.locate(system.body)
+                self._take_attachments()
         self._make_room()
 
     def _after_cut(self) -> None:

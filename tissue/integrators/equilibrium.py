@@ -127,7 +127,8 @@ def _take_steps(stepper: GlobalStepper, system: System, edge: Edge, rate: float)
     at_rest = elasticity.frequency_squared
     limit = StepLimit(at_rest, 0.0, 0)
     strained = elasticity.strained_frequency_squared(system.body, system.visits, limit)
-    highest = max(at_rest, strained) + contact.added_frequency_squared
+    added = contact.added_frequency_squared + system.added_by_attachments
+    highest = max(at_rest, strained) + added
     step = stable_step(stepper.method.limit, elasticity.arrays, highest, system.surroundings)
     dt = STEPS_BETWEEN_LOOKS * step
     contact.begin()

@@ -158,7 +158,7 @@ class GlobalStepper:
         if choice is None or len(choice.no_frequency) != n_nodes:
             where = (system.node_size, system.surroundings, n_nodes)
             self._choice = choice = new_step_choice(self.method.limit, *where)
-        choice.of_contact = system.contact.added_frequency_squared
+        choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
         return choice
 
     def _arrays(self, system: System, blade: BladeContext, choice: StepChoice) -> Relaxation:

@@ -23,6 +23,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
 from tissue.elasticity.internal_forces import deform
+from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
 from tissue.integrators.node_loops import acceleration
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,
@@ -87,7 +88,7 @@ def apply_outer_forces(
     share: float,
     dt: float,
 ) -> None:
-    """Write the forces of the blade and of contact on the nodes; count impulses and work.
+    """Write the forces of blade, contact and attachments on nodes; count impulses and work.
 
     Args:
         context: Forces on the nodes are written to its stages.
@@ -99,15 +100,21 @@ def apply_outer_forces(
         dt: Length of the time step [s].
     """
     external = context.stages.external
+    attachments = context.attachments
     clear_contact_forces(context.contacts, external)
+    clear_attachment_forces(attachments, external)
     apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
     add_contact_forces(context.contacts, positions, velocities, share * dt, external)
+    add_attachment_forces(attachments, positions, velocities, when, share, dt, external)
 
 
 @kernel
 def accelerations(context: StepContext, out: FloatArray) -> None:
     """Write the acceleration of every node as it is and moves now to `out` [m/s2]."""
-    body = context.body
-    deform(context.elastic, body, body.positions)
+    body, external = context.body, context.stages.external
+    x, v = body.positions, body.velocities
+    deform(context.elastic, body, x)
+    add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
     for i in range(body.n_nodes):
-        store_point(out, i, acceleration(context, i, body.positions, body.velocities))
+        store_point(out, i, acceleration(context, i, x, v))
+    clear_attachment_forces(context.attachments, external)

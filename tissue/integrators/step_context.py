@@ -8,6 +8,7 @@ from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.structs import Arrays
 from tissue.core.thread_team import Team
 from tissue.elasticity.internal_forces import Elastic, Surroundings
+from tissue.integrators.attachments import Attachments
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stages import Stages
@@ -36,6 +37,8 @@ class StepContext(Arrays, two_precisions=True):
     """What contact takes from the energy, where that is counted."""
     supports: Supports
     """Whether fixed nodes move, and their work."""
+    attachments: Attachments
+    """Points that are tied to what moves from outside."""
     loose: LoosePieces
     """The pieces that are not held: drag does not act on their rigid motion."""
     stages: Stages

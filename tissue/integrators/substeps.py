@@ -8,6 +8,7 @@ from tissue.contact.state import ContactState
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
 from tissue.elasticity.energy import body_energy
+from tissue.integrators.attachments import clear_attachment_forces
 from tissue.integrators.damping import change_velocities
 from tissue.integrators.nystroem import three_stage_nystroem
 from tissue.integrators.rigid_motion import (
@@ -260,6 +261,7 @@ def _end_with_forces(context: StepContext, edge: Edge, seconds: float, when: flo
     """End a step in which contact acted as forces; see `end_substep`."""
     body, external = context.body, context.stages.external
     end_contact_substep(context.contacts, body.positions, body.velocities, external)
+    clear_attachment_forces(context.attachments, external)
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
 
 
@@ -280,6 +282,7 @@ def end_substep(
         Whether contact had room. If not, make room and call again.
     """
     body, stages = context.body, context.stages
+    clear_attachment_forces(context.attachments, stages.external)
     if contact.is_awake == 1:
         if contact.is_pending == 0 and context.contact_loss.is_counted == 1:
             _note_state(body, stages)

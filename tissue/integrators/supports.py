@@ -5,6 +5,7 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import deform, internal_force, viscous_force
+from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
 from tissue.integrators.step_context import StepContext
 
 
@@ -82,9 +83,12 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
     """Write the force that holds each fixed node now to `out` [N], and zero for other nodes."""
     body = context.body
     time = context.surroundings.retardation_time + context.damping.retardation_time
-    deform(context.elastic, body, body.positions)
+    x, v, external = body.positions, body.velocities, context.stages.external
+    deform(context.elastic, body, x)
+    add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
     for i in range(body.n_nodes):
         force = point_of(0.0, 0.0, 0.0)
         if body.fixed[i]:
-            force = support_force(context, i, body.positions, body.velocities, time)
+            force = support_force(context, i, x, v, time)
         store_point(out, i, force)
+    clear_attachment_forces(context.attachments, external)

@@ -17,6 +17,7 @@ from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
+from tissue.integrators.attachments import no_attachments
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import damping_rate, stable_step
@@ -86,6 +87,10 @@ class System:
         """What contact takes from the energy, where that is counted."""
         self.supports = supports_at_rest()
         """Whether fixed nodes move, and their work."""
+        self.attachments = no_attachments()
+        """Points that are tied to what moves from outside."""
+        self.added_by_attachments = 0.0
+        """What they add to w^2 of the body at most [1/s2]."""
         self.loose = no_loose_pieces()
         """The pieces that are not held, as they were found last."""
         self._increments_to_pieces = 0
@@ -102,6 +107,7 @@ class System:
             or context.blade is not self.interaction.state
             or context.contacts is not self.contact.forces
             or context.stages is not self.stages
+            or context.attachments is not self.attachments
             or context.loose is not self.loose
         ):
             self._context = context = StepContext(
@@ -113,6 +119,7 @@ class System:
                 damping=self.damping,
                 contact_loss=self.contact_loss,
                 supports=self.supports,
+                attachments=self.attachments,
                 loose=self.loose,
                 stages=self.stages,
                 visits=self.visits,

@@ -1,5 +1,8 @@
 """`DrivenBody`: the methods of `Tissue` that push it and move its supports."""
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -8,6 +11,7 @@ from tissue.core.simd import room_for_points
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.supports import write_support_forces
 from tissue.integrators.system import System
+from tissue.loads.attachment import Attachment, AttachmentList
 from tissue.loads.load import Load, Loads
 from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.mesh.body import Body
@@ -22,6 +26,7 @@ class DrivenBody(BodyQueries):
 
     _system: System
     _loads: Loads
+    _attachments: AttachmentList
     solver: SolverSettings
 
     @property
@@ -65,13 +70,62 @@ class DrivenBody(BodyQueries):
         self._loads.add(load)
         return load
 
-    def release(self, load: Load) -> None:
-        """End a load of `push`.
+    def attach(
+        self,
+        where: str | npt.ArrayLike | MaterialPoints,
+        *,
+        stiffness: float,
+        damping: float = 0.0,
+        rest_length: float = 0.0,
+        breaks_at: float = math.inf,
+        origin: Sequence[float] | None = None,
+    ) -> Attachment:
+        """Tie points of the tissue by springs to a frame that is moved from outside; return it.
+
+        The frame stays where it is until `Attachment.move`: an attachment to the world. Its points
+        are points of the material, so that each side of a cut through them keeps its own. Its work
+        on the tissue is in the account of energy as that of a load.
+
+        Args:
+            where: Material points, or what `material_points` takes, except that a region holds its
+                nodes, inside the body as well.
+            stiffness: Of all springs together [N/m].
+            damping: Of all dampers together [N s/m].
+            rest_length: Length up to which each point is slack, in any direction [m].
+            breaks_at: Force at which the attachment lets go [N].
+            origin: Origin of the frame, about which `Attachment.wrench` has its torque [m]; None:
+                the mean of the points.
+
+        Raises:
+            ValueError: no point is there, one is outside the body, a number is not finite or has
+                the wrong sign, or the relaxation is `hierarchical`, which knows no attachments.
+        """
+        self._expect_all_nodes_move("tissue is not attached")
+        points = where if isinstance(where, MaterialPoints) else self._points_inside(where)
+        attachment = Attachment(
+            points,
+            self.positions_of(points),
+            stiffness=stiffness,
+            damping=damping,
+            rest_length=rest_length,
+            breaks_at=breaks_at,
+            origin=origin,
+        )
+        self._attachments.add(attachment, self._body)
+        self._take_attachments()
+        return attachment
+
+    def release(self, held: Load | Attachment) -> None:
+        """End a load of `push`, or let go of an attachment.
 
         Raises:
             ValueError: it does not act on this tissue, or was released before.
         """
-        self._loads.remove(load, self._system.stages.loads)
+        if isinstance(held, Load):
+            self._loads.remove(held, self._system.stages.loads)
+        else:
+            self._attachments.remove(held, self._body)
+            self._take_attachments()
 
     def move_supports(self, where: str | npt.ArrayLike, velocity: npt.ArrayLike) -> None:
         """Move fixed nodes at a velocity, from the next step on until it is given anew.
@@ -89,12 +143,7 @@ class DrivenBody(BodyQueries):
             ValueError: no node there is fixed, one of a list is not, the velocity has another shape
                 or is not finite, or the relaxation is `hierarchical`, which moves no fixed node.
         """
-        if self.solver.relaxation == "hierarchical" or isinstance(
-            self.solver.relaxation, Hierarchical
-        ):
-            raise ValueError(
-                "supports do not move with relaxation='hierarchical'; use 'global' or 'verlet'"
-            )
+        self._expect_all_nodes_move("supports do not move")
         system, body = self._system, self._body
         nodes = self._supports_at(where)
         array = np.array(velocity, dtype=np.float64)
@@ -118,6 +167,29 @@ class DrivenBody(BodyQueries):
         out = room_for_points(len(system.body.rest))
         write_support_forces(system.context, out)
         return out[:n].copy()
+
+    def _expect_all_nodes_move(self, what: str) -> None:
+        """Refuse the relaxation that moves nodes level by level."""
+        chosen = self.solver.relaxation
+        if chosen == "hierarchical" or isinstance(chosen, Hierarchical):
+            raise ValueError(f"{what} with relaxation='hierarchical'; use 'global' or 'verlet'")
+
+    def _points_inside(self, where: str | npt.ArrayLike) -> MaterialPoints:
+        """Return material points; of a region those at its nodes."""
+        region = np.asarray(where)
+        if not isinstance(where, str) and region.dtype != np.bool_:
+            return self.material_points(where)
+        mask = region_mask(self._body, where if isinstance(where, str) else region)
+        if not mask.any():
+            raise ValueError(
+                f"no node is in the region {where!r}; take a larger one, or give points"
+            )
+        return self.material_points(np.flatnonzero(mask))
+
+    def _take_attachments(self) -> None:
+        """Let the integrator work on the arrays of the attachments."""
+        self._system.attachments = self._attachments.arrays
+        self._system.added_by_attachments = self._attachments.added_frequency_squared
 
     def _supports_at(self, where: str | npt.ArrayLike) -> IntArray:
         """Return the fixed nodes of a region, or of a list."""

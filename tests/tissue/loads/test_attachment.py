@@ -1,0 +1,256 @@
+"""Attachments: springs from points of the tissue to a frame that is moved from outside."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tissue import (
+    BladeSegment,
+    BladeSweep,
+    Material,
+    SolverSettings,
+    Tissue,
+    block,
+    fixed_nodes,
+)
+
+DT = 1e-3
+GEL = Material(
+    law="neo_hookean", young_modulus=20e3, poisson_ratio=0.45, toughness=5.0, viscous_damping=40.0
+)
+CUBE = block((4, 4, 4), (0.04, 0.04, 0.04))
+TOP = "0,0,0.0399:0.04,0.04,0.0401"
+NOTHING = (0.0, 0.0, 0.0)
+
+
+def cube(fixed="bottom", *, gravity=NOTHING, **solver):
+    held = fixed_nodes(CUBE, fixed)
+    return Tissue(CUBE, GEL, fixed=held, gravity=gravity, solver=SolverSettings(**solver))
+
+
+def settled(tissue, seconds=0.6):
+    for _ in range(round(seconds / DT)):
+        result = tissue.step(None, DT)
+    return result
+
+
+def by(x, y, z):
+    return np.array([x, y, z])
+
+
+def turn_about(axis, angle):
+    return Rotation.from_rotvec(angle * np.array(axis, dtype=float)).as_matrix()
+
+
+def weight_of(tissue):
+    return 9.81 * float(tissue.snapshot().masses.sum())
+
+
+# Forces
+
+
+def test_an_attachment_that_nothing_pulls_does_nothing():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=100.0, damping=1.0)
+    before = tissue.snapshot().positions
+    settled(tissue, 0.05)
+    np.testing.assert_array_equal(tissue.snapshot().positions, before)
+    np.testing.assert_array_equal(grip.wrench.force, 0.0)
+    assert grip.n_points == 25
+
+
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
+@pytest.mark.parametrize("contact", ["penalty", "impulses"])
+def test_a_body_hangs_from_its_attachment_with_its_weight(relaxation, contact):
+    tissue = cube("none", gravity=(0, 0, -9.81), relaxation=relaxation, contact=contact)
+    grip = tissue.attach(TOP, stiffness=200.0, damping=4.0)
+    settled(tissue, 1.5)
+    np.testing.assert_allclose(grip.wrench.force, [0, 0, -weight_of(tissue)], atol=1e-3)
+
+
+def test_what_a_frame_that_moves_does_to_the_tissue_the_supports_bear():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
+    for i in range(600):
+        grip.move(grip.wrench.point + by(0, 0, 2e-5 if i < 100 else 0.0))
+        tissue.step(None, DT)
+    on_frame, on_tissue = grip.wrench.force, tissue.support_forces().sum(axis=0)
+    assert on_frame[2] < -0.5  # it is pulled down
+    np.testing.assert_allclose(on_frame, on_tissue, atol=2e-3)
+
+
+def test_a_spring_in_series_stretches_by_its_share():
+    """Tissue of stiffness c and a spring k: moved by u, the force is u k c / (k + c)."""
+    forces = []
+    for stiffness in (50.0, 1e5):
+        tissue = cube()
+        grip = tissue.attach(TOP, stiffness=stiffness, damping=1.0)
+        grip.move(grip.wrench.point + by(0, 0, 5e-4))
+        settled(tissue, 1.0)
+        forces.append(-grip.wrench.force[2])
+    of_tissue = forces[1] / 5e-4  # the second spring is rigid beside it
+    assert forces[0] == pytest.approx(5e-4 / (1 / 50.0 + 1 / of_tissue), rel=0.02)
+
+
+def test_the_torque_is_that_of_the_forces_about_the_origin():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0, origin=NOTHING)
+    grip.move(NOTHING, turn_about([0, 0, 1], 0.1))
+    settled(tissue, 0.4)
+    held = np.cross(tissue.snapshot().positions, tissue.support_forces()).sum(axis=0)
+    np.testing.assert_allclose(grip.wrench.torque, held, atol=2e-4)
+    assert abs(grip.wrench.torque[2]) > 1e-3
+
+
+def test_linear_and_angular_momentum_change_by_the_impulse_of_the_wrench():
+    tissue = cube("none")
+    grip = tissue.attach("0,0,0:0.011,0.011,0.011", stiffness=300.0, damping=3.0, origin=NOTHING)
+    grip.move([2e-3, 1e-3, 0.0], turn_about([0, 1, 0], 0.05))
+    push, turn = np.zeros(3), np.zeros(3)
+    for _ in range(20):
+        tissue.step(None, DT)
+        wrench = grip.wrench
+        push -= DT * wrench.force
+        turn -= DT * (wrench.torque + np.cross(wrench.point, wrench.force))
+    body = tissue.snapshot()
+    momenta = body.masses[:, None] * body.velocities
+    np.testing.assert_allclose(momenta.sum(axis=0), push, rtol=1e-9, atol=1e-12)
+    angular = np.cross(body.positions, momenta).sum(axis=0)
+    np.testing.assert_allclose(angular, turn, rtol=1e-4, atol=1e-4 * np.abs(turn).max())
+
+
+def test_the_account_of_energy_closes_with_a_frame_that_moves():
+    tissue = cube(audit=True)
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
+    for i in range(300):
+        grip.move(grip.wrench.point + by(4e-5 * np.cos(i / 20), 0, 2e-5))
+        result = tissue.step(None, DT)
+    energies = result.energies
+    assert energies.work_of_loads > 1e-4
+    assert abs(energies.residual) < 5e-3 * energies.work_of_loads
+
+
+def test_very_stiff_attachments_take_more_steps_and_stay_stable():
+    soft, stiff = cube(), cube()
+    soft.attach(TOP, stiffness=100.0)
+    grip = stiff.attach(TOP, stiffness=1e6, damping=10.0)
+    grip.move(grip.wrench.point + by(1e-3, 0, 1e-3))
+    n_soft = settled(soft, 0.01).n_substeps
+    assert settled(stiff, 0.3).n_substeps > 2 * n_soft
+    assert np.abs(stiff.snapshot().velocities).max() < 1e-2
+
+
+# Ligaments, breaking, letting go
+
+
+def test_a_ligament_is_slack_up_to_its_rest_length_and_only_pulls():
+    tissue = cube()
+    ligament = tissue.attach([[0.02, 0.02, 0.04]], stiffness=100.0, rest_length=5e-3)
+    start = ligament.wrench.point
+    ligament.move(start + by(0, 0, 4.9e-3))
+    settled(tissue, 0.05)
+    np.testing.assert_array_equal(ligament.wrench.force, 0.0)
+    ligament.move(start + by(0, 0, 8e-3))
+    settled(tissue, 0.5)
+    at = tissue.positions_of(ligament.points)[0]
+    length = np.linalg.norm(start + by(0, 0, 8e-3) - at)
+    assert -ligament.wrench.force[2] == pytest.approx(100.0 * (length - 5e-3), rel=1e-3)
+
+
+def test_an_attachment_lets_go_at_its_force():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0, breaks_at=0.5)
+    for _ in range(200):
+        grip.move(grip.wrench.point + by(0, 0, 2e-5))
+        tissue.step(None, DT)
+        if grip.is_released:
+            break
+    assert grip.is_released and grip.n_points == 0
+    assert np.linalg.norm(grip.wrench.force) == pytest.approx(0.5, rel=0.1)
+    settled(tissue)
+    np.testing.assert_allclose(tissue.support_forces().sum(axis=0), 0.0, atol=1e-3)
+    with pytest.raises(ValueError, match="released before"):
+        tissue.release(grip)
+
+
+def test_released_tissue_goes_back():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
+    grip.move(grip.wrench.point + by(0, 0, 2e-3))
+    settled(tissue, 0.3)
+    tissue.release(grip)
+    settled(tissue, 1.0)
+    np.testing.assert_allclose(tissue.snapshot().positions, CUBE.positions, atol=2e-5)
+
+
+def test_settling_takes_attachments_into_account():
+    tissue = cube("none", gravity=(0, 0, -9.81))
+    grip = tissue.attach(TOP, stiffness=500.0)
+    tissue.settle()
+    tissue.step(None, DT)
+    np.testing.assert_allclose(grip.wrench.force, [0, 0, -weight_of(tissue)], rtol=0.02, atol=1e-3)
+
+
+# Cuts
+
+
+def test_each_side_of_a_cut_through_a_grip_keeps_its_points():
+    tissue = cube("none", gravity=(0, 0, -9.81))
+    grip = tissue.attach(TOP, stiffness=400.0, damping=8.0)
+    settled(tissue, 0.5)
+    ends = [
+        BladeSegment(
+            np.array([0.02, y, -0.03]), np.array([0.02, y, 0.07]), np.array([0.0, 1.0, 0.0])
+        )
+        for y in (-0.01, 0.06)
+    ]
+    n = 800
+    for i in range(n):
+        a, b = (
+            BladeSegment(*((1 - t) * p + t * q for p, q in zip(*ends, strict=True)))
+            for t in (i / n, (i + 1) / n)
+        )
+        tissue.step(BladeSweep(a, b), DT)
+    settled(tissue, 1.5)
+    pieces = tissue.pieces()
+    assert len(pieces) == 2 and grip.n_points == 25
+    np.testing.assert_allclose(grip.wrench.force[2], -weight_of(tissue), rtol=0.01)
+    sides = tissue.positions_of(grip.points)[:, 0]
+    assert (sides < 0.02).any() and (sides > 0.02).any()
+    assert max(np.linalg.norm(piece.velocity) for piece in pieces) < 1e-2
+
+
+# What is refused
+
+
+@pytest.mark.parametrize(
+    ("where", "numbers", "expected"),
+    [
+        (TOP, {"stiffness": 0.0}, "stiffness is 0.0 N/m; it must be positive"),
+        (TOP, {"stiffness": np.inf}, "must be positive and finite"),
+        (TOP, {"damping": -1.0}, "damping is -1.0"),
+        (TOP, {"rest_length": np.nan}, "rest_length is nan"),
+        (TOP, {"breaks_at": 0.0}, "breaks_at is 0.0 N"),
+        (TOP, {"origin": [0.0, np.nan, 0.0]}, "three finite numbers"),
+        ("1,1,1:2,2,2", {}, "no node"),
+        ([[0.02, 0.02, 0.1]], {}, "outside the body"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(where, numbers, expected):
+    with pytest.raises(ValueError, match=expected):
+        cube().attach(where, **({"stiffness": 100.0} | numbers))
+
+
+def test_a_frame_that_is_no_frame_is_refused():
+    grip = cube().attach(TOP, stiffness=100.0)
+    with pytest.raises(ValueError, match="must be three axes"):
+        grip.move(NOTHING, 2.0 * np.eye(3))
+    with pytest.raises(ValueError, match="three finite numbers"):
+        grip.move([0.0, 0.0])
+
+
+def test_the_hierarchical_relaxation_knows_no_attachments():
+    springs = Material(law="springs", poisson_ratio=0.25)
+    tissue = Tissue(CUBE, springs, solver=SolverSettings(relaxation="hierarchical"))
+    with pytest.raises(ValueError, match="not attached with relaxation='hierarchical'"):
+        tissue.attach(TOP, stiffness=100.0)
