@@ -12,13 +12,13 @@ import argparse
 import importlib
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import replace
 from statistics import median
 from time import perf_counter_ns
 from typing import Any
 
 from scalpel_sim import SCENES
 from scalpel_sim.preparation import prepare
+from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.simulation import Simulation, no_garbage_collection
 from tissue import BladeShape
 
@@ -108,7 +108,7 @@ def main() -> None:
     parser.add_argument("--audit", action="store_true")
     parser.add_argument("--contact", choices=("impulses", "penalty"), default=None)
     options = parser.parse_args()
-    scene = replace(
+    scene = changed(
         SCENES["grid2"],
         material=SCENES["organ"].material,
         blade=BladeShape(),

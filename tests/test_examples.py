@@ -36,6 +36,13 @@ def numbers(text: str) -> list[float]:
     return [float(number) for number in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", text)]
 
 
+def test_two_hands_stretch_a_bar_and_each_keeps_its_piece(run):
+    felt, after, pieces, *held = numbers(run("two_hands.py"))
+    area, stretch, length = 0.02**2, 4e-3, 0.08
+    assert felt == pytest.approx(20e3 * area * stretch / length, rel=0.15)  # the hands yield, too
+    assert (after, pieces, held) == (0.0, 2.0, [16.0, 16.0])
+
+
 def test_an_attached_arm_cuts_a_block_in_two_with_a_force_set_by_toughness(run):
     peak, area, pieces = re.search(
         r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", run("attach_mjcf.py")

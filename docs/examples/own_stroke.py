@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scalpel_sim import SCENES, prepare
+from scalpel_sim import SCENES, StrokeTable, prepare
 
 rows = ["t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z"]
 for t in np.linspace(0.0, 0.8, 81):  # 0.8 s through the slab along y, at 0.1 m/s, on a wavy line
@@ -14,7 +14,8 @@ for t in np.linspace(0.0, 0.8, 81):  # 0.8 s through the slab along y, at 0.1 m/
     rows.append(f"{t},{x},{y},-0.005,{x},{y},0.055")
 Path("wavy.csv").write_text("\n".join(rows))
 
-simulation = prepare(replace(SCENES["slab"], stroke="wavy.csv"))
+wavy = StrokeTable(kind="recorded", file="wavy.csv")
+simulation = prepare(replace(SCENES["slab"], strokes=[wavy]))
 simulation.run(seconds=0.8)
 result = simulation.result
 print(f"cut {result.cut_area * 1e6:.0f} mm2, {simulation.link.n_pieces()} pieces")

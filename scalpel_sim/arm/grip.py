@@ -1,0 +1,107 @@
+"""A body of a MuJoCo model that holds tissue: its pose leads an attachment, which pulls on it."""
+
+import math
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from bridge import TissueFrame
+from tissue import Attachment, FloatArray, Tissue, Wrench
+
+
+class GripError(ValueError):
+    """The model has no such body."""
+
+
+class Grip:
+    """Tissue that a body of a MuJoCo model holds, from where both are now.
+
+    Call `follow` before the tissue's step and `apply` after it, between `mj_step1` and `mj_step2`:
+    there the body is where `qpos` says, and feels the wrench in the same step.
+
+    Args:
+        data: Data of a compiled model, for which `mj_kinematics` or a step was called.
+        body: The body that holds.
+        tissue: What it holds.
+        where: Which points; see `tissue.Tissue.attach`.
+        frame: Where the tissue lies in the world.
+        stiffness: Of the hold [N/m].
+        damping: Of it [N s/m].
+        breaks_at: Force at which it lets go [N].
+
+    Raises:
+        GripError: the model has no such body, or it cannot move.
+        ValueError: see `tissue.Tissue.attach`.
+    """
+
+    def __init__(
+        self,
+        data: mujoco.MjData,
+        body: str,
+        tissue: Tissue,
+        where: str | npt.ArrayLike,
+        *,
+        frame: TissueFrame = TissueFrame(),
+        stiffness: float,
+        damping: float = 0.0,
+        breaks_at: float = math.inf,
+    ) -> None:
+        model: mujoco.MjModel = data.model
+        body_id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
+        if body_id < 0:
+            names = [model.body(i).name for i in range(1, model.nbody)]
+            there = ", ".join(f"'{name}'" for name in names if name) or "none with a name"
+            raise GripError(f"the model has no body '{body}'. It has: {there}")
+        self._tissue, self._frame = tissue, frame
+        # Views of MuJoCo's arrays: they stay valid for the life of `data`.
+        self._position = data.xpos[body_id]
+        self._axes = data.xmat[body_id].reshape(3, 3)
+        self._centre_of_mass = data.xipos[body_id]
+        self._applied = data.xfrc_applied[body_id]
+        self._of_grip: FloatArray = np.zeros(6)
+        self._axes_at_first = self._axes.copy()
+        self.attachment: Attachment = tissue.attach(
+            where,
+            stiffness=stiffness,
+            damping=damping,
+            breaks_at=breaks_at,
+            origin=frame.points_to_tissue(self._position).tolist(),
+        )
+        """The hold, in the frame of the tissue."""
+
+    @property
+    def n_points(self) -> int:
+        """Number of points that it holds; 0 after it was released."""
+        return self.attachment.n_points
+
+    @property
+    def wrench(self) -> Wrench:
+        """Wrench of the tissue on the body in the last step, about the body's origin, world."""
+        wrench = self.attachment.wrench
+        to_world = self._frame.vectors_to_world
+        point = self._frame.points_to_world(wrench.point)
+        return Wrench(to_world(wrench.force), to_world(wrench.torque), point)
+
+    def follow(self) -> None:
+        """Lead the hold to where the body is, at an even speed in the next step."""
+        frame = self._frame
+        turned = self._axes @ self._axes_at_first.T  # in the world
+        rotation = frame.rotation.T @ turned @ frame.rotation
+        self.attachment.move(frame.points_to_tissue(self._position), rotation)
+
+    def apply(self) -> None:
+        """Apply the wrench of the last step to the body, beside what others apply to it."""
+        wrench = self.wrench if self.n_points else None
+        now = np.zeros(6)
+        if wrench is not None:
+            now[:3] = wrench.force
+            now[3:] = wrench.torque + np.cross(wrench.point - self._centre_of_mass, wrench.force)
+        self._applied += now - self._of_grip
+        self._of_grip = now
+
+    def release(self) -> None:
+        """Let go."""
+        if self.n_points:
+            self._tissue.release(self.attachment)
+        self.apply()
