@@ -13,6 +13,7 @@ from cyclopts import App, CycloptsError, Parameter
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
 from scalpel_sim.cli.console import log_to_stderr, print_report, progress, say, say_error
+from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
     CONNECTION,
     OUTPUT,
@@ -36,7 +37,6 @@ from scalpel_sim.errors import (
 )
 from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.scene_file.command import new
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
