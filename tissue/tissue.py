@@ -187,9 +187,7 @@ class Tissue(DrivenBody):
             incision.open_to_edge(self._hooks)
             topology += perf_counter() - now
         stage_times = StageTimes(collision, topology, relaxation)
-        if self._attachments.act:
-            self._attachments.end_step(self._system.body, dt)
-            self._take_attachments()
+        self._end_hold(dt)
         return self._result(edge, has_blade, dt, n_substeps, stage_times)
 
     def incise(self, edges: npt.ArrayLike, forward: npt.ArrayLike) -> float:
@@ -235,9 +233,8 @@ class Tissue(DrivenBody):
         self._take_edge(None)
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
-        if self._attachments.act:
-            self._attachments.stop(system.body)
-        else:
+        self._attachments.stop(system.body)
+        if not self._attachments.act:
             expect_support(system, self.floor)
         found = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)
@@ -289,20 +286,10 @@ class Tissue(DrivenBody):
 
     def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
-        loads, system = self._loads, self._system
-        before = 0.0
-        if loads.act:
-            self._global_stepper.wake()
-            loads.spread(system.body, system.stages.loads)
-            before = loads.virtual_work(system.body)
-        if self._attachments.act:
-            self._global_stepper.wake()
-            system.attachments.work = 0.0
+        system = self._system
+        before = self._begin_driving()
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
-        if loads.act:
-            self._audit.work_of_loads += loads.virtual_work(system.body) - before
-        if self._attachments.act:
-            self._audit.work_of_loads += system.attachments.work
+        self._audit.work_of_loads += self._driven_work(before)
         if n > 0:
             self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
@@ -378,9 +365,7 @@ class Tissue(DrivenBody):
             nodes = self._touched[:n]
             system.mesh_changed(change, nodes)
             self._integrator.mesh_changed(nodes)
-            if self._attachments.act:
-                self._attachments.locate(system.body)
-                self._take_attachments()
+            self._hold_again()
         self._make_room()
 
     def _after_cut(self) -> None:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
+from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.supports import write_support_forces
 from tissue.integrators.system import System
@@ -27,6 +28,7 @@ class DrivenBody(BodyQueries):
     _system: System
     _loads: Loads
     _attachments: AttachmentList
+    _global_stepper: GlobalStepper
     solver: SolverSettings
 
     @property
@@ -185,6 +187,32 @@ class DrivenBody(BodyQueries):
                 f"no node is in the region {where!r}; take a larger one, or give points"
             )
         return self.material_points(np.flatnonzero(mask))
+
+    def _begin_driving(self) -> float:
+        """Let loads act, and what is held move, in an increment; return `Loads.virtual_work`."""
+        loads, system = self._loads, self._system
+        if loads.act or self._attachments.act:
+            self._global_stepper.wake()
+        system.attachments.work = 0.0
+        loads.spread(system.body, system.stages.loads)
+        return loads.virtual_work(system.body)
+
+    def _driven_work(self, before: float) -> float:
+        """Return the work of loads and attachments [J]; `before`: what `_begin_driving` said."""
+        system = self._system
+        return self._loads.virtual_work(system.body) - before + system.attachments.work
+
+    def _hold_again(self) -> None:
+        """Find what attachments hold in a mesh that has changed."""
+        if self._attachments.act:
+            self._attachments.locate(self._body)
+            self._take_attachments()
+
+    def _end_hold(self, dt: float) -> None:
+        """Tell attachments what they did in a step of that length [s]."""
+        if self._attachments.act:
+            self._attachments.end_step(self._body, dt)
+            self._take_attachments()
 
     def _take_attachments(self) -> None:
         """Let the integrator work on the arrays of the attachments."""
