@@ -243,6 +243,7 @@ INCISION_SCENE = ValidationScene(
             "Moreno-Mateos and Steinmann 2025, arXiv:2507.13565, figure 2",
             "a blade that is pressed in cuts hydrogel from 4.2 to 6.2 mm on, and meat from 9.8 to "
             "10.7 mm; for a drawn blade, and for liver, no figure was found",
+            is_confirmed=False,
         ),
         Reference(
             "Gokgol, Basdogan and Canadinc 2012, doi:10.1016/j.medengphy.2011.09.030",

@@ -26,6 +26,7 @@ from tissue.elasticity.springs import (
     build_rows,
     no_springs,
 )
+from tissue.integrators.attachments import no_attachments
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.runge_kutta import accelerations, runge_kutta_nystroem
@@ -156,6 +157,7 @@ class Network(NamedTuple):
             ),
             contact_loss=ContactLoss(is_counted=0, dissipated=0.0),
             supports=supports_at_rest(),
+            attachments=no_attachments(),
             loose=no_loose_pieces(),
             stages=self.stages,
             visits=no_visits(n_nodes, n_tetrahedra),

@@ -8,7 +8,7 @@ import pytest
 
 from tissue import block
 from tissue.blade.anchors import new_anchors
-from tissue.blade.material_frame import way_at_rest
+from tissue.blade.material_frame import BESIDE, way_at_rest
 from tissue.blade.return_mapping import set_anchor
 from tissue.core.vec3 import Vec3
 from tissue.mesh.body import CUT, build_body
@@ -18,7 +18,7 @@ from tissue.mesh.tetrahedron_grid import build_grid
 pytestmark = pytest.mark.kernel
 
 MIDDLE, SHEAR, STEP = 0.02, 0.1, 1e-4
-REACH = 0.015
+REACH = 0.015 / BESIDE
 """From near the middle this is well within the outer cells [m]."""
 X = Vec3(1.0, 0.0, 0.0)
 
@@ -65,4 +65,4 @@ def test_an_anchor_whose_other_lip_has_parted_goes_straight_on(beside):
 
 
 def test_beside_the_skin_the_tetrahedron_of_the_anchor_decides():
-    assert way(0.0, -SHEAR, beside=0.015, reach=0.006)[0] == pytest.approx(SHEAR * STEP, rel=1e-6)
+    assert way(0.0, -SHEAR, beside=0.015, reach=0.006 / BESIDE)[0] == pytest.approx(SHEAR * STEP, rel=1e-6)
