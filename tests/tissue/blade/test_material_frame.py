@@ -65,4 +65,6 @@ def test_an_anchor_whose_other_lip_has_parted_goes_straight_on(beside):
 
 
 def test_beside_the_skin_the_tetrahedron_of_the_anchor_decides():
-    assert way(0.0, -SHEAR, beside=0.015, reach=0.006 / BESIDE)[0] == pytest.approx(SHEAR * STEP, rel=1e-6)
+    assert way(0.0, -SHEAR, beside=0.015, reach=0.006 / BESIDE)[0] == pytest.approx(
+        SHEAR * STEP, rel=1e-6
+    )
