@@ -11,7 +11,7 @@ from scalpel_sim.scene_parts.scene import GEL
 from tests import bodies, strokes
 from tests.materials import SPRINGS
 from tests.test_contact import NO_GRAVITY, SLAB, frame_speed, joined, overlap_depth, speed
-from tissue import FloatArray, Material, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import Material, SolverSettings, TetrahedralMesh, Tissue, block
 
 ELEMENT = 0.01
 ALLOWED = 0.02 * ELEMENT
@@ -161,38 +161,6 @@ def test_where_nothing_touches_contact_changes_no_bit():
         touched = run(solver, -0.05)
         for one, other in zip(touched.snapshot(), run(PENALTY, None).snapshot(), strict=True):
             np.testing.assert_array_equal(one, other)
-
-
-@pytest.mark.parametrize("contact", ["penalty", "impulses"])
-def test_a_floor_far_below_changes_nothing_of_a_cut(contact):
-    def run(floor: float | None) -> tuple[FloatArray, float]:
-        mesh = block((3, 3, 3), (0.03,) * 3)
-        solver = SolverSettings(contact=contact)
-        tissue = Tissue(mesh, GEL, fixed=bodies.sides(mesh), floor=floor, solver=solver)
-        results = strokes.make(tissue, strokes.straight(mesh))
-        return np.array([result.wrench.force for result in results]), results[-1].cut_area
-
-    (forces, area), (others, of_other) = run(-10.0), run(None)
-    assert area == pytest.approx(of_other, rel=1e-6)
-    # New faces are paired within four frames, and the floor shifts which: not the same bits.
-    assert np.abs(forces - others).max() < 0.03 * np.abs(forces).max()
-    assert np.abs(forces.mean(axis=0) - others.mean(axis=0)).max() < 2e-3 * np.abs(forces).max()
-
-
-def test_lips_press_on_each_other_while_the_blade_is_still_between_them():
-    """The sides are pushed together before the cut."""
-    mesh = block((4, 4, 4), (0.04,) * 3)
-    fixed = bodies.sides(mesh)
-    positions = mesh.positions * (0.9, 1.0, 1.0)
-    tissue = Tissue(mesh, GEL, fixed=fixed, positions=positions, solver=PENALTY)
-    tissue.settle()
-    moved = TetrahedralMesh(tissue.snapshot().positions, mesh.tetrahedra)
-    n_pressing = 0
-    for sweep in strokes.sweeps(strokes.straight(moved)):
-        result = tissue.step(sweep, strokes.DT)
-        if result.anchored_length > 0.0 and result.cut_area > 1e-4:
-            n_pressing = max(n_pressing, result.body_contacts.n_contacts)
-    assert n_pressing > 5
 
 
 def split_block(solver: SolverSettings = PENALTY) -> Tissue:

@@ -211,18 +211,19 @@ class PenaltyContact:
         """Do nothing: contact depends on no position before a substep."""
 
     def mesh_changed(self, body: Body, change: Change) -> None:
-        """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
+        """Add the faces that a pass of a cut made.
+
+        The lips of the first incision do not touch before it ends: the blade is between them.
+        """
         faces = with_room(self._search.faces, 4 * change.n_dirty)
         update_changed_faces(faces, body, change)
         self._take_faces(faces)
         self._search.has_new_faces = self._search.is_listing_due = 1
         self._is_searched = False
-        if not self._is_awake and faces.n_places > 0:
-            self._is_awake = True
-            self._search.is_pairing_due = 1
 
     def incision_ended(self, body: Body) -> None:
-        """Let the skin of pieces touch, where the body is in pieces now."""
+        """Let the lips of the incision touch; where the body is in pieces now, their skin too."""
+        self._is_awake = self._is_awake or self._search.faces.n_places > 0
         self._search.recovered[:] = 0.0
         self._find_pieces(body)
 
