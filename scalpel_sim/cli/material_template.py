@@ -5,7 +5,8 @@ from pathlib import Path
 
 from scalpel_sim.arm.scalpel import SCALPEL
 from scalpel_sim.cli.materials import chosen_presets
-from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.cli.new_file import write_new_file
+from scalpel_sim.errors import UsageError
 from scalpel_sim.scenes import PHANTOM
 from scalpel_sim.tables.toml import SUFFIX
 from tissue import BladeShape, Material, Preset, SourcedValue
@@ -76,17 +77,7 @@ def write_template(path: Path, name: str | None, *, force: bool = False) -> None
     else:
         (preset,) = chosen_presets(name)
         text = template(preset.material, f"{preset.name}, {preset.about}", preset)
-    try:
-        with path.open("w" if force else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError as error:
-        raise UsageError(
-            f"{path} exists already; choose another file, or add --force to replace it"
-        ) from error
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); choose another --write"
-        ) from error
+    write_new_file(path, text, force=force, instead="another --write")
 
 
 def template(

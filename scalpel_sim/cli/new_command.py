@@ -7,7 +7,6 @@ from cyclopts import Parameter
 
 from scalpel_sim.cli.console import log_to_stderr
 from scalpel_sim.cli.options import OUTPUT, Flag, PrintOptions
-from scalpel_sim.errors import RunError, UsageError
 
 
 def new(
@@ -32,6 +31,7 @@ def new(
         scene: The scene that is written: one that comes with the project.
         force: Replace the file if it exists.
     """
+    from scalpel_sim.cli.new_file import write_new_file
     from scalpel_sim.scene_file.reading import shipped_path, shipped_scene
     from scalpel_sim.tables.toml import SUFFIX
 
@@ -39,16 +39,6 @@ def new(
         shipped_scene(scene)  # refuses an unknown one
         path = file if file.suffix.lower() == SUFFIX else file.with_name(file.name + SUFFIX)
         text = shipped_path(scene).read_text(encoding="utf-8")
-        try:
-            with path.open("w" if force else "x", encoding="utf-8") as stream:
-                stream.write(text)
-        except FileExistsError as error:
-            raise UsageError(
-                f"{path} exists already; choose another file, or add --force to replace it"
-            ) from error
-        except OSError as error:
-            raise RunError(
-                f"{path}: cannot be written ({error.strerror or error}); choose another file"
-            ) from error
+        write_new_file(path, text, force=force, instead="another file")
         if not printing.quiet:
             print(f"{path}: written; run it with `scalpel-sim run {path}`")
