@@ -427,8 +427,8 @@ def cut_and_dropped(n_steps: int) -> Snapshot:
     tissue = Tissue(
         mesh, replace(SPRINGS, toughness=0.5), fixed=fixed, floor=-0.01, solver=IMPULSES
     )
-    strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
-    results = [tissue.step(None, strokes.DT) for _ in range(n_steps)]
+    results = strokes.make(tissue, strokes.slanted(mesh, lean=0.4, rake=0.2))
+    results += [tissue.step(None, strokes.DT) for _ in range(n_steps)]
     assert tissue.n_pieces() == 2
     assert max(result.body_contacts.force for result in results) > 0.0
     assert results[-1].body_contacts.force_of_floor[2] > 0.01

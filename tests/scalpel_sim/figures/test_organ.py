@@ -20,6 +20,7 @@ def test_the_picture_of_the_readme_shows_the_organ_as_it_is_cut(monkeypatch, tmp
     assert 5136 < before < after
     image = matplotlib.image.imread(printed["file"])
     assert image.shape[:2] == (195, 2 * 240 + figures.GAP)
-    red = (image[:, :, 0] > 0.3) & (image[:, :, 1] < 0.2 * image[:, :, 0])
+    # Faces of the cut are dark red; skin has 0.4 of its red in green, shadows have all of it.
+    red = (image[:, :, 0] > 0.2) & (image[:, :, 1] < 0.25 * image[:, :, 0])
     halves = np.array_split(red, 2, axis=1)
     assert 0 < halves[0].sum() < halves[1].sum()  # the cut is visible, and grows
