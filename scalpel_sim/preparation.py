@@ -110,6 +110,6 @@ def _warn_of_weakness(needed: ExpectedForce, arm: LedArm) -> None:
             needed.force,
             needed.force / needed.width,
             1e3 * needed.width,
-            arm.preset,
+            arm.name,
             most,
         )

@@ -161,7 +161,7 @@ class Tissue(DrivenBody):
         dt = checked_time_step(dt)
         interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
-        self._attachments.begin_step(self._system.body)
+        self._attachments.begin_step()
         travel = edge.travel if has_blade else 0.0
         n, n_substeps = incision.n_increments(travel), 0
         collision = topology = relaxation = 0.0  # wall times
@@ -233,7 +233,7 @@ class Tissue(DrivenBody):
         self._take_edge(None)
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
-        self._attachments.stop(system.body)
+        self._attachments.stop()
         if not self._attachments.act:
             expect_support(system, self.floor)
         found = settle(self._global_stepper, system, NOWHERE)

@@ -1,13 +1,12 @@
 """A blade on any MuJoCo arm: two sites become a segment, a wrench pushes their body."""
 
-import math
 import struct
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from bridge import MAX_PLAUSIBLE_FORCE, MAX_PLAUSIBLE_TORQUE
+from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from tissue import BladeSegment, FloatArray, Wrench
 
 _SIX = struct.Struct("6d")
@@ -94,8 +93,7 @@ class Blade:
     def apply(self, wrench: Wrench) -> None:
         """Apply a wrench to the blade until the next call.
 
-        MuJoCo's `xfrc_applied` acts at the body's centre of mass, the wrench at its own point: the
-        lever adds (point - centre of mass) x force to the torque.
+        MuJoCo's `xfrc_applied` acts at the body's centre of mass, the wrench at its own point.
 
         Args:
             wrench: World frame.
@@ -105,22 +103,11 @@ class Blade:
                 `MAX_PLAUSIBLE_TORQUE`.
                 The wrench of the call before stays applied.
         """
-        # The last guard: MuJoCo accepts 1e3 N silently, and resets itself at 1e9 N or NaN.
-        # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
-        fx, fy, fz, tx, ty, tz, px, py, pz = wrench.numbers
-        cx, cy, cz = self._centre_of_mass.tolist()
-        rx, ry, rz = px - cx, py - cy, pz - cz
-        tx += ry * fz - rz * fy
-        ty += rz * fx - rx * fz
-        tz += rx * fy - ry * fx
-        force, torque = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
-        if not (force <= MAX_PLAUSIBLE_FORCE and torque <= MAX_PLAUSIBLE_TORQUE):  # catches NaN too
-            raise BladeError(
-                f"a wrench of {force:.3g} N and {torque:.3g} N m about its centre of mass acts "
-                f"on the blade; it must be finite and at most {MAX_PLAUSIBLE_FORCE:g} N and "
-                f"{MAX_PLAUSIBLE_TORQUE:g} N m. Limit it first, as bridge.Bridge does"
-            )
-        _SIX.pack_into(self._applied, 0, fx, fy, fz, tx, ty, tz)
+        try:
+            six = about_centre_of_mass(wrench, self._centre_of_mass)
+        except ValueError as error:
+            raise BladeError(f"the blade: {error}") from error
+        _SIX.pack_into(self._applied, 0, *six)
 
 
 def _identifier(model: mujoco.MjModel, kind: mujoco.mjtObj, word: str, name: str) -> int:

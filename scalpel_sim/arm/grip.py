@@ -7,11 +7,12 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge import TissueFrame
+from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
 
 class GripError(ValueError):
-    """The model has no such body."""
+    """The model has no such body, or was handed a wrench that no tissue can exert."""
 
 
 class Grip:
@@ -31,7 +32,7 @@ class Grip:
         breaks_at: Force at which it lets go [N].
 
     Raises:
-        GripError: the model has no such body, or it cannot move.
+        GripError: the model has no such body.
         ValueError: see `tissue.Tissue.attach`.
     """
 
@@ -91,12 +92,18 @@ class Grip:
         self.attachment.move(frame.points_to_tissue(self._position), rotation)
 
     def apply(self) -> None:
-        """Apply the wrench of the last step to the body, beside what others apply to it."""
-        wrench = self.wrench if self.n_points else None
+        """Apply the wrench of the last step to the body, beside what others apply to it.
+
+        Raises:
+            GripError: the wrench is not finite, or too large; see `body_wrench`. The one of the
+                call before stays applied.
+        """
         now = np.zeros(6)
-        if wrench is not None:
-            now[:3] = wrench.force
-            now[3:] = wrench.torque + np.cross(wrench.point - self._centre_of_mass, wrench.force)
+        if self.n_points:
+            try:
+                now[:] = about_centre_of_mass(self.wrench, self._centre_of_mass)
+            except ValueError as error:
+                raise GripError(f"the hold: {error}") from error
         self._applied += now - self._of_grip
         self._of_grip = now
 

@@ -49,7 +49,8 @@ class LedArm:
     ) -> None:
         route_warnings()
         add_hand(spec, impedance, heel, tip, forward)
-        self.preset = name
+        self.name = name
+        """Name of the arm, for reports."""
         self.limits = limits
         self.model = spec.compile()
         """MuJoCo's model."""

@@ -163,7 +163,7 @@ def move_to_start(arm: LedArm, stroke: Stroke, frame: TissueFrame) -> None:
             return
     miss, when, _ = nearest
     raise PlacementError(
-        f"the arm '{arm.preset}' does not reach the stroke: at {when:.2f} s of it the edge stays "
+        f"the arm '{arm.name}' does not reach the stroke: at {when:.2f} s of it the edge stays "
         f"{miss * 1e3 * _NEAR:.3g} mm away, a turn of {_NEAR_TURN / _NEAR * 1e-3:.2g} rad counted "
         "as a millimetre. Move the tissue ([world] pos, quat), or choose a smaller stroke"
     )

@@ -318,7 +318,8 @@ def _perform(
         return perform(
             prepared.simulation,
             Outputs(prepared.folder, plotter),
-            scene=prepared.scene,
+            # A server does not say how its tissue is held, nor how it is solved.
+            scene=prepared.scene if options.client.connect is None else None,
             settings=prepared.settings,
             seconds=seconds,
             every_frame=_paced(advance) if at_most_real_time else advance,

@@ -66,6 +66,7 @@ class PreparedRun(NamedTuple):
 
     simulation: Simulation
     scene: Scene
+    """What it was made from. Of a tissue elsewhere it says only what the server describes."""
     folder: Path
     settings: dict[str, Any]
     """What the command line and the scene resolved to."""
@@ -98,7 +99,7 @@ def prepared_run(
         link, scene, settings = _tissue_elsewhere(name, options, client.connect)
     try:
         simulation = prepare(scene, link)
-        settings |= {"arm": simulation.arm.preset}
+        settings |= {"arm": simulation.arm.name}
         yield PreparedRun(simulation, scene, _folder(options.output, scene), settings)
     finally:
         link.close()

@@ -30,6 +30,7 @@ from scalpel_sim.tables.stroke import stroke_called
 from scalpel_sim.tables.toml import is_toml_file
 
 OptionGroup = BodyOptions | MaterialOptions | SolverOptions | ArmOptions
+"""Options that are keys of a scene, each by itself."""
 
 _KEYS = {
     "fix": "body.fixed",
@@ -178,10 +179,7 @@ def _with_strokes(file: SceneFile, arm: ArmOptions) -> SceneFile:
     return file if rows == [{}] else file._replace(content={**file.content, "stroke": rows})
 
 
-def _with_options(
-    file: SceneFile,
-    group: BodyOptions | MaterialOptions | BladeOptions | SolverOptions | ArmOptions,
-) -> SceneFile:
+def _with_options(file: SceneFile, group: OptionGroup) -> SceneFile:
     """Return a scene with the keys that a group of options gives.
 
     Raises:

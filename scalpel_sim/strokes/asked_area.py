@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 
+from scalpel_sim.strokes.material_at import tetrahedra_at
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import FloatArray, Snapshot
 
@@ -13,9 +14,6 @@ _POSES, _PLACES = 400, 100
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """By which the places move from pose to pose, as a share of their distance: on average they meet
 the ends of a body as thin as a sheet, and never twice at the same height."""
-
-_ROUNDING = 1e-9
-"""Barycentric weight by which a place may miss a tetrahedron and still be in it."""
 
 
 def asked_area(stroke: Stroke, body: Snapshot) -> float | None:
@@ -58,24 +56,13 @@ def _areas_at_rest(places: FloatArray, areas: FloatArray, body: Snapshot) -> Flo
         areas: Area vectors there [m2], shape (n, 3).
         body: The body.
     """
-    from scipy.spatial import cKDTree  # 0.2 s, and only here
-
-    corners = body.positions[body.tetrahedra]
-    rest = body.rest_positions[body.tetrahedra]
-    lying = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    centres = corners.mean(axis=1)
-    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
-    near = cKDTree(places).query_ball_point(centres, radii)
-    holder = np.full(len(places), -1)
-    tetrahedra = np.repeat(np.arange(len(near)), [len(found) for found in near])
-    candidates = np.array(list(itertools.chain.from_iterable(near)), np.int64)
-    offsets = places[candidates] - corners[tetrahedra, 0]
-    weights = np.einsum("nij,nj->ni", np.linalg.inv(lying)[tetrahedra], offsets)
-    inside = (weights >= -_ROUNDING).all(axis=1) & (weights.sum(axis=1) <= 1.0 + _ROUNDING)
-    holder[candidates[inside]] = tetrahedra[inside]
+    holder, _ = tetrahedra_at(places, body)
     held = np.flatnonzero(holder >= 0)
-    gradients = lying @ np.linalg.inv(np.swapaxes(rest[:, 1:] - rest[:, :1], 1, 2))
-    found = gradients[holder[held]]
+    corners, rest = (
+        part[body.tetrahedra[holder[held]]] for part in (body.positions, body.rest_positions)
+    )
+    lying = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    found = lying @ np.linalg.inv(np.swapaxes(rest[:, 1:] - rest[:, :1], 1, 2))
     at_rest = np.zeros_like(areas)
     # Nanson's formula: area at rest = transposed gradient x area / ratio of volumes.
     at_rest[held] = np.einsum("nji,nj->ni", found, areas[held]) / np.linalg.det(found)[:, None]

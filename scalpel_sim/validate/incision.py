@@ -12,6 +12,7 @@ from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.strokes.incision import DEPTH, SLOPE
+from scalpel_sim.strokes.material_at import tetrahedra_at
 from scalpel_sim.validate.findings import (
     PUBLISHED,
     REGRESSION,
@@ -53,8 +54,6 @@ _POINTS = 9
 """Points of the edge whose material is looked up."""
 _EVERY = 10
 """Frames after which it is looked up."""
-_ROUNDING = 1e-9
-"""Barycentric weight by which a point may miss a tetrahedron and still be in it."""
 _MM_PER_M, _MM2_PER_M2 = 1e3, 1e6
 
 
@@ -108,18 +107,10 @@ def rest_of(points: FloatArray, body: Snapshot) -> FloatArray:
         points: Points of the body as it is [m], shape (n, 3).
         body: The body.
     """
-    corners = body.positions[body.tetrahedra]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    found = np.full_like(points, np.nan)
-    for i, point in enumerate(points):
-        near = np.flatnonzero((low <= point).all(axis=1) & (high >= point).all(axis=1))
-        sides = np.swapaxes(corners[near, 1:] - corners[near, :1], 1, 2)
-        others = np.linalg.solve(sides, (point - corners[near, 0])[:, :, None])[:, :, 0]
-        weights = np.column_stack((1.0 - others.sum(axis=1), others))
-        held = np.flatnonzero(weights.min(axis=1) >= -_ROUNDING)
-        if len(held) > 0:
-            nodes = body.tetrahedra[near[held[0]]]
-            found[i] = weights[held[0]] @ body.rest_positions[nodes]
+    holders, weights = tetrahedra_at(points, body)
+    rest = body.rest_positions[body.tetrahedra[holders]]
+    found: FloatArray = np.einsum("nk,nkx->nx", weights, rest)
+    found[holders < 0] = np.nan
     return found
 
 

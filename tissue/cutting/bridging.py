@@ -87,8 +87,7 @@ def _resolve_edge(cut: Cut, a: int, b: int) -> None:
     side = 1 if height_a + height_b >= 0.0 else -1
     wrong = a if side_of(sheet, a) != side else b
     height = abs(height_a) if wrong == a else abs(height_b)
-    snap = snap_distance(cut, wrong)
-    if height < snap:
+    if height < snap_distance(cut, wrong):
         flag(cut, wrong)
     else:
         note_side(sheet, wrong, side, True)

@@ -149,7 +149,8 @@ def frequency_squared(attachments: Attachments, masses: FloatArray) -> float:
 
     Args:
         attachments: Springs and dampers.
-        masses: Of the nodes [kg], shape (capacity,).
+        masses: Of the nodes [kg], without what mass scaling has added and may take back; shape
+            (capacity,).
     """
     if not len(attachments.nodes):
         return 0.0
@@ -165,7 +166,7 @@ def frequency_squared(attachments: Attachments, masses: FloatArray) -> float:
 
 def _largest_rate(attachments: Attachments, each: FloatArray, masses: FloatArray) -> float:
     """Return the largest sum of a quantity of points over the mass of a node."""
-    nodes = attachments.nodes.ravel()
-    sums = np.bincount(nodes, weights=(each[:, None] * attachments.weights).ravel())
-    touched = np.unique(nodes)
-    return float((sums[touched] / masses[touched]).max())
+    touched, places = np.unique(attachments.nodes, return_inverse=True)
+    shares = each[:, None] * attachments.weights
+    sums = np.bincount(places.ravel(), weights=shares.ravel())
+    return float((sums / masses[touched]).max())

@@ -146,22 +146,21 @@ class AttachmentList:
         self._attachments.remove(attachment)
         self._renew(body)
 
-    def begin_step(self, body: Body) -> None:
+    def begin_step(self) -> None:
         """Write where the frames go in the next step."""
         if self._attachments:
             first, last = zip(*(each.targets() for each in self._attachments), strict=True)
             self.arrays.begin[:], self.arrays.end[:] = np.concatenate(first), np.concatenate(last)
             self.arrays.impulse[:] = self.arrays.turn[:] = 0.0
-            self.locate(body)
 
-    def stop(self, body: Body) -> None:
+    def stop(self) -> None:
         """Have every frame where it was to be at the end of the next step."""
         for each in self._attachments:
             each.stop()
-        self.begin_step(body)
+        self.begin_step()
 
     def locate(self, body: Body) -> None:
-        """Find the points in the mesh, which a cut may have changed."""
+        """Find the points in the mesh, which a cut has changed."""
         row = 0
         for each in self._attachments:
             nodes, weights = each.points.nodes_and_weights(body)
@@ -171,7 +170,8 @@ class AttachmentList:
         # A point in the middle of a cut tetrahedron may be outside of it by rounding.
         if row:
             self.arrays.weights /= self.arrays.weights.sum(axis=1, keepdims=True)
-        self.added_frequency_squared = frequency_squared(self.arrays, body.masses)
+        own_masses = body.masses - body.added_masses
+        self.added_frequency_squared = frequency_squared(self.arrays, own_masses)
 
     def end_step(self, body: Body, dt: float) -> None:
         """Tell each attachment the force on its points; drop those that have let go."""
@@ -196,7 +196,7 @@ class AttachmentList:
             self.arrays.damping[rows] = each.damping * each.points.shares
             self.arrays.length[rows] = each.rest_length
             row += n
-        self.begin_step(body)
+        self.begin_step()
         self.locate(body)
 
 

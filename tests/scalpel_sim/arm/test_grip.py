@@ -159,6 +159,17 @@ def test_the_blade_cuts_between_two_grips_and_the_gap_is_how_far_they_were_moved
     assert gap == pytest.approx(moved, rel=0.05)
 
 
+@pytest.mark.parametrize("size", [np.nan, 1e6])
+def test_a_wrench_that_no_tissue_exerts_is_refused_and_the_one_before_stays(size):
+    model, data, tissue, grip = hanging()
+    advance(model, data, tissue, [grip], 5)
+    before = data.xfrc_applied[1].copy()
+    grip.attachment.end_step(np.array([size, 0.0, 0.0]), np.zeros(3))
+    with pytest.raises(GripError, match="the hold: a wrench of"):
+        grip.apply()
+    np.testing.assert_array_equal(data.xfrc_applied[1], before)
+
+
 def test_a_body_that_is_not_there_is_named():
     _, data = jaws((0, 0, 0), (1, 0, 0), (1, 0, 0))
     with pytest.raises(GripError, match=r"no body 'jaw'. It has: 'left', 'right'"):

@@ -53,7 +53,9 @@ def done():
 
 
 def test_the_model_opens_by_itself():
-    mujoco.MjModel.from_xml_path(str(ROBOT))
+    model = mujoco.MjModel.from_xml_path(str(ROBOT))
+    assert {"heel", "tip"} <= {model.site(i).name for i in range(model.nsite)}
+    assert (model.nv, model.nkey) == (6, 1)
 
 
 def test_the_scene_has_thirty_lines_at_most():

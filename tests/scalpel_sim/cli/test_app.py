@@ -482,6 +482,8 @@ def test_an_arm_and_a_tissue_in_two_processes_give_the_same_bits(tmp_path):
     assert np.array_equal(ours.rows[:, :-timed], theirs.rows[:, :-timed])
     assert (here / "final.vtu").read_bytes() == (there / "final.vtu").read_bytes()
     assert json.loads((there / "summary.json").read_text())["scene"] == "grid2"
+    # The client does not know how the server's tissue is held: it writes no scene.
+    assert (here / "scene.toml").exists() and not (there / "scene.toml").exists()
 
 
 @pytest.mark.parametrize("stroke", ["straight", "slanted", "curved"])

@@ -68,5 +68,5 @@ def test_an_arm_that_is_too_weak_for_the_cut_is_named_with_the_numbers(caplog):
 
 def test_a_stronger_arm_is_taken_where_the_cut_needs_it():
     tough = changed(SCENES["grid2"], toughness=120.0, young_modulus=1e5)
-    assert prepare(SCENES["grid2"]).arm.preset == "touch"
-    assert prepare(tough).arm.preset == "premium"
+    assert prepare(SCENES["grid2"]).arm.name == "touch"
+    assert prepare(tough).arm.name == "premium"
