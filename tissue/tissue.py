@@ -162,8 +162,10 @@ class Tissue(DrivenBody):
         interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
         self._attachments.begin_step()
+        self._system.geoms.begin_step(self._system.body, dt)
         travel = edge.travel if has_blade else 0.0
-        n, n_substeps = incision.n_increments(travel), 0
+        n = max(incision.n_increments(travel), self._system.geoms.n_increments)
+        n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
         for i in range(n):
@@ -234,7 +236,8 @@ class Tissue(DrivenBody):
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
         self._attachments.stop()
-        if not self._attachments.act:
+        system.geoms.stop()
+        if not (self._attachments.act or system.geoms.geoms):
             expect_support(system, self.floor)
         found = settle(self._global_stepper, system, NOWHERE)
         self._integrator.body_moved(system.body)

@@ -151,6 +151,7 @@ def _take_steps(stepper: GlobalStepper, system: System, edge: Edge, rate: float)
     dt = STEPS_BETWEEN_LOOKS * step
     contact.begin()
     system.find_contacts(dt)
+    system.geoms.begin_step(system.body, dt)
     velocities = system.body.velocities[:n]
     for i in range(STEPS_BETWEEN_LOOKS):
         velocities *= math.exp(-2.0 * rate * step)

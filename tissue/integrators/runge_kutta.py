@@ -18,6 +18,7 @@ every stage, for the full order; by default it acts between the steps
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_blade_forces
+from tissue.contact.geoms.held_forces import add_geom_forces, clear_geom_forces
 from tissue.contact.penalty.contact_forces import add_contact_forces, clear_contact_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -103,9 +104,11 @@ def apply_outer_forces(
     attachments = context.attachments
     clear_contact_forces(context.contacts, external)
     clear_attachment_forces(attachments, external)
+    clear_geom_forces(context.geoms, external)
     apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
     add_contact_forces(context.contacts, positions, velocities, share * dt, external)
     add_attachment_forces(attachments, positions, velocities, when, share, dt, external)
+    add_geom_forces(context.geoms, positions, velocities, share, dt, external)
 
 
 @kernel
@@ -115,6 +118,8 @@ def accelerations(context: StepContext, out: FloatArray) -> None:
     x, v = body.positions, body.velocities
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
+    add_geom_forces(context.geoms, x, v, 0.0, 1.0, external)
     for i in range(body.n_nodes):
         store_point(out, i, acceleration(context, i, x, v))
     clear_attachment_forces(context.attachments, external)
+    clear_geom_forces(context.geoms, external)

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from tissue.blade.blade_state import BladeState
 from tissue.blade.edge import Edge
+from tissue.contact.geoms.geom_arrays import GeomContacts
 from tissue.contact.penalty.contact_forces import PenaltyForces
 from tissue.core.structs import Arrays
 from tissue.core.thread_team import Team
@@ -29,6 +30,8 @@ class StepContext(Arrays, two_precisions=True):
     """The blade: it acts in every stage, and slips after every step."""
     contacts: PenaltyForces
     """Contacts that act as forces; none where contact corrects the motion after every step."""
+    geoms: GeomContacts
+    """Contacts with rigid geoms: forces in every stage, which are corrected after every step."""
     surroundings: Surroundings
     """Gravity, and the damping that acts in every stage."""
     damping: Damping

@@ -2,6 +2,8 @@
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_slip, edge_energy
+from tissue.contact.geoms.held_forces import clear_geom_forces
+from tissue.contact.geoms.kinematic_contact import end_geom_substep
 from tissue.contact.penalty.contact_forces import end_contact_substep
 from tissue.contact.resolve import note_all_positions, resolve
 from tissue.contact.state import ContactState
@@ -63,7 +65,7 @@ def runge_kutta_steps(
                 note_all_positions(contact, context.body)
             damp_if_due(context, i, n, share * dt)
             _runge_kutta_step(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, share * dt, at + share):
+        if not end_substep(context, contact, edge, dt, share, at + share):
             return i
     return n
 
@@ -99,7 +101,7 @@ def nystroem_steps(
                 note_all_positions(contact, context.body)
             damp_if_due(context, i, n, share * dt)
             three_stage_nystroem(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, share * dt, at + share):
+        if not end_substep(context, contact, edge, dt, share, at + share):
             return i
     return n
 
@@ -135,7 +137,7 @@ def verlet_steps(
                 note_all_positions(contact, context.body)
             damp_if_due(context, i, n, share * dt)
             position_verlet(context, edge, dt, at, share)
-        if not end_substep(context, contact, edge, share * dt, at + share):
+        if not end_substep(context, contact, edge, dt, share, at + share):
             return i
     return n
 
@@ -159,7 +161,7 @@ def runge_kutta_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         _runge_kutta_step(context, edge, dt, at, share)
-        _end_with_forces(context, edge, share * dt, at + share)
+        _end_with_forces(context, edge, dt, share, at + share)
 
 
 @kernel
@@ -181,7 +183,7 @@ def nystroem_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         three_stage_nystroem(context, edge, dt, at, share)
-        _end_with_forces(context, edge, share * dt, at + share)
+        _end_with_forces(context, edge, dt, share, at + share)
 
 
 @kernel
@@ -203,7 +205,7 @@ def verlet_steps_with_forces(
         at = begin + i * share
         damp_if_due(context, i, n, share * dt)
         position_verlet(context, edge, dt, at, share)
-        _end_with_forces(context, edge, share * dt, at + share)
+        _end_with_forces(context, edge, dt, share, at + share)
 
 
 @kernel
@@ -257,17 +259,22 @@ def _runge_kutta_step(context: StepContext, edge: Edge, dt: float, at: float, sh
 
 
 @kernel
-def _end_with_forces(context: StepContext, edge: Edge, seconds: float, when: float) -> None:
+def _end_with_forces(
+    context: StepContext, edge: Edge, dt: float, share: float, when: float
+) -> None:
     """End a step in which contact acted as forces; see `end_substep`."""
+    seconds = share * dt
     body, external = context.body, context.stages.external
     end_contact_substep(context.contacts, body.positions, body.velocities, external)
     clear_attachment_forces(context.attachments, external)
+    clear_geom_forces(context.geoms, external)
+    end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
 
 
 @kernel
 def end_substep(
-    context: StepContext, contact: ContactState, edge: Edge, seconds: float, when: float
+    context: StepContext, contact: ContactState, edge: Edge, dt: float, share: float, when: float
 ) -> bool:
     """Resolve contact, then let the blade slip.
 
@@ -275,14 +282,14 @@ def end_substep(
         context: What takes part.
         contact: What may touch.
         edge: The cutting edge over the time step.
-        seconds: Length of the step [s].
+        dt: Length of the time step [s].
+        share: Length of the step as a fraction of the time step.
         when: End of the step, as a fraction of the time step.
 
     Returns:
         Whether contact had room. If not, make room and call again.
     """
-    body, stages = context.body, context.stages
-    clear_attachment_forces(context.attachments, stages.external)
+    body, stages, seconds = context.body, context.stages, share * dt
     if contact.is_awake == 1:
         if contact.is_pending == 0 and context.contact_loss.is_counted == 1:
             _note_state(body, stages)
@@ -293,6 +300,9 @@ def end_substep(
         # Without contacts `resolve` has changed nothing.
         if context.contact_loss.is_counted == 1 and contact.contacts.n_contacts > 0:
             _count_loss(context, edge, when)
+    clear_attachment_forces(context.attachments, stages.external)
+    clear_geom_forces(context.geoms, stages.external)
+    end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, stages.external, when, seconds)
     return True
 

@@ -1,5 +1,6 @@
 """Fixed nodes as supports: the force that holds each, and the work of those that move."""
 
+from tissue.contact.geoms.held_forces import add_geom_forces, clear_geom_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
@@ -86,9 +87,11 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
     x, v, external = body.positions, body.velocities, context.stages.external
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
+    add_geom_forces(context.geoms, x, v, 0.0, 1.0, external)
     for i in range(body.n_nodes):
         force = point_of(0.0, 0.0, 0.0)
         if body.fixed[i]:
             force = support_force(context, i, x, v, time)
         store_point(out, i, force)
     clear_attachment_forces(context.attachments, external)
+    clear_geom_forces(context.geoms, external)

@@ -10,6 +10,7 @@ import numpy as np
 from tissue.blade.interaction import BladeInteraction
 from tissue.blade_shape import BladeShape
 from tissue.contact.contact import Contact
+from tissue.contact.geoms.geom_contact import no_geoms
 from tissue.contact.self_contact import SelfContact
 from tissue.core.array_types import IntArray
 from tissue.core.thread_team import new_team
@@ -89,6 +90,8 @@ class System:
         """Whether fixed nodes move, and their work."""
         self.attachments = no_attachments()
         """Points that are tied to what moves from outside."""
+        self.geoms = no_geoms(body, node_size)
+        """Contact with rigid geoms."""
         self.added_by_attachments = 0.0
         """What they add to w^2 of the body at most [1/s2]."""
         self.loose = no_loose_pieces()
@@ -106,6 +109,7 @@ class System:
             or context.elastic is not self.elasticity.arrays
             or context.blade is not self.interaction.state
             or context.contacts is not self.contact.forces
+            or context.geoms is not self.geoms.arrays
             or context.stages is not self.stages
             or context.attachments is not self.attachments
             or context.loose is not self.loose
@@ -115,6 +119,7 @@ class System:
                 elastic=self.elasticity.arrays,
                 blade=self.interaction.state,
                 contacts=self.contact.forces,
+                geoms=self.geoms.arrays,
                 surroundings=self._in_stages,
                 damping=self.damping,
                 contact_loss=self.contact_loss,
@@ -182,6 +187,7 @@ class System:
         self.elasticity.mesh_changed(self.body, self.visits, change, nodes, len(nodes))
         self.interaction.mesh_changed(self.body, self.visits, change)
         self.contact.mesh_changed(self.body, change)
+        self.geoms.mesh_changed(self.body, change)
 
     def incision_ended(self) -> None:
         """Update what is looked at once the blade has left an incision."""
@@ -197,6 +203,7 @@ class System:
         self.elasticity.grow(n_nodes, n_tetrahedra)
         self.interaction.grow(n_tetrahedra)
         self.contact.grow(n_nodes, n_tetrahedra)
+        self.geoms.grow(n_nodes, n_tetrahedra)
 
     def measures(self, method: int) -> MeshMeasures:
         """Return what bounds the time step of the body now.

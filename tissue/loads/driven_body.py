@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from tissue.contact.geoms.geom import Geom
+from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
 from tissue.integrators.global_stepper import GlobalStepper
@@ -117,6 +119,34 @@ class DrivenBody(BodyQueries):
         self._take_attachments()
         return attachment
 
+    def collide_with(
+        self,
+        geoms: Sequence[Geom],
+        origins: npt.ArrayLike | None = None,
+        rotations: npt.ArrayLike | None = None,
+    ) -> GeomContact:
+        """Let the tissue touch rigid geoms from now on, and no others; return the contact.
+
+        Nodes and faces of the skin and of lips stay outside the geoms, and rub on them as Coulomb's
+        law says: what sticks does not creep. Between steps `GeomContact.move` moves the geoms;
+        until then they stay. Their work is in the account of energy as that of loads, what friction
+        and impacts take as that of contact.
+
+        Args:
+            geoms: What the tissue can touch.
+            origins: Origin of each [m], shape (n, 3); None: that of the tissue's frame.
+            rotations: Axes of each as columns, shape (n, 3, 3); None: those of the tissue's frame.
+
+        Raises:
+            ValueError: a geom makes no sense or is inside the tissue, or the relaxation is
+                `hierarchical`, which knows no geoms.
+        """
+        self._expect_all_nodes_move("tissue does not touch geoms")
+        system = self._system
+        contact = GeomContact(geoms, system.body, system.node_size, origins, rotations)
+        system.geoms = contact
+        return contact
+
     def release(self, held: Load | Attachment) -> None:
         """End a load of `push`, or let go of an attachment.
 
@@ -191,16 +221,21 @@ class DrivenBody(BodyQueries):
     def _begin_driving(self) -> float:
         """Let loads act, and what is held move, in an increment; return `Loads.virtual_work`."""
         loads, system = self._loads, self._system
-        if loads.act or self._attachments.act:
+        if loads.act or self._attachments.act or system.geoms.act:
             self._global_stepper.wake()
         system.attachments.work = 0.0
+        touched = system.geoms.arrays
+        touched.work = touched.dissipated = 0.0
         loads.spread(system.body, system.stages.loads)
         return loads.virtual_work(system.body)
 
     def _driven_work(self, before: float) -> float:
         """Return the work of loads and attachments [J]; `before`: what `_begin_driving` said."""
         system = self._system
-        return self._loads.virtual_work(system.body) - before + system.attachments.work
+        touched = system.geoms.arrays
+        system.contact_loss.dissipated += touched.dissipated
+        of_loads = self._loads.virtual_work(system.body) - before
+        return of_loads + system.attachments.work + touched.work
 
     def _hold_again(self) -> None:
         """Find what attachments hold in a mesh that has changed."""
@@ -209,7 +244,8 @@ class DrivenBody(BodyQueries):
             self._take_attachments()
 
     def _end_hold(self, dt: float) -> None:
-        """Tell attachments what they did in a step of that length [s]."""
+        """Tell attachments what they did in a step of that length [s], and have geoms stay."""
+        self._system.geoms.stop()
         if self._attachments.act:
             self._attachments.end_step(self._body, dt)
             self._take_attachments()

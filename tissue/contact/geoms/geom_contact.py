@@ -1,0 +1,312 @@
+"""`GeomContact`: owns the arrays of contact with rigid geoms, and searches once in a time step."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from tissue.contact.faces import (
+    Faces,
+    grown_faces,
+    new_faces,
+    update_changed_faces,
+    with_room,
+    with_skin,
+)
+from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
+from tissue.contact.geoms.geom import Geom, half_thickness
+from tissue.contact.geoms.geom_arrays import (
+    GeomContacts,
+    Geoms,
+    grown_geom_contacts,
+    new_geom_contacts,
+    new_geoms,
+)
+from tissue.contact.geoms.geom_motion import (
+    NO_ROTATION,
+    NOT_FINITE,
+    TAKEN,
+    TURNS_TOO_FAR,
+    lead_geoms,
+    place_geoms,
+)
+from tissue.contact.geoms.held_forces import sum_wrenches
+from tissue.contact.geoms.near_nodes import GeomSearch
+from tissue.contact.geoms.signed_distance import distance_to
+from tissue.core.array_types import BoolArray, FloatArray, IntArray
+from tissue.core.jit import SameTypes, kernel
+from tissue.core.vec3 import vec3
+from tissue.mesh.body import Body, grown
+from tissue.mesh.changes import Change
+from tissue.types import Wrench
+
+CONTACTS_AT_FIRST = 64
+"""Contacts that there is room for at first."""
+
+DEEPEST_AT_FIRST = 0.1
+"""How deep a node may be in a geom as contact begins, per mean node size: 0.3 mm in an organ. It is
+put out of it in the first substep. Deeper: the tissue around is thrown."""
+
+FARTHEST_IN_A_SUBSTEP = 0.5
+"""How far a geom moves in an increment at most, per half its thickness: what is on one side of it
+then is never beyond its middle in the next. Larger: a thin one passes through tissue."""
+
+LARGEST_TURN = 0.5 * math.pi
+"""Angle by which a geom may turn in a time step [rad]: beyond, which way it turned is a guess."""
+
+
+class GeomForces(NamedTuple):
+    """Where tissue touched geoms in a step. Copies."""
+
+    geom: IntArray
+    """Number of the geom of each contact, in the order in which they were given; shape (n,)."""
+    point: FloatArray
+    """Where each is [m], shape (n, 3)."""
+    normal: FloatArray
+    """Unit normal out of the geom, shape (n, 3)."""
+    force: FloatArray
+    """Force on the tissue, averaged over the step [N], shape (n, 3): pressure and friction."""
+
+
+class GeomContact:
+    """Contact of a body with rigid geoms, which are moved from outside between steps.
+
+    Args:
+        geoms: What the body can touch.
+        body: The body.
+        node_size: Its mean node size [m].
+        origins: Origin of each geom [m], shape (n, 3); None: that of the tissue's frame.
+        rotations: Axes of each as columns, shape (n, 3, 3); None: those of the tissue's frame.
+
+    Raises:
+        ValueError: a geom makes no sense (`planes_of`), two have one name, a pose is not finite or
+            no pose, or a geom is inside the body by more than `DEEPEST_AT_FIRST`.
+    """
+
+    def __init__(
+        self,
+        geoms: Sequence[Geom],
+        body: Body,
+        node_size: float,
+        origins: npt.ArrayLike | None = None,
+        rotations: npt.ArrayLike | None = None,
+    ) -> None:
+        self.geoms = tuple(geoms)
+        """The geoms, in the order of their numbers."""
+        names = [geom.name for geom in self.geoms]
+        if len(set(names)) < len(names):
+            twice = next(name for name in names if names.count(name) > 1)
+            raise ValueError(f"two geoms have the name {twice!r}")
+        n_nodes, all_geoms = len(body.rest), new_geoms(list(self.geoms))
+        self.arrays: GeomContacts = new_geom_contacts(all_geoms, CONTACTS_AT_FIRST, n_nodes)
+        """What kernels work on; another one where it grows."""
+        self._thickness = np.array([half_thickness(geom) for geom in self.geoms])
+        self._faces: Faces = with_skin(new_faces(len(body.tetrahedra)), body)
+        of_nodes = ("near", "near_at", "listed")
+        self._search = GeomSearch(
+            stamp=0,
+            search=0,
+            is_first=1,
+            is_due=1,
+            n_listed=0,
+            n_of_faces=0,
+            next_old=0,
+            n_near=0,
+            n_touched=0,
+            seconds=0.0,
+            moved=0.0,
+            covered=0.0,
+            fastest=0.0,
+            touched=np.zeros(len(self._faces.face), np.int64),
+            normal=np.zeros((n_nodes, 3)),
+            node_size=float(node_size),
+            **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
+        )
+        self._find, self._lead = SameTypes(find_geom_contacts), SameTypes(lead_geoms)
+        self._sum = SameTypes(sum_wrenches)
+        self._seconds = 0.0
+        n = len(self.geoms)
+        self._origins = np.zeros((n, 3))
+        self._rotations = np.tile(np.eye(3), (n, 1, 1))
+        self.move(
+            self._origins if origins is None else origins,
+            self._rotations if rotations is None else rotations,
+            is_turn_limited=False,
+        )
+        self.stop()
+        self._expect_outside(body)
+
+    def move(
+        self,
+        origins: npt.ArrayLike,
+        rotations: npt.ArrayLike | None = None,
+        *,
+        is_turn_limited: bool = True,
+    ) -> None:
+        """Move all geoms in the next step, at even speeds, to where they then stay.
+
+        Args:
+            origins: Origin of each at the end of the step [m], shape (n, 3).
+            rotations: Axes of each as columns, shape (n, 3, 3); None: as they are.
+            is_turn_limited: Whether a turn by more than `LARGEST_TURN` is refused.
+
+        Raises:
+            ValueError: a number is not finite, a rotation is none, or turns too far.
+        """
+        n = len(self.geoms)
+        places = np.array(origins, np.float64)
+        axes = self._rotations if rotations is None else np.array(rotations, np.float64)
+        if places.shape != (n, 3) or axes.shape != (n, 3, 3):
+            raise ValueError(
+                f"origins {places.shape} and rotations {axes.shape} of {n} geoms; they have the "
+                f"shapes ({n}, 3) and ({n}, 3, 3)"
+            )
+        most = LARGEST_TURN if is_turn_limited else math.inf
+        fault, g = self._lead.call(self.arrays.geoms, places, axes.reshape(n, 9), most)
+        if fault != TAKEN:
+            what = f"geom '{self.geoms[g].name}'"
+            raise ValueError(
+                {
+                    NOT_FINITE: f"the origin of {what} is {places[g].tolist()}; it is three finite "
+                    "numbers in m",
+                    NO_ROTATION: f"the rotation of {what} is {axes[g].tolist()}; it is three axes "
+                    "as columns, right-handed",
+                    TURNS_TOO_FAR: f"{what} turns by more than {LARGEST_TURN:.2g} rad in one step, "
+                    "so that which way is a guess. Take shorter steps",
+                }[fault]
+            )
+        self._origins, self._rotations = places, axes
+
+    def stop(self) -> None:
+        """Have every geom where it was to be at the end of the next step."""
+        arrays = self.arrays.geoms
+        arrays.origin_t0[:] = self._origins
+        arrays.axes_t0[:] = self._rotations.reshape(-1, 9)
+        arrays.way[:] = arrays.turn[:] = 0.0
+        place_geoms(arrays, 1.0)
+
+    def consider(self, are_near: BoolArray) -> None:
+        """Say which geoms the tissue may touch in the next steps, by a broad phase; shape (n,)."""
+        flags = self.arrays.geoms.is_near
+        if (flags != are_near).any():
+            flags[:] = are_near
+            self._search.is_due = 1
+
+    @property
+    def act(self) -> bool:
+        """Whether any node is near a geom."""
+        return self.arrays.n_contacts > 0
+
+    @property
+    def n_increments(self) -> int:
+        """Into how many increments the next step is divided, so that no geom passes unseen."""
+        arrays = self.arrays.geoms
+        if not len(arrays.shape):
+            return 1
+        far = np.linalg.norm(arrays.way, axis=1) + np.linalg.norm(arrays.turn, axis=1) * (
+            np.linalg.norm(np.where(np.isfinite(arrays.half), arrays.half, 0.0), axis=1)
+        )
+        return max(1, math.ceil(float((far / self._thickness).max()) / FARTHEST_IN_A_SUBSTEP))
+
+    def begin_step(self, body: Body, dt: float) -> None:
+        """Find the contacts of a step of that length [s]."""
+        self._seconds = dt
+        if not self.geoms:
+            return
+        while self._find.call(self._search, self.arrays, self._faces, body, dt) == LIST_IS_FULL:
+            # Twice the room: the arrays have two lists.
+            self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom), len(body.rest))
+
+    def wrenches(self) -> tuple[FloatArray, FloatArray]:
+        """Return forces and torques of the tissue on the geoms, averaged over the last step.
+
+        Returns:
+            Forces [N], shape (n, 3), and torques about the geoms' origins at its end [N m],
+            shape (n, 3), in the tissue's frame.
+        """
+        forces, torques = np.zeros((2, len(self.geoms), 3))
+        per_second = 1.0 / self._seconds if self._seconds > 0.0 else 0.0
+        self._sum.call(self.arrays, self._origins, per_second, forces, torques)
+        return forces, torques
+
+    def wrench(self, geom: int) -> Wrench:
+        """Return the wrench of the tissue on one geom; see `wrenches`."""
+        forces, torques = self.wrenches()
+        return Wrench(forces[geom], torques[geom], self._origins[geom].copy())
+
+    def forces(self) -> GeomForces:
+        """Return where tissue touched geoms in the last step, and with which forces."""
+        rows = self._rows()
+        rows = rows[self.arrays.impulse[rows].any(axis=1)]
+        arrays, seconds = self.arrays, self._seconds or math.inf
+        return GeomForces(
+            arrays.geom[rows],
+            arrays.point[rows],
+            arrays.normal[rows],
+            arrays.impulse[rows] / seconds,
+        )
+
+    def mesh_changed(self, body: Body, change: Change) -> None:
+        """Take the faces that a pass of a cut made."""
+        if self.geoms:
+            self._faces = with_room(self._faces, 4 * change.n_dirty)
+            update_changed_faces(self._faces, body, change)
+            self._search.is_due = 1
+            n_faces = len(self._faces.face)
+            if len(self._search.touched) < n_faces:
+                self._search = self._search.replaced(touched=np.zeros(n_faces, np.int64))
+
+    def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
+        """Make room for a body of `n_nodes` and `n_tetrahedra`."""
+        search = self._search
+        of_nodes = {
+            name: grown(getattr(search, name), n_nodes)
+            for name in ("near", "near_at", "listed", "normal")
+        }
+        self._search = search.replaced(**of_nodes)
+        self._faces = grown_faces(self._faces, n_tetrahedra)
+        self.arrays = grown_geom_contacts(self.arrays, len(self.arrays.geom) // 2, n_nodes)
+
+    def _rows(self) -> IntArray:
+        first = self.arrays.first
+        return np.arange(first, first + self.arrays.n_contacts)
+
+    def _now(self) -> tuple[FloatArray, FloatArray]:
+        """Return origins and axes of the geoms at the begin of the next step."""
+        arrays = self.arrays.geoms
+        return arrays.origin_t0, arrays.axes_t0.reshape(-1, 3, 3)
+
+    def _expect_outside(self, body: Body) -> None:
+        """Refuse geoms that are inside the body.
+
+        Raises:
+            ValueError: a node is deeper in one than `DEEPEST_AT_FIRST`.
+        """
+        most = DEEPEST_AT_FIRST * self._search.node_size
+        for g, geom in enumerate(self.geoms):
+            node, depth = _deepest_node(self.arrays.geoms, g, body)
+            if depth > most:
+                x, y, z = body.positions[node]
+                raise ValueError(
+                    f"geom '{geom.name}' is {1e3 * depth:.2g} mm inside the tissue at ({x:.4g}, "
+                    f"{y:.4g}, {z:.4g}) m as contact begins; at most {1e3 * most:.2g} mm are taken "
+                    "out of it gently. Begin with it outside"
+                )
+
+
+def no_geoms(body: Body, node_size: float) -> GeomContact:
+    """Return contact with nothing."""
+    return GeomContact((), body, node_size)
+
+
+@kernel
+def _deepest_node(geoms: Geoms, g: int, body: Body) -> tuple[int, float]:
+    """Return the free node that is deepest in geom `g`, and how deep [m]."""
+    deepest, found = 0.0, 0
+    for node in range(body.n_nodes):
+        depth = -distance_to(geoms, g, vec3(body.positions, node)).distance
+        if depth > deepest and not body.fixed[node]:
+            deepest, found = depth, node
+    return found, deepest

@@ -1,0 +1,202 @@
+"""Contact with geoms after a substep: the forces that keep nodes and faces outside, and hold them.
+
+A substep moves the tissue with the forces of the last one. Then each contact gets the change of its
+impulse that lets its point move no further into the geom, and within Coulomb's cone not along it
+either. What rests is so in exact balance from then on, what slides is braked by the friction
+coefficient times the pressure, and no stiffness of contact is chosen or limits the step. A
+point that is inside all the same is put onto the surface.
+
+Where nodes belong to several contacts these are solved together, by Gauss and Seidel's method.
+
+Sources: Belytschko, Liu and Moran (2000), Nonlinear finite elements for continua and structures,
+section 10.4, for contact as a correction of explicit steps; Moreau (1988), Unilateral contact and
+dry friction in finite freedom dynamics, for impacts and friction in terms of velocities.
+"""
+
+from typing import Final
+
+from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts
+from tissue.contact.geoms.geom_motion import (
+    geom_motion_at,
+    place_geoms,
+    to_geom,
+    turned_from_geom,
+)
+from tissue.contact.geoms.held_forces import note_velocities, push, weighted
+from tissue.contact.geoms.signed_distance import distance_to
+from tissue.core.jit import kernel
+from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
+from tissue.mesh.body import Body
+
+_SWEEPS: Final = 8
+"""Sweeps over contacts that share nodes. Fewer: a face that is pressed between its nodes sinks in
+by some percent of what it moves in a substep; more: time for nothing that shows."""
+
+_PUSH_OF_FACE: Final = 0.3
+"""Share of its depth by which a face is put out of a geom in a substep; a node is so wholly. Faces
+that meet under a sharp geom are pushed in different directions. Larger: each undoes what the others
+did, which is work on the tissue; smaller: a thin rod that is pressed into a coarse mesh sinks."""
+
+_SLIDING: Final = 1.0 - 1e-9
+"""Share of the limit of friction above which a contact slides: the rest is rounding."""
+
+
+@kernel
+def end_geom_substep(
+    contacts: GeomContacts, body: Body, seconds: float, when: float, dt: float
+) -> None:
+    """Correct forces, velocities and positions after a substep.
+
+    Args:
+        contacts: Written.
+        body: Velocities and positions are written.
+        seconds: Length of the substep [s].
+        when: Its end, as a fraction of the time step.
+        dt: Length of the time step [s].
+    """
+    rows = range(contacts.first, contacts.first + contacts.n_contacts)
+    place_geoms(contacts.geoms, when)
+    for c in rows:
+        _locate(contacts, body, c, seconds, dt)
+    _note_resistances(contacts, body, seconds)
+    n_sweeps = _SWEEPS if contacts.are_coupled == 1 else 1
+    # First positions: the velocities still tell with which forces the tissue resists.
+    for _ in range(n_sweeps):
+        for c in rows:
+            _push_out(contacts, body, c)
+    for _ in range(n_sweeps):
+        for c in rows:
+            _correct_impulse(contacts, body, c, seconds, dt)
+    for c in rows:
+        _hold(contacts, body, c)
+        note_velocities(contacts, body, c)
+
+
+@kernel
+def _locate(contacts: GeomContacts, body: Body, c: int, seconds: float, dt: float) -> None:
+    """Find where contact `c` is, how far from the geom, and in which direction that pushes.
+
+    A face is pushed along its own normal, as it was listed: at its deepest point, where the geom
+    would touch it, that is the normal of the geom. Anywhere else a small ball would push a point
+    aside, off which it then slides, and a box would, near an edge, out to the side.
+    """
+    point = weighted(contacts, c, body.positions)
+    found = distance_to(contacts.geoms, contacts.geom[c], point)
+    contacts.gap[c] = found.distance + contacts.slop[c]
+    if contacts.face[c] == NODE_CONTACT:
+        store(contacts.normal, c, found.normal)
+    store(contacts.point, c, point)
+    contacts.mobility[c] = 0.0
+    force, motion = vec3(contacts.force, c), geom_motion_at(contacts.geoms, contacts.geom[c], point)
+    relative = axpy(-1.0 / dt, motion, weighted(contacts, c, body.velocities))
+    # Twice the way: contacts beside may push the point this way.
+    if dot(force, force) > 0.0 or contacts.gap[c] <= 2.0 * seconds * norm(relative):
+        contacts.mobility[c] = _mobility(contacts, body, c)
+
+
+@kernel
+def _note_resistances(contacts: GeomContacts, body: Body, seconds: float) -> None:
+    """Note with which forces the rest of the tissue acted on the nodes of contacts."""
+    rows, resistance = (
+        range(contacts.first, contacts.first + contacts.n_contacts),
+        contacts.resistance,
+    )
+    for c in rows:
+        for q in range(3):
+            node = contacts.node[c, q]
+            change = sub(vec3(body.velocities, node), vec3(contacts.velocity, node))
+            store(resistance, node, scale(body.masses[node] / seconds, change))
+    for c in rows:
+        for q in range(3):
+            node, weight = contacts.node[c, q], contacts.weight[c, q]
+            held = axpy(-weight, vec3(contacts.force, c), vec3(resistance, node))
+            store(resistance, node, held)
+
+
+@kernel
+def _mobility(contacts: GeomContacts, body: Body, c: int) -> float:
+    """Return by how much an impulse changes the velocity of the point of contact `c` [1/kg]."""
+    total = 0.0
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if not body.fixed[node]:
+            total += weight * weight / body.masses[node]
+    return total
+
+
+@kernel
+def _correct_impulse(contacts: GeomContacts, body: Body, c: int, seconds: float, dt: float) -> None:
+    """Change the force of contact `c` so that its point does not move into the geom or along it."""
+    mobility, gap = contacts.mobility[c], contacts.gap[c]
+    before = vec3(contacts.force, c)
+    if mobility == 0.0:
+        return
+    normal, x = vec3(contacts.normal, c), vec3(contacts.point, c)
+    v = weighted(contacts, c, body.velocities)
+    relative = axpy(-1.0 / dt, geom_motion_at(contacts.geoms, contacts.geom[c], x), v)
+    approach = dot(normal, relative)
+    per_force = seconds * mobility
+    # What is not there yet may come as near in the next substep as it is now.
+    most = max(gap, 0.0) / seconds
+    press = max(dot(normal, before) - (approach + most) / per_force, 0.0)
+    along = axpy(-approach, normal, relative)
+    pull = axpy(-dot(normal, before), normal, before)
+    pull = axpy(-1.0 / per_force, along, pull)
+    limit, length = contacts.geoms.friction[contacts.geom[c]] * press, norm(pull)
+    if length > limit:
+        pull = scale(limit / length, pull)
+    now = axpy(press, normal, pull)
+    store(contacts.force, c, now)
+    change = scale(seconds, sub(now, before))
+    push(contacts, c, change, x, axpy(0.5 * mobility, change, v), dt)
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if weight != 0.0 and not body.fixed[node]:
+            moved = axpy(weight / body.masses[node], change, vec3(body.velocities, node))
+            store(body.velocities, node, moved)
+
+
+@kernel
+def _push_out(contacts: GeomContacts, body: Body, c: int) -> None:
+    """Put the point of contact `c` onto the surface, if it is inside."""
+    mobility = contacts.mobility[c]
+    if mobility == 0.0:
+        return
+    normal = vec3(contacts.normal, c)
+    moved = sub(weighted(contacts, c, body.positions), vec3(contacts.point, c))
+    gap = contacts.gap[c] + dot(normal, moved)
+    if gap < 0.0:
+        share = 1.0 if contacts.face[c] == NODE_CONTACT else _PUSH_OF_FACE
+        _move(contacts, body, c, scale(-share * gap / mobility, normal))
+
+
+@kernel
+def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
+    """Take a point that sticks back to its anchor, and let the anchor of one that slides follow."""
+    geoms, g, mobility = contacts.geoms, contacts.geom[c], contacts.mobility[c]
+    force, normal = vec3(contacts.force, c), vec3(contacts.normal, c)
+    x, press = weighted(contacts, c, body.positions), dot(force, normal)
+    if press <= 0.0 or mobility == 0.0:
+        contacts.is_held[c] = 0
+        return
+    pull = norm(axpy(-press, normal, force))
+    sticks = pull < _SLIDING * geoms.friction[g] * press
+    if sticks and contacts.is_held[c] == 1:
+        anchor = turned_from_geom(geoms.axes, g, vec3(contacts.anchor, c))
+        back = sub(add(vec3(geoms.origin, g), anchor), x)
+        back = axpy(-dot(back, normal), normal, back)
+        _move(contacts, body, c, scale(1.0 / mobility, back))
+    else:
+        contacts.is_held[c] = 1
+        store(contacts.anchor, c, to_geom(geoms, g, x))
+
+
+@kernel
+def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
+    """Move the nodes of contact `c` by a vector over their masses [kg m]; count the work."""
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if weight != 0.0 and not body.fixed[node]:
+            way = scale(weight / body.masses[node], by)
+            store(body.positions, node, add(vec3(body.positions, node), way))
+            contacts.dissipated += dot(vec3(contacts.resistance, node), way)
