@@ -7,6 +7,7 @@ from .collision.collisions import Collisions as Collisions
 from .collision.fixtures import Fixture as Fixture
 from .collision.fixtures import FixtureBox as FixtureBox
 from .collision.fixtures import FixtureMesh as FixtureMesh
+from .collision.near_geoms import NearGeoms as NearGeoms
 from .counters import Counters as Counters
 from .coupling.coupling import MAX_PLAUSIBLE_FORCE as MAX_PLAUSIBLE_FORCE
 from .coupling.coupling import MAX_PLAUSIBLE_TORQUE as MAX_PLAUSIBLE_TORQUE
@@ -45,6 +46,7 @@ __all__ = [
     "MAX_FRAMES_PER_ANSWER",
     "MAX_PLAUSIBLE_FORCE",
     "MAX_PLAUSIBLE_TORQUE",
+    "NearGeoms",
     "PassivityCounters",
     "SIZES_PER_SHAPE",
     "TcpLink",

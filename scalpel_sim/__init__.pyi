@@ -1,4 +1,5 @@
 from .arm.blade import Blade as Blade
+from .arm.geom_coupling import GeomCoupling as GeomCoupling
 from .arm.grip import Grip as Grip
 from .arm.scalpel import SCALPEL as SCALPEL
 from .preparation import prepare as prepare
@@ -11,6 +12,7 @@ from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
     "Blade",
+    "GeomCoupling",
     "Grip",
     "SCALPEL",
     "SCENES",

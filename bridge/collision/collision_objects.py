@@ -51,6 +51,11 @@ class Obstacles:
         self._manager.registerObjects([obstacle for _, obstacle in objects.values()])
         self._manager.setup()
 
+    def update(self) -> None:
+        """Take where the objects are now; whoever moves them calls this."""
+        if self._objects:
+            self._manager.update()
+
     def colliding_with(self, other: fcl.CollisionObject) -> tuple[str, ...]:
         """Return the names of the obstacles that collide with another object, in order."""
         if not self._objects:
