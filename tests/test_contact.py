@@ -7,7 +7,16 @@ import pytest
 
 from tests import bodies, strokes
 from tests.materials import SPRINGS
-from tissue import Material, Snapshot, SolverSettings, TetrahedralMesh, Tissue, block
+from tissue import (
+    FloatArray,
+    IntArray,
+    Material,
+    Snapshot,
+    SolverSettings,
+    TetrahedralMesh,
+    Tissue,
+    block,
+)
 from tissue.contact.resolve import note_all_positions
 from tissue.contact.state import FACES_CHANGED
 from tissue.elasticity.internal_forces import elastic_energy
@@ -37,32 +46,37 @@ def joined(first: TetrahedralMesh, second: TetrahedralMesh, offset) -> Tetrahedr
     )
 
 
-def overlap_depth(body: Snapshot) -> float:
-    """Return the deepest penetration of a node of one piece into another [m], testing every pair.
+def overlap_depths(body: Snapshot, part: IntArray) -> FloatArray:
+    """Return how deep each node that is in another part lies in it [m], testing every pair.
 
-    The depth of a node in a tetrahedron of another piece is its distance from the surface of that
-    piece, approximated by the nearest plane of a boundary face.
+    The depth of a node in a tetrahedron of another part is its distance from the surface of that
+    part, approximated by the nearest plane of a boundary face. `part` is that of each tetrahedron.
     """
-    piece = piece_of_tetrahedra(body)
     of_node = np.zeros(len(body.positions), dtype=np.int64)
-    of_node[body.tetrahedra] = piece[:, None]
+    of_node[body.tetrahedra] = part[:, None]
     corners = body.positions[body.tetrahedra]
     to_weights = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
-    faces = np.sort(body.tetrahedra[:, OUTWARD].reshape(-1, 3), axis=1)
+    nodes = body.tetrahedra[:, OUTWARD].reshape(-1, 3)
+    faces = np.column_stack([np.repeat(part, 4), np.sort(nodes, axis=1)])
     _, same, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
-    boundary = body.tetrahedra[:, OUTWARD].reshape(-1, 3)[count[same.ravel()] == 1]
+    boundary = nodes[count[same.ravel()] == 1]
     a, b, c = (body.positions[boundary[:, k]] for k in range(3))
     normals = np.cross(b - a, c - a)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    worst = 0.0
+    depths = []
     for node, p in enumerate(body.positions):
         w = np.einsum("tij,tj->ti", to_weights, p - corners[:, 0])
-        inside = (w.min(axis=1) > 0.0) & (w.sum(axis=1) < 1.0) & (piece != of_node[node])
+        inside = (w.min(axis=1) > 0.0) & (w.sum(axis=1) < 1.0) & (part != of_node[node])
         if inside.any():
-            other = of_node[boundary[:, 0]] == piece[inside][0]
+            other = of_node[boundary[:, 0]] == part[inside][0]
             below = -((p - a[other]) * normals[other]).sum(axis=1)
-            worst = max(worst, float(below[below > 0.0].min()))
-    return worst
+            depths.append(below[below > 0.0].min())
+    return np.array(depths)
+
+
+def overlap_depth(body: Snapshot) -> float:
+    """Return the deepest penetration of a node of one piece into another [m]."""
+    return float(overlap_depths(body, piece_of_tetrahedra(body)).max(initial=0.0))
 
 
 def speed(tissue: Tissue) -> float:

@@ -44,10 +44,10 @@ def test_two_blocks_pressed_together_with_1_n_hold_and_come_to_rest(beside):
     assert tissue.pieces()[1 if tissue.pieces()[0].is_held else 0].centre[2] > 1.39 * SLAB[2]
 
 
-def move_upper(tissue: Tissue, along: float) -> None:
-    """Move the upper of two blocks sideways [m]."""
+def lift(tissue: Tissue, by: float) -> None:
+    """Lift the upper of two blocks [m]."""
     body, n = tissue._body, tissue.n_nodes
-    body.positions[:n][body.rest[:n, 2] > SLAB[2] + 0.5e-3, 0] += along
+    body.positions[:n][body.rest[:n, 2] > SLAB[2] + 0.5e-3, 2] += by
 
 
 def test_what_is_no_longer_found_lets_go_little_by_little():
@@ -55,7 +55,7 @@ def test_what_is_no_longer_found_lets_go_little_by_little():
     tissue = pressed_blocks()
     for _ in range(500):
         before = tissue.step(None, strokes.DT).body_contacts.force
-    move_upper(tissue, 0.2)
+    lift(tissue, ELEMENT)
     forces = [tissue.step(None, strokes.DT).body_contacts.force for _ in range(20)]
     assert 0.6 * before < forces[0] < before
     assert np.all(np.diff(forces) <= 0.0)
@@ -67,9 +67,9 @@ def test_what_is_found_again_goes_on_with_the_force_that_fades():
     tissue = pressed_blocks()
     for _ in range(500):
         before = tissue.step(None, strokes.DT).body_contacts.force
-    move_upper(tissue, 0.2)
+    lift(tissue, ELEMENT)
     tissue.step(None, strokes.DT)
-    move_upper(tissue, -0.2)
+    lift(tissue, -ELEMENT)
     for _ in range(2):
         assert tissue.step(None, strokes.DT).body_contacts.force > 0.4 * before
     assert tissue._system.contact.forces.n_fading == 0

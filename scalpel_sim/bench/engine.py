@@ -6,7 +6,8 @@ import numpy as np
 
 from scalpel_sim.bench.blocks import held_nodes, jittered_block
 from tissue import FloatArray, Law, Material, SolverSettings, TetrahedralMesh, Tissue
-from tissue.contact.penalty.contact_forces import add_contact_forces, end_contact_substep
+from tissue.contact.penalty.contact_forces import add_contact_forces
+from tissue.contact.penalty.contact_work import end_contact_substep
 from tissue.contact.penalty.penalty_contact import PenaltyContact
 from tissue.core.jit import kernel
 from tissue.core.simd import WIDTH, lanes, load_lanes, store_lanes

@@ -22,6 +22,11 @@ class Contact(Protocol):
         """Whether there is anything that could touch."""
         ...
 
+    @property
+    def is_touching(self) -> bool:
+        """Whether there were contacts in the last step, or some are kept ready."""
+        ...
+
     def wakes(self, body: Body) -> bool:
         """Look whether there is anything that could touch now."""
         ...

@@ -126,6 +126,11 @@ class SelfContact:
         """Whether there is anything that could touch."""
         return bool(self.arrays.is_awake)
 
+    @property
+    def is_touching(self) -> bool:
+        """Whether there were contacts in the last step."""
+        return bool(self.arrays.contacts.n_contacts > 0)
+
     def wakes(self, body: Body) -> bool:
         """Return `is_awake`: folds are not looked for."""
         return self.is_awake
@@ -150,20 +155,17 @@ class SelfContact:
         )
 
     def mesh_changed(self, body: Body, change: Change) -> None:
-        """Add the faces that a pass of a cut made.
-
-        The lips of the first incision do not touch before it ends: the blade is between them.
-        """
+        """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
         arrays = self.arrays
         faces = with_room(arrays.faces, 4 * change.n_dirty)
         update_changed_faces(faces, body, change)
         arrays.stale = max(arrays.stale, FACES_CHANGED)
         if faces is not arrays.faces:
             self.arrays = arrays.replaced(faces=faces)
+        self.arrays.is_awake |= faces.n_places > 0
 
     def incision_ended(self, body: Body) -> None:
-        """Let the lips of the incision touch; where the body is in pieces now, their skin too."""
-        self.arrays.is_awake |= self.arrays.faces.n_places > 0
+        """Let the skin of pieces touch, where the body is in pieces now."""
         self._find_pieces(body)
 
     def _find_pieces(self, body: Body) -> None:

@@ -159,7 +159,7 @@ def _take_steps(stepper: GlobalStepper, system: System, edge: Edge, rate: float)
         part = Increment(edge, dt, i / STEPS_BETWEEN_LOOKS, (i + 1) / STEPS_BETWEEN_LOOKS)
         stepper.take_steps(system, part, 1)
     system.relax_stress(math.inf)
-    if contact.is_awake:  # what holds a body on the floor is not in its forces
+    if contact.is_touching:  # what holds a body on the floor is not in its forces
         return Look((velocities - velocities_t0) / step, highest)
     found = system.stages.a1
     accelerations(system.context, found)
@@ -208,7 +208,7 @@ class _Watch:
         if taken % STEPS_TO_STAY == 0:
             self._expect_near()
         contact = self._system.contact
-        if contact.is_awake and isinstance(contact, SelfContact):
+        if contact.is_touching and isinstance(contact, SelfContact):
             return taken % STEPS_TO_STAY == 0 and self._has_stayed()
         is_rounding = largest < self._rounding(look.frequency_squared)
         self._n_quiet = self._n_quiet + 1 if is_rounding else 0

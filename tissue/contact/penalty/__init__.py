@@ -5,8 +5,10 @@ In the order in which they are best read:
     penalty_contact    owns the arrays
     search             the stages of a search
     contact_forces     contacts as springs with friction, evaluated with all other forces
+    contact_work       what slides slides on after a substep, and work is counted
     eight_contacts     vectors of eight contacts
     line_of_action     where a force acts, so that it and its reaction turn nothing
+    couples            what takes their torque where there is no such place
     stiffness          stiffness by mass splitting, and offsets that keep forces continuous
     contact_list       one contact for each direction in which a node is pushed
     ridge_contacts     one contact for each pair of ridges that cross

@@ -8,7 +8,8 @@ and the floor. With the weights w of its nodes, its gap is g = n . sum(w_i x_i),
     t = k (s + tau v_t), no longer than mu k d          friction, against the stretch s and sliding
 
 The weights of two sides add up to zero, so what one side gets the other gives; the force acts with
-weights that put it and its reaction on one line (`line_of_action`). Friction is a spring
+weights that put it and its reaction on one line (`line_of_action`), and where there is none a
+couple takes what they turn (`couples`). Friction is a spring
 that begins at an anchor; where it pulls with more than Coulomb's limit, the anchor follows at the
 end of the substep, so that within a substep forces depend on positions and velocities alone.
 
@@ -16,8 +17,11 @@ Source: Cundall and Strack (1979), A discrete numerical model for granular assem
 springs with friction.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
+from tissue.contact.penalty.couples import Couples, add_couple, new_couples
 from tissue.contact.penalty.eight_contacts import (
     combined,
     four_of,
@@ -30,16 +34,25 @@ from tissue.contact.penalty.eight_contacts import (
 from tissue.contact.penalty.line_of_action import weights_on_line
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import inlined, kernel
-from tissue.core.simd import WIDTH, filled, lanes, load_lanes, store_lanes
-from tissue.core.simd_blocks import sum_of_lanes
-from tissue.core.simd_gather import larger, larger_bits, largest, where_larger
+from tissue.core.simd import WIDTH, filled, lanes, load_lanes
+from tissue.core.simd_gather import larger, larger_bits, where_larger
 from tissue.core.simd_rows import (
     add_to_row,
     store_rows_of_four,
     store_rows_of_three,
 )
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3, add, axpy, dot, scale, store, sub, vec3
+from tissue.core.vec3 import Vec3, axpy, cross, dot, scale, store, sub, vec3
+
+
+class _Bits(NamedTuple):
+    """Bits of eight contacts."""
+
+    pressing: int
+    """Which press."""
+    turning: int
+    """Which of these need a couple."""
+
 
 HANDED_ON = -1.0
 """Value of `PenaltyForces.push` where a contact of the next list goes on with the force."""
@@ -108,6 +121,8 @@ class PenaltyForces(Arrays):
     velocity: FloatArray
     """sum(w_i v_i) as a contact began to push in this substep [m/s], with the weights `spread`;
     shape (2 * capacity, 3)."""
+    couples: Couples
+    """What keeps forces from turning the body where they are on no line with their reaction."""
     acting: FloatArray
     """Scratch: the forces of eight contacts, and their pressures [N]; shape (8, 4)."""
     place: FloatArray
@@ -142,6 +157,7 @@ def new_penalty_forces(capacity: int, friction: float, retardation_time: float) 
         **{name: np.zeros(rows) for name in of_floats},
         **{name: np.zeros((rows, 3)) for name in ("anchor", "impulse", "velocity")},
         damping_time=np.full(rows, float(retardation_time)),
+        couples=new_couples(rows),
         acting=np.zeros((WIDTH, 4)),
         place=np.arange(float(WIDTH)),
         friction=float(friction),
@@ -234,16 +250,19 @@ def add_contact_forces(
     end = forces.first + forces.n_contacts
     forces.has_acted = 1
     for c in range(forces.first, end, WIDTH):
-        pressing = _eight_forces(forces, positions, velocities, seconds, c)
-        if pressing != 0:
-            _add_eight(forces, c, min(end - c, WIDTH), pressing, seconds, external)
+        n, bits = min(end - c, WIDTH), _eight_forces(forces, positions, velocities, seconds, c)
+        if bits.pressing == 0:
+            continue
+        _add_eight(forces, c, n, bits.pressing, seconds, external)
+        if bits.turning != 0:
+            _add_couples(forces, positions, velocities, (c, n, bits.turning), seconds, external)
 
 
 @inlined
 def _eight_forces(
     forces: PenaltyForces, positions: FloatArray, velocities: FloatArray, seconds: float, c: int
-) -> int:
-    """Compute the forces of eight contacts, and add up their impulses; return bits for which press.
+) -> _Bits:
+    """Compute the forces of eight contacts, and add up their impulses; return which press.
 
     Args:
         forces: `spread`, `acting`, `impulse` and `velocity` are written.
@@ -258,7 +277,7 @@ def _eight_forces(
     along = dot(normal, across)
     free = load_lanes(forces.offset, c) + load_lanes(forces.height, c) - along
     if larger_bits(free, zero) == 0:
-        return 0
+        return _Bits(0, 0)
     depth = smaller(free, load_lanes(forces.largest_depth, c))
     k, v = load_lanes(forces.stiffness, c), points_of_contacts(forces.node, velocities, c)
     velocity = combined(w, v)
@@ -271,8 +290,8 @@ def _eight_forces(
     total = axpy(force, normal, scale(zero - share * k, pull))
     is_acting = where_larger(free, zero, dot(total, total), zero)
     found = weights_on_line(x, w, total)
-    now, last = combined(found, v), four_of(forces.spread, c)
-    spread = where_positive(is_acting, found, last)
+    now, last = combined(found.weights, v), four_of(forces.spread, c)
+    spread = where_positive(is_acting, found.weights, last)
     before = three_of(forces.impulse, c)
     began = three_of(forces.velocity, c)
     has_begun, weight = dot(before, before), where_larger(is_acting, zero, lanes(seconds), zero)
@@ -286,7 +305,8 @@ def _eight_forces(
     store_rows_of_three(forces.impulse, c, after.x, after.y, after.z)
     store_rows_of_three(forces.velocity, c, began.x, began.y, began.z)
     store_rows_of_four(forces.acting, 0, total.x, total.y, total.z, force)
-    return larger_bits(is_acting, zero)
+    pressing = larger_bits(is_acting, zero)
+    return _Bits(pressing, pressing & found.turning)
 
 
 @inlined
@@ -318,70 +338,31 @@ def _add_eight(
 
 
 @kernel
-def end_contact_substep(
-    forces: PenaltyForces, positions: FloatArray, velocities: FloatArray, external: FloatArray
+def _add_couples(
+    forces: PenaltyForces,
+    positions: FloatArray,
+    velocities: FloatArray,
+    eight: tuple[int, int, int],
+    seconds: float,
+    external: FloatArray,
 ) -> None:
-    """Let anchors follow what slides; count work, and note forces and energies after a substep.
-
-    The work is the impulse times the mean of the velocities before and after: that is by what it
-    changed the kinetic energy, however long the substep.
+    """Add the couples of those of eight contacts that need one to the forces on the nodes.
 
     Args:
-        forces: Written.
-        positions: Positions of the nodes [m], as `points_of_column` reads them.
-        velocities: Their velocities [m/s], alike.
-        external: Forces on the nodes [N], shape (capacity, 3); those of contact are cleared.
+        forces: `couples` is written.
+        positions: Positions of the nodes [m].
+        velocities: Their velocities [m/s].
+        eight: The first contact, how many of the eight there are, and bits for which need one.
+        seconds: Weight of this evaluation in the integral over time [s].
+        external: Forces on the nodes [N]; written.
     """
-    clear_contact_forces(forces, external)
-    forces.stored, forces.n_pressing = 0.0, 0
-    end = forces.first + forces.n_contacts
-    for c in range(forces.first, end, WIDTH):
-        _end_eight(forces, positions, velocities, c, min(end - c, WIDTH))
-
-
-@inlined
-def _end_eight(
-    forces: PenaltyForces, positions: FloatArray, velocities: FloatArray, c: int, n: int
-) -> None:
-    """End a substep for eight contacts, of which `n` are there, from `c` on."""
-    zero, half, w = lanes(0.0), lanes(0.5), four_of(forces.weight, c)
-    across, normal = (
-        combined(w, points_of_contacts(forces.node, positions, c)),
-        three_of(forces.normal, c),
-    )
-    along, height = dot(normal, across), load_lanes(forces.height, c)
-    is_there = lanes(float(n)) - load_lanes(forces.place, 0)
-    free = where_larger(is_there, zero, load_lanes(forces.offset, c) + height - along, zero)
-    pressing = larger_bits(free, zero)
-    tangential = axpy(zero - along, normal, across)
-    anchor = three_of(forces.anchor, c)
-    depth = smaller(free, load_lanes(forces.largest_depth, c))
-    k = where_larger(free, zero, load_lanes(forces.stiffness, c), zero)
-    stretch = sub(tangential, anchor)
-    share, one = share_within(lanes(forces.friction) * depth, stretch), lanes(1.0)
-    stretch = scale(share, stretch)
-    slid = sub(tangential, stretch)
-    # What has let go is slack where it is; what holds keeps its anchor to the last bit.
-    anchor = Vec3(
-        where_larger(free, zero, where_larger(one, share, slid.x, anchor.x), tangential.x),
-        where_larger(free, zero, where_larger(one, share, slid.y, anchor.y), tangential.y),
-        where_larger(free, zero, where_larger(one, share, slid.z, anchor.z), tangential.z),
-    )
-    store_rows_of_three(forces.anchor, c, anchor.x, anchor.y, anchor.z)
-    store_lanes(forces.push, c, k * depth)
-    before = three_of(forces.impulse, c)
-    has_begun = where_larger(is_there, zero, dot(before, before), zero)
-    if larger_bits(has_begun, zero) != 0:
-        v, began = points_of_contacts(forces.node, velocities, c), three_of(forces.velocity, c)
-        both = add(began, combined(four_of(forces.spread, c), v))
-        work = where_larger(has_begun, zero, half * dot(before, both), zero)
-        forces.work += sum_of_lanes(work)
-    store_rows_of_three(forces.impulse, c, zero, zero, zero)
-    if pressing == 0:
-        return
-    held = depth * (free - half * depth) + half * dot(stretch, stretch)
-    forces.stored += sum_of_lanes(where_larger(free, zero, k * held, zero))
-    deepest = largest(where_larger(free, zero, height - along, zero))
-    forces.penetration = max(forces.penetration, deepest)
+    first, n, turning = eight
     for i in range(n):
-        forces.n_pressing += pressing >> i & 1
+        if turning >> i & 1 == 0:
+            continue
+        c, across = first + i, Vec3(0.0, 0.0, 0.0)
+        for q in range(4):
+            across = axpy(forces.spread[c, q], vec3(positions, forces.node[c, q]), across)
+        force = Vec3(forces.acting[i, 0], forces.acting[i, 1], forces.acting[i, 2])
+        torque = cross(across, force)
+        add_couple(forces.couples, forces.node, c, torque, positions, velocities, seconds, external)

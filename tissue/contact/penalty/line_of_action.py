@@ -5,30 +5,52 @@ overlap. A force on a node and the opposite one on the listed point of a face ar
 parallel lines, and make a torque. So a force acts where its own line meets the face; between two
 ridges, where its line meets both.
 
+The line of a force that is nearly along the face, or of a deep overlap beside a small face, meets
+it far away or nowhere. So a weight leaves the listed one by `_LARGEST_SHIFT` at most: what asks for
+n times that shift gets 1 / n of it, and nothing jumps where the line meets no face. The torque that
+is left is taken by a couple (`couples.py`).
+
 Eight contacts at a time: each number is a vector of eight.
 """
 
-from tissue.contact.penalty.eight_contacts import Four, FourPoints
-from tissue.core.jit import inlined
-from tissue.core.simd import WIDTH, Lanes, lanes
-from tissue.core.simd_gather import larger, larger_bits, where_larger
-from tissue.core.vec3 import Vec3, axpy, cross, dot, sub
+from typing import NamedTuple
 
-_STEEPEST = 0.2
-"""Cosine between a force and the normal of the face, or of the plane along both ridges, below which
-the line of the force meets them nowhere near. It then acts at the listed points."""
+from tissue.contact.penalty.eight_contacts import Four, FourPoints, combined
+from tissue.core.jit import inlined
+from tissue.core.simd import Lanes, lanes
+from tissue.core.simd_gather import larger, larger_bits, where_larger
+from tissue.core.vec3 import Vec3, axpy, cross, dot, scale, sub
 
 _LARGEST_SHIFT = 0.3
 """By how much a weight may differ from the listed one. More: deep overlaps act far from where they
-are; the stable step is that of the listed weights."""
+are; the stable step is that of the listed weights. Less: more is left to couples."""
 
-ALL = (1 << WIDTH) - 1
-"""Bits of all contacts of eight."""
+_TINY = 1e-300
+"""Stands for 0 where it divides."""
+
+
+class _Shift(NamedTuple):
+    """How far the points of a contact are from the line of its force: `p / per` and `q / per`."""
+
+    p: Lanes
+    """Shift of the second weight of a face, or of the point on the first ridge; times `per`."""
+    q: Lanes
+    """Shift of the third weight of a face, or of the point on the second ridge; times `per`."""
+    per: Lanes
+
+
+class OnLine(NamedTuple):
+    """Where the forces of eight contacts act."""
+
+    weights: Four
+    """Weights of the nodes; those of each contact add up to what the listed ones do."""
+    turning: int
+    """Bits for the contacts whose force and reaction are still on two lines."""
 
 
 @inlined
-def weights_on_line(x: FourPoints, listed: Four, force: Vec3) -> Four:
-    """Return the weights of the nodes for forces that turn nothing.
+def weights_on_line(x: FourPoints, listed: Four, force: Vec3) -> OnLine:
+    """Return the weights of the nodes for forces that turn nothing, as far as there are any.
 
     Args:
         x: Positions of the nodes [m].
@@ -36,77 +58,63 @@ def weights_on_line(x: FourPoints, listed: Four, force: Vec3) -> Four:
             face, and for a node and the floor, whose four nodes are one.
         force: The force on the side of the positive weights [N]; of any length.
     """
-    one = lanes(1.0)
+    zero, one = lanes(0.0), lanes(1.0)
+    across = combined(listed, x)
     is_ridge = larger_bits(one, listed.a)
-    if is_ridge == 0:
-        return _if_near(_of_node_and_face(x, force), listed)
-    if is_ridge == ALL:
-        return _if_near(_of_ridges(x, force), listed)
-    faces, ridges = _of_node_and_face(x, force), _of_ridges(x, force)
-    found = Four(
-        where_larger(one, listed.a, ridges.a, faces.a),
-        where_larger(one, listed.a, ridges.b, faces.b),
-        where_larger(one, listed.a, ridges.c, faces.c),
-        where_larger(one, listed.a, ridges.d, faces.d),
+    shift = _to_line_on_face(x, across, force)
+    if is_ridge != 0:
+        other = _to_line_of_ridges(x, across, force)
+        shift = _Shift(
+            where_larger(one, listed.a, other.p, shift.p),
+            where_larger(one, listed.a, other.q, shift.q),
+            where_larger(one, listed.a, other.per, shift.per),
+        )
+    most = larger(larger(_size(shift.p), _size(shift.q)), _size(shift.p + shift.q))
+    longest, square = lanes(1.0 / _LARGEST_SHIFT) * most, shift.per * shift.per
+    share = shift.per / larger(larger(square, longest * longest), lanes(_TINY))
+    p, q = share * shift.p, share * shift.q
+    on_face = Four(zero, p + q, zero - p, zero - q)
+    moved = Four(
+        where_larger(one, listed.a, zero - p, on_face.a),
+        where_larger(one, listed.a, p, on_face.b),
+        where_larger(one, listed.a, q, on_face.c),
+        where_larger(one, listed.a, zero - q, on_face.d),
     )
-    return _if_near(found, listed)
+    weights = Four(listed.a + moved.a, listed.b + moved.b, listed.c + moved.c, listed.d + moved.d)
+    # The floor is no node: it gives no reaction, and the weights add up to 1.
+    has_reaction = larger_bits(lanes(0.5), listed.a + listed.b + listed.c + listed.d)
+    return OnLine(weights, has_reaction & ~larger_bits(square, longest * longest))
 
 
 @inlined
-def _if_near(found: Four, listed: Four) -> Four:
-    """Return the weights that were found where they differ little from those listed, else these."""
-    shift = larger(
-        larger(_size(found.a - listed.a), _size(found.b - listed.b)),
-        larger(_size(found.c - listed.c), _size(found.d - listed.d)),
-    )
-    most = lanes(_LARGEST_SHIFT)
-    return Four(
-        where_larger(most, shift, found.a, listed.a),
-        where_larger(most, shift, found.b, listed.b),
-        where_larger(most, shift, found.c, listed.c),
-        where_larger(most, shift, found.d, listed.d),
-    )
-
-
-@inlined
-def _of_node_and_face(x: FourPoints, force: Vec3) -> Four:
-    """Return the weights of a node and of the point of a face on a line through the node."""
-    ab, ac, from_a = sub(x.c, x.b), sub(x.d, x.b), sub(x.a, x.b)
-    area = cross(ab, ac)
-    square, along = dot(area, area), dot(area, force)
-    # One division for two: it takes as long as ten products.
-    per_both = lanes(1.0) / (along * square)
-    at = axpy(lanes(0.0) - dot(area, from_a) * square * per_both, force, from_a)
-    per_square = along * per_both
-    wb, wc = dot(cross(at, ac), area) * per_square, dot(cross(ab, at), area) * per_square
-    nowhere = _is_shallow(along, square, force)
-    return Four(lanes(1.0), wb + wc - lanes(1.0) + nowhere, lanes(0.0) - wb, lanes(0.0) - wc)
-
-
-@inlined
-def _of_ridges(x: FourPoints, force: Vec3) -> Four:
-    """Return the weights of the points of the edges ab and cd on one line along a force."""
-    u, v, apart = sub(x.b, x.a), sub(x.d, x.c), sub(x.a, x.c)
-    across = cross(u, v)
-    along = dot(across, force)
-    per_along = lanes(-1.0) / along
-    s = dot(apart, cross(v, force)) * per_along
-    t = dot(apart, cross(u, force)) * per_along
-    nowhere = _is_shallow(along, dot(across, across), force)
-    return Four(lanes(1.0) - s, s + nowhere, t - lanes(1.0), lanes(0.0) - t)
-
-
-@inlined
-def _is_shallow(along: Lanes, square: Lanes, force: Vec3) -> Lanes:
-    """Return a huge number where the line of a force meets a plane nowhere near, else 0.
+def _to_line_on_face(x: FourPoints, across: Vec3, force: Vec3) -> _Shift:
+    """Return the way along the face to where the line of a force through the node meets it.
 
     Args:
-        along: Product of the force and a normal of the plane.
-        square: Squared length of that normal.
-        force: The force.
+        x: Positions of the node and the corners [m].
+        across: From the listed point of the face to the node [m].
+        force: The force [N].
     """
-    least = lanes(_STEEPEST * _STEEPEST) * square * dot(force, force)
-    return where_larger(along * along, least, lanes(0.0), lanes(1e9))
+    ab, ac = sub(x.c, x.b), sub(x.d, x.b)
+    area = cross(ab, ac)
+    along = dot(area, force)
+    way = axpy(lanes(0.0) - dot(area, across), force, scale(along, across))
+    p, q = dot(cross(way, ac), area), dot(cross(ab, way), area)
+    return _Shift(p, q, along * dot(area, area))
+
+
+@inlined
+def _to_line_of_ridges(x: FourPoints, across: Vec3, force: Vec3) -> _Shift:
+    """Return the ways along the edges ab and cd to where one line along a force meets both.
+
+    Args:
+        x: Positions of the ends of the edges [m].
+        across: From the listed point of the second edge to that of the first [m].
+        force: The force [N].
+    """
+    u, v, zero = sub(x.b, x.a), sub(x.d, x.c), lanes(0.0)
+    p, q = dot(across, cross(v, force)), dot(across, cross(u, force))
+    return _Shift(zero - p, zero - q, dot(cross(u, v), force))
 
 
 @inlined

@@ -18,11 +18,11 @@ from tissue.contact.faces import (
 )
 from tissue.contact.penalty.contact_forces import (
     clear_contact_totals,
-    end_contact_substep,
     grown_penalty_forces,
     new_penalty_forces,
 )
-from tissue.contact.penalty.contact_list import DIRECTIONS
+from tissue.contact.penalty.contact_list import DIRECTIONS, floor_changes
+from tissue.contact.penalty.contact_work import end_contact_substep
 from tissue.contact.penalty.folds import grown_folds, look_for_folds, new_folds
 from tissue.contact.penalty.near_pairs import grown_near_pairs, new_near_pairs
 from tissue.contact.penalty.node_ways import grown_node_ways, new_node_ways
@@ -61,6 +61,7 @@ CAPACITY_OF_PAIRS = 1 << 12
 
 
 _SEARCH, _FOLDS = SameTypes(search_contacts), SameTypes(look_for_folds)
+_NEARS_FLOOR = SameTypes(floor_changes)
 
 _NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, np.zeros(3))
 _NOTHING_TOUCHES.force_of_floor.setflags(write=False)  # many results share it
@@ -124,7 +125,7 @@ class PenaltyContact:
         )
         time = RETARDATION_TIME / np.sqrt(added)
         self.forces = new_penalty_forces(n_nodes, friction, time)
-        self._is_awake = floor is not None
+        self._is_awake = False
         self._is_searched = self._has_looked = False
         self._n_contacts = 0
         self._has_touched = False
@@ -136,18 +137,28 @@ class PenaltyContact:
         return self._is_awake
 
     @property
+    def is_touching(self) -> bool:
+        """Whether there are contacts; some are kept ready."""
+        return self._n_contacts > 0
+
+    @property
     def added_frequency_squared(self) -> float:
         """What contact adds at most to w^2 of the body [1/s2]."""
         return self._search.limits.added if self._n_contacts else 0.0
 
     def wakes(self, body: Body) -> bool:
-        """Look for folds, whose skin may touch itself; return whether anything could touch."""
+        """Look for folds, whose skin may touch itself, and whether the floor is near.
+
+        Returns:
+            Whether anything could touch.
+        """
         if not self._has_looked:
             self._has_looked = True
             search = self._search
             has_folds = _FOLDS.call(search.folds, search.ways, search.faces, body)
             if has_folds and not search.faces.has_skin:
                 self._take_skin(with_skin(search.faces, body))
+            self._is_awake = self._is_awake or _NEARS_FLOOR.call(search, body)
         return self._is_awake
 
     def begin(self) -> None:
@@ -211,19 +222,16 @@ class PenaltyContact:
         """Do nothing: contact depends on no position before a substep."""
 
     def mesh_changed(self, body: Body, change: Change) -> None:
-        """Add the faces that a pass of a cut made.
-
-        The lips of the first incision do not touch before it ends: the blade is between them.
-        """
+        """Add the faces that a pass of a cut made: lips touch as soon as they have parted."""
         faces = with_room(self._search.faces, 4 * change.n_dirty)
         update_changed_faces(faces, body, change)
         self._take_faces(faces)
         self._search.has_new_faces = self._search.is_listing_due = 1
         self._is_searched = False
+        self._is_awake = self._is_awake or faces.n_places > 0
 
     def incision_ended(self, body: Body) -> None:
-        """Let the lips of the incision touch; where the body is in pieces now, their skin too."""
-        self._is_awake = self._is_awake or self._search.faces.n_places > 0
+        """Let the skin of pieces touch, where the body is in pieces now."""
         self._search.recovered[:] = 0.0
         self._find_pieces(body)
 

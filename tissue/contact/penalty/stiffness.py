@@ -141,8 +141,8 @@ def split_masses(
     """Write the stiffness of every contact; what has a force keeps it by its offset.
 
     Args:
-        forces: Stiffness, damping, offset, greatest depth and anchors are written. `stiffness` is
-            as it was in the last list, or 0.
+        forces: Stiffness, damping, offset, greatest depth, anchors and masses are written.
+            `stiffness` is as it was in the last list, or 0.
         limits: How stiff contact may be.
         body: Masses and positions.
         frequency_squared: Bound on w^2 of each node without contact [1/s2], shape (capacity,).
@@ -155,6 +155,7 @@ def split_masses(
         softness, mobility, squared = 0.0, 0.0, 0.0
         for q in range(4):
             node, weight = forces.node[c, q], abs(forces.weight[c, q])
+            forces.couples.mass[c, q] = body.masses[node]
             room = max(limits.highest - frequency_squared[node], 0.0)
             added = limits.added + _ROOM_SHARE * room
             squared = max(squared, added)

@@ -7,10 +7,10 @@ from tests.tissue.contact.penalty.lists import FRICTION, random_contacts, stiffe
 from tissue.contact.penalty.contact_forces import (
     add_contact_forces,
     clear_contact_forces,
-    end_contact_substep,
     list_touching_nodes,
     new_penalty_forces,
 )
+from tissue.contact.penalty.contact_work import end_contact_substep
 
 pytestmark = pytest.mark.kernel
 

@@ -12,7 +12,7 @@ from tests.tissue.contact.penalty.lists import (
     random_contacts,
     stiffened,
 )
-from tissue.contact.penalty.contact_forces import end_contact_substep
+from tissue.contact.penalty.contact_work import end_contact_substep
 from tissue.contact.penalty.stiffness import (
     fade,
     limit_stiffness,
