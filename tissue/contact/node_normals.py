@@ -43,6 +43,13 @@ def update_normals(
 
 
 @kernel
+def area_at_rest(body: Body, a: int, b: int, c: int) -> Vec3:
+    """Return the normal of a triangle of nodes at rest, times twice its area [m2]."""
+    p = vec3(body.rest, a)
+    return cross(sub(vec3(body.rest, b), p), sub(vec3(body.rest, c), p))
+
+
+@kernel
 def has_inverted(inverted_step: IntArray, step: int, nodes: Nodes) -> bool:
     """Whether one of the nodes was seen at `step` to be of an inverted tetrahedron."""
     a, b, c, d = nodes

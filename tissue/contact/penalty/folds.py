@@ -1,12 +1,14 @@
-"""Folds: skin that has come near skin of the same piece that is far from it in the body at rest.
+"""Folds: skin that has come near skin of the same piece that is not beside it in the body at rest.
 
-A thin wall folds before the blade, and a flap may fold over. Such skin is asked for contacts; other
+A thin wall folds before the blade, and a flap may fold over: such skin is far apart at rest. The
+walls of a notch face each other at rest, however near they are. Both are asked for contacts; other
 skin of one piece cannot touch itself, and costs nothing.
 """
 
 import numpy as np
 
 from tissue.contact.faces import Faces
+from tissue.contact.node_normals import area_at_rest
 from tissue.contact.penalty.cells import (
     Cells,
     cells_in,
@@ -17,13 +19,14 @@ from tissue.contact.penalty.cells import (
     row_of,
     take_place,
 )
-from tissue.contact.penalty.node_ways import NodeWays
+from tissue.contact.penalty.node_ways import FLAT, FOLDED, NOTCHED, NodeWays
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
-from tissue.core.vec3 import dot, store, sub, vec3
+from tissue.core.vec3 import Vec3, add, dot, norm, store, sub, vec3
 from tissue.geometry.aabb import Aabb, empty_box, widened, with_point
 from tissue.mesh.body import OUTER, Body, grown
+from tissue.mesh.faces import OUTWARD
 
 NEAR = 3.0
 """Distance between nodes of skin from which on it may be a fold, per node size. An edge of a
@@ -33,6 +36,11 @@ touch."""
 APART = 8.0
 """Distance at rest above which it is a fold, per node size. Nodes that near are 6 node sizes apart
 at rest where the tissue is squeezed to half its length."""
+
+OPPOSITE = -0.5
+"""Cosine between normals at rest up to which skin faces other skin: the walls of a notch of less
+than 60 degrees. Larger: skin in the corners of a body is asked for nothing; smaller: the walls of
+a wedge go through each other."""
 
 WAY = 0.5
 """Way of a node after which folds are looked for again, per node size. Larger: two skins may be
@@ -61,6 +69,8 @@ class Folds(Arrays):
     """The nodes of the skin, shape (node capacity,)."""
     sorted: IntArray
     """The same in the order of their cells, shape (node capacity,)."""
+    outward: FloatArray
+    """Normal at each node of the skin at rest, weighted by area [m2]; shape (node capacity, 3)."""
     cells: Cells
 
 
@@ -75,6 +85,7 @@ def new_folds(n_nodes: int) -> Folds:
         seen_at=np.zeros(n_nodes, np.int64),
         skin=np.zeros(n_nodes, np.int64),
         sorted=np.zeros(n_nodes, np.int64),
+        outward=np.zeros((n_nodes, 3)),
         cells=new_cells(n_nodes),
     )
 
@@ -86,6 +97,7 @@ def grown_folds(folds: Folds, n_nodes: int) -> Folds:
         seen_at=grown(folds.seen_at, n_nodes),
         skin=np.zeros(n_nodes, np.int64),
         sorted=np.zeros(n_nodes, np.int64),
+        outward=np.zeros((n_nodes, 3)),
         cells=new_cells(n_nodes),
     )
 
@@ -126,7 +138,7 @@ def _is_due(folds: Folds, body: Body, way: float) -> bool:
 
 @kernel
 def _sort_skin(folds: Folds, body: Body, edge: float) -> None:
-    """List the nodes of the skin by cells of that edge [m]."""
+    """List the nodes of the skin by cells of that edge [m], and find their normals at rest."""
     folds.n_looks += 1
     folds.n_skin = 0
     box = empty_box()
@@ -134,13 +146,17 @@ def _sort_skin(folds: Folds, body: Body, edge: float) -> None:
         for f in range(4):
             if body.links[t, f] != OUTER:
                 continue
-            for k in range(4):
-                node = body.tetrahedra[t, k]
-                if k != f and folds.seen_at[node] != folds.n_looks:
+            i, j, k = OUTWARD[f, 0], OUTWARD[f, 1], OUTWARD[f, 2]
+            a, b, c = body.tetrahedra[t, i], body.tetrahedra[t, j], body.tetrahedra[t, k]
+            area = area_at_rest(body, a, b, c)
+            for node in (a, b, c):
+                if folds.seen_at[node] != folds.n_looks:
                     folds.seen_at[node] = folds.n_looks
                     folds.skin[folds.n_skin] = node
                     folds.n_skin += 1
                     box = with_point(box, vec3(body.positions, node))
+                    store(folds.outward, node, Vec3(0.0, 0.0, 0.0))
+                store(folds.outward, node, add(vec3(folds.outward, node), area))
     lay_cells(folds.cells, box, edge)
     for i in range(folds.n_skin):
         count_thing(folds.cells, i, vec3(body.positions, folds.skin[i]))
@@ -151,47 +167,60 @@ def _sort_skin(folds: Folds, body: Body, edge: float) -> None:
 
 @kernel
 def _mark_folds(folds: Folds, ways: NodeWays, faces: Faces, body: Body) -> bool:
-    """Mark the nodes of folds; return whether any mark is new, or none is left of one."""
+    """Mark the nodes of folds; return whether any mark has changed."""
     has_changed = False
     folds.n_folded = 0
-    near = NEAR * ways.node_size
     for i in range(folds.n_skin):
         node = folds.skin[i]
-        is_folded = _is_in_fold(folds, faces, body, node, near, APART * ways.node_size)
-        has_changed = has_changed or is_folded != (ways.is_folded[node] == 1)
-        ways.is_folded[node] = is_folded
-        folds.n_folded += is_folded
+        mark = _mark_of(folds, faces, body, node, ways.node_size)
+        has_changed = has_changed or mark != ways.is_folded[node]
+        ways.is_folded[node] = mark
+        folds.n_folded += mark != FLAT
     return has_changed
 
 
 @kernel
-def _is_in_fold(
-    folds: Folds, faces: Faces, body: Body, node: int, near: float, apart: float
-) -> bool:
-    """Whether a node is near another of the skin of its piece that is far from it at rest.
+def _mark_of(folds: Folds, faces: Faces, body: Body, node: int, size: float) -> int:
+    """Return FOLDED or NOTCHED where a node is near skin of its piece that may touch it, else FLAT.
 
     Args:
-        folds: The nodes of the skin, in cells.
+        folds: The nodes of the skin, in cells, and their normals.
         faces: The piece that each tetrahedron is in.
         body: Where the nodes are.
         node: The node.
-        near: How near the other is [m].
-        apart: How far it is at rest [m].
+        size: Mean node size [m].
     """
     p, rest, piece = vec3(body.positions, node), vec3(body.rest, node), _piece(faces, body, node)
+    near, apart, mark = NEAR * size, APART * size, FLAT
     within = cells_in(folds.cells, widened(Aabb(p, p), near))
     for z in range(within.z0, within.z1 + 1):
         for y in range(within.y0, within.y1 + 1):
             begin, end = row_of(folds.cells, within, y, z)
             for i in range(begin, end):
                 other = folds.sorted[i]
-                d = sub(vec3(body.rest, other), rest)
-                if dot(d, d) <= apart * apart:
-                    continue
                 d = sub(vec3(body.positions, other), p)
-                if dot(d, d) < near * near and not _are_apart(piece, _piece(faces, body, other)):
-                    return True
-    return False
+                if dot(d, d) >= near * near or _are_apart(piece, _piece(faces, body, other)):
+                    continue
+                d = sub(vec3(body.rest, other), rest)
+                if _is_across_notch(vec3(folds.outward, node), vec3(folds.outward, other), d):
+                    return NOTCHED
+                if dot(d, d) > apart * apart:
+                    mark = FOLDED
+    return mark
+
+
+@kernel
+def _is_across_notch(normal: Vec3, other: Vec3, d: Vec3) -> bool:
+    """Whether two nodes of skin face each other at rest, with nothing of the body between them.
+
+    Args:
+        normal: Normal of the one, of any length.
+        other: Normal of the other.
+        d: From the one to the other.
+    """
+    if not (dot(normal, d) > 0.0 and dot(other, d) < 0.0):
+        return False
+    return dot(normal, other) < OPPOSITE * norm(normal) * norm(other)
 
 
 @kernel

@@ -18,6 +18,10 @@ from tissue.mesh.body import Body, grown
 IN_BALL, OUT_OF_BALL, LOST = 0, 1, 2
 """Results of `measure_ways`: all nodes are in their balls; one is not; one moved by a metre."""
 
+FLAT, FOLDED, NOTCHED = 0, 1, 2
+"""Values of `NodeWays.is_folded`: skin that touches no skin of its piece; skin that has come near
+some that is far from it at rest; and skin near some that faces it at rest."""
+
 BALL = 0.125
 """Radius of the ball of a slow node, per node size. Larger: more pairs; smaller: they must be
 listed more often."""
@@ -70,8 +74,7 @@ class NodeWays(Arrays):
     moved_at: IntArray
     """Search in which each node last moved much, shape (node capacity,)."""
     is_folded: IntArray
-    """1 for a node of skin that has come near skin of its piece that is far from it at rest, else 0
-    (`folds`); shape (node capacity,)."""
+    """FLAT, FOLDED or NOTCHED, as `folds` finds it; shape (node capacity,)."""
     node_size: float
     """Mean node size [m]."""
 

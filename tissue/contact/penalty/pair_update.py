@@ -6,6 +6,7 @@ A cut, or a lip that the blade drags along, costs its neighbourhood and not the 
 import math
 
 from tissue.contact.faces import NO_FACE, Faces, is_face_of_cut
+from tissue.contact.node_normals import area_at_rest
 from tissue.contact.penalty.near_pairs import CONTACT_REACH, NearPairs
 from tissue.contact.penalty.node_grid import (
     Asking,
@@ -18,6 +19,7 @@ from tissue.contact.penalty.node_grid import (
 from tissue.contact.penalty.node_ways import (
     BALL,
     LARGEST_BALL,
+    NOTCHED,
     NodeWays,
     begin_ball,
     has_left_middle,
@@ -291,9 +293,7 @@ def _ask(
     room = len(pairs.wake) // 2
     for i in range(find_near_face(grid, face, ways.node_size)):
         node = grid.found[i]
-        if node in face.nodes or _is_same_skin(
-            pairs, faces, body, face.at, node, OF_ONE_SHEET * ways.node_size
-        ):
+        if node in face.nodes or _is_same_skin(pairs, ways, faces, body, face.at, node):
             continue
         if pairs.n_found < room:
             pairs.found_node[pairs.n_found] = node
@@ -304,25 +304,29 @@ def _ask(
 
 @kernel
 def _is_same_skin(
-    pairs: NearPairs, faces: Faces, body: Body, at: int, node: int, apart: float
+    pairs: NearPairs, ways: NodeWays, faces: Faces, body: Body, at: int, node: int
 ) -> bool:
     """Whether a face or a node is only of skin, and both are of one sheet of one piece.
 
     Args:
         pairs: Which faces and nodes are of cuts.
+        ways: Which nodes are on the walls of notches.
         faces: The piece that each face is of.
         body: The body at rest.
         at: Place of the face.
         node: The node.
-        apart: Distance at rest up to which they are of one sheet [m].
     """
     if pairs.is_of_cut[at] == 1 and pairs.cut_at[node] == pairs.n_updates:
         return False
     piece = faces.piece[body.node_tetrahedron[node]]
     if piece < 0 or piece != faces.piece[pairs.tetrahedron[at]]:
         return False
-    d = sub(vec3(body.rest, node), vec3(body.rest, pairs.triangle[at, 0]))
-    return dot(d, d) <= apart * apart
+    a, b, c = pairs.triangle[at, 0], pairs.triangle[at, 1], pairs.triangle[at, 2]
+    d, apart = sub(vec3(body.rest, node), vec3(body.rest, a)), OF_ONE_SHEET * ways.node_size
+    if dot(d, d) > apart * apart:
+        return False
+    is_before = dot(d, area_at_rest(body, a, b, c)) > 0.0
+    return not (is_before and ways.is_folded[node] == NOTCHED)
 
 
 @kernel

@@ -1,13 +1,13 @@
-"""A fold is skin near skin of the same piece that is far from it in the body at rest."""
+"""A fold is skin near skin of the same piece that is not beside it in the body at rest."""
 
 import numpy as np
 import pytest
 
 from tests.test_contact import joined
-from tissue import block
+from tissue import TetrahedralMesh, block
 from tissue.contact.faces import new_faces, with_found_pieces
 from tissue.contact.penalty.folds import APART, NEAR, look_for_folds, new_folds
-from tissue.contact.penalty.node_ways import new_node_ways
+from tissue.contact.penalty.node_ways import NOTCHED, new_node_ways
 from tissue.mesh.body import build_body
 
 pytestmark = pytest.mark.kernel
@@ -19,7 +19,7 @@ N = 24
 
 
 class Strip:
-    """A flat strip of a row of cells, and the folds that are found in it."""
+    """A flat strip of a row of cells, or another body, and the folds that are found in it."""
 
     def __init__(self, mesh=None):
         mesh = mesh or block((N, 1, 1), (N * SIZE, SIZE, SIZE))
@@ -122,3 +122,39 @@ def test_a_body_that_has_exploded_is_not_looked_at():
     strip.body.positions[5] = [1e9, 0.0, 0.0]
     assert not strip.look()
     assert strip.folds.n_looks == 1
+
+
+def notched(gap: int, lean: float = 0.0) -> Strip:
+    """Return a block with a notch that many cells wide, whose walls lean out by an angle [rad]."""
+    mesh = block((gap + 4, 2, 6), ((gap + 4) * SIZE, 2.0 * SIZE, 6.0 * SIZE))
+    x, _, z = (mesh.positions[mesh.tetrahedra].mean(axis=1) / SIZE).T
+    is_kept = (np.abs(x - 0.5 * gap - 2.0) > 0.5 * gap) | (z < 2.0)
+    used, kept = np.unique(mesh.tetrahedra[is_kept], return_inverse=True)
+    positions = mesh.positions[used]
+    above = np.maximum(positions[:, 2] - 2.0 * SIZE, 0.0)
+    side = np.sign(positions[:, 0] - (0.5 * gap + 2.0) * SIZE)
+    positions[:, 0] += side * above * np.tan(lean)
+    return Strip(TetrahedralMesh(positions, kept.reshape(-1, 4)))
+
+
+@pytest.mark.parametrize("gap", [1, 2])
+@pytest.mark.parametrize("degrees", [0.0, 20.0])
+def test_the_walls_of_a_notch_are_a_fold_however_near_they_are_and_no_other_skin(gap, degrees):
+    strip = notched(gap, np.radians(degrees))
+    assert strip.look()
+    x, _, z = strip.body.rest[strip.marked].T / SIZE
+    above = (z - 2.0) * np.tan(np.radians(degrees))
+    assert np.abs(np.abs(x - 0.5 * gap - 2.0) - 0.5 * gap - above).max() < 1e-9
+    assert (z > 1.5).all()
+    assert (strip.ways.is_folded[strip.marked] == NOTCHED).all()
+
+
+def test_the_walls_of_a_wedge_of_more_than_60_degrees_are_no_fold():
+    assert not notched(1, np.radians(35.0)).look()
+
+
+def test_walls_that_are_farther_apart_than_near_are_no_fold_until_they_are_near():
+    strip = notched(4)
+    assert not strip.look()
+    strip.body.positions[:, 0] *= 0.7
+    assert strip.look()
