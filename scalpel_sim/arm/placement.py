@@ -11,6 +11,7 @@ from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.tables.stroke import DRAWN_STROKES
 from tissue import FloatArray
 
 AUTO = "auto"
@@ -267,16 +268,19 @@ def _advice(stroke: Stroke, bounds: FloatArray, preset: str) -> str:
     )
     larger = list(ARMS)[list(ARMS).index(preset) + 1 :]
     other = f", or choose --arm {larger[0]}" if larger else ""
+    is_drawn = not DRAWN_STROKES.keys().isdisjoint(stroke.name.split(", "))
+    # A stroke that is given in metres does not shrink with the body.
+    remedy = f"{'draw the stroke' if is_drawn else 'make --scale'} smaller{other}"
     low, high = math.log(SMALLEST_SCALE), 0.0
     if not _reaches(measures, _scaled(path, SMALLEST_SCALE)):
-        return f"{message}. Move the stroke, or make --scale smaller{other}"
+        return f"{message}. Move the stroke, or {remedy}"
     for _ in range(SCALE_HALVINGS):
         middle = (low + high) / 2.0
         if _reaches(measures, _scaled(path, math.exp(middle))):
             low = middle
         else:
             high = middle
-    return f"{message}. It would at {math.exp(low):.2g} times the size: make --scale smaller{other}"
+    return f"{message}. It would at {math.exp(low):.2g} times the size: {remedy}"
 
 
 def _reaches(measures: Geometry, path: _Path) -> bool:

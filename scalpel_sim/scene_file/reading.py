@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.tables.scene import SceneContent
+from scalpel_sim.tables.stroke import check_kind
 from scalpel_sim.tables.toml import as_tables, read_toml
 
 _SHIPPED = Path(__file__).parent / "shipped"
@@ -42,9 +43,12 @@ class SceneFile(NamedTuple):
         """Return the content as tables.
 
         Raises:
-            UsageError: a table, key or value is wrong.
+            UsageError: a table, key or value is wrong, or there is no such stroke.
         """
-        return as_tables(self.content, SceneContent)
+        tables = as_tables(self.content, SceneContent)
+        for stroke in tables.stroke:
+            check_kind(stroke)
+        return tables
 
 
 def read_scene_file(path: Path) -> SceneFile:

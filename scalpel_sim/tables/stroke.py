@@ -81,6 +81,16 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """How long the blade rests afterwards [s]."""
 
 
+def check_kind(stroke: StrokeTable) -> None:
+    """Check that there is a stroke of that kind.
+
+    Raises:
+        UsageError: there is none; the message names the nearest.
+    """
+    if stroke.kind not in KEYS_OF_STROKE:
+        raise unknown("stroke", stroke.kind, KEYS_OF_STROKE)
+
+
 def check_stroke(stroke: StrokeTable, where: str) -> None:
     """Check that a stroke exists, and has what its kind needs.
 
@@ -91,8 +101,7 @@ def check_stroke(stroke: StrokeTable, where: str) -> None:
     Raises:
         UsageError: there is no such kind, a key belongs to another, or numbers make no sense.
     """
-    if stroke.kind not in KEYS_OF_STROKE:
-        raise unknown("stroke", stroke.kind, [*PLANNED_STROKES, *DRAWN_STROKES])
+    check_kind(stroke)
     check_keys(stroke, where, "kind", KEYS_OF_STROKE)
     if stroke.speed is not None and stroke.speed > FASTEST_STROKE:
         raise UsageError(

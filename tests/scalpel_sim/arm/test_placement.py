@@ -3,8 +3,9 @@ import pytest
 
 from scalpel_sim.arm.arm import ARMS
 from scalpel_sim.arm.placement import NEEDED_MARGIN, PlacementError, place
+from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.planning import plan_stroke
-from scalpel_sim.tables.stroke import PLANNED_STROKES
+from scalpel_sim.tables.stroke import PLANNED_STROKES, StrokeTable
 from tissue import block
 
 SLAB = block((4, 6, 4), (0.04, 0.06, 0.04))
@@ -102,6 +103,12 @@ def test_a_stroke_out_of_reach_is_refused_with_a_scale_that_is_in_reach(preset, 
     scale = float(str(error.value).split(" times the size")[0].split()[-1])
     smaller = block((4, 6, 4), (0.4 * scale, 0.6 * scale, 0.4 * scale))
     place(plan_stroke("straight", smaller), bounds(smaller), preset)
+
+
+def test_a_stroke_in_metres_that_is_out_of_reach_is_to_be_drawn_smaller():
+    table = StrokeTable(kind="points", points=[[0.0, -0.6, 0.0], [0.0, 0.6, 0.0]], length=0.04)
+    with pytest.raises(PlacementError, match=r"at 0\.\d+ times the size: draw the stroke smaller$"):
+        place(drawn_stroke(table, 0.06), bounds(SLAB))
 
 
 def test_an_unknown_arm_is_refused_with_the_known_ones():

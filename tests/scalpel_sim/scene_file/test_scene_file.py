@@ -152,6 +152,10 @@ def test_rows_are_counted_from_zero_and_the_usual_stroke_is_one():
         ("body.strech=1", "--set body.strech=1: no key of [body] is called 'strech'. Did you mean"),
         ("material.toughness=-1", "[material] toughness is -1; it must be a number, 0 or more"),
         ("stroke.1.kind=press", "'1' is no row; it must be a number from 0 to 0"),
+        (
+            "stroke.0.kind=pres",
+            "--set stroke.0.kind=pres: no stroke is called 'pres'. Did you mean",
+        ),
         ("about.x=1", "'about' is a value; it has no key 'x'"),
         ("body=3", "it must be a table: [body]"),
         ("gravity", "has no key and value; write --set"),
