@@ -301,6 +301,14 @@ def test_json_prints_the_summary_and_nothing_else(files, capsys):
     assert printed["simulated_seconds"] == pytest.approx(0.02)
 
 
+def test_the_keys_of_json_are_those_that_are_documented(files, capsys):
+    """They stay: programs read them. A new one is added to the page."""
+    page = (Path(__file__).parents[3] / "docs" / "results.md").read_text(encoding="utf-8")
+    documented = re.findall(r"^\| `(\w+)` \|", page, re.MULTILINE)
+    assert command_line(["run", "grid2", "--seconds", "0.01", "--json"]) == 0
+    assert list(json.loads(capsys.readouterr().out)) == documented
+
+
 def test_quiet_prints_nothing(files, capsys):
     assert command_line(["run", "grid2", "--seconds", "0.01", "-q"]) == 0
     assert capsys.readouterr() == ("", "")

@@ -1,10 +1,12 @@
 import re
+import shlex
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+from scalpel_sim.cli.app import app
 from scalpel_sim.cli.options import (
     ArmOptions,
     BladeOptions,
@@ -73,6 +75,23 @@ def test_commands_share_the_groups_that_are_about_the_tissue(command):
 
     for name in ("Body", "Material", "Blade", "Solver"):
         assert part(name, f"scalpel-sim {command}") == part(name, "scalpel-sim run")
+
+
+def examples() -> list[str]:
+    """Return the commands that the help shows, without the usage of each."""
+    found = re.findall(r"^(?:\w+=\S+ )?scalpel-sim ([a-z].*)$", reference(), re.MULTILINE)
+    return [line for line in found if "[OPTIONS]" not in line]
+
+
+@pytest.mark.parametrize("command", ["run", "view", "serve", "new", "materials"])
+def test_a_command_has_an_example(command):
+    assert any(example.split()[0] == command for example in examples())
+
+
+@pytest.mark.parametrize("example", examples())
+def test_an_example_is_a_command(example):
+    """It has all that it needs, and no option that there is not."""
+    app.parse_args(shlex.split(example), exit_on_error=False, print_error=False)
 
 
 def test_there_is_no_seed_because_nothing_is_random():
