@@ -79,7 +79,7 @@ class Contact(Protocol):
         ...
 
     def incision_ended(self, body: Body) -> None:
-        """Let the lips of the incision touch."""
+        """Let the skin of pieces touch, where the body is in pieces now."""
         ...
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
