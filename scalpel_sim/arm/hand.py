@@ -128,22 +128,23 @@ class Hand:
     Args:
         model: A compiled model.
         data: Its data.
+        prefix: What the names of its arm begin with.
 
     Raises:
         KeyError: the model has no hand.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        mocap = int(model.body(HAND).mocapid[0])
-        first = model.actuator(ACTUATORS[0]).id
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
+        mocap = int(model.body(prefix + HAND).mocapid[0])
+        first = model.actuator(prefix + ACTUATORS[0]).id
         controls = int(model.actuator_ctrladr[first])
         outputs = int(model.actuator_outadr[first])
         self._position = data.mocap_pos[mocap]
         self._quaternion = data.mocap_quat[mocap]
         self._control = data.ctrl[controls : controls + 6]
         self._output = data.actuator_force[outputs : outputs + 6]
-        self._edge = data.site_xpos[model.site(EDGE).id]
-        turn = model.actuator(ACTUATORS[3]).id
+        self._edge = data.site_xpos[model.site(prefix + EDGE).id]
+        turn = model.actuator(prefix + ACTUATORS[3]).id
         bias, dt = model.actuator_biasprm, model.opt.timestep
         of_motion, of_turning = (bias[i, 2] / bias[i, 1] / dt for i in (first, turn))
         self.command = HandCommand(

@@ -8,7 +8,7 @@ import numpy as np
 
 from tissue import FloatArray, kernel
 
-_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+_HINGE, _SLIDE = int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
 class JointReach:
@@ -18,23 +18,27 @@ class JointReach:
     hinge, which is at most the length of the chain of bodies between them, however it is bent.
     Hinges that turn one after the other move it by at most the sum. The distance between two geoms
     changes by no more than that sum either: a hinge carries one of them, or both as a rigid body.
+    A slide moves what it carries by as much as it slides.
 
     Args:
-        model: A compiled model. With joints other than hinges nothing is known.
+        model: A compiled model. With joints other than hinges and slides of a limited range nothing
+            is known.
         data: Its data, seen live.
         geoms: Numbers of the geoms.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, geoms: Sequence[int]) -> None:
-        has_hinges_alone = set(model.jnt_type.tolist()) <= {_HINGE}
+        is_slide = model.jnt_type == _SLIDE
+        is_known = (model.jnt_type == _HINGE) | (is_slide & model.jnt_limited.astype(bool))
         self.angles = data.qpos
-        """Angles of the joints now [rad]. MuJoCo's own array."""
+        """Angles of the joints now [rad], or how far they slide [m]. MuJoCo's own array."""
         self.start = np.full(model.nq, math.nan)
         """Their angles at `begin` [rad]."""
         self.reach = np.array(
-            [_reach(model, j, geoms) if has_hinges_alone else math.inf for j in range(model.njnt)]
+            [_reach(model, j, geoms) if is_known.all() else math.inf for j in range(model.njnt)]
         )
-        """Distance of the farthest point from each joint [m]; infinite where nothing is known."""
+        """Distance of the farthest point from each hinge [m], and 1 for a slide; infinite where
+        nothing is known."""
 
     def begin(self) -> None:
         """Measure from the present configuration on."""
@@ -50,7 +54,7 @@ class JointReach:
 
 @kernel
 def hinge_displacement(angles: FloatArray, start: FloatArray, reach: FloatArray) -> float:
-    """Return the displacement by turns of hinges: see `JointReach`."""
+    """Return the displacement by turns of hinges and by slides: see `JointReach`."""
     total = 0.0
     for joint in range(len(reach)):
         if reach[joint] == math.inf:
@@ -61,6 +65,8 @@ def hinge_displacement(angles: FloatArray, start: FloatArray, reach: FloatArray)
 
 def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:
     """Return the largest distance from a hinge of a point of the geoms that it carries [m]."""
+    if model.jnt_type[joint] == _SLIDE:
+        return 1.0
     carrier, longest = int(model.jnt_bodyid[joint]), 0.0
     for geom in geoms:
         box = model.geom_aabb[geom]  # its centre and half its size, in the geom's frame
@@ -75,10 +81,15 @@ def _reach(model: mujoco.MjModel, joint: int, geoms: Sequence[int]) -> float:
 
 
 def _play(model: mujoco.MjModel, body: int) -> float:
-    """Return how far hinges beside a body's origin can move the origin in its parent [m]."""
+    """Return how far hinges beside it, and slides, can move a body's origin in its parent [m]."""
     first = int(model.body_jntadr[body])
     joints = range(first, first + int(model.body_jntnum[body]))
-    return sum(2.0 * _norm(model.jnt_pos[joint]) for joint in joints)
+    return sum(
+        float(np.abs(model.jnt_range[joint]).max())
+        if model.jnt_type[joint] == _SLIDE
+        else 2.0 * _norm(model.jnt_pos[joint])
+        for joint in joints
+    )
 
 
 def _norm(vector: Sequence[float]) -> float:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.arm.arm import ARMS, Arm
+from scalpel_sim.arm.grasper import add_grasper
 from scalpel_sim.arm.joint_reach import JointReach
 
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -61,7 +62,27 @@ def test_a_hinge_beside_the_origin_of_its_body_counts_with_its_distance():
     assert reach.displacement() >= 3e-4
 
 
-def test_nothing_is_known_before_the_start_nor_of_joints_that_are_no_hinges():
+def test_slides_of_a_grasper_count_with_how_far_they_slide_and_move_what_turns():
+    spec, rng = mujoco.MjSpec(), np.random.default_rng(0)
+    arm = spec.worldbody.add_body(name="arm")
+    arm.add_joint(axis=[0.0, 0.0, 1.0], range=[-1.0, 1.0], limited=True)
+    arm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0.0, 0.0])
+    add_grasper(spec, "arm")
+    model = spec.compile()
+    data, geoms = mujoco.MjData(model), geoms_of(model)
+    reach, (low, high) = JointReach(model, data, geoms), model.jnt_range.T
+    for size in (1.0, 1e-2) * 100:
+        data.qpos[:] = rng.uniform(low, high)
+        mujoco.mj_kinematics(model, data)
+        reach.begin()
+        before = corners_of(model, data)[geoms]
+        data.qpos[:] += size * (rng.uniform(low, high) - data.qpos)
+        mujoco.mj_kinematics(model, data)
+        moved = np.linalg.norm(corners_of(model, data)[geoms] - before, axis=2).max()
+        assert moved <= reach.displacement() + 1e-12
+
+
+def test_nothing_is_known_before_the_start_nor_of_other_joints():
     arm = Arm("touch")
     reach = JointReach(arm.model, arm.data, geoms_of(arm.model))
     assert math.isnan(reach.displacement())

@@ -1,0 +1,176 @@
+"""A surgical grasper: two jaws on a shaft, which an arm of any MuJoCo model holds."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from scalpel_sim.arm.hand import Hand
+from scalpel_sim.arm.model_options import take_options
+from tissue import BladeSegment, FloatArray, Wrench
+
+_FILE = Path(__file__).parent / "assets" / "grasper.xml"
+
+GRASPER = "grasper_"
+"""What the names of its bodies, geoms, sites and joints begin with in the model of its arm."""
+
+GRASPER_HEEL, GRASPER_TIP = f"{GRASPER}heel", f"{GRASPER}tip"
+"""Sites where the pads begin and end: a hand holds the grasper half way between them."""
+
+SHAFT_LENGTH = 0.0715
+"""From where an arm holds it to the middle of the pads [m]."""
+
+PAD_LENGTH = 0.015
+"""Length of a pad, along the shaft [m]."""
+
+FORWARD = (0.0, 0.0, -1.0)
+"""What a blade calls forward, in the frame of the shaft: across the shaft and across the way of the
+jaws. A grasper is led as a blade is."""
+
+_PARTS = ("shaft", "jaw_low", "jaw_high")
+"""Its bodies."""
+
+_ALONG_FLANGE = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+"""Rotation that has the shaft, +y, point along +z."""
+
+
+class GrasperError(ValueError):
+    """The model has no such place for a grasper."""
+
+
+class Pads(NamedTuple):
+    """The space between the pads: a box in the frame of the shaft, where it is now."""
+
+    centre: FloatArray
+    """Where the site `pinch` is [m], world frame, shape (3,)."""
+    axes: FloatArray
+    """Axes as columns: across from pad to pad, along the shaft, and across both; shape (3, 3)."""
+    half_size: FloatArray
+    """Half the opening, half the length of a pad, half its width [m], shape (3,)."""
+
+
+def add_grasper(spec: mujoco.MjSpec, at: str, *, force: float | None = None) -> None:
+    """Have a body or a site of a model hold a grasper, whose shaft points along its +z.
+
+    That is how the flanges of robots point. The actuator `grasper_jaws` opens the jaws [m].
+
+    Args:
+        spec: A model that is yet to be compiled.
+        at: Name of a site, or of a body, at whose origin the shaft begins.
+        force: Largest force of the jaws [N]; None: that of `grasper.xml`.
+
+    Raises:
+        GrasperError: the model has no such site or body.
+    """
+    site, body = spec.site(at), spec.body(at)
+    if site is None and body is None:
+        names = [each.name for each in (*spec.sites, *spec.bodies) if each.name]
+        there = ", ".join(f"'{name}'" for name in names) or "none with a name"
+        raise GrasperError(
+            f"the model has no site or body '{at}' to hold a grasper. It has: {there}"
+        )
+    grasper = grasper_spec(spec, force)
+    grasper.body("shaft").quat = _ALONG_FLANGE
+    if site is None:
+        spec.attach(grasper, prefix=GRASPER, frame=body.add_frame())
+    else:
+        spec.attach(grasper, prefix=GRASPER, site=site)
+
+
+def grasper_spec(spec: mujoco.MjSpec, force: float | None = None) -> mujoco.MjSpec:
+    """Return a grasper, to be attached to a model with the prefix `GRASPER`.
+
+    Its shaft points along +y.
+
+    Args:
+        spec: That model.
+        force: Largest force of the jaws [N]; None: that of `grasper.xml`.
+    """
+    grasper = mujoco.MjSpec.from_file(str(_FILE))
+    take_options(grasper, spec)
+    if force is not None:
+        grasper.actuator("jaws").forcerange = [-force, force]
+    return grasper
+
+
+class Grasper:
+    """A grasper of a compiled model. World frame.
+
+    Args:
+        model: The model.
+        data: Its data.
+        prefix: What the names of its arm begin with.
+
+    Raises:
+        KeyError: the model has no such grasper.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
+        name = prefix + GRASPER
+        self.body = f"{name}shaft"
+        """Name of the body that carries shaft and jaws."""
+        bodies = [model.body(name + part).id for part in _PARTS]
+        pinch = model.site(f"{name}pinch").id
+        joints = [model.joint(f"{name}jaw_{side}") for side in ("low", "high")]
+        servo = int(model.actuator_ctrladr[model.actuator(f"{name}jaws").id])
+        _, length, width = model.geom(f"{name}pad_low").size
+        self._half_pad = float(length), float(width)
+        # Views of MuJoCo's arrays: they stay valid for the life of `data`.
+        self._jaws = [data.qpos[joint.qposadr[0] : joint.qposadr[0] + 1] for joint in joints]
+        self._control = data.ctrl[servo : servo + 1]
+        self._pinch: FloatArray = data.site_xpos[pinch]
+        self._axes = data.xmat[bodies[0]].reshape(3, 3)
+        self._applied = [data.xfrc_applied[i] for i in bodies]
+        self._centres = [data.xipos[i] for i in bodies]
+
+    @property
+    def opening(self) -> float:
+        """Distance between the pads [m]."""
+        return float(self._jaws[0][0] + self._jaws[1][0])
+
+    def open_to(self, opening: float) -> None:
+        """Have the jaws open or close to a distance between the pads [m], with limited force."""
+        self._control[0] = opening
+
+    @property
+    def pads(self) -> Pads:
+        """The space between the pads, as it is now. Copies."""
+        half = np.array([0.5 * self.opening, *self._half_pad])
+        return Pads(self._pinch.copy(), self._axes.copy(), half)
+
+    @property
+    def wrench(self) -> Wrench:
+        """Sum of all wrenches that are applied to shaft and jaws, about the site `pinch`.
+
+        Those are what tissue does to it, however it is held (`xfrc_applied`).
+        """
+        force, torque = np.zeros(3), np.zeros(3)
+        for applied, centre in zip(self._applied, self._centres, strict=True):
+            force += applied[:3]
+            torque += applied[3:] + np.cross(centre - self._pinch, applied[:3])
+        return Wrench(force, torque, self._pinch.copy())
+
+
+class GuidedGrasper(Grasper):
+    """A grasper that a virtual hand leads; `hand.add_hand` put it into the model.
+
+    Args:
+        model: The model.
+        data: Its data.
+        prefix: What the names of its arm begin with.
+
+    Raises:
+        KeyError: the model has no such grasper, or no hand that leads it.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, prefix: str = "") -> None:
+        super().__init__(model, data, prefix)
+        self.hand = Hand(model, data, prefix)
+
+    def hold(self) -> None:
+        """Lead it to rest where it is, as far open as it is: where a motion begins."""
+        along, forward = self._axes[:, 1], self._axes @ np.array(FORWARD)
+        half = self._half_pad[0] * along
+        self.hand.hold(BladeSegment(self._pinch + half, self._pinch - half, forward))
+        self.open_to(self.opening)

@@ -1,0 +1,142 @@
+"""The motion of a grasper over time: where its pads are, how it is turned, how far it is open."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.timing import SAMPLE
+from tissue import BladeSegment, FloatArray
+
+_LEAST_SINE = 1e-3
+"""Sine of the angle between shaft and jaws below which they are along one line, by rounding."""
+
+
+class Waypoint(NamedTuple):
+    """Where a grasper rests at an instant, tissue frame."""
+
+    time: float
+    """When it is there [s]."""
+    at: Sequence[float]
+    """Where the middle between the pads is [m]."""
+    approach: Sequence[float]
+    """Direction in which shaft and pads point."""
+    across: Sequence[float]
+    """Direction in which the jaws open, which is made orthogonal to it."""
+    opening: float
+    """Distance between the pads [m]."""
+
+
+class GraspMotion:
+    """The motion of a grasper from waypoint to waypoint, at rest at each.
+
+    In between position, turn and opening follow the polynomial of least jerk (Flash and Hogan 1985,
+    J. Neuroscience 5:1688), as the hands of people do.
+
+    Args:
+        waypoints: At least one, in the order of time. Before the first it is there.
+        name: For messages.
+
+    Raises:
+        StrokeError: times do not increase, a direction is zero or along another, or a part of the
+            grasper would be too fast.
+    """
+
+    def __init__(self, waypoints: Sequence[Waypoint], name: str = "grasper") -> None:
+        if not waypoints:
+            raise StrokeError(f"the motion of '{name}' has no waypoint")
+        first, last = waypoints[0], waypoints[-1]
+        if first.time > 0.0:
+            waypoints = [first._replace(time=0.0), *waypoints]
+        if last.time == 0.0:
+            waypoints = [*waypoints, last._replace(time=SAMPLE)]
+        for i, (before, after) in enumerate(pairwise(waypoints)):
+            if after.time <= before.time:
+                raise StrokeError(
+                    f"the motion of '{name}': time {after.time:g} s follows {before.time:g} s in "
+                    f"waypoint {i + 2}; times must increase"
+                )
+        self.name = name
+        self._waypoints = waypoints
+        self._times = [waypoint.time for waypoint in waypoints]
+        self._poses = [_pose(waypoint, name) for waypoint in waypoints]
+
+    @property
+    def duration(self) -> float:
+        """When it is at the last waypoint [s]."""
+        return self._times[-1]
+
+    def opening(self, t: float) -> float:
+        """Return the distance between the pads at time `t` [s], in m."""
+        i = bisect_right(self._times, t)
+        if i == 0 or i == len(self._times):
+            return self._waypoints[min(i, len(self._times) - 1)].opening
+        before, after = self._waypoints[i - 1], self._waypoints[i]
+        share = least_jerk((t - before.time) / (after.time - before.time))
+        return before.opening + share * (after.opening - before.opening)
+
+    def stroke(self, behind: float, ahead: float) -> Stroke:
+        """Return the motion as that of an edge along the shaft, which a hand can follow.
+
+        Args:
+            behind: From the middle between the pads to its heel [m].
+            ahead: From there to its tip [m].
+
+        Raises:
+            StrokeError: an end of the edge would be too fast.
+        """
+        times, poses = [self._times[0]], [_edge(self._poses[0], behind, ahead)]
+        for (begin, end), legs in zip(pairwise(self._times), pairwise(self._poses), strict=True):
+            is_still = all(np.array_equal(a, b) for a, b in zip(*legs, strict=True))
+            n = 1 if is_still else max(2, round((end - begin) / SAMPLE))
+            for k in range(1, n + 1):
+                times.append(begin + (end - begin) * k / n)
+                poses.append(_edge(_between(*legs, least_jerk(k / n)), behind, ahead))
+        return Stroke(times, poses, f"motion of '{self.name}'")
+
+
+def least_jerk(s: float) -> float:
+    """Return the share of a way that is done after a share of its time, from rest to rest."""
+    return s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
+
+
+class _Pose(NamedTuple):
+    at: FloatArray
+    turn: FloatArray
+    """Quaternion of axes across, along the shaft, and across both, tissue frame."""
+
+
+def _pose(waypoint: Waypoint, name: str) -> _Pose:
+    """Return a waypoint as position and rotation."""
+    y, x = np.array(waypoint.approach, float), np.array(waypoint.across, float)
+    sizes = np.linalg.norm(y), np.linalg.norm(x)
+    z = np.cross(x, y)
+    if not np.linalg.norm(z) > _LEAST_SINE * sizes[0] * sizes[1]:
+        raise StrokeError(
+            f"the motion of '{name}' at {waypoint.time:g} s: approach {list(waypoint.approach)} "
+            f"and across {list(waypoint.across)} must be two directions, not along one line"
+        )
+    y, z = y / sizes[0], z / np.linalg.norm(z)
+    turn = np.empty(4)
+    mujoco.mju_mat2Quat(turn, np.stack([np.cross(y, z), y, z], axis=1).ravel())
+    return _Pose(np.array(waypoint.at, float), turn)
+
+
+def _between(before: _Pose, after: _Pose, share: float) -> _Pose:
+    """Return the pose at a share of the way, turned about one axis."""
+    turn, way = before.turn.copy(), np.empty(3)
+    mujoco.mju_subQuat(way, after.turn, before.turn)
+    mujoco.mju_quatIntegrate(turn, way, share)
+    return _Pose(before.at + share * (after.at - before.at), turn)
+
+
+def _edge(pose: _Pose, behind: float, ahead: float) -> BladeSegment:
+    """Return the edge along the shaft at a pose."""
+    axes = np.empty(9)
+    mujoco.mju_quat2Mat(axes, pose.turn)
+    _, y, z = axes.reshape(3, 3).T
+    return BladeSegment(pose.at + ahead * y, pose.at - behind * y, -z)
