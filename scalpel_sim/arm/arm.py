@@ -9,6 +9,7 @@ import numpy as np
 
 from bridge import DeviceLimits
 from scalpel_sim.arm.hand import Impedance
+from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.errors import unknown
 from tissue import FloatArray
@@ -41,6 +42,7 @@ class Arm(LedArm):
         base_position: Middle of the base's underside [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
+        others: Arms that stand in its world, each with a grasper.
 
     Raises:
         UsageError: no preset has this name.
@@ -55,17 +57,24 @@ class Arm(LedArm):
         base_position: Sequence[float] | FloatArray = (0.0, 0.0, 0.0),
         base_yaw: float = 0.0,
         impedance: Impedance = Impedance(),
+        others: Sequence[HeldArm] = (),
     ) -> None:
         if preset not in ARMS:
             raise unknown("arm", preset, ARMS)
-        spec = mujoco.MjSpec.from_file(str(ASSETS / f"{preset}.xml"))
-        _put_base(spec, np.array(base_position, np.float64), base_yaw)
+        spec = preset_spec(preset)
+        put_base(spec, np.array(base_position, np.float64), base_yaw)
         _make_blade(spec, blade_length, mount_angle)
-        super().__init__(spec, preset, ARMS[preset], impedance)
-        self.reset(self.model.key("home").qpos)
+        home = np.array(spec.key("home").qpos)
+        super().__init__(spec, preset, ARMS[preset], impedance, others=others)
+        self.reset(home)
 
 
-def _put_base(spec: mujoco.MjSpec, position: FloatArray, yaw: float) -> None:
+def preset_spec(preset: str) -> mujoco.MjSpec:
+    """Return the model of a preset, yet to be compiled."""
+    return mujoco.MjSpec.from_file(str(ASSETS / f"{preset}.xml"))
+
+
+def put_base(spec: mujoco.MjSpec, position: FloatArray, yaw: float) -> None:
     """Move the arm, and add a column below a base that does not stand on the table."""
     base = spec.body("base")
     base.pos = position

@@ -9,6 +9,7 @@ import numpy as np
 from bridge import DeviceLimits
 from scalpel_sim.arm.blade import Blade
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
+from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
 from tissue import FloatArray
 
@@ -31,6 +32,7 @@ class LedArm:
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
+        others: Arms that stand in its world, each with a grasper.
 
     Raises:
         ValueError: the model has no such sites, or cannot be compiled.
@@ -46,9 +48,13 @@ class LedArm:
         heel: str = "heel",
         tip: str = "tip",
         forward: Sequence[float] = (0.0, 0.0, -1.0),
+        others: Sequence[HeldArm] = (),
     ) -> None:
         route_warnings()
         add_hand(spec, impedance, heel, tip, forward)
+        self._n_own = len(spec.joints)
+        for other in others:
+            other.stand_in(spec)
         self.name = name
         """Name of the arm, for reports."""
         self.limits = limits
@@ -58,10 +64,14 @@ class LedArm:
         """MuJoCo's data."""
         self.blade = Blade(self.model, self.data, heel, tip, forward=forward)
         self.hand = Hand(self.model, self.data)
+        self.others = tuple(others)
+        """Arms that stand in its world."""
+        self.graspers = tuple(other.grasper(self.model, self.data) for other in others)
+        """What these hold."""
         self.joints = tuple(
             self.model.joint(i).name or f"joint {i}" for i in range(self.model.njnt)
         )
-        """Names of the joints."""
+        """Names of the joints, its own first."""
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._qpos, self._qvel = self.data.qpos, self.data.qvel
         self._n_warnings = self.data.warning.number
@@ -74,13 +84,15 @@ class LedArm:
     def reset(self, qpos: Sequence[float] | FloatArray) -> None:
         """Start again at time 0, at rest in a joint configuration, where the hand then is too.
 
+        Other arms are where they start.
+
         Args:
-            qpos: Angles of the joints [rad], or where they slide to [m], shape (nq,).
+            qpos: Angles of its joints [rad], or where they slide to [m], shape (n_joints,).
 
         Raises:
             ValueError: not as many finite numbers, or one beyond its joint's range.
         """
-        angles, n = np.array(qpos, np.float64), self.model.nq
+        angles, n = np.array(qpos, np.float64), self._n_own
         if angles.shape != (n,) or not np.isfinite(angles).all():
             raise ValueError(f"qpos is {angles.tolist()}; it must be {n} finite angles [rad]")
         low, high = self.ranges()
@@ -91,15 +103,17 @@ class LedArm:
                 f"{low[i]:.3f} to {high[i]:.3f}"
             )
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:] = angles
+        self.data.qpos[:] = np.concatenate([angles, *(other.qpos for other in self.others)])
         mujoco.mj_kinematics(self.model, self.data)
         self.hand.hold(self.blade.segment())
+        for grasper in self.graspers:
+            grasper.hold()
         mujoco.mj_forward(self.model, self.data)
 
     def ranges(self) -> tuple[FloatArray, FloatArray]:
-        """Return the lowest and the highest position of each joint; infinite where unlimited."""
-        limited = self.model.jnt_limited.astype(bool)
-        low, high = self.model.jnt_range.T
+        """Return the ends of the range of each of its joints; infinite where unlimited."""
+        limited = self.model.jnt_limited[: self._n_own].astype(bool)
+        low, high = self.model.jnt_range[: self._n_own].T
         return np.where(limited, low, -np.inf), np.where(limited, high, np.inf)
 
     def step1(self) -> None:

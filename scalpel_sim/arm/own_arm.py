@@ -7,6 +7,7 @@ would hold the joints where they are.
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.hand import EDGE, Impedance
+from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.errors import UsageError
@@ -49,6 +51,7 @@ def own_arm(
     heel: str = "heel",
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
+    others: Sequence[HeldArm] = (),
 ) -> LedArm:
     """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
 
@@ -58,23 +61,28 @@ def own_arm(
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
+        others: Arms that stand in its world, each with a grasper.
 
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
     """
+    led = partial(LedArm, heel=heel, tip=tip, forward=forward)
     try:
-        usual = LedArm(_spec(path), path.stem, limits, heel=heel, tip=tip, forward=forward)
-        _expect_angles(usual.model)
-        firm = _impedance(usual)
-        arm = LedArm(_spec(path), path.stem, limits, firm, heel=heel, tip=tip, forward=forward)
+        usual = led(own_spec(path), path.stem, limits)
+        firm = firm_impedance(usual)
+        arm = led(own_spec(path), path.stem, limits, firm, others=others)
     except ValueError as error:
         raise UsageError(f"[arm] model {path}: {error}") from error
-    arm.reset(_at_first(arm))
+    arm.reset(_at_first(usual))
     return arm
 
 
-def _spec(path: Path) -> mujoco.MjSpec:
-    """Return the model of a file without its actuators, its gravity compensated."""
+def own_spec(path: Path) -> mujoco.MjSpec:
+    """Return the model of a file without its actuators, its gravity compensated.
+
+    Raises:
+        ValueError: the file cannot be read, or is no model.
+    """
     spec = mujoco.MjSpec.from_file(str(path))
     for actuator in list(spec.actuators):
         spec.delete(actuator)
@@ -100,13 +108,20 @@ def _at_first(arm: LedArm) -> FloatArray:
     return np.asarray(np.clip(first, *arm.ranges()))
 
 
-def _impedance(arm: LedArm) -> Impedance:
+def firm_impedance(arm: LedArm) -> Impedance:
     """Return a hand that moves this arm as fast as the usual one moves the arms of the scenes.
 
     A robot is a hundred times as heavy at its edge: the usual hand would leave it swinging at 5 Hz.
     Stiffness and damping follow its inertia there (Khatib 1987, IEEE J. Robotics and Automation
     3:43), and are critical.
+
+    Args:
+        arm: The arm, alone in its model; it is moved to the configuration of its first keyframe.
+
+    Raises:
+        ValueError: a joint is no hinge and no slide.
     """
+    _expect_angles(arm.model)
     model, data = arm.model, arm.data
     arm.reset(_at_first(arm))
     site = model.site(EDGE).id

@@ -1,0 +1,240 @@
+"""The search for a place from which a PHANTOM-like arm reaches a path, clear of what is there."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from scalpel_sim.arm.inverse_kinematics import Geometry, reach
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import FloatArray
+
+YAWS = np.arange(24) * (2.0 * math.pi / 24)
+"""Directions from the base to the stroke that the search tries [rad]."""
+
+DISTANCES, HEIGHTS = np.linspace(0.25, 1.0, 11), np.linspace(-0.7, 0.7, 13)
+"""Distances of the middle of the stroke from the axis of the waist, and heights over the shoulder,
+that the search tries, as fractions of the length of the stretched arm."""
+
+MOUNT_ANGLES = (0.0, math.pi / 4.0, math.pi / 2.0)
+"""Angles between stylus and blade that the search tries [rad]: scalpel handles are straight or
+bent. No one angle suits both a blade that stands and one that lies."""
+
+BASE_RADIUS = 0.08
+"""Radius about the axis of the waist in which the body must not lie [m]."""
+
+LINK_CLEARANCE = 0.01
+"""Smallest distance of the axes of upper arm and forearm from the box around the body [m]."""
+
+LINK_RADIUS = 0.02
+"""Radius of the spheres that cover upper arm, forearm and stylus [m]: capsules of 8 mm, of which
+every quarter of the length has a point."""
+
+MOST_TRIED = 2000
+"""Places, the best first, that are tried for one that is clear of other arms: of some 10,000."""
+
+TABLE_ROUNDING = 1e-9
+"""Height by which a base that stands on a table may be off it [m]."""
+
+TABLE_CLEARANCE = 0.01
+"""Distance of the table from the lowest point of blade and body [m]: the blade passes beneath the
+body."""
+
+AWKWARD = 2.0
+"""Subtracted from the margin of a place where a link passes through the body, or where the base
+stands on a column: any place without that is better."""
+
+
+class Spheres(NamedTuple):
+    """Spheres that cover an arm along its way, at some instants. Tissue frame."""
+
+    centres: FloatArray
+    """Their centres [m], shape (n_instants, n, 3)."""
+    radii: FloatArray
+    """Their radii [m], shape (n,)."""
+
+
+class InstrumentPath(NamedTuple):
+    """Poses of the blade's body along a stroke, tissue frame."""
+
+    positions: FloatArray
+    """Origin of the blade's body [m], shape (n, 3)."""
+    axes: FloatArray
+    """Axes of the blade's body as columns, shape (n, 3, 3)."""
+    lowest: float
+    """Lowest height of the blade and of the tissue along the stroke [m]."""
+    bounds: FloatArray
+    """Lowest and highest corner of the tissue [m], shape (2, 3)."""
+    table: float | None = None
+    """Height of a table that is there [m]; None: it is where the arm needs it."""
+
+
+class Places(NamedTuple):
+    """Candidate places of the base, relative to the middle of the stroke; arrays of one shape."""
+
+    yaws: FloatArray
+    distances: FloatArray
+    heights: FloatArray
+    """Height of the middle of the stroke over the base's underside [m]."""
+
+
+class Found(NamedTuple):
+    """What a search has found."""
+
+    place: Places
+    """One place."""
+    mount_angle: float
+    margin: float
+    """Along the path: see `Placement.margin`."""
+    score: float
+    """How good it is; not finite where the base cannot stand there."""
+
+
+def blade_path(
+    stroke: Stroke, bounds: FloatArray, edge_height: float, times: FloatArray
+) -> InstrumentPath:
+    """Return where the blade's body is along the stroke.
+
+    Args:
+        stroke: The stroke.
+        bounds: Lowest and highest corner of the tissue [m], shape (2, 3).
+        edge_height: How far the edge lies off the axis of the blade [m].
+        times: Instants [s].
+    """
+    poses = [stroke.pose(t) for t in times]
+    heels = np.array([pose.heel for pose in poses])
+    tips = np.array([pose.tip for pose in poses])
+    edges = (tips - heels) / stroke.blade_length
+    backs = -np.array([pose.forward for pose in poses])
+    axes = np.stack([np.cross(edges, backs), edges, backs], axis=2)
+    lowest = min(float(heels[:, 2].min()), float(tips[:, 2].min()), float(bounds[0][2]))
+    return InstrumentPath(heels - edge_height * backs, axes, lowest, bounds)
+
+
+def search_place(measures: Geometry, path: InstrumentPath, others: Sequence[Spheres] = ()) -> Found:
+    """Return the best of all places that is clear of other arms; the best of all if none is.
+
+    Args:
+        measures: Of the arm.
+        path: What it is to reach, at the instants at which the others are known.
+        others: What covers them.
+    """
+    length = measures.upper + measures.forearm + measures.neck
+    heights = HEIGHTS * length + measures.shoulder
+    if path.table is not None:  # the base may stand on it
+        heights = np.append(heights, _middle(path)[2] - path.table)
+    grid = np.meshgrid(YAWS, DISTANCES * length, heights, indexing="ij")
+    places = Places(*(values.ravel() for values in grid))
+    scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
+    order = np.argsort(-scores, axis=None, kind="stable")
+    order = order[: MOST_TRIED if others else 1]
+    for mount, best in zip(*np.unravel_index(order, scores.shape), strict=True):
+        place = Places(*(values[best : best + 1] for values in places))
+        found = Found(place, MOUNT_ANGLES[mount], 0.0, float(scores[mount, best]))
+        if all(_is_clear(measures, path, found, other) for other in others):
+            break
+    else:
+        found = found._replace(score=-math.inf)
+    reached = reach(measures, *in_base(path, found.place), found.mount_angle)
+    return found._replace(margin=float(reached.margin.min()))
+
+
+def spheres_along(
+    measures: Geometry, path: InstrumentPath, base: FloatArray, yaw: float, mount_angle: float
+) -> Spheres:
+    """Return spheres that cover an arm: its base, its links, and its stylus, at each pose.
+
+    Args:
+        measures: Of the arm.
+        path: Where its instrument is.
+        base: Where the arm stands, tissue frame [m], shape (3,).
+        yaw: Angle by which it is turned about +z [rad].
+        mount_angle: Between stylus and instrument [rad].
+    """
+    turn = _turns(np.array([yaw]))[0]
+    axes = turn.T @ path.axes
+    angles = reach(measures, (path.positions - base) @ turn, axes, mount_angle).angles
+    c, s = math.cos(mount_angle), math.sin(mount_angle)
+    stylus = path.axes @ np.array([0.0, c, -s])
+    gimbal = path.positions - measures.neck * stylus
+    column = np.multiply.outer(np.linspace(0.0, measures.shoulder, 4), [0.0, 0.0, 1.0])
+    parts = [
+        (np.broadcast_to(base + column, (len(gimbal), 4, 3)), BASE_RADIUS),
+        (base + _links(measures, angles) @ turn.T, LINK_RADIUS),
+        (np.stack([gimbal - d * stylus for d in (0.0, 0.03, 0.06)], axis=1), LINK_RADIUS),
+    ]
+    return Spheres(
+        np.concatenate([centres for centres, _ in parts], axis=1),
+        np.concatenate([np.full(centres.shape[1], radius) for centres, radius in parts]),
+    )
+
+
+def _is_clear(measures: Geometry, path: InstrumentPath, found: Found, other: Spheres) -> bool:
+    """Whether an arm at a place stays clear of another one at each instant."""
+    base, yaw = base_of(path, found.place)[0], float(found.place.yaws[0])
+    own = spheres_along(measures, path, base, yaw, found.mount_angle)
+    apart = np.linalg.norm(own.centres[:, :, None] - other.centres[:, None], axis=3)
+    return bool((apart >= own.radii[:, None] + other.radii + LINK_CLEARANCE).all())
+
+
+def _scores(
+    measures: Geometry, path: InstrumentPath, places: Places, mount_angle: float
+) -> FloatArray:
+    """Return how good each place is: the margin along the path, less `AWKWARD` where it applies."""
+    positions, axes = in_base(path, places)
+    reached = reach(measures, positions, axes, mount_angle)
+    base = base_of(path, places)
+    stands_beside = _distance_to_box(base[:, :2], path.bounds[:, :2]) >= BASE_RADIUS
+    if path.table is None:
+        on_column = base[:, 2] > path.lowest - TABLE_CLEARANCE
+    else:
+        stands_beside &= base[:, 2] >= path.table - TABLE_ROUNDING
+        on_column = base[:, 2] > path.table + TABLE_ROUNDING
+    links = _links(measures, reached.angles)
+    in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), links) + base[:, None, None]
+    through = _distance_to_box(in_tissue, path.bounds) < LINK_CLEARANCE
+    score = reached.margin.min(axis=1) - AWKWARD * on_column - AWKWARD * through.any(axis=(1, 2))
+    return np.asarray(np.where(stands_beside, score, -np.inf))
+
+
+def base_of(path: InstrumentPath, places: Places) -> FloatArray:
+    """Return where the base stands, tissue frame [m], shape (n_places, 3)."""
+    outward = _turns(places.yaws)[:, :, 1]
+    beside = _middle(path) - places.distances[:, None] * outward
+    return np.asarray(beside - np.multiply.outer(places.heights, [0.0, 0.0, 1.0]))
+
+
+def in_base(path: InstrumentPath, places: Places) -> tuple[FloatArray, FloatArray]:
+    """Return the path as each base sees it, shapes (n_places, n, 3) and (n_places, n, 3, 3)."""
+    back = np.swapaxes(_turns(places.yaws), 1, 2)
+    offset = path.positions[None] - base_of(path, places)[:, None]
+    return np.einsum("pij,pnj->pni", back, offset), back[:, None] @ path.axes[None]
+
+
+def _middle(path: InstrumentPath) -> FloatArray:
+    """Return the middle of the box around the positions along the path [m], shape (3,)."""
+    return np.asarray((path.positions.min(axis=0) + path.positions.max(axis=0)) / 2.0)
+
+
+def _turns(yaws: FloatArray) -> FloatArray:
+    """Return rotations about z, shape (n, 3, 3)."""
+    c, s, zero = np.cos(yaws), np.sin(yaws), np.zeros_like(yaws)
+    return np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=1).reshape(-1, 3, 3)
+
+
+def _links(measures: Geometry, angles: FloatArray) -> FloatArray:
+    """Return points along upper arm and forearm in the frame of the base, shape (..., 8, 3)."""
+    waist, shoulder = angles[..., 0, None], angles[..., 1, None]
+    level = shoulder + angles[..., 2, None] - measures.bend
+    upper = measures.upper * np.array([0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0, 1.0])
+    forearm = measures.forearm * np.array([0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0])
+    out = upper * np.cos(shoulder) + forearm * np.cos(level)
+    up = measures.shoulder + upper * np.sin(shoulder) + forearm * np.sin(level)
+    return np.stack([-np.sin(waist) * out, np.cos(waist) * out, up], axis=-1)
+
+
+def _distance_to_box(points: FloatArray, box: FloatArray) -> FloatArray:
+    """Return how far points are from a box [m]; 0 inside."""
+    outside = np.maximum(np.maximum(box[0] - points, points - box[1]), 0.0)
+    return np.asarray(np.linalg.norm(outside, axis=-1))

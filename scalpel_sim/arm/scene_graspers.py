@@ -1,0 +1,128 @@
+"""From the graspers of a scene to arms that hold them, and to what leads them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bridge import TissueFrame
+from scalpel_sim.arm.held_arm import HeldArm
+from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.led_grasper import Hold, LedGrasper
+from scalpel_sim.arm.placement import AUTO, Placement, covered
+from scalpel_sim.arm.second_arm import (
+    model_with_grasper,
+    place_of_grasper,
+    preset_with_grasper,
+)
+from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
+from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.tables.grasper import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
+from tissue import FloatArray, Tissue
+
+WATCHED_INSTANTS = 33
+"""Instants at which arms must reach and be clear of each other: between two of them a hand that
+crosses the scene in a second moves by less than a link is thick."""
+
+
+def motions_of(graspers: Sequence[GrasperTable]) -> list[GraspMotion]:
+    """Return the motions of graspers; what a row leaves out is as in the row before.
+
+    Raises:
+        StrokeError: no grasper can follow one.
+    """
+    return [GraspMotion(_waypoints(grasper), grasper.name) for grasper in graspers]
+
+
+def _waypoints(grasper: GrasperTable) -> list[Waypoint]:
+    """Return the rows of a motion, complete."""
+    now = Waypoint(0.0, (0.0, 0.0, 0.0), DEFAULT_APPROACH, DEFAULT_ACROSS, 0.0)
+    found = []
+    for row in grasper.motion:
+        given = {name: getattr(row, name) for name in Waypoint._fields}
+        now = now._replace(**{name: value for name, value in given.items() if value is not None})
+        found.append(now)
+    return found
+
+
+def arms_with_graspers(
+    graspers: Sequence[GrasperTable],
+    motions: Sequence[GraspMotion],
+    bounds: FloatArray,
+    frame: TissueFrame,
+    first: tuple[Placement, Stroke] | None,
+) -> list[HeldArm]:
+    """Return the arms that hold the graspers of a scene, each clear of those before.
+
+    Args:
+        graspers: What the scene says of them.
+        motions: Where they go, tissue frame.
+        bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3).
+        frame: Where the tissue lies in the world.
+        first: Where an arm of the project stands that does a stroke, and that stroke; its table is
+            that of all. None: there is none, and each arm has its own table.
+
+    Raises:
+        UsageError: a model cannot be read, or has no place for a grasper.
+        PlacementError: an arm does not reach its motion.
+    """
+    last = max([motion.duration for motion in motions], default=0.0)
+    if first is not None:
+        last = max(last, first[1].duration)
+    times = np.linspace(0.0, last, WATCHED_INSTANTS)
+    table = None if first is None else -float(first[0].tissue_origin[2])
+    taken = [] if first is None else [covered(*first, bounds, times)]
+    found = []
+    for grasper, motion in zip(graspers, motions, strict=True):
+        if grasper.model is None:
+            preset = grasper.preset or AUTO
+            place, spheres = place_of_grasper(
+                motion, bounds, preset, times, table=table, others=taken
+            )
+            taken.append(spheres)
+            found.append(preset_with_grasper(motion, place, frame, force=grasper.force))
+        else:
+            assert grasper.at is not None
+            base = TissueFrame(_rotation(grasper), np.array(grasper.pos or (0.0, 0.0, 0.0)))
+            model = Path(grasper.model)
+            arm = model_with_grasper(motion, model, grasper.at, base, frame, force=grasper.force)
+            found.append(arm)
+    return found
+
+
+def _rotation(grasper: GrasperTable) -> FloatArray:
+    """Return how the model of an arm is turned in the frame of the tissue, shape (3, 3)."""
+    quaternion, axes = np.array(grasper.quat or (1.0, 0.0, 0.0, 0.0)), np.empty(9)
+    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
+    return axes.reshape(3, 3)
+
+
+def led_graspers(
+    graspers: Sequence[GrasperTable],
+    motions: Sequence[GraspMotion],
+    arm: LedArm,
+    tissue: Tissue,
+    frame: TissueFrame,
+) -> list[LedGrasper]:
+    """Return what leads the graspers of a scene.
+
+    Args:
+        graspers: What the scene says of them.
+        motions: Where they go, tissue frame.
+        arm: In whose model they are.
+        tissue: What they may hold.
+        frame: Where the tissue lies in the world.
+    """
+    return [
+        LedGrasper(grasper, arm.data, motion, tissue, frame, _hold(table))
+        for table, motion, grasper in zip(graspers, motions, arm.graspers, strict=True)
+    ]
+
+
+def _hold(table: GrasperTable) -> Hold | None:
+    """Return how a grasper holds what its jaws close on; None: by friction alone."""
+    if table.holds == "friction":
+        return None
+    given = {name: getattr(table, name) for name in Hold._fields}
+    return Hold()._replace(**{name: value for name, value in given.items() if value is not None})

@@ -1,0 +1,144 @@
+"""An arm that holds a grasper: one of the presets, or a model of the user's own."""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from bridge import DeviceLimits, TissueFrame
+from scalpel_sim.arm.arm import preset_spec, put_base
+from scalpel_sim.arm.grasper import (
+    FORWARD,
+    GRASPER,
+    GRASPER_HEEL,
+    GRASPER_TIP,
+    PAD_LENGTH,
+    SHAFT_LENGTH,
+    add_grasper,
+    grasper_spec,
+)
+from scalpel_sim.arm.hand import Impedance, add_hand
+from scalpel_sim.arm.held_arm import HeldArm
+from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.own_arm import firm_impedance, move_to_start, own_spec
+from scalpel_sim.arm.place_search import Spheres
+from scalpel_sim.arm.placement import Placement, covered, place_beside
+from scalpel_sim.errors import UsageError
+from scalpel_sim.strokes.grasp_motion import GraspMotion
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import FloatArray
+
+
+def preset_with_grasper(
+    motion: GraspMotion,
+    placement: Placement,
+    frame: TissueFrame,
+    *,
+    force: float | None = None,
+) -> HeldArm:
+    """Return an arm of the project that holds a grasper, at the start of a motion.
+
+    Args:
+        motion: Where the grasper goes; its name is that of the grasper.
+        placement: Where the arm stands.
+        frame: Where the tissue lies in the world.
+        force: Largest force of the jaws [N]; None: the usual.
+    """
+    spec = preset_spec(placement.preset)
+    put_base(spec, placement.base_position, placement.base_yaw)
+    stylus, blade = spec.body("stylus"), spec.body("blade")
+    half = 0.5 * placement.mount_angle
+    place = stylus.add_frame(pos=blade.pos, quat=[math.cos(half), math.sin(half), 0.0, 0.0])
+    spec.delete(blade)
+    spec.attach(grasper_spec(spec, force), prefix=GRASPER, frame=place)
+    add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
+    qpos = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)])
+    origin = frame.points_to_world(-placement.tissue_origin)
+    return HeldArm(motion.name, spec, qpos, origin, _quaternion(frame.rotation))
+
+
+def place_of_grasper(
+    motion: GraspMotion,
+    bounds: FloatArray,
+    preset: str,
+    times: FloatArray,
+    *,
+    table: float | None,
+    others: Sequence[Spheres],
+) -> tuple[Placement, Spheres]:
+    """Return where an arm of the project stands that holds a grasper, and what covers it.
+
+    Args:
+        motion: Where the grasper goes.
+        bounds: See `place_beside`, as the rest.
+        preset: The arm.
+        times: Instants [s].
+        table: Height of the table.
+        others: What covers other arms.
+    """
+    path = path_of_grasper(motion)
+    place = place_beside(path, bounds, preset, times, table=table, others=others)
+    return place, covered(place, path, bounds, times, edge_height=0.0)
+
+
+def path_of_grasper(motion: GraspMotion) -> Stroke:
+    """Return a motion as that of an edge from where an arm holds it to the end of its pads."""
+    return motion.stroke(SHAFT_LENGTH, 0.5 * PAD_LENGTH)
+
+
+def model_with_grasper(
+    motion: GraspMotion,
+    path: Path,
+    at: str,
+    base: TissueFrame,
+    frame: TissueFrame,
+    *,
+    force: float | None = None,
+) -> HeldArm:
+    """Return the arm of an MJCF file that holds a grasper, at the start of a motion.
+
+    Args:
+        motion: Where the grasper goes; its name is that of the grasper.
+        path: The file.
+        at: Site or body that holds the grasper, along its +z.
+        base: Where the origin of the model lies in the frame of the tissue.
+        frame: Where the tissue lies in the world.
+        force: Largest force of the jaws [N]; None: the usual.
+
+    Raises:
+        UsageError: the file cannot be read, is no model, or has no such site or body.
+        PlacementError: the arm does not reach the whole motion.
+    """
+
+    def spec_with_grasper() -> mujoco.MjSpec:
+        spec = own_spec(path)
+        add_grasper(spec, at, force=force)
+        return spec
+
+    led = partial(LedArm, heel=GRASPER_HEEL, tip=GRASPER_TIP, forward=FORWARD)
+    try:
+        alone = led(spec_with_grasper(), path.stem, DeviceLimits())
+        firm = firm_impedance(alone)
+        spec = spec_with_grasper()
+        add_hand(spec, firm, GRASPER_HEEL, GRASPER_TIP, FORWARD)
+    except ValueError as error:
+        raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error
+    half = 0.5 * PAD_LENGTH
+    tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
+    move_to_start(alone, motion.stroke(half, half), tissue_in_model)
+    qpos = np.array(alone.data.qpos)
+    for side in ("low", "high"):
+        joint = alone.model.joint(f"{GRASPER}jaw_{side}")
+        qpos[int(joint.qposadr[0])] = 0.5 * motion.opening(0.0)
+    turned = frame.rotation @ base.rotation
+    return HeldArm(motion.name, spec, qpos, frame.points_to_world(base.origin), _quaternion(turned))
+
+
+def _quaternion(rotation: FloatArray) -> FloatArray:
+    """Return a rotation as (w, x, y, z)."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
+    return quaternion
