@@ -87,6 +87,11 @@ class InProcessLink:
         self._tissue = tissue
         self._scene = scene
 
+    @property
+    def tissue(self) -> Tissue:
+        """The tissue itself."""
+        return self._tissue
+
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
         return TissueDescription(

@@ -1,18 +1,25 @@
 from .arm.blade import Blade as Blade
 from .arm.geom_coupling import GeomCoupling as GeomCoupling
+from .arm.grasper import Grasper as Grasper
+from .arm.grasper import add_grasper as add_grasper
 from .arm.grip import Grip as Grip
+from .arm.led_grasper import between_pads as between_pads
 from .arm.scalpel import SCALPEL as SCALPEL
 from .preparation import prepare as prepare
 from .scene_parts.scene import Scene as Scene
 from .scenes import SCENES as SCENES
 from .scenes import read_scene as read_scene
 from .simulation import Simulation as Simulation
+from .tables.grasper import GrasperTable as GrasperTable
+from .tables.grasper import WaypointTable as WaypointTable
 from .tables.stroke import StrokeTable as StrokeTable
 from .viewer.viewer import Viewer as Viewer
 
 __all__ = [
     "Blade",
     "GeomCoupling",
+    "Grasper",
+    "GrasperTable",
     "Grip",
     "SCALPEL",
     "SCENES",
@@ -20,6 +27,9 @@ __all__ = [
     "Simulation",
     "StrokeTable",
     "Viewer",
+    "WaypointTable",
+    "add_grasper",
+    "between_pads",
     "prepare",
     "read_scene",
 ]

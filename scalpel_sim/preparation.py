@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -10,9 +10,11 @@ import numpy as np
 
 from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
+from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
 from scalpel_sim.arm.placement import place
+from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_body import highest_toughness, make_tissue
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
@@ -23,7 +25,7 @@ from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import TetrahedralMesh
+from tissue import TetrahedralMesh, Tissue
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -54,14 +56,23 @@ def prepare(
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
     bounds = link.describe().bounds
+    held = tissue_held(scene, link)
+    motions = motions_of(scene.graspers)
     if scene.own_arm is None:
         placement = place(stroke, bounds, scene.arm, force=needed.force)
-        arm: LedArm = placement.arm()
         frame = TissueFrame(origin=placement.tissue_origin)
+        first = placement, stroke
+        others = arms_with_graspers(scene.graspers, motions, bounds, frame, first)
+        arm: LedArm = placement.arm(others=others)
     else:
         arm, frame = _own(scene.own_arm)
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
+        others = arms_with_graspers(scene.graspers, motions, bounds, frame, None)
+        if others:
+            start = np.array(arm.data.qpos)
+            arm, _ = _own(scene.own_arm, others)
+            arm.reset(start)
     _warn_of_weakness(needed, arm)
     tissue = link.describe()
     floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
@@ -69,7 +80,7 @@ def prepare(
         frame.rotation.T, frame.points_to_tissue(np.zeros(3))
     )  # as the tissue sees it
     standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
-    return Simulation(
+    simulation = Simulation(
         arm,
         stroke,
         link,
@@ -79,6 +90,26 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
+    if held is not None:
+        for grasper in led_graspers(scene.graspers, motions, arm, held, frame):
+            simulation.add_grasper(grasper)
+    return simulation
+
+
+def tissue_held(scene: Scene, link: TissueLink) -> Tissue | None:
+    """Return the tissue that the graspers of a scene may hold; None where there are none.
+
+    Raises:
+        UsageError: the tissue is in another process.
+    """
+    if not scene.graspers:
+        return None
+    if not isinstance(link, InProcessLink):
+        raise UsageError(
+            "the scene has a [[grasper]], and its tissue is in another process, where nothing can "
+            "be held; run it without --connect"
+        )
+    return link.tissue
 
 
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:
@@ -88,10 +119,17 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _own(own: OwnArm) -> tuple[LedArm, TissueFrame]:
+def _own(own: OwnArm, others: Sequence[HeldArm] = ()) -> tuple[LedArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
-    arm = own_arm(Path(own.model), limits, heel=own.heel, tip=own.tip, forward=own.forward)
+    arm = own_arm(
+        Path(own.model),
+        limits,
+        heel=own.heel,
+        tip=own.tip,
+        forward=own.forward,
+        others=others,
+    )
     quaternion, axes = np.array(own.quat), np.empty(9)
     if not quaternion.any():
         raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")

@@ -81,7 +81,8 @@ def perform(
     if text is not None:
         outputs.write_scene(text)
     outputs.write_mesh(INITIAL, at_first)
-    asked = asked_area(simulation.stroke, at_first)
+    # What graspers move is elsewhere when the blade comes.
+    asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
     replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
     simulation.pictures.append(into_replay(replay))
     _warn_if_slow(simulation)
@@ -187,5 +188,5 @@ def _warn_if_slow(simulation: Simulation) -> None:
 
 
 def run_time(simulation: Simulation, seconds: float | None) -> float:
-    """Return how long to simulate [s]: `seconds`, else the stroke and `REST_AFTER_STROKE`."""
-    return simulation.stroke.duration + REST_AFTER_STROKE if seconds is None else seconds
+    """Return how long to simulate [s]: `seconds`, else all motions and `REST_AFTER_STROKE`."""
+    return simulation.duration + REST_AFTER_STROKE if seconds is None else seconds

@@ -4,15 +4,17 @@ import gc
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from typing import Protocol
 
 import numpy as np
 
 from bridge import Bridge, Fixture, TissueFrame, TissueLink, VirtualCoupling
 from scalpel_sim.arm.collision_monitor import CollisionMonitor
 from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.led_grasper import LedGrasper
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
-from scalpel_sim.output.recording import Recording
+from scalpel_sim.output.recording import Recording, columns_of_hand
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
@@ -26,6 +28,16 @@ EveryFrame = Callable[["Simulation"], bool | None]
 
 DrawFrame = Callable[["Simulation"], None]
 """Called after each frame, timed as the stage RD: a replay or a live viewer draws it."""
+
+
+class Partner(Protocol):
+    """What else acts on the tissue in each frame, and is acted on by it: a grip, a contact."""
+
+    def follow(self) -> None:
+        """Be where the model is, before the tissue's step: between MuJoCo's two halves of one."""
+
+    def apply(self) -> None:
+        """Apply to the model what the tissue did in its step."""
 
 
 class Simulation:
@@ -74,6 +86,10 @@ class Simulation:
         self._rows = FrameRows(frame)
         self.recording = Recording()
         """What happened in each frame so far."""
+        self.graspers: list[LedGrasper] = []
+        """Graspers of other arms: see `add_grasper`."""
+        self.partners: list[Partner] = []
+        """What else acts on the tissue, graspers among it."""
         self.pictures: list[DrawFrame] = []
         """Called after each frame; most frames they skip."""
         self.wall_seconds = 0.0
@@ -89,6 +105,18 @@ class Simulation:
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
         self._follower = StrokeFollower(self.arm.hand, stroke, self.frame)
+
+    def add_grasper(self, grasper: LedGrasper) -> None:
+        """Have a grasper of the arm's model take part, before the first frame."""
+        self.graspers.append(grasper)
+        self.partners.append(grasper)
+        names = [name for each in self.graspers for name in columns_of_hand(each.name)]
+        self.recording = Recording(others=names)
+
+    @property
+    def duration(self) -> float:
+        """When the blade and all graspers are at the end of their ways [s]."""
+        return max(self.stroke.duration, *(each.motion.duration for each in self.graspers), 0.0)
 
     @property
     def title(self) -> str:
@@ -119,11 +147,17 @@ class Simulation:
         start = time.perf_counter()
         arm, blade, now = self.arm, self.arm.blade, self.time
         self._follower.lead(now)
+        for grasper in self.graspers:
+            grasper.lead(now)
         arm.step1()
         self.touching.check()
         segment = blade.segment()
+        for partner in self.partners:
+            partner.follow()
         self.wrench = self._wrench_on(segment)
         blade.apply(self.wrench)
+        for partner in self.partners:
+            partner.apply()
         arm.step2()
         arm.check()
         done = time.perf_counter()
@@ -154,6 +188,8 @@ class Simulation:
             WallTimes(*stages, *wall_seconds),
         )
         row.append(time.perf_counter() - start)
+        for grasper in self.graspers:
+            row += grasper.record()
         self.recording.append(row)
 
     def _wrench_on(self, segment: BladeSegment) -> Wrench:

@@ -100,3 +100,14 @@ def test_a_tissue_in_another_process_is_cut_in_two():
         env=os.environ | {"PYTHONPATH": str(FOLDER.parents[1])},
     )
     assert "cut 400 mm2, 2 pieces" in done.stdout
+
+
+def test_a_robot_of_your_own_is_the_left_hand_and_carries_what_is_cut_off(run):
+    printed = run("own_grasper.py")
+    pieces, held, weight = re.search(
+        r"(\d) pieces; .* (\d+) points .*\n.* ([\d.]+) N", printed
+    ).groups()
+    assert int(pieces) == 2 and int(held) > 100
+    assert float(weight) == pytest.approx(11e-3 * 9.81, rel=0.15)  # it still swings
+    code = (FOLDER / "own_grasper.py").read_text(encoding="utf-8").splitlines()
+    assert sum(bool(line) and not line.startswith(('"""', "import", "from")) for line in code) < 15

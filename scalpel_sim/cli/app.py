@@ -317,7 +317,7 @@ def _perform(
     with progress(seconds, options.printing) as advance:
         return perform(
             prepared.simulation,
-            Outputs(prepared.folder, plotter),
+            Outputs(prepared.folder, plotter, prepared.simulation.recording.columns),
             # A server does not say how its tissue is held, nor how it is solved.
             scene=prepared.scene if options.client.connect is None else None,
             settings=prepared.settings,

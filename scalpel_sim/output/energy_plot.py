@@ -28,7 +28,7 @@ _MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 
 def plot_energies(recording: Recording, title: str, path: Path) -> None:
     """Write a PNG: the terms of the account on top of each other, and the residual."""
     time = recording.column("time_s")
-    work = recording.column("work_of_blade_j")
+    work = sum(recording.column(f"work_of_{what}_j") for what in ("blade", "loads", "supports"))
     figure = Figure(figsize=(8.0, 5.8))
     above, below = figure.subplots(
         2, 1, sharex=True, height_ratios=(3.2, 1.0), gridspec_kw=_MARGINS
@@ -36,7 +36,7 @@ def plot_energies(recording: Recording, title: str, path: Path) -> None:
     figure.suptitle(title, x=0.01, y=0.985, ha="left", fontsize=12, fontweight="bold")
     for sign in (1.0, -1.0):
         _stack(above, time, recording, sign)
-    above.plot(time, _MJ_PER_J * work, color=MAGNITUDE, lw=1.6, label="work of the blade")
+    above.plot(time, _MJ_PER_J * work, color=MAGNITUDE, lw=1.6, label="work put in")
     above.axhline(0.0, color=MAGNITUDE, lw=0.6)
     above.set_ylabel("energy [mJ]")
     legend(above, 4)

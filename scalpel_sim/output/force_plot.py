@@ -22,6 +22,8 @@ PARTS = (
 MAGNITUDE = "#222222"
 _AREA = "#aa3377"
 LIMITED = "#d55e00"
+HAND_COLOURS = ("#882255", "#117733", "#999933")
+"""Colours of graspers, in turn: Paul Tol's muted palette."""
 DOTS_PER_INCH = 150
 _MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.065, "top": 0.91, "hspace": 0.16}
 """Fixed: matplotlib finds margins by itself only by drawing everything twice."""
@@ -85,6 +87,10 @@ def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
             time, 0.0, 1.0, where=is_limited, transform=axes.get_xaxis_transform(),
             color=LIMITED, alpha=0.12, lw=0.0, label="the device limits it",
         )  # fmt: skip
+    for i, name in enumerate(recording.hands):
+        of_hand = np.linalg.norm(recording.vector(f"{name}_force"), axis=1)
+        colour = HAND_COLOURS[i % len(HAND_COLOURS)]
+        axes.plot(time, of_hand, color=colour, lw=1.3, ls="--", label=name)
     axes.set_ylabel("force on the arm [N]")
     legend(axes, 6)
 

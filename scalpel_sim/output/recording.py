@@ -51,17 +51,34 @@ times of the stages that the paper's Table 1 names: collision detection, geometr
 relaxation and rendering. `frame_s` is the wall time of the whole frame without rendering (`rd_s`)
 and without the recording of its row (`recording_s`)."""
 
-_ROW = struct.Struct(f"{len(COLUMNS)}d")
+
+def columns_of_hand(name: str) -> tuple[str, ...]:
+    """Return the columns of a grasper, which follow after all others.
+
+    Force and torque of the tissue on it in the frame, about the middle between the pads, world
+    frame; the distance between the pads; and how many points of the tissue are tied to it.
+    """
+    vectors = (*_vector(f"{name}_force", "n"), *_vector(f"{name}_torque", "nm"))
+    return (*vectors, f"{name}_opening_m", f"{name}_points")
+
 
 FRAMES_AT_FIRST = 1024
 
 
 class Recording:
-    """Rows of `COLUMNS`, one per frame. Grows by doubling, so that a frame allocates nothing."""
+    """Rows of `COLUMNS`, one per frame. Grows by doubling, so that a frame allocates nothing.
 
-    def __init__(self, n_frames: int = FRAMES_AT_FIRST) -> None:
+    Args:
+        n_frames: Room at first.
+        others: Further columns: see `columns_of_hand`.
+    """
+
+    def __init__(self, n_frames: int = FRAMES_AT_FIRST, others: Sequence[str] = ()) -> None:
+        self.columns = (*COLUMNS, *others)
+        """Names and units of all columns."""
+        self._row = struct.Struct(f"{len(self.columns)}d")
         self._n = 0
-        self._take_rows(np.zeros((max(n_frames, 1), len(COLUMNS))))
+        self._take_rows(np.zeros((max(n_frames, 1), len(self.columns))))
 
     def _take_rows(self, rows: FloatArray) -> None:
         self._rows, self._memory = rows, rows.data.cast("B")
@@ -75,21 +92,30 @@ class Recording:
         return self._rows[: self._n]
 
     def append(self, row: Sequence[float]) -> None:
-        """Add one frame: a number for each of `COLUMNS`."""
+        """Add one frame: a number for each of `columns`."""
         if self._n == len(self._rows):
             self._take_rows(np.concatenate([self._rows, np.zeros_like(self._rows)]))
         # For NumPy to look at fifty numbers of a list takes three times as long.
-        _ROW.pack_into(self._memory, self._n * _ROW.size, *row)
+        self._row.pack_into(self._memory, self._n * self._row.size, *row)
         self._n += 1
 
     def column(self, name: str) -> FloatArray:
         """Return one column, shape (n_frames,). A view."""
-        return self.rows[:, COLUMNS.index(name)]
+        return self.rows[:, self.columns.index(name)]
 
     def vector(self, name: str) -> FloatArray:
         """Return the three columns of a vector such as `tip`, shape (n_frames, 3). A view."""
-        first = next(i for i, column in enumerate(COLUMNS) if column.startswith(f"{name}_x_"))
+        first = next(i for i, each in enumerate(self.columns) if each.startswith(f"{name}_x_"))
         return self.rows[:, first : first + 3]
+
+    @property
+    def hands(self) -> tuple[str, ...]:
+        """Names of the graspers."""
+        return tuple(
+            each.removesuffix("_opening_m")
+            for each in self.columns[len(COLUMNS) :]
+            if each.endswith("_opening_m")
+        )
 
     @property
     def is_audited(self) -> bool:
@@ -108,13 +134,16 @@ def read_forces(path: Path) -> Recording:
     """
     with path.open(encoding="ascii") as file:
         header = file.readline().strip()
-        if header != ",".join(COLUMNS):
+        columns = header.split(",")
+        others = columns[len(COLUMNS) :]
+        hands = [each.removesuffix("_opening_m") for each in others if each.endswith("_opening_m")]
+        if columns != [*COLUMNS, *(name for hand in hands for name in columns_of_hand(hand))]:
             raise ValueError(
                 f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )
         lines = [line for line in file if line.endswith("\n")]
-    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(COLUMNS)))
-    recording = Recording(len(rows))
+    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(columns)))
+    recording = Recording(len(rows), others)
     for row in rows:
         recording.append(row)
     return recording

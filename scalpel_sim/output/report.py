@@ -46,6 +46,14 @@ SATURATIONS = {
 """Counters of the bridge that the table shows where they are not zero, and their labels."""
 
 
+WORKS = {
+    "work_of_blade": "work of the blade",
+    "work_of_loads": "work of loads and graspers",
+    "work_of_supports": "work of supports",
+}
+"""The works of the account, and their labels."""
+
+
 class _Rows:
     """The table of a run, with a column of the paper's figures where there are any."""
 
@@ -175,6 +183,9 @@ def _add_cut(rows: _Rows, summary: Summary) -> None:
         rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}")
     rows.add("peak force", f"{summary.force_peak_n:.3f} N")
     rows.add("mean force", f"{summary.force_mean_n:.3f} N")
+    for hand in summary.hands:
+        held = f"{hand['points_held_most']:,} points held at most"
+        rows.add(f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N, {held}")
     for pair, frames in summary.touched.items():
         rows.add(f"collision: {pair}", f"{frames:,} frames")
     rows.add("work of the blade", f"{summary.work_of_blade_j * _MJ_PER_J:.2f} mJ")
@@ -211,9 +222,9 @@ def _add_times(rows: _Rows, summary: Summary) -> None:
 
 
 def _account(energies: dict[str, float], residual_of_work: float | None) -> Table:
-    """Return the energy account as a table; the shares are of the blade's work, 100 % in all."""
-    work = energies["work_of_blade"]
-    table = Table(title="where the work of the blade went", title_justify="left", show_header=False)
+    """Return the energy account as a table; the shares are of the work put in, 100 % in all."""
+    work = sum(energies[name] for name in ("work_of_blade", "work_of_loads", "work_of_supports"))
+    table = Table(title="where the work went", title_justify="left", show_header=False)
     table.add_column(style="bold")
     table.add_column(justify="right")
     table.add_column(justify="right")
@@ -222,7 +233,9 @@ def _account(energies: dict[str, float], residual_of_work: float | None) -> Tabl
         percent = "" if share is None else f"{share:.2%}"
         table.add_row(label, f"{energy * _MJ_PER_J:.4f} mJ", percent)
 
-    row("work of the blade", work, 1.0 if work else None)
+    for name, label in WORKS.items():
+        if energies[name] or name == "work_of_blade":
+            row(label, energies[name], energies[name] / work if work else None)
     table.add_section()
     for term in TERMS:
         if energies[term.name]:

@@ -2,7 +2,7 @@
 
 import json
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
@@ -42,20 +42,21 @@ class Outputs:
     Args:
         folder: The folder; it is made if there is none.
         plotter: Draws the plots. The caller closes it.
+        columns: Columns of `forces.csv`.
 
     Raises:
         UsageError: the path is a file, or lies below one.
         RunError: the folder cannot be made or written.
     """
 
-    def __init__(self, folder: Path, plotter: Plotter) -> None:
+    def __init__(self, folder: Path, plotter: Plotter, columns: Sequence[str] = COLUMNS) -> None:
         self.folder = folder
         self._plotter = plotter
         check_folder(folder)
         for name in RUN_FILES:
             _naming_path(folder / name, lambda path: path.unlink(missing_ok=True))
         self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
-        self._append((",".join(COLUMNS) + "\n").encode("ascii"))
+        self._append((",".join(columns) + "\n").encode("ascii"))
         self._n_written = 0
 
     def path(self, name: str) -> Path:

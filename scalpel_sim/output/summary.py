@@ -62,7 +62,10 @@ class Summary(NamedTuple):
     """The energy account: the terms of `tissue.Energies`, and their `residual`. None without an
     audit."""
     residual_of_work: float | None
-    """The residual over the work of the blade; None without an audit, or without work."""
+    """The residual over the work of all hands: of the blade, and the most that loads and graspers
+    had done. None without an audit, or without work."""
+    hands: list[dict[str, Any]]
+    """What each grasper felt: see `hand_figures`."""
     share: dict[str, float]
     """Fractions of `wall_seconds`: the paper's RX, RD, GC, CD, and `other` (arm, bridge, link,
     recording). They sum to 1."""
@@ -132,13 +135,41 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
         work_of_blade_j=work,
         energies_j=energies,
-        residual_of_work=energies["residual"] / work if energies and work else None,
+        residual_of_work=_residual_of_work(recording, energies, work),
+        hands=[hand_figures(recording, name) for name in recording.hands],
         share=shares(recording, facts.wall_seconds),
         counters=facts.counters,
         touched=facts.touched,
         settings=facts.settings,
         versions=versions(),
     )
+
+
+def _residual_of_work(
+    recording: Recording, energies: dict[str, float] | None, work: float
+) -> float | None:
+    """Return the residual over the work of all hands; None without an account, or without work."""
+    if energies is None:
+        return None
+    # What is lifted and put down again takes work that is given back.
+    work_of_loads = np.abs(recording.column("work_of_loads_j")).max(initial=0.0)
+    in_all = work + float(work_of_loads)
+    return energies["residual"] / in_all if in_all else None
+
+
+def hand_figures(recording: Recording, name: str) -> dict[str, Any]:
+    """Return what a grasper felt: peak force and torque, and how many points it held at most."""
+    force, torque = (
+        np.linalg.norm(recording.vector(f"{name}_{what}"), axis=1) for what in ("force", "torque")
+    )
+    points = recording.column(f"{name}_points")
+    return {
+        "name": name,
+        "force_peak_n": float(force.max(initial=0.0)),
+        "torque_peak_nm": float(torque.max(initial=0.0)),
+        "points_held_most": int(points.max(initial=0.0)),
+        "points_held_at_end": int(points[-1]) if len(points) else 0,
+    }
 
 
 def _area_paid_for(energies: dict[str, float] | None, material: dict[str, float]) -> float | None:

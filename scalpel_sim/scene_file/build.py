@@ -12,6 +12,7 @@ from scalpel_sim.scene_file.reading import SceneFile
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import DEFAULT_CUT_SETTINGS, GEL, Scene
 from scalpel_sim.tables.body import KEYS_OF_SHAPE, BodySource
+from scalpel_sim.tables.grasper import GrasperTable
 from scalpel_sim.tables.kinds import check_keys
 from scalpel_sim.tables.material import BladeTable, given_in, material_of
 from scalpel_sim.tables.problems import naming_table
@@ -66,6 +67,7 @@ def scene_in(file: SceneFile) -> Scene:
         cut=naming_table("[solver]", lambda: _cut(tables.solver)),
         blade=naming_table("[blade]", lambda: _blade(tables.blade)),
         strokes=tuple(_located(stroke, file.folder) for stroke in tables.stroke),
+        graspers=tuple(_with_model(grasper, file.folder) for grasper in tables.grasper),
         **{key: value for key, value in given.items() if value is not None},
     )
 
@@ -114,3 +116,10 @@ def _located(stroke: StrokeTable, folder: Path) -> StrokeTable:
     if stroke.file is None:
         return stroke
     return msgspec.structs.replace(stroke, file=str(folder / stroke.file))
+
+
+def _with_model(grasper: GrasperTable, folder: Path) -> GrasperTable:
+    """Return a grasper the model of whose arm is found from anywhere."""
+    if grasper.model is None:
+        return grasper
+    return msgspec.structs.replace(grasper, model=str(folder / grasper.model))

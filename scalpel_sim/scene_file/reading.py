@@ -13,6 +13,7 @@ _SHIPPED = Path(__file__).parent / "shipped"
 SHIPPED_SCENES = (
     "organ",
     "incision",
+    "retract",
     "liver",
     "kidney",
     "skin",

@@ -42,6 +42,10 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
     for stroke in strokes:
         if "file" in stroke:
             stroke["file"] = _relative(Path(stroke["file"]), folder)
+    graspers = [given_in(grasper) for grasper in scene.graspers]
+    for grasper in graspers:
+        if "model" in grasper:
+            grasper["model"] = _relative(Path(grasper["model"]), folder)
     run = {} if scene.seconds is None else {"seconds": scene.seconds}
     return {
         "name": scene.name,
@@ -79,6 +83,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
                 "passivity": scene.passivity,
             }
         ),
+        **({"grasper": graspers} if graspers else {}),
         "stroke": strokes,
     }
 

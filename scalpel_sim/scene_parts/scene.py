@@ -20,6 +20,7 @@ from scalpel_sim.scene_parts.choices import (
     check_scheme,
 )
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
+from scalpel_sim.tables.grasper import GrasperTable, check_graspers
 from scalpel_sim.tables.material import given_in
 from scalpel_sim.tables.stroke import DEFAULT_SPEED, StrokeTable, check_stroke, stroke_called
 from tissue import (
@@ -96,6 +97,8 @@ class Scene:
     """`touch`, `premium`, or `auto`: the first of them that reaches."""
     own_arm: OwnArm | None = None
     """An arm of the user's own, in place of those."""
+    graspers: Sequence[GrasperTable] = ()
+    """Other arms, each with a grasper, and what they do."""
     tissue_every: int = 1
     """Number of frames after which the tissue is asked again."""
     coupling: str = "rigid"
@@ -155,6 +158,7 @@ class Scene:
             raise UsageError("the scene has no stroke; give at least one [[stroke]]")
         for i, stroke in enumerate(self.strokes):
             check_stroke(stroke, f"[[stroke]] number {i + 1}")
+        check_graspers(self.graspers)
 
     @property
     def stroke(self) -> str:
@@ -192,6 +196,7 @@ class Scene:
         return found | {
             "stroke": self.stroke,
             "strokes": [given_in(stroke) for stroke in self.strokes],
+            "graspers": [given_in(grasper) for grasper in self.graspers],
             "material": asdict(self.material),
             "cut": asdict(self.cut),
             "blade": None if self.blade is None else asdict(self.blade),

@@ -25,7 +25,8 @@ def stroke_through(
         StrokeError: no blade can follow it, or the body has no section where it is planned.
     """
     paths = [_path(mesh, table, material) for table in strokes]
-    return in_turn(paths, [table.pause for table in strokes], mesh)
+    rests = [(table.wait, table.pause) for table in strokes]
+    return in_turn(paths, rests, mesh)
 
 
 def _path(mesh: TetrahedralMesh, table: StrokeTable, material: Material) -> Stroke:

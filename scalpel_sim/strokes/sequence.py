@@ -25,8 +25,10 @@ Poses = list[tuple[float, BladeSegment]]
 """Instants [s] and poses."""
 
 
-def in_turn(strokes: Sequence[Stroke], pauses: Sequence[float], mesh: TetrahedralMesh) -> Stroke:
-    """Return one stroke that does several, and rests after each.
+def in_turn(
+    strokes: Sequence[Stroke], rests: Sequence[tuple[float, float]], mesh: TetrahedralMesh
+) -> Stroke:
+    """Return one stroke that does several, and rests before and after each.
 
     From stroke to stroke the blade is drawn out along its edge if it is in the body, raised above
     it, led over, and let down. It is as long as the longest of the strokes needs; its tip is where
@@ -34,19 +36,19 @@ def in_turn(strokes: Sequence[Stroke], pauses: Sequence[float], mesh: Tetrahedra
 
     Args:
         strokes: At least one.
-        pauses: How long the blade rests after each [s].
+        rests: How long the blade rests before and after each [s].
         mesh: The body as it lies before the first, tissue frame [m].
 
     Raises:
         StrokeError: a blade would be too fast.
     """
-    if len(strokes) == 1 and pauses[0] == 0.0:
+    if len(strokes) == 1 and not any(rests[0]):
         return strokes[0]
     length = max(stroke.blade_length for stroke in strokes)
     box = mesh.positions.min(axis=0) - _CLEARANCE, mesh.positions.max(axis=0) + _CLEARANCE
     poses: Poses = []
     asked = []
-    for stroke, pause in zip(strokes, pauses, strict=True):
+    for stroke, (wait, pause) in zip(strokes, rests, strict=True):
         own = [(t, _lengthened(stroke.pose(t), length)) for t in stroke.times.tolist()]
         start = 0.0
         if poses:
@@ -54,7 +56,11 @@ def in_turn(strokes: Sequence[Stroke], pauses: Sequence[float], mesh: Tetrahedra
             way = _way(last, own[0][1], box)
             poses += [(start + t, pose) for t, pose in way[1:]]
             start = poses[-1][0]
-            own = own[1:]
+            if wait == 0.0:
+                own = own[1:]
+        if wait > 0.0:
+            poses += [] if poses else [(0.0, own[0][1])]
+            start += wait
         poses += [(start + t, pose) for t, pose in own]
         asked += [(start + a, start + b) for a, b in stroke.asked or ()]
         if pause > 0.0:

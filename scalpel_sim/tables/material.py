@@ -60,8 +60,17 @@ class BladeTable(TomlTable, kw_only=True, frozen=True):
 
 
 def given_in(table: msgspec.Struct) -> dict[str, Any]:
-    """Return the keys of a table that are given, and their values."""
-    return {key: value for key, value in msgspec.structs.asdict(table).items() if value is not None}
+    """Return the keys of a table that are given, and their values; rows of it as such too."""
+    given = {
+        key: value for key, value in msgspec.structs.asdict(table).items() if value is not None
+    }
+    return {key: _rows_given(value) for key, value in given.items()}
+
+
+def _rows_given(value: Any) -> Any:
+    """Return rows of a table as the keys that they give; another value as it is."""
+    is_rows = isinstance(value, list) and all(isinstance(row, msgspec.Struct) for row in value)
+    return [given_in(row) for row in value] if is_rows else value
 
 
 def material_called(name: str) -> Material:

@@ -102,7 +102,8 @@ def _problem_of_value(
         if not value:
             return f"the file has no [[{key}]]"
         problems = (
-            _problem(each, row, f"[[{key}]] number {i + 1}", whole) for i, each in enumerate(value)
+            _problem(each, row, f"{where} [[{key}]] number {i + 1}".strip(), whole)
+            for i, each in enumerate(value)
         )
         return next((problem for problem in problems if problem), "")
     inner = _table_of(kind)

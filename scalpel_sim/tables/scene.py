@@ -6,6 +6,7 @@ from msgspec import Meta, field
 
 from bridge import MAX_FRAMES_PER_ANSWER
 from scalpel_sim.tables.body import BodyTable
+from scalpel_sim.tables.grasper import GrasperTable
 from scalpel_sim.tables.material import BladeTable, PresetMaterialTable
 from scalpel_sim.tables.stroke import StrokeTable
 from scalpel_sim.tables.values import (
@@ -112,4 +113,5 @@ class SceneContent(TomlTable, kw_only=True, frozen=True):
     world: WorldTable = field(default_factory=WorldTable)
     solver: SolverTable = field(default_factory=SolverTable)
     arm: ArmTable = field(default_factory=ArmTable)
+    grasper: list[GrasperTable] = field(default_factory=list)
     stroke: list[StrokeTable] = field(default_factory=lambda: [StrokeTable()])

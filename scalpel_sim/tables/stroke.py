@@ -77,6 +77,8 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """How often it is [1/s]."""
     file: Text | None = None
     """CSV file of poses."""
+    wait: NotNegative = 0.0
+    """How long the blade rests before it begins [s]."""
     pause: NotNegative = 0.0
     """How long the blade rests afterwards [s]."""
 

@@ -11,9 +11,9 @@ from rich.console import Console
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.energy_plot import OPACITY, plot_energies
 from scalpel_sim.output.energy_terms import TERMS
-from scalpel_sim.output.force_plot import LIMITED, PARTS, plot_forces
+from scalpel_sim.output.force_plot import HAND_COLOURS, LIMITED, PARTS, plot_forces
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.recording import COLUMNS, Recording, read_forces
+from scalpel_sim.output.recording import COLUMNS, Recording, columns_of_hand, read_forces
 from scalpel_sim.output.report import print_summary
 from scalpel_sim.output.run_folder import (
     ENERGY_PLOT,
@@ -453,3 +453,69 @@ def test_a_row_that_a_killed_run_did_not_finish_is_left_out(tmp_path):
         np.testing.assert_array_equal(read_forces(path).rows, rows[:1])
     path.write_text(whole)
     np.testing.assert_array_equal(read_forces(path).rows, rows)
+
+
+# Graspers
+
+
+def recording_of_hands(*names: str, n_frames: int = 3) -> Recording:
+    """Return a recording in which grasper i pulls with i + 1 newtons along x, and holds points."""
+    recording = Recording(others=[column for name in names for column in columns_of_hand(name)])
+    for frame in range(n_frames):
+        row = dict.fromkeys(recording.columns, 0.0) | {"time_s": frame * DT, "frame_s": 1e-4}
+        for i, name in enumerate(names):
+            row |= {f"{name}_force_x_n": i + 1.0, f"{name}_torque_z_nm": 0.1 * frame}
+            row |= {f"{name}_points": 7.0 if frame == 1 else 0.0}
+        recording.append(list(row.values()))
+    return recording
+
+
+def test_columns_of_graspers_follow_after_all_others_and_are_read_again(tmp_path, plotter):
+    recording = recording_of_hands("left", "helper_2")
+    assert recording.columns[: len(COLUMNS)] == COLUMNS and recording.hands == ("left", "helper_2")
+    outputs = Outputs(tmp_path, plotter, recording.columns)
+    outputs.write_forces(recording, all_rows=True)
+    outputs.close()
+    found = read_forces(tmp_path / FORCES)
+    assert found.columns == recording.columns
+    np.testing.assert_array_equal(found.rows, recording.rows)
+    np.testing.assert_array_equal(found.vector("helper_2_force")[0], [2.0, 0.0, 0.0])
+
+
+def test_a_table_with_half_a_grasper_is_refused(tmp_path):
+    path = tmp_path / FORCES
+    path.write_text(",".join((*COLUMNS, *columns_of_hand("left")[:-1])) + "\n")
+    with pytest.raises(ValueError, match="must be the columns of a run"):
+        read_forces(path)
+
+
+def test_the_summary_and_the_table_tell_what_each_grasper_felt():
+    console = Console(record=True, width=100)
+    summary = summary_of(recording_of_hands("left"))
+    assert summary.hands == [
+        {
+            "name": "left",
+            "force_peak_n": 1.0,
+            "torque_peak_nm": pytest.approx(0.2),
+            "points_held_most": 7,
+            "points_held_at_end": 0,
+        }
+    ]
+    print_summary(summary, console)
+    assert re.search("peak force, left.* 1.000 N, 7 points held at most", console.export_text())
+
+
+def test_the_picture_of_the_forces_has_a_line_for_each_grasper(tmp_path):
+    plain, with_hand = tmp_path / "plain.png", tmp_path / "hand.png"
+    plot_forces(zero_recording(30), "one hand", plain)
+    plot_forces(recording_of_hands("left", n_frames=30), "two hands", with_hand)
+    assert n_of_colour(with_hand, HAND_COLOURS[0]) > 100 + n_of_colour(plain, HAND_COLOURS[0])
+
+
+def test_the_residual_is_over_the_work_of_all_hands():
+    """Also of what a grasper lifted and put down again, which took no work in the end."""
+    recording = recording_of_hands("left")
+    recording.column("work_of_blade_j")[-1] = 1e-3
+    recording.column("work_of_loads_j")[:] = [0.0, 3e-3, 0.0]
+    recording.column("residual_j")[-1] = 1e-5
+    assert summary_of(recording).residual_of_work == pytest.approx(1e-5 / 4e-3)

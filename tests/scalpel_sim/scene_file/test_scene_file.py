@@ -20,6 +20,7 @@ from scalpel_sim.scene_file.reading import (
     shipped_scene,
 )
 from scalpel_sim.scene_file.writing import scene_text
+from scalpel_sim.tables.grasper import GrasperTable, WaypointTable
 from scalpel_sim.tables.material import BladeTable
 from scalpel_sim.tables.scene import (
     ArmTable,
@@ -37,7 +38,17 @@ from scalpel_sim.tables.stroke import (
 from tissue import pieces_of
 
 ROOT = Path(__file__).parents[3]
-TABLES = (SceneContent, SceneBodyTable, BladeTable, WorldTable, SolverTable, ArmTable, StrokeTable)
+TABLES = (
+    SceneContent,
+    SceneBodyTable,
+    BladeTable,
+    WorldTable,
+    SolverTable,
+    ArmTable,
+    GrasperTable,
+    WaypointTable,
+    StrokeTable,
+)
 SLAB = shipped_scene("slab")
 
 

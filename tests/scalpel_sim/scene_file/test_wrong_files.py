@@ -22,6 +22,13 @@ gravity = 9.81
 relaxation = "global"
 [arm]
 preset = "touch"
+[[grasper]]
+name = "helper"
+holds = "attachment"
+motion = [
+  { time = 0.0, at = [0.1, 0.02, 0.03], approach = [-1, 0, 0], across = [0, 1, 0], opening = 0.01 },
+  { time = 0.5, opening = 0.005 },
+]
 [[stroke]]
 kind = "points"
 points = [[0.02, -0.01, 0.01], [0.02, 0.05, 0.01]]
@@ -91,6 +98,57 @@ WRONG = {
     "a stroke at the speed of sound": ("length =", "speed = 340.0\nlength =", "at most 1"),
     "a stroke along its edge": ("[0.02, 0.05, 0.01]", "[0.02, -0.01, 0.03]", "give the direction"),
     "a stroke beside the body": ("0.02, -0.01, 0.01], [0.02", "0.2, -0.01, 0.01], [0.2", "mm away"),
+    "a grasper that waits": ('"attachment"', '"suction"', 'must be "attachment" or "friction"'),
+    "friction with a spring": (
+        'holds = "attachment"',
+        'holds = "friction"\nstiffness = 100.0',
+        'stiffness is for holds = "attachment"',
+    ),
+    "a wide grasper": ("opening = 0.005", "opening = 0.03", "a distance from 0 to 0.02 m"),
+    "a grasper nowhere": ("at = [0.1, 0.02, 0.03], ", "", "number 1 has no at"),
+    "a row without a time": (
+        "{ time = 0.5, ",
+        "{ ",
+        "[[grasper]] number 1 [[motion]] number 2 has no time",
+    ),
+    "an unknown key of a row": ("time = 0.5, opening", "time = 0.5, openning", "'openning'. Did"),
+    "times that go back": ("time = 0.5", "time = 0.0", "times must increase"),
+    "jaws along the shaft": ("opening = 0.005", "across = [1, 0, 0]", "not along one line"),
+    "a grasper at the speed of sound": ("time = 0.5, ", "time = 0.5, at = [9, 9, 9], ", "2 m/s is"),
+    "a grasper that is far away": (
+        "time = 0.5, ",
+        "time = 9.0, at = [2, 0, 0], ",
+        "does not reach the whole motion of 'helper'",
+    ),
+    "a grasper in the way": (
+        "at = [0.1, 0.02, 0.03], approach = [-1, 0, 0]",
+        "at = [0.03, 0.02, 0.09], approach = [0, 0, -1]",
+        "not clear of the other arm",
+    ),
+    "a place without a model": (
+        'holds = "attachment"',
+        'at = "flange"',
+        "at is for an arm of your own",
+    ),
+    "a model without a place": (
+        'holds = "attachment"',
+        'model = "arm.xml"',
+        "has a model and no at",
+    ),
+    "a model that is not there": (
+        'holds = "attachment"',
+        'model = "no.xml"\nat = "flange"',
+        "no.xml",
+    ),
+    "a name with a space": ('"helper"', '"my left"', "letters, digits and underscores"),
+    "two graspers of one name": (
+        "[[stroke]]",
+        """[[grasper]]
+name = "helper"
+motion = [{ time = 0.0, at = [0.0, 0.0, 0.1], opening = 0.01 }]
+[[stroke]]""",
+        "has the name 'helper' of another",
+    ),
     "an hour and more": ("about", "seconds = 4000.0\nabout", "at most 3600"),
 }
 

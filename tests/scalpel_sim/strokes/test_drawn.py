@@ -11,6 +11,7 @@ from tissue import BladeSegment, block
 
 SPEED = 0.05
 CUBE = block((1, 1, 1), (0.04, 0.04, 0.04))
+NO_RESTS = [(0.0, 0.0), (0.0, 0.0)]
 
 
 def drawn(kind="points", **keys):
@@ -152,11 +153,11 @@ def through(x, *, length=0.06):
 
 def test_one_stroke_without_a_pause_is_itself():
     stroke = through(0.02)
-    assert in_turn([stroke], [0.0], CUBE) is stroke
+    assert in_turn([stroke], [(0.0, 0.0)], CUBE) is stroke
 
 
 def test_strokes_in_turn_are_each_done_at_their_pace_with_the_longest_blade():
-    both = in_turn([through(0.01), through(0.03, length=0.08)], [0.0, 0.0], CUBE)
+    both = in_turn([through(0.01), through(0.03, length=0.08)], NO_RESTS, CUBE)
     assert both.name == "at 0.01, at 0.03"
     assert both.blade_length == pytest.approx(0.08)
     for (start, end), x in zip(both.asked, (0.01, 0.03), strict=True):
@@ -172,7 +173,7 @@ def inside(pose):
 
 
 def test_between_strokes_the_blade_stays_outside_the_body():
-    both = in_turn([through(0.01), through(0.03)], [0.0, 0.0], CUBE)
+    both = in_turn([through(0.01), through(0.03)], NO_RESTS, CUBE)
     (_, left), (back, _) = both.asked
     for t in np.linspace(left, back, 300):
         assert not inside(both.pose(t))
@@ -181,7 +182,7 @@ def test_between_strokes_the_blade_stays_outside_the_body():
 def test_a_blade_that_ends_in_the_body_is_drawn_out_along_its_edge():
     slit = through(0.01)
     poses = [slit.pose(0.0), slit.pose(0.6)]
-    both = in_turn([Stroke([0.0, 1.0], poses, "slit"), through(0.03)], [0.0, 0.0], CUBE)
+    both = in_turn([Stroke([0.0, 1.0], poses, "slit"), through(0.03)], NO_RESTS, CUBE)
     outside_from = None
     for t in np.linspace(1.0, both.asked[0][0], 300):
         pose = both.pose(t)
@@ -194,6 +195,25 @@ def test_a_blade_that_ends_in_the_body_is_drawn_out_along_its_edge():
 
 
 def test_after_a_stroke_the_blade_rests_for_its_pause():
-    one = in_turn([through(0.02)], [0.7], CUBE)
+    one = in_turn([through(0.02)], [(0.0, 0.7)], CUBE)
     assert one.duration == pytest.approx(1.7)
     np.testing.assert_allclose(one.pose(1.0).tip, one.pose(1.7).tip, atol=1e-12)
+
+
+def test_before_a_stroke_the_blade_waits_where_it_begins():
+    stroke = through(0.02)
+    one = in_turn([stroke], [(0.7, 0.0)], CUBE)
+    assert one.duration == pytest.approx(1.7) and one.asked == [(0.7, 1.7)]
+    for t in (0.0, 0.4, 0.7):
+        np.testing.assert_allclose(one.pose(t).tip, stroke.pose(0.0).tip, atol=1e-12)
+    np.testing.assert_allclose(one.pose(1.2).tip, stroke.pose(0.5).tip, atol=1e-12)
+
+
+def test_between_strokes_a_wait_comes_after_the_way_to_the_next():
+    without = in_turn([through(0.01), through(0.03)], NO_RESTS, CUBE)
+    both = in_turn([through(0.01), through(0.03)], [(0.0, 0.0), (0.5, 0.0)], CUBE)
+    assert both.duration == pytest.approx(without.duration + 0.5)
+    begin = both.asked[1][0]
+    assert begin == pytest.approx(without.asked[1][0] + 0.5)
+    for t in (begin - 0.5, begin):
+        np.testing.assert_allclose(both.pose(t).tip, through(0.03).pose(0.0).tip, atol=1e-9)

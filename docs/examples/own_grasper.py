@@ -1,0 +1,21 @@
+"""A robot of your own is the left hand: it holds a grasper, and lifts the edge of a lobe."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+from msgspec.structs import replace as changed
+
+from scalpel_sim import SCENES, prepare
+
+robot = mujoco.MjSpec.from_file(str(Path(__file__).parent / "robot.xml"))
+robot.delete(robot.body("scalpel"))  # its flange is free
+Path("bare.xml").write_text(robot.to_xml())
+
+scene = SCENES["retract"]
+place = {"model": "bare.xml", "at": "wrist_3", "pos": (0.6, 0.03, -0.1)}
+simulation = prepare(replace(scene, graspers=[changed(scene.graspers[0], **place)]))
+simulation.run(simulation.duration)
+left = simulation.graspers[0]
+print(f"{simulation.link.n_pieces()} pieces; the robot holds {left.n_points} points of one,")
+print(f"which weighs {-left.wrench.force[2]:.3f} N")

@@ -1,0 +1,135 @@
+"""Scenes of two hands: what must be true at their end, and that both arms reach and stay apart."""
+
+import numpy as np
+import pytest
+
+from bridge import InProcessLink
+from scalpel_sim import prepare
+from scalpel_sim.arm.place_search import LINK_RADIUS
+from scalpel_sim.errors import UsageError
+from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.scene_file.build import scene_in
+from scalpel_sim.scene_file.layers import with_settings
+from scalpel_sim.scene_file.reading import shipped_scene
+from tests.scalpel_sim.moved_scenes import moved
+from tissue import pieces_of
+
+FAST = ("solver.relaxation=verlet", "solver.audit=true")
+RETRACT = scene_in(with_settings(shipped_scene("retract"), FAST))
+
+
+def done(scene):
+    simulation = prepare(scene)
+    simulation.run(simulation.duration + 0.3)
+    return simulation
+
+
+def pieces(simulation):
+    """The piece that is held by the supports, and the one that came off."""
+    found = pieces_of(simulation.link.snapshot())
+    assert [piece.is_held for piece in found] == [True, False]
+    return found
+
+
+def check_retract(simulation):
+    """The piece came off, and hangs from the grasper above the table."""
+    _, off = pieces(simulation)
+    assert off.centre[2] > 0.03 and np.linalg.norm(off.velocity) < 0.05
+    (left,) = simulation.graspers
+    assert left.n_points == simulation.recording.column("left_points").max() > 100
+
+
+@pytest.fixture(scope="module")
+def retract():
+    return done(RETRACT)
+
+
+# How they end
+
+
+def test_the_lobe_is_cut_off_under_the_edge_that_the_left_hand_lifts(retract):
+    check_retract(retract)
+    assert retract.touching.frames == {}
+
+
+def test_hands_that_start_up_to_three_millimetres_away_do_it_too():
+    check_retract(done(moved(RETRACT, np.random.default_rng(1))))
+
+
+# What the hands feel
+
+
+def test_after_the_cut_the_left_hand_carries_the_weight_of_the_piece(retract):
+    _, off = pieces(retract)
+    force = retract.recording.vector("left_force")[-300:].mean(axis=0)
+    assert force == pytest.approx([0.0, 0.0, -off.mass * 9.81], abs=0.1 * off.mass * 9.81)
+
+
+def test_the_left_hand_feels_nothing_before_its_jaws_close(retract):
+    closed = retract.recording.column("left_points") > 0
+    first = int(np.argmax(closed))
+    assert 0.5 < first * retract.dt < 0.8 and closed[first:].all()
+    assert (retract.recording.vector("left_force")[:first] == 0.0).all()
+
+
+def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(retract):
+    energies = retract.result.energies
+    lifted = np.abs(retract.recording.column("work_of_loads_j")).max()
+    assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
+
+
+# Where the arms stand
+
+
+def test_links_of_the_two_arms_stay_apart_on_their_whole_ways():
+    """Upper arms and forearms, from joint to joint, at every hundredth frame."""
+    simulation = prepare(RETRACT)
+    data = simulation.arm.data
+    chains = [
+        [data.body(prefix + name).id for name in ("torso", "upper_arm", "forearm", "wrist")]
+        for prefix in ("", "left_")
+    ]
+    share = np.linspace(0.0, 1.0, 9)[:, None, None]
+    closest = np.inf
+
+    def measure(now):
+        nonlocal closest
+        if len(now.recording) % 100 == 0:
+            a, b = (data.xpos[chain] for chain in chains)
+            first, second = (
+                ((1.0 - share) * p[:-1] + share * p[1:]).reshape(-1, 3) for p in (a, b)
+            )
+            apart = np.linalg.norm(first[:, None] - second, axis=2)
+            closest = min(closest, float(apart.min()))
+
+    simulation.link.step = still(simulation)
+    simulation.run(simulation.duration, measure)
+    assert closest > 2.0 * LINK_RADIUS
+
+
+def still(simulation):
+    """A tissue that does nothing: only the arms move."""
+    result = simulation.link.tissue.step(None, simulation.dt)
+    return lambda sweep, dt: result
+
+
+def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_begin():
+    simulation = prepare(RETRACT)
+    data, frame = simulation.arm.data, simulation.frame
+    assert data.body("base").xpos[2] >= 0.0 and data.body("left_base").xpos[2] >= 0.0
+    (left,) = simulation.graspers
+    start = frame.points_to_world(np.array(RETRACT.graspers[0].motion[0].at))
+    assert left.grasper.pads.centre == pytest.approx(start, abs=1e-5)
+    assert left.grasper.opening == pytest.approx(RETRACT.graspers[0].motion[0].opening)
+    tip = frame.points_to_world(simulation.stroke.pose(0.0).tip)
+    assert simulation.arm.blade.segment().tip == pytest.approx(tip, abs=1e-5)
+
+
+# What cannot be
+
+
+def test_a_scene_with_a_grasper_needs_its_tissue_in_the_same_process():
+    here = InProcessLink(make_tissue(RETRACT))
+    elsewhere = type("Elsewhere", (), {"__getattr__": lambda _, name: getattr(here, name)})()
+    with pytest.raises(UsageError, match="in another process, where nothing can be held"):
+        prepare(RETRACT, elsewhere)
