@@ -14,6 +14,7 @@ SHIPPED_SCENES = (
     "organ",
     "incision",
     "retract",
+    "excise",
     "liver",
     "kidney",
     "skin",

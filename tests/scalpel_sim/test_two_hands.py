@@ -16,6 +16,8 @@ from tissue import pieces_of
 
 FAST = ("solver.relaxation=verlet", "solver.audit=true")
 RETRACT = scene_in(with_settings(shipped_scene("retract"), FAST))
+EXCISE = scene_in(with_settings(shipped_scene("excise"), (*FAST, "body.cells=[18, 12, 2]")))
+BOTH = pytest.mark.parametrize("scene", [RETRACT, EXCISE], ids=["retract", "excise"])
 
 
 def done(scene):
@@ -39,9 +41,24 @@ def check_retract(simulation):
     assert left.n_points == simulation.recording.column("left_points").max() > 100
 
 
+def check_excise(simulation):
+    """The lump came out whole, and lies on the table in front of the sheet."""
+    sheet, lump = pieces(simulation)
+    assert sheet.rest_volume + lump.rest_volume == pytest.approx(60 * 40 * 8e-9, rel=1e-6)
+    assert lump.centre[1] < -0.03 and abs(lump.centre[2] + 0.01) < 0.002
+    assert np.linalg.norm(lump.velocity) < 0.01
+    assert simulation.recording.column("left_points").max() > 50
+    assert simulation.graspers[0].n_points == 0
+
+
 @pytest.fixture(scope="module")
 def retract():
     return done(RETRACT)
+
+
+@pytest.fixture(scope="module")
+def excise():
+    return done(EXCISE)
 
 
 # How they end
@@ -52,8 +69,26 @@ def test_the_lobe_is_cut_off_under_the_edge_that_the_left_hand_lifts(retract):
     assert retract.touching.frames == {}
 
 
-def test_hands_that_start_up_to_three_millimetres_away_do_it_too():
-    check_retract(done(moved(RETRACT, np.random.default_rng(1))))
+def test_the_lump_is_cut_out_lifted_and_put_down(excise):
+    check_excise(excise)
+    assert excise.touching.frames == {}
+
+
+def test_the_lump_is_what_the_arc_encloses_but_for_how_far_the_sheet_gives(excise):
+    """A segment of a circle of 18 mm, 14 mm high, through 8 mm; the sheet is taut, and opens."""
+    radius, height = 18.0, 14.0
+    chord = np.sqrt(2.0 * radius * height - height**2)
+    area = radius**2 * np.arccos(1.0 - height / radius) - (radius - height) * chord
+    assert 0.75 < pieces(excise)[1].rest_volume / (8e-9 * area) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("scene", "check"),
+    [(RETRACT, check_retract), (EXCISE, check_excise)],
+    ids=["retract", "excise"],
+)
+def test_hands_that_start_up_to_three_millimetres_away_do_it_too(scene, check):
+    check(done(moved(scene, np.random.default_rng(1))))
 
 
 # What the hands feel
@@ -72,18 +107,21 @@ def test_the_left_hand_feels_nothing_before_its_jaws_close(retract):
     assert (retract.recording.vector("left_force")[:first] == 0.0).all()
 
 
-def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(retract):
-    energies = retract.result.energies
-    lifted = np.abs(retract.recording.column("work_of_loads_j")).max()
+@pytest.mark.parametrize("name", ["retract", "excise"])
+def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(name, request):
+    simulation = request.getfixturevalue(name)
+    energies = simulation.result.energies
+    lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
     assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
 
 
 # Where the arms stand
 
 
-def test_links_of_the_two_arms_stay_apart_on_their_whole_ways():
+@BOTH
+def test_links_of_the_two_arms_stay_apart_on_their_whole_ways(scene):
     """Upper arms and forearms, from joint to joint, at every hundredth frame."""
-    simulation = prepare(RETRACT)
+    simulation = prepare(scene)
     data = simulation.arm.data
     chains = [
         [data.body(prefix + name).id for name in ("torso", "upper_arm", "forearm", "wrist")]
@@ -113,14 +151,15 @@ def still(simulation):
     return lambda sweep, dt: result
 
 
-def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_begin():
-    simulation = prepare(RETRACT)
+@BOTH
+def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_begin(scene):
+    simulation = prepare(scene)
     data, frame = simulation.arm.data, simulation.frame
     assert data.body("base").xpos[2] >= 0.0 and data.body("left_base").xpos[2] >= 0.0
     (left,) = simulation.graspers
-    start = frame.points_to_world(np.array(RETRACT.graspers[0].motion[0].at))
+    start = frame.points_to_world(np.array(scene.graspers[0].motion[0].at))
     assert left.grasper.pads.centre == pytest.approx(start, abs=1e-5)
-    assert left.grasper.opening == pytest.approx(RETRACT.graspers[0].motion[0].opening)
+    assert left.grasper.opening == pytest.approx(scene.graspers[0].motion[0].opening)
     tip = frame.points_to_world(simulation.stroke.pose(0.0).tip)
     assert simulation.arm.blade.segment().tip == pytest.approx(tip, abs=1e-5)
 
