@@ -13,13 +13,16 @@ from cyclopts import Group, Parameter
 SceneName = Annotated[
     str | None,
     Parameter(
-        help="organ (default), incision, a specimen of a material (liver, kidney, skin, fat, "
-        "muscle, gelatin, silicone), slab, grid2 or grid7; or a FILE.toml, which the command `new` "
-        "writes."
+        help="organ (default), incision, retract, excise, a specimen of a material (liver, kidney, "
+        "skin, fat, muscle, gelatin, silicone), slab, grid2 or grid7; or a FILE.toml, which the "
+        "command `new` writes."
     ),
 ]
 
-FigureNumber = Annotated[Literal[10, 11, 12, "organ"], Parameter(help="10, 11, 12 or organ.")]
+FigureNumber = Annotated[
+    Literal[10, 11, 12, "organ", "retract", "excise"],
+    Parameter(help="10, 11, 12, organ, retract or excise."),
+]
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]
 """An option that is given or not, and has no value."""

@@ -1,4 +1,4 @@
-"""The command `figure`: draws the paper's figures and that of the organ."""
+"""The command `figure`: draws the paper's figures, and those of the organ and of two hands."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,8 @@ def figure(
 
     Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
     the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
-    frames of a cut through the organ, which is the picture of the README.
+    frames of a cut through the organ, which is the picture of the README. retract, excise: two
+    moments of the scene of that name, with both instruments.
 
     For example:
 
@@ -31,8 +32,8 @@ def figure(
     ```
 
     Args:
-        number: 10, 11, 12 or organ.
-        output: The file [default: figure10.png (11, 12, organ) in this folder].
+        number: 10, 11, 12, organ, retract or excise.
+        output: The file [default: figure10.png (11, ...) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
     from scalpel_sim.output.run_folder import check_file
@@ -45,11 +46,17 @@ def figure(
         from scalpel_sim.cli.run_setup import load_kernels
         from scalpel_sim.figures.figures import draw_figure
         from scalpel_sim.figures.organ import draw_organ
+        from scalpel_sim.figures.two_hands import draw_two_hands
 
         load_kernels(printing)
         if not printing.quiet:
             say(f"cutting and drawing figure {number}: about half a minute")
-        drawn = draw_organ(path, scheme) if number == "organ" else draw_figure(number, path, scheme)
+        if number == "organ":
+            drawn = draw_organ(path, scheme)
+        elif number == "retract" or number == "excise":
+            drawn = draw_two_hands(number, path)
+        else:
+            drawn = draw_figure(number, path, scheme)
         if printing.json:
             print(json.dumps({"figure": number, "file": str(path)} | drawn._asdict(), indent=2))
         elif not printing.quiet:

@@ -17,8 +17,8 @@ STRETCH = 0.3
 and enough for the cut to open."""
 REST = 0.4
 """Time after the stroke in which the tissue comes to rest [s]."""
-TOOL = ("blade", "stylus")
-"""Bodies of the arm that are drawn; the others would hide the cut."""
+TOOL = ("blade", "stylus", "shaft", "jaw_low", "jaw_high")
+"""Ends of the names of bodies of arms that are drawn; the others would hide the cut."""
 
 FIGURE_10 = PlannedCut(
     replace(SCENES["slab"], stretch=STRETCH),
@@ -75,17 +75,17 @@ def moments(cut: PlannedCut, shares: tuple[float, ...] = (1.0,)) -> list[Moment]
     for share in shares:
         simulation.run(duration + REST if share == 1.0 else share * duration)
         link = simulation.link
-        found.append(Moment(link.snapshot(), link.surface(), _tool(simulation)))
+        found.append(Moment(link.snapshot(), link.surface(), tool_of(simulation)))
     return found
 
 
-def _tool(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
-    """Return the meshes of the scalpel in its present pose, tissue frame, and their shapes."""
+def tool_of(simulation: Simulation) -> list[tuple[TriangleMesh, Shape]]:
+    """Return the meshes of the instruments as they are now, tissue frame, and their shapes."""
     model, poses = simulation.arm.model, body_poses(simulation.arm.data)
     frame = simulation.frame
     found = []
     for shape in shapes_of(model):
-        if model.body(shape.body).name not in TOOL or shape.is_target:
+        if shape.is_target or not model.body(shape.body).name.endswith(TOOL):
             continue
         mesh = _posed(_posed(shape.mesh, shape.pose), poses[shape.body])
         mesh = mesh._replace(

@@ -26,6 +26,8 @@ class Shape(NamedTuple):
     """The geom's name; its number if it has none."""
     body: int
     """Number of the body that the geom belongs to."""
+    root: int
+    """Number of the body of the world that carries that body: one for each arm."""
     kind: int
     """Type of the geom: a value of `mujoco.mjtGeom`."""
     mesh: TriangleMesh
@@ -54,6 +56,7 @@ def shapes_of(model: mujoco.MjModel) -> Iterator[Shape]:
             yield Shape(
                 name=model.geom(geom).name or str(geom),
                 body=body,
+                root=int(model.body_rootid[body]),
                 kind=kind,
                 mesh=mesh,
                 pose=np.concatenate([model.geom_pos[geom], model.geom_quat[geom]]),

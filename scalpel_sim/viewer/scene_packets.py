@@ -147,14 +147,24 @@ class ScenePackets:
         scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
 
+    def _arms(self, body_poses: FloatArray) -> list[FloatArray]:
+        """Return where each arm is, seen from above: the mean of its bodies [m], shape (2,)."""
+        bodies: dict[int, set[int]] = {}
+        for shape in self._shapes:
+            if shape.body > 0 and not shape.is_target:
+                bodies.setdefault(shape.root, set()).add(shape.body)
+        return [body_poses[sorted(arm), :2].mean(axis=0) for arm in bodies.values()]
+
     def _eye(self, centre: FloatArray, body_poses: FloatArray) -> FloatArray:
-        """Return the camera's position [m]: above, and beside the line from the body to the arm."""
-        axis, moving = self._frame.rotation[:, 0], [body for body in self._bodies if body > 0]
-        arm = body_poses[moving, :2].mean(axis=0) if moving else centre[:2]
+        """Return the camera's position [m]: above, and beside the lines from the body to arms."""
+        axis = self._frame.rotation[:, 0]
         azimuths = np.arctan2(axis[1], axis[0]) + CAMERA_AZIMUTHS
         level = np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
-        towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
-        deviations = np.abs(np.arccos(np.clip(level @ towards_arm, -1.0, 1.0)) - ARM_AZIMUTH)
+        deviations = np.zeros(len(level))
+        for arm in self._arms(body_poses) or [centre[:2]]:
+            towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
+            between = np.arccos(np.clip(level @ towards_arm, -1.0, 1.0))
+            deviations += np.abs(between - ARM_AZIMUTH)
         flat, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
         direction = np.array([*(flat * level[deviations.argmin()]), up])
         return centre + CAMERA_DISTANCE * self._diagonal * direction

@@ -1,0 +1,33 @@
+"""The picture of a scene of two hands: one command makes it."""
+
+import json
+from dataclasses import replace
+
+import matplotlib.image
+import numpy as np
+
+from scalpel_sim import SCENES
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.figures import figures
+
+
+def test_the_picture_shows_what_the_left_hand_lifts_before_and_after_it_is_cut_off(
+    monkeypatch, tmp_path, capsys
+):
+    fast = replace(SCENES["retract"], relaxation="verlet")
+    monkeypatch.setitem(SCENES, "retract", fast)
+    monkeypatch.setattr(figures, "_WIDTH", 240)
+    monkeypatch.setattr(figures, "HEIGHT", 195)
+    monkeypatch.chdir(tmp_path)
+    assert command_line(["figure", "retract", "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["file"] == "figureretract.png"
+    before, after = printed["n_tetrahedra"]
+    assert 5136 <= before < after
+    image = matplotlib.image.imread(printed["file"])
+    assert image.shape[:2] == (195, 2 * 240 + figures.GAP)
+    # Both instruments are of grey steel, and the handle of the scalpel is blue.
+    for half in np.array_split(image[:, :, :3], 2, axis=1):
+        red, green, blue = np.moveaxis(half, 2, 0)
+        grey = (np.abs(red - blue) < 0.08) & (np.abs(red - green) < 0.08) & (red < 0.9)
+        assert grey.sum() > 100 and (blue > 1.5 * red).sum() > 20
