@@ -26,7 +26,7 @@ from tissue.contact.geoms.geom_arrays import (
 )
 from tissue.contact.geoms.geom_motion import (
     NO_ROTATION,
-    NOT_FINITE,
+    ORIGIN_NOT_FINITE,
     TAKEN,
     TURNS_TOO_FAR,
     lead_geoms,
@@ -169,8 +169,8 @@ class GeomContact:
             what = f"geom '{self.geoms[g].name}'"
             raise ValueError(
                 {
-                    NOT_FINITE: f"the origin of {what} is {places[g].tolist()}; it is three finite "
-                    "numbers in m",
+                    ORIGIN_NOT_FINITE: f"the origin of {what} is {places[g].tolist()}; it is three "
+                    "finite numbers in m",
                     NO_ROTATION: f"the rotation of {what} is {axes[g].tolist()}; it is three axes "
                     "as columns, right-handed",
                     TURNS_TOO_FAR: f"{what} turns by more than {LARGEST_TURN:.2g} rad in one step, "

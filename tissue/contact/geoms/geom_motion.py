@@ -29,7 +29,7 @@ def place_geoms(geoms: Geoms, when: float) -> None:
 
 
 TAKEN: Final = 0
-NOT_FINITE: Final = 1
+ORIGIN_NOT_FINITE: Final = 1
 NO_ROTATION: Final = 2
 TURNS_TOO_FAR: Final = 3
 """What `lead_geoms` found."""
@@ -58,7 +58,7 @@ def lead_geoms(
         columns = _column(axes, g, 0), _column(axes, g, 1), _column(axes, g, 2)
         sums = origins[g, 0] + origins[g, 1] + origins[g, 2]
         if not math.isfinite(sums):
-            return NOT_FINITE, g
+            return ORIGIN_NOT_FINITE, g
         for i in range(3):
             for j in range(3):
                 product = dot(columns[i], columns[j]) - (1.0 if i == j else 0.0)
