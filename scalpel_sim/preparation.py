@@ -10,13 +10,15 @@ import numpy as np
 
 from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
+from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.led_arm import AddToWorld, LedArm
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
 from scalpel_sim.arm.placement import place
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
+from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
-from scalpel_sim.scene_body import highest_toughness, make_tissue
+from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
@@ -58,20 +60,21 @@ def prepare(
     bounds = link.describe().bounds
     held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
+    table = tabletop_of(scene, bounds)
     if scene.own_arm is None:
         placement = place(stroke, bounds, scene.arm, force=needed.force)
         frame = TissueFrame(origin=placement.tissue_origin)
         first = placement, stroke
         others = arms_with_graspers(scene.graspers, motions, bounds, frame, first)
-        arm: LedArm = placement.arm(others=others)
+        arm: LedArm = placement.arm(others=others, world=_standing(table, frame))
     else:
         arm, frame = _own(scene.own_arm)
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
         others = arms_with_graspers(scene.graspers, motions, bounds, frame, None)
-        if others:
+        if others or table is not None:
             start = np.array(arm.data.qpos)
-            arm, _ = _own(scene.own_arm, others)
+            arm, _ = _own(scene.own_arm, others, _standing(table, frame))
             arm.reset(start)
     _warn_of_weakness(needed, arm)
     tissue = link.describe()
@@ -91,6 +94,8 @@ def prepare(
         passivity=scene.passivity,
     )
     if held is not None:
+        blade = arm.model.body(arm.blade.body_id).name
+        simulation.partners.append(GeomCoupling(arm.data, held, without=[blade], frame=frame))
         for grasper in led_graspers(scene.graspers, motions, arm, held, frame):
             simulation.add_grasper(grasper)
     return simulation
@@ -119,7 +124,14 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _own(own: OwnArm, others: Sequence[HeldArm] = ()) -> tuple[LedArm, TissueFrame]:
+def _standing(table: Tabletop | None, frame: TissueFrame) -> AddToWorld | None:
+    """Return what adds the table of a scene to the world of an arm."""
+    return None if table is None else lambda spec: table.stand_in(spec, frame)
+
+
+def _own(
+    own: OwnArm, others: Sequence[HeldArm] = (), world: AddToWorld | None = None
+) -> tuple[LedArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
     arm = own_arm(
@@ -129,6 +141,7 @@ def _own(own: OwnArm, others: Sequence[HeldArm] = ()) -> tuple[LedArm, TissueFra
         tip=own.tip,
         forward=own.forward,
         others=others,
+        world=world,
     )
     quaternion, axes = np.array(own.quat), np.empty(9)
     if not quaternion.any():

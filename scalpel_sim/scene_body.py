@@ -4,11 +4,13 @@ import logging
 
 import numpy as np
 
+from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.strokes.stroke import from_csv
 from tissue import (
     FloatArray,
+    Geom,
     Material,
     SolverSettings,
     Tissue,
@@ -31,6 +33,12 @@ changes its volume; held at its sides the softest scene keeps 0.99."""
 
 _HARDLY_COMPRESSIBLE = 0.45
 """Poisson's ratio that most presets have [1]."""
+
+TABLE_MARGIN = 0.05
+"""How far a table reaches beyond the body [m]: as far as pieces are put down beside it."""
+
+TABLE_HALF_THICKNESS = 0.005
+"""Half the thickness of a table [m]: what is pressed on it is never nearer to the other side."""
 
 OPPOSITE_SIDES = (("left", "right"), ("front", "back"), ("bottom", "top"))
 """Pairs of sides that can be pulled apart, one pair per axis."""
@@ -67,10 +75,31 @@ def make_tissue(scene: Scene) -> Tissue:
         ),
     )
     expect_toughness_in_range(scene.material, tissue.node_size)  # a blade will come
-    if fixed.any():
+    table = tabletop_of(scene, tissue.bounds)
+    if table is not None:
+        tissue.collide_with([table.geom], [table.centre])
+    if fixed.any() or table is not None:
         tissue.settle()
         _warn_of_collapse(tissue, scene.material)
     return tissue
+
+
+def tabletop_of(scene: Scene, bounds: FloatArray) -> Tabletop | None:
+    """Return the table of a scene; None where it has none.
+
+    Args:
+        scene: The scene.
+        bounds: Lowest and highest corner of the body [m], shape (2, 3).
+    """
+    if scene.table is None:
+        return None
+    friction = scene.material.friction if scene.table_friction is None else scene.table_friction
+    middle, half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
+    # Whole millimetres: the same table, whatever a body has sagged by before it is asked for.
+    size = np.ceil(1e3 * (half[:2] + TABLE_MARGIN)) * 1e-3
+    centre = np.array([*np.round(middle[:2], 3), scene.table - TABLE_HALF_THICKNESS])
+    geom = Geom("tabletop", "box", (*size.tolist(), TABLE_HALF_THICKNESS), float(friction))
+    return Tabletop(geom, centre)
 
 
 def _warn_of_collapse(tissue: Tissue, material: Material) -> None:

@@ -1,7 +1,7 @@
 """An arm of MuJoCo whose blade a virtual hand leads: what every arm of a run has."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -12,6 +12,9 @@ from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
 from tissue import FloatArray
+
+AddToWorld = Callable[[mujoco.MjSpec], None]
+"""Adds what stands in the world to a model that is yet to be compiled."""
 
 
 class ArmError(RuntimeError):
@@ -33,6 +36,7 @@ class LedArm:
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
         others: Arms that stand in its world, each with a grasper.
+        world: What else stands in it, added to the model before it is compiled; None: nothing.
 
     Raises:
         ValueError: the model has no such sites, or cannot be compiled.
@@ -49,12 +53,15 @@ class LedArm:
         tip: str = "tip",
         forward: Sequence[float] = (0.0, 0.0, -1.0),
         others: Sequence[HeldArm] = (),
+        world: AddToWorld | None = None,
     ) -> None:
         route_warnings()
         add_hand(spec, impedance, heel, tip, forward)
         self._n_own = len(spec.joints)
         for other in others:
             other.stand_in(spec)
+        if world is not None:
+            world(spec)
         self.name = name
         """Name of the arm, for reports."""
         self.limits = limits

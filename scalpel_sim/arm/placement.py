@@ -11,6 +11,7 @@ from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
+from scalpel_sim.arm.led_arm import AddToWorld
 from scalpel_sim.arm.place_search import (
     TABLE_CLEARANCE,
     TABLE_ROUNDING,
@@ -72,12 +73,18 @@ class Placement(NamedTuple):
     """Smallest distance of a joint from an end of its range along the stroke, as a fraction of half
     the range."""
 
-    def arm(self, impedance: Impedance = Impedance(), others: Sequence[HeldArm] = ()) -> Arm:
+    def arm(
+        self,
+        impedance: Impedance = Impedance(),
+        others: Sequence[HeldArm] = (),
+        world: AddToWorld | None = None,
+    ) -> Arm:
         """Return an arm that stands there, with its blade at the start of the stroke.
 
         Args:
             impedance: How firmly the hand holds the blade.
             others: Arms that stand in its world, each with a grasper.
+            world: What else stands in it: see `LedArm`.
         """
         arm = Arm(
             self.preset,
@@ -87,6 +94,7 @@ class Placement(NamedTuple):
             base_yaw=self.base_yaw,
             impedance=impedance,
             others=others,
+            world=world,
         )
         arm.reset(self.qpos)
         return arm

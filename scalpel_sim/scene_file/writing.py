@@ -57,7 +57,15 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
             for field in fields(scene.material)
         },
         "blade": _blade(scene.blade),
-        "world": _given({"gravity": scene.gravity, "floor": scene.floor} | _place(scene)),
+        "world": _given(
+            {
+                "gravity": scene.gravity,
+                "floor": scene.floor,
+                "table": scene.table,
+                "table_friction": scene.table_friction,
+            }
+            | _place(scene)
+        ),
         "solver": _given(
             {
                 "scheme": scene.scheme,

@@ -87,6 +87,10 @@ class Scene:
     """Gravity along -z [m/s2]."""
     floor: float | None = None
     """Height of a floor on which loose pieces land [m], tissue frame; None: no floor."""
+    table: float | None = None
+    """Height of the upper side of a table on which the body lies [m], tissue frame; None: none."""
+    table_friction: float | None = None
+    """Coefficient of friction between the two; None: that of the material."""
     blade: BladeShape | None = SCALPEL
     """The blade as a body; None: a line, as in the paper."""
     audit: bool = False

@@ -61,6 +61,10 @@ class WorldTable(TomlTable, kw_only=True, frozen=True):
 
     gravity: NotNegative | None = None
     floor: Finite | None = None
+    table: Finite | None = None
+    """Height of the upper side of a table on which the body lies, tissue frame [m]."""
+    table_friction: NotNegative | None = None
+    """Coefficient of friction between the two; None: that of the material."""
     pos: ThreeNumbers | None = None
     """Where the origin of the tissue is in the world of an arm of the user's own [m]."""
     quat: _Quaternion | None = None

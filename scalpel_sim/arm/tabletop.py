@@ -1,0 +1,42 @@
+"""The table that tissue lies on, in the MuJoCo model of a run: instruments stop at it."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from bridge import TissueFrame
+from tissue import FloatArray, Geom
+
+TABLETOP = "tabletop"
+"""Name of its geom."""
+
+_COLOUR = (0.32, 0.38, 0.4, 1.0)
+
+
+class Tabletop(NamedTuple):
+    """A board, as tissue touches it and as it stands in the world."""
+
+    geom: Geom
+    """Its shape: a box."""
+    centre: FloatArray
+    """Where its middle is [m], tissue frame, shape (3,)."""
+
+    def stand_in(self, spec: mujoco.MjSpec, frame: TissueFrame) -> None:
+        """Have it stand in the world of a model that is yet to be compiled.
+
+        It collides with what a user's model lets collide, and with instruments and arms of ours.
+        """
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
+        spec.worldbody.add_geom(
+            name=TABLETOP,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=self.geom.size,
+            pos=frame.points_to_world(self.centre),
+            quat=quaternion,
+            friction=[self.geom.friction, 0.005, 0.0001],
+            contype=1,
+            conaffinity=1,
+            rgba=_COLOUR,
+        )
