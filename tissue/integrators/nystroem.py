@@ -25,6 +25,7 @@ from typing import Final
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
+from tissue.integrators.geom_reactions import add_geom_reactions
 from tissue.integrators.node_loops import is_solid
 from tissue.integrators.runge_kutta import apply_outer_forces
 from tissue.integrators.shared_loops import (
@@ -69,18 +70,21 @@ def three_stage_nystroem(
     solid = context.elastic.solid
     deform_shared(context, DEFORMED if solid.are_gradients_known == 1 else DISPLACEMENTS)
     solid.are_gradients_known = 0
+    add_geom_reactions(context, x1, v1, share * w1, dt)
     if is_moving:
         add_support_work(context, x1, v1, h * w1)
     run_loop(context, NYSTROEM_FIRST, h)
     x2, v2, w2 = stages.positions, stages.velocities, WEIGHTS[1]
     apply_outer_forces(context, edge, x2, v2, at + INSTANTS[1] * share, share * w2, dt)
     deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_2)
+    add_geom_reactions(context, x2, v2, share * w2, dt)
     if is_moving:
         add_support_work(context, x2, v2, h * w2)
     run_loop(context, NYSTROEM_SECOND, h)
     x3, v3, w3 = stages.last_positions, stages.velocities, WEIGHTS[2]
     apply_outer_forces(context, edge, x3, v3, at + INSTANTS[2] * share, share * w3, dt)
     deform_shared(context, DISPLACED if is_displaced else DISPLACEMENTS_LAST)
+    add_geom_reactions(context, x3, v3, share * w3, dt)
     if is_moving:
         add_support_work(context, x3, v3, h * w3)
     run_loop(context, NYSTROEM_THIRD, h)

@@ -18,13 +18,14 @@ every stage, for the full order; by default it acts between the steps
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_blade_forces
-from tissue.contact.geoms.held_forces import add_geom_forces, clear_geom_forces
+from tissue.contact.geoms.contact_impulses import clear_geom_forces
 from tissue.contact.penalty.contact_forces import add_contact_forces, clear_contact_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
 from tissue.elasticity.internal_forces import deform
 from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
+from tissue.integrators.geom_reactions import add_geom_reactions
 from tissue.integrators.node_loops import acceleration
 from tissue.integrators.shared_loops import (
     DISPLACEMENTS,
@@ -60,12 +61,14 @@ def runge_kutta_nystroem(
     half, end = at + 0.5 * share, at + share
     apply_outer_forces(context, edge, body.positions, body.velocities, at, share / 6.0, dt)
     deform_shared(context, DISPLACEMENTS)
+    add_geom_reactions(context, body.positions, body.velocities, share / 6.0, dt)
     if is_moving:
         add_support_work(context, body.positions, body.velocities, h / 6.0)
     run_loop(context, FIRST_STAGE, h)
     x2 = stages.positions
     apply_outer_forces(context, edge, x2, stages.velocities, half, share * 2.0 / 3.0, dt)
     deform_shared(context, DISPLACEMENTS_2)
+    add_geom_reactions(context, x2, stages.velocities, share * 2.0 / 3.0, dt)
     if is_moving:
         add_support_work(context, x2, stages.velocities, h * 2.0 / 3.0)
     run_loop(context, SECOND_STAGE, h)
@@ -74,6 +77,7 @@ def runge_kutta_nystroem(
     x4 = stages.last_positions
     apply_outer_forces(context, edge, x4, stages.velocities, end, share / 6.0, dt)
     deform_shared(context, DISPLACEMENTS_LAST)
+    add_geom_reactions(context, x4, stages.velocities, share / 6.0, dt)
     if is_moving:
         add_support_work(context, x4, stages.velocities, h / 6.0)
     run_loop(context, FOURTH_STAGE, h)
@@ -108,7 +112,6 @@ def apply_outer_forces(
     apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
     add_contact_forces(context.contacts, positions, velocities, share * dt, external)
     add_attachment_forces(attachments, positions, velocities, when, share, dt, external)
-    add_geom_forces(context.geoms, positions, velocities, share, dt, external)
 
 
 @kernel
@@ -118,7 +121,7 @@ def accelerations(context: StepContext, out: FloatArray) -> None:
     x, v = body.positions, body.velocities
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
-    add_geom_forces(context.geoms, x, v, 0.0, 1.0, external)
+    add_geom_reactions(context, x, v, 0.0, 1.0)
     for i in range(body.n_nodes):
         store_point(out, i, acceleration(context, i, x, v))
     clear_attachment_forces(context.attachments, external)

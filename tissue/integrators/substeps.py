@@ -2,7 +2,7 @@
 
 from tissue.blade.edge import Edge
 from tissue.blade.forces import apply_slip, edge_energy
-from tissue.contact.geoms.held_forces import clear_geom_forces
+from tissue.contact.geoms.contact_impulses import clear_geom_forces
 from tissue.contact.geoms.kinematic_contact import end_geom_substep
 from tissue.contact.penalty.contact_work import end_contact_substep
 from tissue.contact.resolve import note_all_positions, resolve

@@ -1,12 +1,13 @@
 """Fixed nodes as supports: the force that holds each, and the work of those that move."""
 
-from tissue.contact.geoms.held_forces import add_geom_forces, clear_geom_forces
+from tissue.contact.geoms.contact_impulses import clear_geom_forces
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point, point_of, store_point, times
 from tissue.core.vec3 import dot, vec3
 from tissue.elasticity.internal_forces import deform, internal_force, viscous_force
 from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
+from tissue.integrators.geom_reactions import add_geom_reactions
 from tissue.integrators.step_context import StepContext
 
 
@@ -87,7 +88,7 @@ def write_support_forces(context: StepContext, out: FloatArray) -> None:
     x, v, external = body.positions, body.velocities, context.stages.external
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
-    add_geom_forces(context.geoms, x, v, 0.0, 1.0, external)
+    add_geom_reactions(context, x, v, 0.0, 1.0)
     for i in range(body.n_nodes):
         force = point_of(0.0, 0.0, 0.0)
         if body.fixed[i]:

@@ -10,6 +10,7 @@ between the steps (`tissue.integrators.damping`).
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import kernel
+from tissue.integrators.geom_reactions import add_geom_reactions
 from tissue.integrators.node_loops import is_solid
 from tissue.integrators.runge_kutta import apply_outer_forces
 from tissue.integrators.shared_loops import (
@@ -40,6 +41,7 @@ def position_verlet(context: StepContext, edge: Edge, dt: float, at: float, shar
     at_middle = at + 0.5 * share
     apply_outer_forces(context, edge, body.positions, body.velocities, at_middle, share, dt)
     deform_shared(context, DISPLACED if moves_in_loops else DISPLACEMENTS)
+    add_geom_reactions(context, body.positions, body.velocities, share, dt)
     if context.supports.is_moving == 1:
         add_support_work(context, body.positions, body.velocities, h)
     run_loop(context, KICKING, h)

@@ -7,8 +7,9 @@ In the order in which they are best read:
     geom_motion        where geoms are at an instant, and how fast
     signed_distance    how far a point is from a geom, and in which direction
     deepest_point      the point of a triangle that is deepest in a geom
-    contact_search     which nodes and faces may touch a geom in a time step
-    held_forces        the forces of contacts in the stages of a substep
-    kinematic_contact  what makes them just large enough, after it
+    near_nodes         which nodes and faces are near one, by boxes
+    contact_search     which of them may touch it in a time step
+    contact_impulses   impulses of contacts, their sums and their work
+    kinematic_contact  what corrects the motion after each substep
     geom_contact       owns the arrays
 """

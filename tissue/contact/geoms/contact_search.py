@@ -12,7 +12,7 @@ from tissue.contact.geoms.deepest_point import Deepest, deepest_point, is_flat_a
 from tissue.contact.geoms.geom import PLANE
 from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts, Geoms
 from tissue.contact.geoms.geom_motion import place_geoms
-from tissue.contact.geoms.held_forces import note_velocities, weighted
+from tissue.contact.geoms.contact_impulses import note_velocities, weighted
 from tissue.contact.geoms.near_nodes import (
     GeomSearch,
     find_near_faces,
@@ -279,7 +279,8 @@ def _go_on(
     store(contacts.force, c, nothing)
     store(contacts.impulse, c, nothing)
     store(contacts.moment, c, nothing)
-    contacts.is_held[c] = 0
+    store(contacts.pressed, c, nothing)
+    contacts.is_held[c] = contacts.touches[c] = contacts.sticks[c] = 0
     distance = distance_to(
         contacts.geoms, contacts.geom[c], weighted(contacts, c, body.positions)
     ).distance
@@ -288,6 +289,9 @@ def _go_on(
         recovered = contacts.slop[old] - _RECOVERY * search.node_size * search.seconds
         contacts.slop[c] = max(slop, min(recovered, -distance))
         store(contacts.force, c, vec3(contacts.force, old))
+        contacts.touches[c], contacts.sticks[c] = contacts.touches[old], contacts.sticks[old]
+        if contacts.face[c] == NODE_CONTACT:
+            store(contacts.normal, c, vec3(contacts.normal, old))
         store(contacts.anchor, c, vec3(contacts.anchor, old))
         contacts.is_held[c] = contacts.is_held[old]
     note_velocities(contacts, body, c)

@@ -66,8 +66,14 @@ class GeomContacts(Arrays):
     """Its nodes: the corners of a face, or three times the same; shape (2 * capacity, 3)."""
     weight: FloatArray
     """Weight of each node, which add up to 1; shape (2 * capacity, 3)."""
+    touches: IntArray
+    """1 if it pressed after the last substep, else 0; shape (2 * capacity,)."""
+    sticks: IntArray
+    """1 if it pressed within the cone of friction then, else 0; shape (2 * capacity,)."""
     force: FloatArray
-    """Force on the tissue that acts in the stages of a substep [N], shape (2 * capacity, 3)."""
+    """Mean force on the tissue in the last substep [N], shape (2 * capacity, 3)."""
+    pressed: FloatArray
+    """Impulse on the tissue in the stages of this substep [N s], shape (2 * capacity, 3)."""
     anchor: FloatArray
     """Where a node that sticks is held, in the frame of the geom [m], shape (2 * capacity, 3)."""
     is_held: IntArray
@@ -123,7 +129,8 @@ def new_geoms(geoms: list[Geom]) -> Geoms:
 def new_geom_contacts(geoms: Geoms, capacity: int, n_nodes: int) -> GeomContacts:
     """Return no contacts, with room for that many, of a body with room for `n_nodes`."""
     rows = 2 * capacity
-    of_three = ("weight", "force", "anchor", "normal", "point", "impulse", "moment")
+    of_one = ("geom", "face", "touches", "sticks", "is_held")
+    of_three = ("weight", "force", "anchor", "normal", "point", "impulse", "moment", "pressed")
     return GeomContacts(
         first=0,
         n_contacts=0,
@@ -135,7 +142,7 @@ def new_geom_contacts(geoms: Geoms, capacity: int, n_nodes: int) -> GeomContacts
         gap=np.zeros(rows),
         slop=np.zeros(rows),
         mobility=np.zeros(rows),
-        **{name: np.zeros(rows, np.int64) for name in ("geom", "face", "is_held")},
+        **{name: np.zeros(rows, np.int64) for name in of_one},
         **{name: np.zeros((rows, 3)) for name in of_three},
         velocity=np.zeros((n_nodes, 3)),
         resistance=np.zeros((n_nodes, 3)),
@@ -147,7 +154,19 @@ def grown_geom_contacts(contacts: GeomContacts, capacity: int, n_nodes: int) -> 
     larger, n = new_geom_contacts(contacts.geoms, capacity, n_nodes), contacts.n_contacts
     larger.velocity[: len(contacts.velocity)] = contacts.velocity
     used = slice(contacts.first, contacts.first + n)
-    of_rows = ("geom", "face", "node", "weight", "force", "anchor", "is_held", "normal", "slop")
+    of_rows = (
+        "geom",
+        "face",
+        "node",
+        "weight",
+        "force",
+        "anchor",
+        "is_held",
+        "normal",
+        "slop",
+        "touches",
+        "sticks",
+    )
     for name in (*of_rows, "impulse", "moment"):
         getattr(larger, name)[:n] = getattr(contacts, name)[used]
     for name in ("n_contacts", "are_coupled", "work", "dissipated"):

@@ -32,7 +32,7 @@ from tissue.contact.geoms.geom_motion import (
     lead_geoms,
     place_geoms,
 )
-from tissue.contact.geoms.held_forces import sum_wrenches
+from tissue.contact.geoms.contact_impulses import sum_wrenches
 from tissue.contact.geoms.near_nodes import GeomSearch
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.array_types import BoolArray, FloatArray, IntArray

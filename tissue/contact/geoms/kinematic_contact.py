@@ -1,10 +1,10 @@
-"""Contact with geoms after a substep: the forces that keep nodes and faces outside, and hold them.
+"""Contact with geoms after a substep: the impulses that keep nodes and faces outside.
 
-A substep moves the tissue with the forces of the last one. Then each contact gets the change of its
-impulse that lets its point move no further into the geom, and within Coulomb's cone not along it
-either. What rests is so in exact balance from then on, what slides is braked by the friction
-coefficient times the pressure, and no stiffness of contact is chosen or limits the step. A
-point that is inside all the same is put onto the surface.
+In a substep what touches is held by reactions (`tissue.integrators.geom_reactions`). Then each
+contact gets the change of its impulse that lets its point move no further into the geom, and
+within Coulomb's cone not along it either. What rests is so in exact balance, what slides is braked
+by the friction coefficient times the pressure, and no stiffness of contact is chosen or limits the
+step. A point that is inside all the same is put onto the surface.
 
 Where nodes belong to several contacts these are solved together, by Gauss and Seidel's method.
 
@@ -22,7 +22,7 @@ from tissue.contact.geoms.geom_motion import (
     to_geom,
     turned_from_geom,
 )
-from tissue.contact.geoms.held_forces import note_velocities, push, weighted
+from tissue.contact.geoms.contact_impulses import note_velocities, push, weighted
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
@@ -57,6 +57,8 @@ def end_geom_substep(
     rows = range(contacts.first, contacts.first + contacts.n_contacts)
     place_geoms(contacts.geoms, when)
     for c in rows:
+        store(contacts.force, c, scale(1.0 / seconds, vec3(contacts.pressed, c)))
+        store(contacts.pressed, c, Vec3(0.0, 0.0, 0.0))
         _locate(contacts, body, c, seconds, dt)
     _note_resistances(contacts, body, seconds)
     n_sweeps = _SWEEPS if contacts.are_coupled == 1 else 1
@@ -176,11 +178,14 @@ def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
     geoms, g, mobility = contacts.geoms, contacts.geom[c], contacts.mobility[c]
     force, normal = vec3(contacts.force, c), vec3(contacts.normal, c)
     x, press = weighted(contacts, c, body.positions), dot(force, normal)
+    contacts.touches[c] = contacts.sticks[c] = 0
     if press <= 0.0 or mobility == 0.0:
         contacts.is_held[c] = 0
         return
+    contacts.touches[c] = 1
     pull = norm(axpy(-press, normal, force))
     sticks = pull < _SLIDING * geoms.friction[g] * press
+    contacts.sticks[c] = 1 if sticks else 0
     if sticks and contacts.is_held[c] == 1:
         anchor = turned_from_geom(geoms.axes, g, vec3(contacts.anchor, c))
         back = sub(add(vec3(geoms.origin, g), anchor), x)

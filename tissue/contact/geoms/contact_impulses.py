@@ -1,7 +1,4 @@
-"""Forces of contact with geoms in the stages of a substep: those found at the end of the last one.
-
-They stay as they are during a substep, so that what rests on a geom is in balance in each stage.
-"""
+"""Impulses of contact with geoms: what they do to nodes, how they add up, and their work."""
 
 from tissue.contact.geoms.geom_arrays import GeomContacts
 from tissue.contact.geoms.geom_motion import geom_motion_at
@@ -36,40 +33,6 @@ def clear_geom_forces(contacts: GeomContacts, external: FloatArray) -> None:
     for c in range(contacts.first, contacts.first + contacts.n_contacts):
         for q in range(3):
             store(external, contacts.node[c, q], Vec3(0.0, 0.0, 0.0))
-
-
-@kernel
-def add_geom_forces(
-    contacts: GeomContacts,
-    positions: FloatArray,
-    velocities: FloatArray,
-    share: float,
-    dt: float,
-    external: FloatArray,
-) -> None:
-    """Add the forces of contacts on the nodes; count impulses and work.
-
-    The contacts are taken one after the other, so that the sums do not depend on threads.
-
-    Args:
-        contacts: Impulses and works are written.
-        positions: Positions of the nodes [m].
-        velocities: Their velocities [m/s].
-        share: Weight of this evaluation in the integral over the time step.
-        dt: Length of the time step [s].
-        external: Forces on the nodes [N], shape (capacity, 3); written.
-    """
-    for c in range(contacts.first, contacts.first + contacts.n_contacts):
-        force = vec3(contacts.force, c)
-        if dot(force, force) == 0.0:
-            continue
-        for q in range(3):
-            node, weight = contacts.node[c, q], contacts.weight[c, q]
-            if weight != 0.0:
-                store(external, node, axpy(weight, force, vec3(external, node)))
-        if share > 0.0:
-            x, v = weighted(contacts, c, positions), weighted(contacts, c, velocities)
-            push(contacts, c, scale(share * dt, force), x, v, dt)
 
 
 @kernel
