@@ -12,7 +12,7 @@ from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import AddToWorld, LedArm
+from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
 from scalpel_sim.arm.placement import place
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
@@ -27,7 +27,7 @@ from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import TetrahedralMesh, Tissue
+from tissue import FloatArray, TetrahedralMesh, Tissue
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -60,21 +60,21 @@ def prepare(
     bounds = link.describe().bounds
     held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
-    table = tabletop_of(scene, bounds)
     if scene.own_arm is None:
         placement = place(stroke, bounds, scene.arm, force=needed.force)
         frame = TissueFrame(origin=placement.tissue_origin)
         first = placement, stroke
         others = arms_with_graspers(scene.graspers, motions, bounds, frame, first)
-        arm: LedArm = placement.arm(others=others, world=_standing(table, frame))
+        arm: LedArm = placement.arm(others=[*others, *_table_of(scene, bounds, frame)])
     else:
         arm, frame = _own(scene.own_arm)
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
         others = arms_with_graspers(scene.graspers, motions, bounds, frame, None)
-        if others or table is not None:
+        standing_there = [*others, *_table_of(scene, bounds, frame)]
+        if standing_there:
             start = np.array(arm.data.qpos)
-            arm, _ = _own(scene.own_arm, others, _standing(table, frame))
+            arm, _ = _own(scene.own_arm, standing_there)
             arm.reset(start)
     _warn_of_weakness(needed, arm)
     tissue = link.describe()
@@ -124,14 +124,13 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _standing(table: Tabletop | None, frame: TissueFrame) -> AddToWorld | None:
-    """Return what adds the table of a scene to the world of an arm."""
-    return None if table is None else lambda spec: table.stand_in(spec, frame)
+def _table_of(scene: Scene, bounds: FloatArray, frame: TissueFrame) -> list[Tabletop]:
+    """Return the table of a scene where the tissue lies, or none."""
+    table = tabletop_of(scene, bounds)
+    return [] if table is None else [table._replace(frame=frame)]
 
 
-def _own(
-    own: OwnArm, others: Sequence[HeldArm] = (), world: AddToWorld | None = None
-) -> tuple[LedArm, TissueFrame]:
+def _own(own: OwnArm, others: Sequence[HeldArm | Tabletop] = ()) -> tuple[LedArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
     arm = own_arm(
@@ -141,7 +140,6 @@ def _own(
         tip=own.tip,
         forward=own.forward,
         others=others,
-        world=world,
     )
     quaternion, axes = np.array(own.quat), np.empty(9)
     if not quaternion.any():

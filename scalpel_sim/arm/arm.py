@@ -10,7 +10,8 @@ import numpy as np
 from bridge import DeviceLimits
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import AddToWorld, LedArm
+from scalpel_sim.arm.led_arm import LedArm
+from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import unknown
 from tissue import FloatArray
 
@@ -42,8 +43,7 @@ class Arm(LedArm):
         base_position: Middle of the base's underside [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
-        others: Arms that stand in its world, each with a grasper.
-        world: What else stands in it: see `LedArm`.
+        others: What else stands in its world: arms, each with a grasper, and a table.
 
     Raises:
         UsageError: no preset has this name.
@@ -58,8 +58,7 @@ class Arm(LedArm):
         base_position: Sequence[float] | FloatArray = (0.0, 0.0, 0.0),
         base_yaw: float = 0.0,
         impedance: Impedance = Impedance(),
-        others: Sequence[HeldArm] = (),
-        world: AddToWorld | None = None,
+        others: Sequence[HeldArm | Tabletop] = (),
     ) -> None:
         if preset not in ARMS:
             raise unknown("arm", preset, ARMS)
@@ -67,7 +66,7 @@ class Arm(LedArm):
         put_base(spec, np.array(base_position, np.float64), base_yaw)
         _make_blade(spec, blade_length, mount_angle)
         home = np.array(spec.key("home").qpos)
-        super().__init__(spec, preset, ARMS[preset], impedance, others=others, world=world)
+        super().__init__(spec, preset, ARMS[preset], impedance, others=others)
         self.reset(home)
 
 

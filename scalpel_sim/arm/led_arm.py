@@ -1,7 +1,7 @@
 """An arm of MuJoCo whose blade a virtual hand leads: what every arm of a run has."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -11,10 +11,8 @@ from scalpel_sim.arm.blade import Blade
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
+from scalpel_sim.arm.tabletop import Tabletop
 from tissue import FloatArray
-
-AddToWorld = Callable[[mujoco.MjSpec], None]
-"""Adds what stands in the world to a model that is yet to be compiled."""
 
 
 class ArmError(RuntimeError):
@@ -35,8 +33,7 @@ class LedArm:
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
-        others: Arms that stand in its world, each with a grasper.
-        world: What else stands in it, added to the model before it is compiled; None: nothing.
+        others: What else stands in its world: arms, each with a grasper, and a table.
 
     Raises:
         ValueError: the model has no such sites, or cannot be compiled.
@@ -52,16 +49,13 @@ class LedArm:
         heel: str = "heel",
         tip: str = "tip",
         forward: Sequence[float] = (0.0, 0.0, -1.0),
-        others: Sequence[HeldArm] = (),
-        world: AddToWorld | None = None,
+        others: Sequence[HeldArm | Tabletop] = (),
     ) -> None:
         route_warnings()
         add_hand(spec, impedance, heel, tip, forward)
         self._n_own = len(spec.joints)
         for other in others:
             other.stand_in(spec)
-        if world is not None:
-            world(spec)
         self.name = name
         """Name of the arm, for reports."""
         self.limits = limits
@@ -71,9 +65,9 @@ class LedArm:
         """MuJoCo's data."""
         self.blade = Blade(self.model, self.data, heel, tip, forward=forward)
         self.hand = Hand(self.model, self.data)
-        self.others = tuple(others)
+        self.others = tuple(each for each in others if isinstance(each, HeldArm))
         """Arms that stand in its world."""
-        self.graspers = tuple(other.grasper(self.model, self.data) for other in others)
+        self.graspers = tuple(other.grasper(self.model, self.data) for other in self.others)
         """What these hold."""
         self.joints = tuple(
             self.model.joint(i).name or f"joint {i}" for i in range(self.model.njnt)

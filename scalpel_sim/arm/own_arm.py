@@ -17,8 +17,9 @@ import numpy as np
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.hand import EDGE, Impedance
 from scalpel_sim.arm.held_arm import HeldArm
-from scalpel_sim.arm.led_arm import AddToWorld, LedArm
+from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
+from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray
@@ -51,8 +52,7 @@ def own_arm(
     heel: str = "heel",
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
-    others: Sequence[HeldArm] = (),
-    world: AddToWorld | None = None,
+    others: Sequence[HeldArm | Tabletop] = (),
 ) -> LedArm:
     """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
 
@@ -62,8 +62,7 @@ def own_arm(
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
-        others: Arms that stand in its world, each with a grasper.
-        world: What else stands in it: see `LedArm`.
+        others: What else stands in its world: arms, each with a grasper, and a table.
 
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
@@ -72,7 +71,7 @@ def own_arm(
     try:
         usual = led(own_spec(path), path.stem, limits)
         firm = firm_impedance(usual)
-        arm = led(own_spec(path), path.stem, limits, firm, others=others, world=world)
+        arm = led(own_spec(path), path.stem, limits, firm, others=others)
     except ValueError as error:
         raise UsageError(f"[arm] model {path}: {error}") from error
     arm.reset(_at_first(usual))

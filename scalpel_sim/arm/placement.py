@@ -11,7 +11,6 @@ from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.hand import Impedance
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
-from scalpel_sim.arm.led_arm import AddToWorld
 from scalpel_sim.arm.place_search import (
     TABLE_CLEARANCE,
     TABLE_ROUNDING,
@@ -24,6 +23,7 @@ from scalpel_sim.arm.place_search import (
     search_place,
     spheres_along,
 )
+from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.stroke import DRAWN_STROKES
@@ -76,15 +76,13 @@ class Placement(NamedTuple):
     def arm(
         self,
         impedance: Impedance = Impedance(),
-        others: Sequence[HeldArm] = (),
-        world: AddToWorld | None = None,
+        others: Sequence[HeldArm | Tabletop] = (),
     ) -> Arm:
         """Return an arm that stands there, with its blade at the start of the stroke.
 
         Args:
             impedance: How firmly the hand holds the blade.
-            others: Arms that stand in its world, each with a grasper.
-            world: What else stands in it: see `LedArm`.
+            others: What else stands in its world: arms, each with a grasper, and a table.
         """
         arm = Arm(
             self.preset,
@@ -94,7 +92,6 @@ class Placement(NamedTuple):
             base_yaw=self.base_yaw,
             impedance=impedance,
             others=others,
-            world=world,
         )
         arm.reset(self.qpos)
         return arm

@@ -21,13 +21,15 @@ class Tabletop(NamedTuple):
     """Its shape: a box."""
     centre: FloatArray
     """Where its middle is [m], tissue frame, shape (3,)."""
+    frame: TissueFrame = TissueFrame()
+    """Where the tissue lies in the world."""
 
-    def stand_in(self, spec: mujoco.MjSpec, frame: TissueFrame) -> None:
+    def stand_in(self, spec: mujoco.MjSpec) -> None:
         """Have it stand in the world of a model that is yet to be compiled.
 
         It collides with what a user's model lets collide, and with instruments and arms of ours.
         """
-        quaternion = np.empty(4)
+        quaternion, frame = np.empty(4), self.frame
         mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
         spec.worldbody.add_geom(
             name=TABLETOP,

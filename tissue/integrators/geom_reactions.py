@@ -7,8 +7,8 @@ substep (`tissue.contact.geoms.kinematic_contact`). A face has three nodes, whic
 hold as well; it keeps the force that it had then.
 """
 
-from tissue.contact.geoms.geom_arrays import NODE_CONTACT
 from tissue.contact.geoms.contact_impulses import push, weighted
+from tissue.contact.geoms.geom_arrays import NODE_CONTACT
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point

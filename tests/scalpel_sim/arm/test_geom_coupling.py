@@ -15,9 +15,11 @@ MASS = 0.05
 GEL = Material(law="neo_hookean", young_modulus=20e3, poisson_ratio=0.45, density=MASS / EDGE**3)
 
 
-def cube(cells=4):
+def cube(cells=4, frame=TissueFrame()):
+    """A cube that lies on the table of the world, wherever its own frame is."""
     mesh = block((cells,) * 3, (EDGE,) * 3)
-    mesh = mesh._replace(positions=mesh.positions - [EDGE / 2, EDGE / 2, 0.0])
+    in_world = mesh.positions - [EDGE / 2, EDGE / 2, 0.0]
+    mesh = mesh._replace(positions=frame.points_to_tissue(in_world))
     return Tissue(mesh, GEL, solver=SolverSettings(audit=True))
 
 
@@ -70,7 +72,7 @@ def test_a_parallel_jaw_lifts_a_block_of_50_g_by_friction():
     way, touch, energies = lifted(friction=0.5)
     assert way == pytest.approx(0.019, abs=1e-3)
     held = touch.wrench("left").force + touch.wrench("right").force
-    assert held == pytest.approx([0.0, 0.0, -MASS * 9.81], abs=0.02 * MASS * 9.81)
+    assert held[2] == pytest.approx(-MASS * 9.81, rel=0.02)
     assert not touch.wrench(0).force.any()  # nothing is on the table
     assert abs(energies.residual) < 0.01 * energies.work_of_loads
 
@@ -104,10 +106,11 @@ def test_bodies_get_what_the_contacts_push_and_its_moment():
 
 
 def test_the_frame_of_the_tissue_changes_nothing():
-    ways = []
-    for frame in (TissueFrame(), TissueFrame(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))):
+    pushed = []
+    turned = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    for frame in (TissueFrame(), TissueFrame(turned, np.array([0.3, -0.2, 0.1]))):
         model, data = parallel_jaw(0.5)
-        tissue = cube()
+        tissue = cube(frame=frame)
         touch = GeomCoupling(data, tissue, frame=frame)
         for _ in range(80):
             data.ctrl[1:] = 1.0
@@ -116,8 +119,8 @@ def test_the_frame_of_the_tissue_changes_nothing():
             tissue.step(None, 1e-3)
             touch.apply()
             mujoco.mj_step2(model, data)
-        ways.append(np.linalg.norm(touch.wrench("left").force))
-    assert ways[0] == pytest.approx(ways[1], rel=0.02)
+        pushed.append(touch.wrench("left").force)
+    assert pushed[0] == pytest.approx(pushed[1], abs=1e-3)
 
 
 def test_convex_meshes_and_ellipsoids_of_a_model_push_too():

@@ -8,11 +8,11 @@ import math
 from typing import Final
 
 from tissue.contact.faces import Faces
+from tissue.contact.geoms.contact_impulses import note_velocities, weighted
 from tissue.contact.geoms.deepest_point import Deepest, deepest_point, is_flat_at
 from tissue.contact.geoms.geom import PLANE
 from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts, Geoms
 from tissue.contact.geoms.geom_motion import place_geoms
-from tissue.contact.geoms.contact_impulses import note_velocities, weighted
 from tissue.contact.geoms.near_nodes import (
     GeomSearch,
     find_near_faces,

@@ -15,6 +15,7 @@ from tissue.contact.faces import (
     with_room,
     with_skin,
 )
+from tissue.contact.geoms.contact_impulses import sum_wrenches
 from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
 from tissue.contact.geoms.geom import Geom, half_thickness
 from tissue.contact.geoms.geom_arrays import (
@@ -32,7 +33,6 @@ from tissue.contact.geoms.geom_motion import (
     lead_geoms,
     place_geoms,
 )
-from tissue.contact.geoms.contact_impulses import sum_wrenches
 from tissue.contact.geoms.near_nodes import GeomSearch
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.array_types import BoolArray, FloatArray, IntArray

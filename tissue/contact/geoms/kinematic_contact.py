@@ -15,6 +15,7 @@ dry friction in finite freedom dynamics, for impacts and friction in terms of ve
 
 from typing import Final
 
+from tissue.contact.geoms.contact_impulses import note_velocities, push, weighted
 from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts
 from tissue.contact.geoms.geom_motion import (
     geom_motion_at,
@@ -22,7 +23,6 @@ from tissue.contact.geoms.geom_motion import (
     to_geom,
     turned_from_geom,
 )
-from tissue.contact.geoms.contact_impulses import note_velocities, push, weighted
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
