@@ -1,9 +1,10 @@
-"""Displacement boundary conditions: nodes of sides, boxes, half-spaces and lists.
+"""Displacement boundary conditions: nodes of sides, boxes, spheres, half-spaces and lists.
 
 All functions return masks of shape (n_nodes,).
 """
 
 import difflib
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -54,8 +55,11 @@ FACING_DOWN = 0.3
 """Least downward part of the outward unit normal of a face of the underside: 17 degrees from
 upright. Less, and the sides of a round body would be held as well."""
 
+_SPHERE = "sphere:"
+"""What the text of a sphere begins with."""
+
 _ROUNDING = 1e-9
-"""Distance from a box or a plane at which nodes are on it, in units of the body's extent."""
+"""Distance from a box, a sphere or a plane at which nodes are on it, in the body's extent."""
 
 
 def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
@@ -64,14 +68,17 @@ def fixed_nodes(mesh: TetrahedralMesh, specification: str) -> BoolArray:
     Args:
         mesh: The body.
         specification: Sides joined by commas ("left,right"; "underside": all that faces down), or
-            the corners of a box in m ("0,0,0:0.01,0.06,0.04"), or "none".
+            the corners of a box in m ("0,0,0:0.01,0.06,0.04"), or centre and radius of a sphere in
+            m ("sphere:0.01,0.03,0.04,0.005"), or "none".
 
     Raises:
-        ValueError: The text is none of these, or the box holds no node.
+        ValueError: The text is none of these, or the box or the sphere holds no node.
     """
     text = specification.strip()
     if text.lower() == "none":
         return np.zeros(len(mesh.positions), dtype=bool)
+    if text.lower().startswith(_SPHERE):
+        return sphere_nodes(mesh, *_centre_and_radius(text))
     if ":" in text:
         return box_nodes(mesh, *_box_corners(text))
     return side_nodes(mesh, text.split(","))
@@ -118,6 +125,25 @@ def box_nodes(mesh: TetrahedralMesh, low: npt.ArrayLike, high: npt.ArrayLike) ->
     if not mask.any():
         raise ValueError(
             f"no node is in the box from {_text(low)} to {_text(high)} m; {_where(mesh.positions)}"
+        )
+    return mask
+
+
+def sphere_nodes(mesh: TetrahedralMesh, centre: npt.ArrayLike, radius: float) -> BoolArray:
+    """Return a mask of the nodes in the sphere around `centre` [m] of a radius [m], and on it.
+
+    Raises:
+        ValueError: A number is not finite, the radius is not positive, or no node is there.
+    """
+    middle = _point(centre, "the centre of the sphere")
+    if not (math.isfinite(radius) and radius > 0.0):
+        raise ValueError(f"the radius of the sphere is {radius} m; it must be positive and finite")
+    slack = _ROUNDING * np.ptp(mesh.positions, axis=0).max()
+    mask: BoolArray = np.linalg.norm(mesh.positions - middle, axis=1) <= radius + slack
+    if not mask.any():
+        raise ValueError(
+            f"no node is in the sphere of {radius:.4g} m around {_text(middle)} m; "
+            f"{_where(mesh.positions)}"
         )
     return mask
 
@@ -172,7 +198,7 @@ def _side(name: str) -> tuple[int, bool]:
         hint = f" Did you mean '{close[0]}'?" if close else ""
         raise ValueError(
             f"'{name.strip()}' is not a side of the body.{hint} Sides: {', '.join(SIDES)}, "
-            f"{UNDERSIDE}; or a box x0,y0,z0:x1,y1,z1 in m; or none"
+            f"{UNDERSIDE}; or a box x0,y0,z0:x1,y1,z1 or {_SPHERE}x,y,z,radius in m; or none"
         )
     return SIDES[key]
 
@@ -230,6 +256,17 @@ def _box_corners(text: str) -> tuple[FloatArray, FloatArray]:
     if low.shape != (3,) or high.shape != (3,):
         raise ValueError(f"'{text}' is not a box; write its corners in m as x0,y0,z0:x1,y1,z1")
     return low, high
+
+
+def _centre_and_radius(text: str) -> tuple[FloatArray, float]:
+    """Parse "sphere:x,y,z,r"."""
+    try:
+        x, y, z, radius = (float(n) for n in text[len(_SPHERE) :].split(","))
+    except ValueError:
+        raise ValueError(
+            f"'{text}' is not a sphere; write its centre and its radius in m as {_SPHERE}x,y,z,r"
+        ) from None
+    return np.array([x, y, z]), radius
 
 
 def _point(values: npt.ArrayLike, name: str) -> FloatArray:

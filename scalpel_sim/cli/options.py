@@ -49,7 +49,7 @@ class BodyOptions:
     "Metres in one unit of the mesh file: 0.001 for millimetres."
     fix: str | None = None
     """What is held: sides (left, right, front, back, bottom, top), the underside (all that faces
-    down), a box x0,y0,z0:x1,y1,z1, or none."""
+    down), a box x0,y0,z0:x1,y1,z1 in m, a sphere sphere:x,y,z,radius in m, or none."""
     stretch: float | None = None
     "How far opposite held sides are pulled apart before the run, as a fraction: a slit opens."
     gravity: float | None = None

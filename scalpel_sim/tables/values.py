@@ -57,7 +57,8 @@ Region = Annotated[
     str,
     Meta(
         min_length=1,
-        description='a region: sides ("left,right"; "underside") or a box ("0,0,0:0.01,0.02,0.03")',
+        description='a region: sides ("left,right"; "underside"), a box ("0,0,0:0.01,0.02,0.03") '
+        'or a sphere ("sphere:0.01,0.02,0.03,0.005")',
     ),
 ]
 LawName = Annotated[Law, one_of(*get_args(Law))]

@@ -76,6 +76,14 @@ def test_a_box_holds_the_nodes_on_its_faces_too():
     assert box_nodes(mesh, (0.0, 0.0, 0.02), (1.0, 1.0, 0.02)).sum() == 9
 
 
+def test_a_sphere_holds_the_nodes_on_it_too():
+    """The corner at the origin and its three neighbours, at just that radius."""
+    mesh = block((2, 2, 2), (0.02, 0.02, 0.02))
+    held = fixed_nodes(mesh, "sphere:0,0,0,0.01")
+    assert np.array_equal(held, np.linalg.norm(mesh.positions, axis=1) <= 0.01)
+    assert held.sum() == 4
+
+
 def test_a_plane_with_an_outward_normal_holds_the_nodes_on_it():
     mesh = block((2, 2, 2), (0.02, 0.02, 0.02))
     assert plane_nodes(mesh, (0.0, 0.0, 0.0), (0.0, 0.0, -5.0)).sum() == 9
@@ -99,6 +107,11 @@ def test_a_list_holds_the_nodes_in_it():
         ("1,1,1:2,2,2", "no node is in the box.*the body goes from"),
         ("1,1,1:0,0,0", "must be the smaller"),
         ("nan,0,0:1,1,1", "finite"),
+        ("sphere:1,1,1,0.01", "no node is in the sphere.*the body goes from"),
+        ("sphere:0,0,0", "sphere:x,y,z,r"),
+        ("sphere:0,0,0,0.01,0.02", "sphere:x,y,z,r"),
+        ("sphere:0,0,0,-0.01", "radius of the sphere is -0.01 m"),
+        ("sphere:0,0,inf,0.01", "centre of the sphere .* finite"),
     ],
 )
 def test_a_text_that_selects_nothing_is_refused_with_valid_choices(text, message):
