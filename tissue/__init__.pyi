@@ -27,6 +27,7 @@ from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .loads.attachment import Attachment as Attachment
+from .loads.ligament import Ligament as Ligament
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
 from .material import Law as Law
@@ -81,6 +82,7 @@ __all__ = [
     "IntArray",
     "Law",
     "Attachment",
+    "Ligament",
     "Load",
     "MATERIALS",
     "Material",

@@ -12,6 +12,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.elasticity.energy import kinetic_energy, potential_energy
 from tissue.elasticity.internal_forces import elastic_energy
+from tissue.integrators.attachments import attached_energy
 from tissue.integrators.step_context import StepContext
 from tissue.integrators.system import System
 from tissue.types import Energies
@@ -98,6 +99,12 @@ def _write_amounts(
     out[15] = totals.released
 
 
+def _attached(system: System) -> float:
+    """Return the energy in the springs of attachments [J]."""
+    attachments = system.attachments
+    return attached_energy(attachments, system.body.positions, 0, len(attachments.nodes))
+
+
 class Audit:
     """The account of one body, or none.
 
@@ -114,7 +121,8 @@ class Audit:
         """What changes of the mesh added since the account began."""
         self._before_cut = self.changes
         self.work_of_loads = 0.0
-        """Work of the loads since the account began [J]."""
+        """Work of loads, and of what moves attachments, since the account began [J]."""
+        self._attached_at_first = 0.0
         self._is_known = False
         self._numbers = np.zeros(len(_Amounts._fields))
         self._now = self._at_first = _Amounts(*self._numbers)
@@ -130,6 +138,9 @@ class Audit:
         clear_works(system.interaction.state.totals)
         system.supports.work = self.work_of_loads = 0.0
         system.elasticity.arrays.scaling.lost = 0.0
+        attachments = system.attachments
+        attachments.dissipated = attachments.severing = attachments.released = 0.0
+        self._attached_at_first = _attached(system)
         self.forget()
         self._at_first = self._amounts(system, edge, 1.0)
 
@@ -155,6 +166,7 @@ class Audit:
         if not self._is_kept:
             return None
         now, first = self._amounts(system, edge, 1.0), self._at_first
+        attachments, attached = system.attachments, _attached(system) - self._attached_at_first
         in_contacts = now.in_contacts - first.in_contacts
         # What the body gave to contacts, and their springs do not hold.
         lost_in_contacts = (first.work_of_contacts - now.work_of_contacts) - in_contacts
@@ -165,14 +177,14 @@ class Audit:
             elastic=now.elastic - first.elastic,
             kinetic=now.kinetic - first.kinetic,
             potential=now.potential - first.potential,
-            held=now.edge + now.sides + now.in_contacts - first.in_contacts,
-            damping=now.damping,
+            held=now.edge + now.sides + in_contacts + attached,
+            damping=now.damping + attachments.dissipated,
             cutting=now.cutting,
-            breaking=now.breaking,
+            breaking=now.breaking + attachments.severing,
             friction=now.friction,
             contact=now.contact + lost_in_contacts,
             topology=now.mass - sum(self.changes),
-            released=now.released,
+            released=now.released + attachments.released,
         )
 
     def _amounts(self, system: System, edge: Edge, when: float) -> _Amounts:

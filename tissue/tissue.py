@@ -41,7 +41,7 @@ from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import Numerics, assembled
-from tissue.loads.attachment import AttachmentList
+from tissue.loads.attachment_list import AttachmentList
 from tissue.loads.driven_body import DrivenBody
 from tissue.loads.load import Loads
 from tissue.material import Material
@@ -235,7 +235,7 @@ class Tissue(DrivenBody):
         self._take_edge(None)
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
-        self._attachments.stop()
+        self._attachments.stop(system.body)
         system.geoms.stop()
         if not (self._attachments.act or system.geoms.geoms):
             expect_support(system, self.floor)
@@ -290,9 +290,9 @@ class Tissue(DrivenBody):
     def _relax(self, increment: Increment, has_blade: bool) -> int:
         """Relax by an increment; return the substeps that it took."""
         system = self._system
-        before = self._begin_driving()
+        before = self._begin_driving(increment, has_blade)
         n = self._integrator.relax(system, self._blade_context, increment, has_blade)
-        self._audit.work_of_loads += self._driven_work(before)
+        self._audit.work_of_loads += self._driven_work(before, increment)
         if n > 0:
             self._audit.forget()
         self._edge_now = (increment.edge, increment.end)
@@ -319,7 +319,7 @@ class Tissue(DrivenBody):
     ) -> StepResult:
         """Return what the step did."""
         system, incision = self._system, self._incision
-        report = system.interaction.report(self._blade_context, edge, dt)
+        report = system.report(self._blade_context, edge, dt)
         amounts, change = report.amounts, incision.scheme.change
         return LazyResult.of(
             report,

@@ -160,7 +160,7 @@ class Energies(NamedTuple):
     work_of_blade: float
     """Work that the blade did on the tissue."""
     work_of_loads: float
-    """Work of the forces of `Tissue.push`."""
+    """Work of the forces of `Tissue.push`, and of the frames of attachments that are moved."""
     work_of_supports: float
     """Work of the fixed nodes that `Tissue.move_supports` moves; 0 where they rest."""
     elastic: float
@@ -172,13 +172,13 @@ class Energies(NamedTuple):
     """Change of the energy of the tissue in gravity."""
     held: float
     """Change of the elastic energy of the contact of edge and faces of the blade with the tissue,
-    and of contacts of the tissue that act as springs."""
+    of contacts of the tissue that act as springs, and of attachments."""
     damping: float
-    """Energy dissipated by viscosity, drag and Maxwell elements."""
+    """Energy dissipated by viscosity, drag, Maxwell elements and the dampers of attachments."""
     cutting: float
     """Energy of cutting: toughness times area."""
     breaking: float
-    """Energy of breaking the skin beyond that of cutting."""
+    """Energy of breaking the skin beyond that of cutting, and of cutting ligaments."""
     friction: float
     """Energy dissipated by sliding along the faces of the blade."""
     contact: float
@@ -187,7 +187,8 @@ class Energies(NamedTuple):
     """Energy lost as the mesh changes: impacts of nodes that part, and, under laws other than plain
     tetrahedra, elastic energy."""
     released: float
-    """Energy of contacts that the blade released, which is lost."""
+    """Energy of contacts and strands that the blade released, and of attachments that let go, which
+    is lost; less that of attachments that began under tension."""
 
     @property
     def residual(self) -> float:

@@ -1,6 +1,7 @@
 """`BladeInteraction`: the anchors and side contacts of one body with the blade, and the wrench."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from tissue.blade.return_mapping import relocate
 from tissue.blade.side_contact import grown_side_contacts, with_more_faces
 from tissue.blade.side_search import forget_cells, forget_changed_faces
 from tissue.blade.toughness import toughness_law_of
-from tissue.blade.wrench import BladeReport, blade_report, new_report
+from tissue.blade.wrench import BladeReport, WrenchReport, blade_report, new_report
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import SameTypes
@@ -58,6 +59,10 @@ _SAME_LENGTH = 1e-3
 between two places of a turning blade, differ by less; another edge would begin another incision."""
 
 
+AddToReport = Callable[[WrenchReport], None]
+"""Adds what acts on the blade beside the tissue."""
+
+
 class BladeInteraction:
     """The interaction of one body with the blade: anchors, side contacts, forces of both.
 
@@ -78,6 +83,7 @@ class BladeInteraction:
         self.state = new_blade_state(anchors, blade, material, node_size, n_tetrahedra)
         """State for the kernels; replaced by another object when arrays grow."""
         self._shape, self._material = blade, material
+        self._n_strands = 0
         self._renew_report()
         self._edge_length = 0.0
         self._grid = no_grid()
@@ -86,8 +92,14 @@ class BladeInteraction:
 
     def _renew_report(self) -> None:
         """Make a report with room for all contacts that the blade may have."""
-        self._report = new_report(self.state)
+        self._report = new_report(self.state, self._n_strands)
         self._views: dict[int, BladeContacts] = {}
+
+    def make_room_for_strands(self, n: int) -> None:
+        """Make room for that many contacts with strands."""
+        if n > self._n_strands:
+            self._n_strands = n
+            self._renew_report()
 
     @property
     def n_samples(self) -> int:
@@ -277,9 +289,13 @@ class BladeInteraction:
         """Trace the path of the edge; see `tissue.blade.blade_context.trace`."""
         return _TRACE.call(context, edge, when)
 
-    def report(self, context: BladeContext, edge: Edge, dt: float) -> BladeReport:
-        """Return what a time step of `dt` [s] came to."""
+    def report(
+        self, context: BladeContext, edge: Edge, dt: float, also: AddToReport | None = None
+    ) -> BladeReport:
+        """Return what a time step of `dt` [s] came to, and what `also` adds to that."""
         _REPORT.call(context, edge, dt)
+        if also is not None:
+            also(self._report)
         return blade_report(self._report, self._views)
 
     def all_nodes(self, body: Body) -> IntArray:

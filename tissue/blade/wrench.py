@@ -88,9 +88,11 @@ class Amounts(NamedTuple):
     """Toughness times area cut since the start [J]."""
 
 
-def new_report(blade: BladeState) -> WrenchReport:
-    """Return a report without contacts, with room for as many as the blade may have."""
-    capacity = len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.blunt.state)
+def new_report(blade: BladeState, n_more: int = 0) -> WrenchReport:
+    """Return a report without contacts, with room for all of the blade, and `n_more`."""
+    capacity = (
+        n_more + len(blade.anchors.state) + POINTS * len(blade.sides.face) + len(blade.blunt.state)
+    )
     plain = np.zeros(18 + len(Amounts._fields))
     return WrenchReport(
         n_contacts=0,
@@ -200,6 +202,29 @@ def write_report(report: WrenchReport, blade: BladeState, body: Body, edge: Edge
         for j in range(i):
             mean = 0.5 * (report.stiffness[i, j] + report.stiffness[j, i])
             report.stiffness[i, j] = report.stiffness[j, i] = mean
+
+
+@kernel
+def report_strand(
+    report: WrenchReport, pose: BladePose, at: Vec3, force: Vec3, stiffness: float
+) -> None:
+    """Add a strand that goes around the edge to the report.
+
+    Args:
+        report: Written, the number of contacts among its amounts too.
+        pose: The blade at the end of the time step.
+        at: Where the strand is bent [m].
+        force: Force of the blade on it [N].
+        stiffness: How that grows as the blade moves along it [N/m].
+    """
+    lever, size = sub(at, pose.tip), norm(force)
+    _add_force(report, lever, force)
+    if size > 0.0:
+        _add_stiffness_along(report, lever, stiffness, scale(1.0 / size, force))
+    across = dot(force, pose.forward)
+    friction = axpy(-across, pose.forward, force)
+    _add_contact(report, at, pose.forward, across, friction, 0.0)
+    report.amounts[0] = report.n_contacts
 
 
 @kernel

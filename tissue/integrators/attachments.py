@@ -10,13 +10,13 @@ by Gershgorin's circles, since the weights w_p of a point are not negative and a
 """
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
-from tissue.core.structs import Arrays, FloatCell
+from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, lerp, norm, scale, store, sub, vec3
 
 _STABLE: Final = 1.5
@@ -24,9 +24,24 @@ _STABLE: Final = 1.5
 method of the whole body, 2 for Verlet and 3.46 for the Nystroem method."""
 
 
+STRAIGHT, CAUGHT, SEVERED = 0, 1, 2
+"""State of what is between a point and its other end: STRAIGHT; CAUGHT, a strand that goes around
+the edge of the blade (`tissue.integrators.strands`); SEVERED, nothing more."""
+
+
 class Attachments(Arrays):
     """The attached points of a body, n of them."""
 
+    n_caught: IntCell
+    """Number of strands that the blade has caught."""
+    work: FloatCell
+    """Work of what moves from outside on springs and dampers, since it was last set to 0 [J]."""
+    dissipated: FloatCell
+    """Energy that the dampers took since the account of energy began [J]."""
+    severing: FloatCell
+    """Energy that cutting strands took since then [J]."""
+    released: FloatCell
+    """Energy of springs that ended since then, less that of those that began [J]."""
     nodes: IntArray
     """Nodes around each point, shape (n, 4)."""
     weights: FloatArray
@@ -40,18 +55,39 @@ class Attachments(Arrays):
     damping: FloatArray
     """Damping of each [N s/m], shape (n,)."""
     length: FloatArray
-    """Length up to which each is slack [m], shape (n,): 0 for one that holds in all directions."""
+    """Length up to which each is slack [m], shape (n,): 0 for one that holds in all directions,
+    unless it is a strand."""
+    section: FloatArray
+    """Cross-section of each strand, which the blade can cut [m2], shape (n,); 0: it is none."""
+    toughness: FloatArray
+    """Energy of cutting a strand [J/m2], shape (n,)."""
+    state: IntArray
+    """STRAIGHT, CAUGHT or SEVERED, shape (n,)."""
+    place: FloatArray
+    """Where a caught strand goes around the blade: along the edge from the tip, and behind the edge
+    [m], shape (n, 2)."""
+    bend: FloatArray
+    """The same in space after the last step of the integrator [m], shape (n, 3)."""
+    spent: FloatArray
+    """Energy that was spent on cutting each [J], shape (n,)."""
+    side: FloatArray
+    """On which side of the edge's line each strand passes: 1 or -1; 0 where that is not known."""
+    before: FloatArray
+    """Point and other end before an increment [m], shape (n, 6)."""
     impulse: FloatArray
-    """Impulse on each point in the time step so far [N s], shape (n, 3)."""
+    """Impulse of what each is attached to in the time step so far [N s], shape (n, 3)."""
     turn: FloatArray
-    """Angular impulse on each about the origin [N m s], shape (n, 3)."""
-    work: FloatCell
-    """Work on the tissue since it was last set to 0 [J]."""
+    """Angular impulse of it about the origin [N m s], shape (n, 3)."""
 
 
 def no_attachments(n: int = 0) -> Attachments:
     """Return room for that many points, which are attached to nothing yet."""
     return Attachments(
+        n_caught=0,
+        work=0.0,
+        dissipated=0.0,
+        severing=0.0,
+        released=0.0,
         nodes=np.zeros((n, 4), dtype=np.int64),
         weights=np.zeros((n, 4)),
         begin=np.zeros((n, 3)),
@@ -59,10 +95,34 @@ def no_attachments(n: int = 0) -> Attachments:
         stiffness=np.zeros(n),
         damping=np.zeros(n),
         length=np.zeros(n),
+        section=np.zeros(n),
+        toughness=np.zeros(n),
+        state=np.zeros(n, dtype=np.int64),
+        place=np.zeros((n, 2)),
+        bend=np.zeros((n, 3)),
+        spent=np.zeros(n),
+        side=np.zeros(n),
+        before=np.zeros((n, 6)),
         impulse=np.zeros((n, 3)),
         turn=np.zeros((n, 3)),
-        work=0.0,
     )
+
+
+@kernel
+def attached_point(attachments: Attachments, p: int, of_nodes: FloatArray) -> Vec3:
+    """Return what nodes have, such as positions [m], at point `p`."""
+    x = Vec3(0.0, 0.0, 0.0)
+    for q in range(4):
+        x = axpy(attachments.weights[p, q], vec3(of_nodes, attachments.nodes[p, q]), x)
+    return x
+
+
+@kernel
+def spread_force(attachments: Attachments, p: int, force: Vec3, external: FloatArray) -> None:
+    """Add a force on point `p` [N] to those on the nodes around it."""
+    for q in range(4):
+        node, weight = attachments.nodes[p, q], attachments.weights[p, q]
+        store(external, node, axpy(weight, force, vec3(external, node)))
 
 
 @kernel
@@ -98,26 +158,39 @@ def add_attachment_forces(
         external: Forces on the nodes [N], shape (capacity, 3); written.
     """
     for p in range(len(attachments.nodes)):
-        x, v = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
-        for q in range(4):
-            node, weight = attachments.nodes[p, q], attachments.weights[p, q]
-            x = axpy(weight, vec3(positions, node), x)
-            v = axpy(weight, vec3(velocities, node), v)
+        if attachments.state[p] != STRAIGHT:
+            continue
+        x = attached_point(attachments, p, positions)
+        v = attached_point(attachments, p, velocities)
         begin, end = vec3(attachments.begin, p), vec3(attachments.end, p)
         way = sub(lerp(when, begin, end), x)
-        force = _force(attachments, p, way, axpy(-dt, v, sub(end, begin)), dt)
+        pull = _pull(attachments, p, way, axpy(-dt, v, sub(end, begin)), dt)
         seconds = share * dt
-        store(attachments.impulse, p, axpy(seconds, force, vec3(attachments.impulse, p)))
-        store(attachments.turn, p, axpy(seconds, cross(x, force), vec3(attachments.turn, p)))
-        attachments.work += seconds * dot(force, v)
-        for q in range(4):
-            node, weight = attachments.nodes[p, q], attachments.weights[p, q]
-            store(external, node, axpy(weight, force, vec3(external, node)))
+        count_impulse(attachments, p, x, scale(seconds, pull.force))
+        attachments.work += share * dot(pull.force, sub(end, begin))
+        attachments.dissipated += seconds * pull.lost
+        spread_force(attachments, p, pull.force, external)
 
 
 @kernel
-def _force(attachments: Attachments, p: int, way: Vec3, motion: Vec3, dt: float) -> Vec3:
-    """Return the force on point `p` [N].
+def count_impulse(attachments: Attachments, p: int, at: Vec3, impulse: Vec3) -> None:
+    """Count an impulse of what point `p` is attached to [N s], which acts at a place [m]."""
+    store(attachments.impulse, p, add(vec3(attachments.impulse, p), impulse))
+    store(attachments.turn, p, add(vec3(attachments.turn, p), cross(at, impulse)))
+
+
+class _Pull(NamedTuple):
+    """What a spring and its damper do."""
+
+    force: Vec3
+    """Force on the point [N]."""
+    lost: float
+    """Power that the damper takes [W]."""
+
+
+@kernel
+def _pull(attachments: Attachments, p: int, way: Vec3, motion: Vec3, dt: float) -> _Pull:
+    """Return the force on point `p`, and what its damper takes.
 
     Args:
         attachments: Stiffness, damping and slack.
@@ -126,22 +199,68 @@ def _force(attachments: Attachments, p: int, way: Vec3, motion: Vec3, dt: float)
         motion: How far that moves ahead of the point in the time step [m].
         dt: Length of the time step [s].
     """
-    stiffness, damping, slack = (
-        attachments.stiffness[p],
-        attachments.damping[p],
-        attachments.length[p],
-    )
-    if slack == 0.0:
-        return add(scale(stiffness, way), scale(damping / dt, motion))
+    stiffness, damping = attachments.stiffness[p], attachments.damping[p]
+    if attachments.length[p] == 0.0 and attachments.section[p] == 0.0:
+        drag = scale(damping / dt, motion)
+        return _Pull(add(scale(stiffness, way), drag), dot(drag, motion) / dt)
     length = norm(way)
-    if length <= slack:
-        return Vec3(0.0, 0.0, 0.0)
-    along = dot(motion, way) / length
-    pull = max(stiffness * (length - slack) + damping / dt * along, 0.0)
-    return scale(pull / length, way)
+    if length <= attachments.length[p]:
+        return _Pull(Vec3(0.0, 0.0, 0.0), 0.0)
+    rate = dot(motion, way) / (length * dt)
+    tension = tension_of(attachments, p, length, rate)
+    lost = (tension - stiffness * (length - attachments.length[p])) * rate
+    return _Pull(scale(tension / length, way), lost)
 
 
-def frequency_squared(attachments: Attachments, masses: FloatArray) -> float:
+@kernel
+def tension_of(attachments: Attachments, p: int, length: float, rate: float) -> float:
+    """Return how hard what holds point `p` pulls [N]; it never pushes.
+
+    Args:
+        attachments: Stiffness, damping and slack.
+        p: The point.
+        length: Its length, that at rest or more [m].
+        rate: How fast that grows [m/s].
+    """
+    spring = attachments.stiffness[p] * (length - attachments.length[p])
+    tension: float = max(spring + attachments.damping[p] * rate, 0.0)
+    return tension
+
+
+@kernel
+def holding_energy(attachments: Attachments, p: int, length: float) -> float:
+    """Return the energy of what holds point `p` at a length [m], in J."""
+    stretch = max(length - attachments.length[p], 0.0)
+    energy: float = 0.5 * attachments.stiffness[p] * stretch * stretch
+    return energy
+
+
+@kernel
+def attached_energy(attachments: Attachments, positions: FloatArray, begin: int, end: int) -> float:
+    """Return the energy of the springs of some points at the end of a step of the integrator [J].
+
+    Args:
+        attachments: All of them.
+        positions: Positions of the nodes [m].
+        begin: The first of these points.
+        end: One more than the last.
+    """
+    total = 0.0
+    for p in range(begin, end):
+        if attachments.state[p] == SEVERED:
+            continue
+        x, other = attached_point(attachments, p, positions), vec3(attachments.end, p)
+        if attachments.state[p] == CAUGHT:
+            bend = vec3(attachments.bend, p)
+            total += holding_energy(attachments, p, norm(sub(x, bend)) + norm(sub(other, bend)))
+        else:
+            total += holding_energy(attachments, p, norm(sub(other, x)))
+    return total
+
+
+def frequency_squared(
+    attachments: Attachments, masses: FloatArray, stiffening: FloatArray | None = None
+) -> float:
     """Return what attachments add to w^2 of the body at most [1/s2].
 
     A damper of rate r adds 2 r w at most where the step is bounded by w: it is counted as the
@@ -151,12 +270,13 @@ def frequency_squared(attachments: Attachments, masses: FloatArray) -> float:
         attachments: Springs and dampers.
         masses: Of the nodes [kg], without what mass scaling has added and may take back; shape
             (capacity,).
+        stiffening: By what factor each spring is stiffer where it is bent, shape (n,); None: 1.
     """
     if not len(attachments.nodes):
         return 0.0
+    stiffness = attachments.stiffness * (1.0 if stiffening is None else stiffening)
     springs, dampers = (
-        _largest_rate(attachments, each, masses)
-        for each in (attachments.stiffness, attachments.damping)
+        _largest_rate(attachments, each, masses) for each in (stiffness, attachments.damping)
     )
     # h^2 springs + 2 h dampers = s^2 gives the step; its (s / h)^2 is what is added.
     s = _STABLE

@@ -39,6 +39,7 @@ from tissue.integrators.shared_loops import (
     run_loop,
 )
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.strands import add_caught_forces
 from tissue.integrators.supports import add_support_work
 
 
@@ -112,6 +113,8 @@ def apply_outer_forces(
     apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
     add_contact_forces(context.contacts, positions, velocities, share * dt, external)
     add_attachment_forces(attachments, positions, velocities, when, share, dt, external)
+    if attachments.n_caught > 0:
+        add_caught_forces(context, edge, positions, velocities, when, share, dt)
 
 
 @kernel

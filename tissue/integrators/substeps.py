@@ -27,6 +27,7 @@ from tissue.integrators.stage_damping import (
 )
 from tissue.integrators.stages import Stages
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.strands import slip_strands
 from tissue.integrators.supports import add_support_damping
 from tissue.integrators.verlet import position_verlet
 from tissue.mesh.body import Body
@@ -270,6 +271,8 @@ def _end_with_forces(
     clear_geom_forces(context.geoms, external)
     end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
+    if context.attachments.n_caught > 0:
+        slip_strands(context.attachments, body.positions, edge, when)
 
 
 @kernel
@@ -304,6 +307,8 @@ def end_substep(
     clear_geom_forces(context.geoms, stages.external)
     end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, stages.external, when, seconds)
+    if context.attachments.n_caught > 0:
+        slip_strands(context.attachments, body.positions, edge, when)
     return True
 
 

@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tissue.blade.blade_context import BladeContext
+from tissue.blade.edge import Edge
 from tissue.blade.interaction import BladeInteraction
+from tissue.blade.wrench import BladeReport
 from tissue.blade_shape import BladeShape
 from tissue.contact.contact import Contact
 from tissue.contact.geoms.geom_contact import no_geoms
@@ -24,6 +27,7 @@ from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import damping_rate, stable_step
 from tissue.integrators.stages import new_stages
 from tissue.integrators.step_context import StepContext
+from tissue.integrators.strands import report_strands
 from tissue.integrators.support_state import supports_at_rest
 from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
@@ -204,6 +208,15 @@ class System:
         self.interaction.grow(n_tetrahedra)
         self.contact.grow(n_nodes, n_tetrahedra)
         self.geoms.grow(n_nodes, n_tetrahedra)
+
+    def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
+        """Return what a time step of `dt` [s] came to for the blade."""
+        strands, positions = self.attachments, self.body.positions
+        if strands.n_caught == 0:
+            return self.interaction.report(blade, edge, dt)
+        return self.interaction.report(
+            blade, edge, dt, lambda report: report_strands(report, strands, positions, edge)
+        )
 
     def measures(self, method: int) -> MeshMeasures:
         """Return what bounds the time step of the body now.

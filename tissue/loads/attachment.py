@@ -6,10 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from tissue.core.array_types import FloatArray
-from tissue.integrators.attachments import Attachments, frequency_squared, no_attachments
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.integrators.attachments import SEVERED
 from tissue.loads.material_points import MaterialPoints
-from tissue.mesh.body import Body
 from tissue.types import Wrench
 
 _ORTHONORMAL = 1e-6
@@ -21,7 +20,8 @@ class Attachment:
 
     Args:
         points: The points.
-        positions: Where they are now [m], shape (n, 3): there the springs are at rest.
+        others: Where the other ends of the springs are now [m], shape (n, 3): where the points are,
+            unless each is slack.
         stiffness: Of all springs together [N/m].
         damping: Of all dampers together [N s/m].
         rest_length: Length up to which each point is slack, in any direction [m]; 0: it is held
@@ -36,7 +36,7 @@ class Attachment:
     def __init__(
         self,
         points: MaterialPoints,
-        positions: FloatArray,
+        others: FloatArray,
         *,
         stiffness: float,
         damping: float = 0.0,
@@ -46,26 +46,30 @@ class Attachment:
     ) -> None:
         if not (math.isfinite(stiffness) and stiffness > 0.0):
             raise ValueError(f"stiffness is {stiffness} N/m; it must be positive and finite")
-        for name, value in (("damping", damping), ("rest_length", rest_length)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ValueError(f"{name} is {value}; it must be finite and not negative")
         if not breaks_at > 0.0:
             raise ValueError(f"breaks_at is {breaks_at} N; it must be positive")
         self.points = points
-        self.stiffness, self.damping = float(stiffness), float(damping)
-        self.rest_length, self.breaks_at = float(rest_length), float(breaks_at)
+        self.stiffness, self.damping = float(stiffness), checked_amount("damping", damping)
+        self.breaks_at = float(breaks_at)
+        self.lengths: FloatArray = np.full(len(points), checked_amount("rest_length", rest_length))
+        """Length up to which each point is slack [m], shape (n,)."""
+        self.sections: FloatArray = np.zeros(len(points))
+        """Cross-section of each, where it is a strand that the blade can cut [m2], shape (n,)."""
+        self.toughness = 0.0
+        """Energy of cutting them [J/m2]."""
         self.is_released = False
         """Whether it holds no more: it was released, or the force was too large."""
-        at = positions.mean(axis=0) if origin is None else np.array(origin, dtype=np.float64)
-        self._local: FloatArray = positions - _triple("origin", at)
+        self._states = np.zeros(len(points), dtype=np.int64)
+        at = others.mean(axis=0) if origin is None else np.array(origin, dtype=np.float64)
+        self._local: FloatArray = others - _triple("origin", at)
         self._begin = self._end = (np.eye(3), at)
         self._force: FloatArray = np.zeros(3)
         self._moment: FloatArray = np.zeros(3)
 
     @property
     def n_points(self) -> int:
-        """Number of points that it holds; 0 after it was released."""
-        return 0 if self.is_released else len(self.points)
+        """Number of points that it holds, without cut ones; 0 after it was released."""
+        return 0 if self.is_released else int((self._states != SEVERED).sum())
 
     @property
     def wrench(self) -> Wrench:
@@ -102,102 +106,19 @@ class Attachment:
         """Have the frame where it was to be at the end of the next step."""
         self._begin = self._end
 
-    def end_step(self, force: FloatArray, moment: FloatArray) -> None:
-        """Take what acted on the points, averaged over a step.
+    def end_step(self, force: FloatArray, moment: FloatArray, states: IntArray) -> None:
+        """Take what it did to the tissue, averaged over a step.
 
         Args:
             force: Sum of the forces [N], shape (3,).
             moment: Sum of their moments about the origin of the tissue's frame [N m], shape (3,).
+            states: `Attachments.state` of its points, shape (n,).
         """
         self._begin, self._force, self._moment = self._end, force, moment
-        if float(np.linalg.norm(force)) > self.breaks_at:
+        self._states = states.copy()
+        too_much = float(np.linalg.norm(force)) > self.breaks_at
+        if too_much or (states == SEVERED).all():
             self.is_released = True
-
-
-class AttachmentList:
-    """All attachments of a body, and their arrays."""
-
-    def __init__(self) -> None:
-        self._attachments: list[Attachment] = []
-        self.arrays: Attachments = no_attachments()
-        """What kernels work on; another one where attachments come or go."""
-        self.added_frequency_squared = 0.0
-        """What they add to w^2 of the body at most [1/s2]."""
-
-    @property
-    def act(self) -> bool:
-        """Whether there are any."""
-        return bool(self._attachments)
-
-    def add(self, attachment: Attachment, body: Body) -> None:
-        """Let an attachment hold from now on."""
-        self._attachments.append(attachment)
-        self._renew(body)
-
-    def remove(self, attachment: Attachment, body: Body) -> None:
-        """Let an attachment hold no longer.
-
-        Raises:
-            ValueError: it does not hold this body.
-        """
-        if attachment not in self._attachments:
-            raise ValueError("it does not hold this tissue, or was released before")
-        attachment.is_released = True
-        self._attachments.remove(attachment)
-        self._renew(body)
-
-    def begin_step(self) -> None:
-        """Write where the frames go in the next step."""
-        if self._attachments:
-            first, last = zip(*(each.targets() for each in self._attachments), strict=True)
-            self.arrays.begin[:], self.arrays.end[:] = np.concatenate(first), np.concatenate(last)
-            self.arrays.impulse[:] = self.arrays.turn[:] = 0.0
-
-    def stop(self) -> None:
-        """Have every frame where it was to be at the end of the next step."""
-        for each in self._attachments:
-            each.stop()
-        self.begin_step()
-
-    def locate(self, body: Body) -> None:
-        """Find the points in the mesh, which a cut has changed."""
-        row = 0
-        for each in self._attachments:
-            nodes, weights = each.points.nodes_and_weights(body)
-            rows = slice(row, row + len(nodes))
-            self.arrays.nodes[rows], self.arrays.weights[rows] = nodes, np.maximum(weights, 0.0)
-            row += len(nodes)
-        # A point in the middle of a cut tetrahedron may be outside of it by rounding.
-        if row:
-            self.arrays.weights /= self.arrays.weights.sum(axis=1, keepdims=True)
-        own_masses = body.masses - body.added_masses
-        self.added_frequency_squared = frequency_squared(self.arrays, own_masses)
-
-    def end_step(self, body: Body, dt: float) -> None:
-        """Tell each attachment the force on its points; drop those that have let go."""
-        arrays, row = self.arrays, 0
-        for each in self._attachments:
-            rows = slice(row, row + len(each.points))
-            impulse, turn = (part[rows].sum(axis=0) for part in (arrays.impulse, arrays.turn))
-            each.end_step(impulse / dt, turn / dt)
-            row += len(each.points)
-        if any(each.is_released for each in self._attachments):
-            self._attachments = [each for each in self._attachments if not each.is_released]
-            self._renew(body)
-
-    def _renew(self, body: Body) -> None:
-        """Make arrays for the attachments that there are."""
-        counts = [len(each.points) for each in self._attachments]
-        self.arrays = no_attachments(sum(counts))
-        row = 0
-        for each, n in zip(self._attachments, counts, strict=True):
-            rows = slice(row, row + n)
-            self.arrays.stiffness[rows] = each.stiffness * each.points.shares
-            self.arrays.damping[rows] = each.damping * each.points.shares
-            self.arrays.length[rows] = each.rest_length
-            row += n
-        self.begin_step()
-        self.locate(body)
 
 
 def _triple(name: str, values: FloatArray) -> FloatArray:
@@ -205,3 +126,14 @@ def _triple(name: str, values: FloatArray) -> FloatArray:
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ValueError(f"{name} is {values.tolist()}; it is three finite numbers in m")
     return values
+
+
+def checked_amount(name: str, value: float) -> float:
+    """Return a number that is finite and not negative.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{name} is {value}; it must be finite and not negative")
+    return float(value)

@@ -12,9 +12,12 @@ from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.options import Hierarchical
+from tissue.integrators.step_context import Increment
 from tissue.integrators.supports import write_support_forces
 from tissue.integrators.system import System
-from tissue.loads.attachment import Attachment, AttachmentList
+from tissue.loads.attachment import Attachment
+from tissue.loads.attachment_list import AttachmentList
+from tissue.loads.ligament import Ligament, ends_of_strands
 from tissue.loads.load import Load, Loads
 from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.mesh.body import Body
@@ -104,8 +107,7 @@ class DrivenBody(BodyQueries):
             ValueError: no point is there, one is outside the body, a number is not finite or has
                 the wrong sign, or the relaxation is `hierarchical`, which knows no attachments.
         """
-        self._expect_all_nodes_move("tissue is not attached")
-        points = where if isinstance(where, MaterialPoints) else self._points_inside(where)
+        points = self._points_to_hold(where)
         attachment = Attachment(
             points,
             self.positions_of(points),
@@ -115,9 +117,57 @@ class DrivenBody(BodyQueries):
             breaks_at=breaks_at,
             origin=origin,
         )
+        self._add(attachment)
+        return attachment
+
+    def tie(
+        self,
+        where: str | npt.ArrayLike | MaterialPoints,
+        to: npt.ArrayLike,
+        *,
+        stiffness: float,
+        area: float,
+        toughness: float,
+        damping: float = 0.0,
+        rest_length: float | None = None,
+        breaks_at: float = math.inf,
+    ) -> Ligament:
+        """Tie points of the tissue by strands to places in the world; return the ligament.
+
+        The edge of the blade cuts the strands that it sweeps across, each for its cross-section
+        times the toughness (`tissue.integrators.strands`): that energy is in
+        `Energies.breaking`.
+
+        Args:
+            where: What `attach` takes.
+            to: Where the strands end [m], shape (3,), or one place for each point, (n, 3).
+            stiffness: Of all strands together, along them [N/m].
+            area: Cross-section of all strands together [m2].
+            toughness: Energy of cutting them [J/m2].
+            damping: Of all of them together, along them [N s/m].
+            rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
+            breaks_at: Force of all of them at which they let go [N].
+
+        Raises:
+            ValueError: see `attach`; or `to` has another shape.
+        """
+        points = self._points_to_hold(where)
+        ligament = Ligament(
+            points,
+            *ends_of_strands(self.positions_of(points), to, rest_length),
+            stiffness=stiffness,
+            area=area,
+            toughness=toughness,
+            damping=damping,
+            breaks_at=breaks_at,
+        )
+        self._add(ligament)
+        return ligament
+
+    def _add(self, attachment: Attachment) -> None:
         self._attachments.add(attachment, self._body)
         self._take_attachments()
-        return attachment
+        self._system.interaction.make_room_for_strands(self._attachments.n_strands)
 
     def collide_with(
         self,
@@ -206,8 +256,11 @@ class DrivenBody(BodyQueries):
         if chosen == "hierarchical" or isinstance(chosen, Hierarchical):
             raise ValueError(f"{what} with relaxation='hierarchical'; use 'global' or 'verlet'")
 
-    def _points_inside(self, where: str | npt.ArrayLike) -> MaterialPoints:
+    def _points_to_hold(self, where: str | npt.ArrayLike | MaterialPoints) -> MaterialPoints:
         """Return material points; of a region those at its nodes."""
+        self._expect_all_nodes_move("tissue is not attached")
+        if isinstance(where, MaterialPoints):
+            return where
         region = np.asarray(where)
         if not isinstance(where, str) and region.dtype != np.bool_:
             return self.material_points(where)
@@ -218,20 +271,25 @@ class DrivenBody(BodyQueries):
             )
         return self.material_points(np.flatnonzero(mask))
 
-    def _begin_driving(self) -> float:
+    def _begin_driving(self, increment: Increment, has_blade: bool) -> float:
         """Let loads act, and what is held move, in an increment; return `Loads.virtual_work`."""
         loads, system = self._loads, self._system
         if loads.act or self._attachments.act or system.geoms.act:
             self._global_stepper.wake()
-        system.attachments.work = 0.0
+        self._attachments.begin_increment(system.body, increment, has_blade)
+        system.added_by_attachments = self._attachments.added_frequency_squared
         touched = system.geoms.arrays
         touched.work = touched.dissipated = 0.0
         loads.spread(system.body, system.stages.loads)
         return loads.virtual_work(system.body)
 
-    def _driven_work(self, before: float) -> float:
-        """Return the work of loads and attachments [J]; `before`: what `_begin_driving` said."""
+    def _driven_work(self, before: float, increment: Increment) -> float:
+        """End an increment; return the work of loads and of frames that are moved [J].
+
+        `before`: what `_begin_driving` said.
+        """
         system = self._system
+        self._attachments.end_increment(system.body, increment)
         touched = system.geoms.arrays
         system.contact_loss.dissipated += touched.dissipated
         of_loads = self._loads.virtual_work(system.body) - before

@@ -1,0 +1,174 @@
+"""`AttachmentList`: the attachments of a body, as the arrays that kernels work on."""
+
+import numpy as np
+
+from tissue.integrators.attachments import (
+    CAUGHT,
+    Attachments,
+    attached_energy,
+    frequency_squared,
+    no_attachments,
+)
+from tissue.integrators.step_context import Increment
+from tissue.integrators.strand_crossing import catch_strands, note_strands
+from tissue.integrators.strands import free_strands, write_stiffening
+from tissue.loads.attachment import Attachment
+from tissue.mesh.body import Body
+
+_SAME = 1e-3
+"""Relative change of its length by which an edge is another one, as for the tissue
+(`tissue.blade.interaction`)."""
+
+_LASTING = ("state", "place", "bend", "spent", "side", "before")
+"""Arrays of `Attachments` that last while others come and go."""
+
+_SUMS = ("work", "dissipated", "severing", "released")
+"""Sums that do."""
+
+
+class AttachmentList:
+    """All attachments of a body, and their arrays."""
+
+    def __init__(self) -> None:
+        self._attachments: list[Attachment] = []
+        self.arrays: Attachments = no_attachments()
+        """What kernels work on; another one where attachments come or go."""
+        self.added_frequency_squared = 0.0
+        """What they add to w^2 of the body at most [1/s2]."""
+        self._edge_length = 0.0
+        self._has_strands = self._had_caught = False
+
+    @property
+    def n_strands(self) -> int:
+        """Number of strands that the blade may hold."""
+        return int((self.arrays.section > 0.0).sum())
+
+    @property
+    def act(self) -> bool:
+        """Whether there are any."""
+        return bool(self._attachments)
+
+    def add(self, attachment: Attachment, body: Body) -> None:
+        """Let an attachment hold from now on."""
+        row = len(self.arrays.nodes)
+        self._attachments.append(attachment)
+        self._renew(body, list(range(row)))
+        arrays = self.arrays
+        arrays.released -= attached_energy(arrays, body.positions, row, len(arrays.nodes))
+
+    def remove(self, attachment: Attachment, body: Body) -> None:
+        """Let an attachment hold no longer.
+
+        Raises:
+            ValueError: it does not hold this body.
+        """
+        if attachment not in self._attachments:
+            raise ValueError("it does not hold this tissue, or was released before")
+        attachment.is_released = True
+        self._drop(body)
+
+    def begin_step(self) -> None:
+        """Write where the frames go in the next step."""
+        if self._attachments:
+            first, last = zip(*(each.targets() for each in self._attachments), strict=True)
+            self.arrays.begin[:], self.arrays.end[:] = np.concatenate(first), np.concatenate(last)
+            self.arrays.impulse[:] = self.arrays.turn[:] = 0.0
+
+    def stop(self, body: Body) -> None:
+        """Have every frame where it was to be at the end of the next step, and no blade there."""
+        self._free(body)
+        for each in self._attachments:
+            each.stop()
+        self.begin_step()
+
+    def begin_increment(self, body: Body, increment: Increment, has_blade: bool) -> None:
+        """Let the blade, which may be gone or another, hold what it has caught."""
+        self.arrays.work = 0.0
+        if not self._has_strands:
+            return
+        edge = increment.edge
+        if not (has_blade and abs(edge.length - self._edge_length) <= _SAME * edge.length):
+            self._free(body)
+        self._edge_length = edge.length if has_blade else 0.0
+        note_strands(self.arrays, body.positions, increment.begin)
+        has_caught = self.arrays.n_caught > 0
+        if has_caught or self._had_caught:
+            self._bound(body, edge.travel * (increment.end - increment.begin))
+        self._had_caught = has_caught
+
+    def end_increment(self, body: Body, increment: Increment) -> None:
+        """Catch the strands that the blade has met."""
+        if self._has_strands and self._edge_length > 0.0:
+            _, _, begin, end = increment
+            catch_strands(self.arrays, body.positions, increment.edge, begin, end)
+
+    def locate(self, body: Body) -> None:
+        """Find the points in the mesh, which a cut has changed."""
+        row = 0
+        for each in self._attachments:
+            nodes, weights = each.points.nodes_and_weights(body)
+            rows = slice(row, row + len(nodes))
+            self.arrays.nodes[rows], self.arrays.weights[rows] = nodes, np.maximum(weights, 0.0)
+            row += len(nodes)
+        # A point in the middle of a cut tetrahedron may be outside of it by rounding.
+        if row:
+            self.arrays.weights /= self.arrays.weights.sum(axis=1, keepdims=True)
+        self._bound(body, 0.0)
+
+    def _bound(self, body: Body, travel: float) -> None:
+        """Bound what attachments add to w^2 while the edge moves by `travel` [m] at most."""
+        stiffening = np.empty(len(self.arrays.nodes))
+        write_stiffening(self.arrays, body.positions, travel, stiffening)
+        own_masses = body.masses - body.added_masses
+        self.added_frequency_squared = frequency_squared(self.arrays, own_masses, stiffening)
+
+    def end_step(self, body: Body, dt: float) -> None:
+        """Tell each attachment the force on its points; drop those that have let go."""
+        arrays, row = self.arrays, 0
+        for each in self._attachments:
+            rows = slice(row, row + len(each.points))
+            impulse, turn = (part[rows].sum(axis=0) for part in (arrays.impulse, arrays.turn))
+            each.end_step(impulse / dt, turn / dt, arrays.state[rows])
+            row += len(each.points)
+        if any(each.is_released for each in self._attachments):
+            self._drop(body)
+
+    def _drop(self, body: Body) -> None:
+        """Drop those that were released, and count the energy of their springs."""
+        arrays, begin = self.arrays, 0
+        kept: list[int] = []
+        for each in self._attachments:
+            rows = range(begin, begin + len(each.points))
+            if each.is_released:
+                arrays.released += attached_energy(arrays, body.positions, rows.start, rows.stop)
+            else:
+                kept += rows
+            begin = rows.stop
+        self._attachments = [each for each in self._attachments if not each.is_released]
+        self._renew(body, kept)
+
+    def _free(self, body: Body) -> None:
+        """Take the blade away from all strands."""
+        free_strands(self.arrays, body.positions)
+
+    def _renew(self, body: Body, kept: list[int]) -> None:
+        """Make arrays for the attachments that there are; the first are at rows of the old ones."""
+        counts = [len(each.points) for each in self._attachments]
+        old, self.arrays = self.arrays, no_attachments(sum(counts))
+        for name in _LASTING:
+            getattr(self.arrays, name)[: len(kept)] = getattr(old, name)[kept]
+        for name in _SUMS:
+            setattr(self.arrays, name, getattr(old, name))
+        self.arrays.n_caught = int((self.arrays.state == CAUGHT).sum())
+        row = 0
+        for each, n in zip(self._attachments, counts, strict=True):
+            rows = slice(row, row + n)
+            self.arrays.stiffness[rows] = each.stiffness * each.points.shares
+            self.arrays.damping[rows] = each.damping * each.points.shares
+            self.arrays.length[rows] = each.lengths
+            self.arrays.section[rows] = each.sections
+            self.arrays.toughness[rows] = each.toughness
+            row += n
+        self._has_strands = bool(self.arrays.section.any())
+        self.begin_step()
+        self.locate(body)
