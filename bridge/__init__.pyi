@@ -12,11 +12,15 @@ from .counters import Counters as Counters
 from .coupling.coupling import MAX_PLAUSIBLE_FORCE as MAX_PLAUSIBLE_FORCE
 from .coupling.coupling import MAX_PLAUSIBLE_TORQUE as MAX_PLAUSIBLE_TORQUE
 from .coupling.coupling import CouplingError as CouplingError
+from .coupling.led_grips import LedGrip as LedGrip
 from .coupling.limits import DeviceLimits as DeviceLimits
 from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.passivity import PassivityCounters as PassivityCounters
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
 from .frames import TissueFrame as TissueFrame
+from .led_frames import FrameLoad as FrameLoad
+from .led_frames import FramePose as FramePose
+from .led_frames import Hold as Hold
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
 from .link import TissueDescription as TissueDescription
@@ -40,8 +44,12 @@ __all__ = [
     "Fixture",
     "FixtureBox",
     "FixtureMesh",
+    "FrameLoad",
+    "FramePose",
     "GeomShape",
+    "Hold",
     "InProcessLink",
+    "LedGrip",
     "LinkError",
     "MAX_FRAMES_PER_ANSWER",
     "MAX_PLAUSIBLE_FORCE",

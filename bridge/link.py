@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 
+import numpy as np
+
+from bridge.led_frames import FrameLoad, FramePose, Hold, expect_each
 from tissue import (
     BladeShape,
     BladeSweep,
@@ -17,7 +21,7 @@ from tissue import (
 )
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
-    from tissue import Tissue
+    from tissue import Attachment, Tissue
 
 
 class LinkError(ConnectionError):
@@ -49,8 +53,36 @@ class TissueLink(Protocol):
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""
 
-    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+    def step(
+        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+    ) -> StepResult:
         """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near).
+
+        Args:
+            sweep: Motion of the blade.
+            dt: Length of the step [s].
+            poses: Where the frames that were attached are at its end, one for each, in order.
+
+        Raises:
+            ValueError: there is another number of poses.
+            LinkError: the tissue is in another process and did not answer, or refuses the request.
+        """
+
+    def attach(self, hold: Hold) -> int:
+        """Attach a frame to the body, which the caller leads from now on; return its number.
+
+        That is its place in `loads`, where those of the tissue's own scene come first.
+
+        Raises:
+            ValueError: see `tissue.Tissue.attach`.
+            LinkError: the tissue is in another process, and refuses it or did not answer.
+        """
+
+    def release(self, number: int) -> None:
+        """Let the frame of that number go, which keeps its number; again it does nothing."""
+
+    def loads(self) -> Sequence[FrameLoad]:
+        """Return what the body did to each frame in the last step, in the order of numbers.
 
         Raises:
             LinkError: the tissue is in another process and did not answer.
@@ -86,6 +118,8 @@ class InProcessLink:
     def __init__(self, tissue: Tissue, scene: str = "") -> None:
         self._tissue = tissue
         self._scene = scene
+        self._frames: list[Attachment] = list(tissue.attachments)
+        self._n_own = len(self._frames)
 
     @property
     def tissue(self) -> Tissue:
@@ -104,9 +138,43 @@ class InProcessLink:
             self._tissue.floor,
         )
 
-    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near)."""
+    def step(
+        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+    ) -> StepResult:
+        """Advance the tissue by `dt` [s]; see `TissueLink.step`."""
+        led = self._frames[self._n_own :]
+        expect_each(poses, len(led))
+        for frame, pose in zip(led, poses, strict=True):
+            frame.move(pose.origin, pose.rotation)
         return self._tissue.step(sweep, dt)
+
+    def attach(self, hold: Hold) -> int:
+        """Attach a frame to the body; see `TissueLink.attach`."""
+        where = hold.where if isinstance(hold.where, str) else np.array(hold.where)
+        attachment = self._tissue.attach(
+            where,
+            stiffness=hold.stiffness,
+            damping=hold.damping,
+            breaks_at=hold.breaks_at,
+            origin=hold.origin,
+        )
+        self._frames.append(attachment)
+        return len(self._frames) - 1
+
+    def release(self, number: int) -> None:
+        """Let the frame of that number go."""
+        frame = self._frames[number]
+        if frame.n_points:
+            self._tissue.release(frame)
+
+    def loads(self) -> Sequence[FrameLoad]:
+        """Return what the body did to each frame in the last step."""
+        return [FrameLoad(frame.wrench, frame.n_points) for frame in self._frames]
+
+    @property
+    def n_led(self) -> int:
+        """Number of frames that were attached over this link, whose poses each step takes."""
+        return len(self._frames) - self._n_own
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""

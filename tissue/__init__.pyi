@@ -27,6 +27,7 @@ from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
 from .loads.attachment import Attachment as Attachment
+from .loads.frame_path import FramePath as FramePath
 from .loads.ligament import Ligament as Ligament
 from .loads.load import Load as Load
 from .loads.material_points import MaterialPoints as MaterialPoints
@@ -82,6 +83,7 @@ __all__ = [
     "IntArray",
     "Law",
     "Attachment",
+    "FramePath",
     "Ligament",
     "Load",
     "MATERIALS",

@@ -161,8 +161,7 @@ class Tissue(DrivenBody):
         dt = checked_time_step(dt)
         interaction, incision = self._system.interaction, self._incision
         self._begin_step(sweep, edge, dt)
-        self._attachments.begin_step()
-        self._system.geoms.begin_step(self._system.body, dt)
+        self._begin_hold(dt)
         travel = edge.travel if has_blade else 0.0
         n = max(incision.n_increments(travel), self._system.geoms.n_increments)
         n_substeps = 0

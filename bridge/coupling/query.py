@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridge.led_frames import FrameLoad, FramePose, combined_loads, mean_wrench
 from bridge.link import TissueLink
 from bridge.poses import motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
@@ -22,6 +23,8 @@ class TimedSweep(NamedTuple):
     """Motion of the blade; None if it is nowhere near the tissue."""
     seconds: float
     """Duration [s]."""
+    poses: Sequence[FramePose] = ()
+    """Where the frames are at its end that the arm's side leads."""
 
 
 class TissueAnswer(NamedTuple):
@@ -37,6 +40,8 @@ class TissueAnswer(NamedTuple):
     """Mean wrench over the last part of the path; its point is the tip at the end."""
     last_sweep: BladeSweep | None
     """Last part of the path; None if the blade was nowhere near."""
+    loads: Sequence[FrameLoad]
+    """Mean loads on all frames over the query."""
 
     @property
     def middle_pose(self) -> BladeSegment:
@@ -82,13 +87,20 @@ class Query:
         else:
             self._future = self._thread.submit(self._step, path, pose)
 
-    def step(self, sweep: BladeSweep | None, seconds: float) -> StepResult:
-        """Advance the tissue along one part of a path, and wait for it.
+    def step(
+        self, sweep: BladeSweep | None, seconds: float, poses: Sequence[FramePose] = ()
+    ) -> StepResult:
+        """Advance the tissue along one part of a path, and wait for it; see `TimedSweep`.
 
         Raises:
             LinkError: the tissue is in another process, and did not answer.
         """
-        return self._link.step(sweep, min(seconds, _LONGEST_STEP))
+        return self._link.step(sweep, min(seconds, _LONGEST_STEP), poses)
+
+    def wait(self) -> None:
+        """Wait for the answer, if there is a request: then the link is free for another one."""
+        if self._future is not None:
+            self._answer, self._future = self._future.result(), None
 
     def take_answer(self) -> TissueAnswer | None:
         """Return the answer, once; None if there is none yet.
@@ -103,28 +115,29 @@ class Query:
 
     def _step(self, path: Sequence[TimedSweep], pose: BladeSegment) -> TissueAnswer:
         if len(path) == 1:
-            sweep, duration = path[0]
-            result = self.step(sweep, duration)
-            return TissueAnswer(result, pose, duration, result.wrench, sweep)
-        results = [self.step(part.sweep, part.seconds) for part in path]
+            result = self.step(*path[0])
+            sweep, duration, _ = path[0]
+            return TissueAnswer(result, pose, duration, result.wrench, sweep, self._link.loads())
+        results, loads = [], []
+        for part in path:
+            results.append(self.step(*part))
+            loads.append(self._link.loads())
         seconds = [part.seconds for part in path]
-        last_wrench = results[-1].wrench
+        last_wrench, last_sweep = results[-1].wrench, path[-1].sweep
         return TissueAnswer(
-            _combined(results, seconds), pose, sum(seconds), last_wrench, path[-1].sweep
+            _combined(results, seconds),
+            pose,
+            sum(seconds),
+            last_wrench,
+            last_sweep,
+            combined_loads(loads, seconds),
         )
 
 
 def _combined(results: Sequence[StepResult], seconds: Sequence[float]) -> StepResult:
     """Return the last result, with the mean wrench and summed times and counts of all steps."""
-    last = results[-1]
-    force, torque = np.zeros(3), np.zeros(3)
-    for result, duration in zip(results, seconds, strict=True):
-        share = duration / sum(seconds)
-        wrench, lever = result.wrench, result.wrench.point - last.wrench.point
-        force += share * wrench.force
-        torque += share * (wrench.torque + np.cross(lever, wrench.force))
-    return last._replace(
-        wrench=Wrench(force, torque, last.wrench.point),
+    return results[-1]._replace(
+        wrench=mean_wrench([result.wrench for result in results], seconds),
         n_substeps=sum(result.n_substeps for result in results),
         stage_times=StageTimes(
             *np.sum([result.stage_times for result in results], axis=0).tolist()

@@ -3,9 +3,10 @@
 import contextlib
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
+from bridge.led_frames import FrameLoad, FramePose, Hold, expect_each
 from bridge.link import LinkError, TissueDescription
 from bridge.tcp.address import is_loopback, parse_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
@@ -20,6 +21,14 @@ from bridge.tcp.messages.body import (
 )
 from bridge.tcp.messages.chunks import LARGEST_CHUNKS, unpack_chunks
 from bridge.tcp.messages.cut_report import CUT_REPORT_BYTES, unpack_cut_report
+from bridge.tcp.messages.led_frames import (
+    LOAD_BYTES,
+    MAX_FRAMES,
+    pack_hold,
+    pack_number,
+    unpack_all_loads,
+    unpack_loads,
+)
 from bridge.tcp.messages.result import LARGEST_RESULT, unpack_result
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import (
@@ -63,6 +72,8 @@ class TcpLink:
         self._address = address
         self._timeout = timeout
         self._sequence = 0
+        self._n_led = 0
+        self._loads: Sequence[FrameLoad] | None = None
         self._channel = Channel()
         self._socket: socket.socket | None = _connect(address, timeout, has_key=key is not None)
         try:
@@ -79,15 +90,41 @@ class TcpLink:
         self._n_nodes, self._n_tetrahedra = description.n_nodes, description.n_tetrahedra
         return description
 
-    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near).
+    def step(
+        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+    ) -> StepResult:
+        """Advance the tissue by `dt` [s]; see `TissueLink.step`.
 
         Raises:
+            ValueError: there is another number of poses than frames that were attached.
             LinkError: the tissue refuses the request, or did not answer.
         """
-        result = self._ask(MessageKind.STEP, pack_step(sweep, dt), LARGEST_RESULT, unpack_result)
+        expect_each(poses, self._n_led)
+        request = pack_step(sweep, dt, poses)
+        result, self._loads = self._ask(MessageKind.STEP, request, LARGEST_RESULT, unpack_result)
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
+
+    def attach(self, hold: Hold) -> int:
+        """Attach a frame to the body; see `TissueLink.attach`."""
+        before = self.loads()
+        reply = self._ask(MessageKind.ATTACH, pack_hold(hold), LOAD_BYTES, _one_load)
+        self._loads = [*before, reply]
+        self._n_led += 1
+        return len(before)
+
+    def release(self, number: int) -> None:
+        """Let the frame of that number go."""
+        loads = [*self.loads()]
+        loads[number] = self._ask(MessageKind.RELEASE, pack_number(number), LOAD_BYTES, _one_load)
+        self._loads = loads
+
+    def loads(self) -> Sequence[FrameLoad]:
+        """Return what the body did to each frame in the last step."""
+        if self._loads is None:
+            limit = LOAD_BYTES * MAX_FRAMES
+            self._loads = self._ask(MessageKind.FRAMES, b"", limit, unpack_all_loads)
+        return self._loads
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
@@ -194,6 +231,10 @@ class TcpLink:
                 parts.append(frame.payload)
                 if not frame.kind & MORE:
                     return frame._replace(payload=b"".join(parts))
+
+
+def _one_load(payload: bytes) -> FrameLoad:
+    return unpack_loads(payload, 1)[0]
 
 
 def _checked_nonce(payload: bytes) -> bytes:

@@ -15,12 +15,18 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from bridge.link import InProcessLink, LinkError, TissueLink
+from bridge.link import InProcessLink, LinkError
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT, bound_socket, format_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report
+from bridge.tcp.messages.led_frames import (
+    MAX_FRAMES,
+    pack_loads,
+    unpack_hold,
+    unpack_number,
+)
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error
@@ -104,7 +110,7 @@ class TissueServer:
                 "another port, or 0 for a free one"
             ) from cause
         try:
-            self._link: TissueLink = self._new_link()
+            self._link = self._new_link()
             self._listener.listen(MAX_CONNECTIONS)
         except BaseException:
             self._listener.close()
@@ -146,7 +152,7 @@ class TissueServer:
         self._selector.close()
         self._listener.close()
 
-    def _new_link(self) -> TissueLink:
+    def _new_link(self) -> InProcessLink:
         """Return a link to a new tissue."""
         return InProcessLink(self._make_tissue(), self._scene)
 
@@ -255,7 +261,14 @@ class TissueServer:
             MessageError: the request is malformed or of an unknown kind.
         """
         if frame.kind == MessageKind.STEP:
-            return pack_result(self._link.step(*unpack_step(frame.payload)))
+            result = self._link.step(*unpack_step(frame.payload, self._link.n_led))
+            return pack_result(result, self._link.loads())
+        if frame.kind == MessageKind.ATTACH:
+            return self._attached(frame.payload)
+        if frame.kind == MessageKind.RELEASE:
+            number = unpack_number(frame.payload, len(self._link.loads()))
+            self._link.release(number)
+            return pack_loads([self._link.loads()[number]])
         if frame.payload:
             raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
         if frame.kind == MessageKind.HELLO:
@@ -264,6 +277,8 @@ class TissueServer:
             return pack_snapshot(self._link.snapshot())
         if frame.kind == MessageKind.SURFACE:
             return pack_surface(self._link.surface())
+        if frame.kind == MessageKind.FRAMES:
+            return pack_loads(self._link.loads())
         if frame.kind == MessageKind.CHUNKS:
             return pack_chunks(self._link.chunks())
         if frame.kind == MessageKind.PIECES:
@@ -271,6 +286,20 @@ class TissueServer:
         if frame.kind == MessageKind.QUALITY:
             return pack_cut_report(self._link.cut_report())
         raise MessageError(f"there is no request of kind {frame.kind}")
+
+    def _attached(self, payload: bytes) -> bytes:
+        """Attach a frame, and return the load on it.
+
+        Raises:
+            MessageError: it cannot be attached so, or there are too many.
+        """
+        if len(self._link.loads()) == MAX_FRAMES:
+            raise MessageError(f"there are {MAX_FRAMES} frames, and there may be no more")
+        try:
+            number = self._link.attach(unpack_hold(payload))
+        except ValueError as error:
+            raise MessageError(str(error)) from error
+        return pack_loads(self._link.loads()[number:])
 
     def _send(
         self, peer: Peer, kind: MessageKind, payload: bytes, sequence: int | None = None

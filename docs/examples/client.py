@@ -13,7 +13,7 @@ connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 def ask(sequence, kind, payload=b""):
     """Return the payload of the reply to a request."""
-    head = struct.pack("<4sHHIII", b"SCUT", 5, kind, sequence, len(payload), zlib.crc32(payload))
+    head = struct.pack("<4sHHIII", b"SCUT", 6, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
     head = connection.recv(24, socket.MSG_WAITALL)
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
@@ -30,6 +30,6 @@ for frame in range(1, 1001):  # 1 ms each, at 60 mm/s along y
     before, y = pose, y + 60e-6
     pose = (x, y, bottom, x, y, z1 + 5e-3, *forward)
     result = ask(frame, STEP, struct.pack("<19d", 1e-3, *before, *pose))
-    force, area = struct.unpack_from("<3d", result, 144), struct.unpack_from("<d", result, 72)[0]
+    force, area = struct.unpack_from("<3d", result, 152), struct.unpack_from("<d", result, 80)[0]
     if frame % 100 == 0:
         print(f"{frame} ms: {force[1]:+.3f} N along y, {area * 1e6:.0f} mm2 cut")

@@ -1,12 +1,13 @@
 """A body of a MuJoCo model that holds tissue: its pose leads an attachment, which pulls on it."""
 
 import math
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from bridge import TissueFrame
+from bridge import Bridge, LedGrip, TissueFrame
 from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
@@ -18,15 +19,15 @@ class GripError(ValueError):
 class Grip:
     """Tissue that a body of a MuJoCo model holds, from where both are now.
 
-    Call `follow` before the tissue's step and `apply` after it, between `mj_step1` and `mj_step2`:
-    there the body is where `qpos` says, and feels the wrench in the same step.
+    Call `follow` before the step of tissue or bridge and `apply` after it, between `mj_step1` and
+    `mj_step2`: there the body is where `qpos` says, and feels the wrench in the same step.
 
     Args:
         data: Data of a compiled model, for which `mj_kinematics` or a step was called.
         body: The body that holds.
-        tissue: What it holds.
+        tissue: What it holds: a tissue in this process, or a bridge to one anywhere.
         where: Which points; see `tissue.Tissue.attach`.
-        frame: Where the tissue lies in the world.
+        frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
         stiffness: Of the hold [N/m].
         damping: Of it [N s/m].
         breaks_at: Force at which it lets go [N].
@@ -40,7 +41,7 @@ class Grip:
         self,
         data: mujoco.MjData,
         body: str,
-        tissue: Tissue,
+        tissue: Tissue | Bridge,
         where: str | npt.ArrayLike,
         *,
         frame: TissueFrame = TissueFrame(),
@@ -54,7 +55,7 @@ class Grip:
             names = [model.body(i).name for i in range(1, model.nbody)]
             there = ", ".join(f"'{name}'" for name in names if name) or "none with a name"
             raise GripError(f"the model has no body '{body}'. It has: {there}")
-        self._tissue, self._frame = tissue, frame
+        self._frame = frame = tissue.frame if isinstance(tissue, Bridge) else frame
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._position = data.xpos[body_id]
         self._axes = data.xmat[body_id].reshape(3, 3)
@@ -62,14 +63,16 @@ class Grip:
         self._applied = data.xfrc_applied[body_id]
         self._of_grip: FloatArray = np.zeros(6)
         self._axes_at_first = self._axes.copy()
-        self.attachment: Attachment = tissue.attach(
-            where,
-            stiffness=stiffness,
-            damping=damping,
-            breaks_at=breaks_at,
-            origin=frame.points_to_tissue(self._position).tolist(),
-        )
+        origin = frame.points_to_tissue(self._position).tolist()
+        numbers = {"stiffness": stiffness, "damping": damping, "breaks_at": breaks_at}
+        self.attachment: Attachment | LedGrip
         """The hold, in the frame of the tissue."""
+        if isinstance(tissue, Bridge):
+            self.attachment = grip = tissue.attach(where, **numbers, origin=origin)
+            self._let_go: Callable[[], None] = lambda: tissue.release(grip)
+        else:
+            self.attachment = attachment = tissue.attach(where, **numbers, origin=origin)
+            self._let_go = lambda: tissue.release(attachment)
 
     @property
     def n_points(self) -> int:
@@ -98,17 +101,15 @@ class Grip:
             GripError: the wrench is not finite, or too large; see `body_wrench`. The one of the
                 call before stays applied.
         """
-        now = np.zeros(6)
-        if self.n_points:
-            try:
-                now[:] = about_centre_of_mass(self.wrench, self._centre_of_mass)
-            except ValueError as error:
-                raise GripError(f"the hold: {error}") from error
+        try:  # zero after the step in which it let go
+            now = np.array(about_centre_of_mass(self.wrench, self._centre_of_mass))
+        except ValueError as error:
+            raise GripError(f"the hold: {error}") from error
         self._applied += now - self._of_grip
         self._of_grip = now
 
     def release(self) -> None:
         """Let go."""
         if self.n_points:
-            self._tissue.release(self.attachment)
+            self._let_go()
         self.apply()

@@ -161,10 +161,10 @@ class BreakingLink(InProcessLink):
         if self.n_steps_left == 0:
             raise LinkError("the server is gone")
 
-    def step(self, sweep, dt):
+    def step(self, sweep, dt, poses=()):
         self._check_connection()
         self.n_steps_left -= 1
-        return super().step(sweep, dt)
+        return super().step(sweep, dt, poses)
 
     def snapshot(self):
         self._check_connection()

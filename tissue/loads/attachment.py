@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.integrators.attachments import SEVERED
+from tissue.loads.frame_path import FramePath
 from tissue.loads.material_points import MaterialPoints
 from tissue.types import Wrench
 
@@ -63,6 +64,8 @@ class Attachment:
         at = others.mean(axis=0) if origin is None else np.array(origin, dtype=np.float64)
         self._local: FloatArray = others - _triple("origin", at)
         self._begin = self._end = (np.eye(3), at)
+        self._path: FramePath | None = None
+        self._seconds, self._start = 0.0, self._end[1]
         self._force: FloatArray = np.zeros(3)
         self._moment: FloatArray = np.zeros(3)
 
@@ -73,7 +76,10 @@ class Attachment:
 
     @property
     def wrench(self) -> Wrench:
-        """Wrench of the tissue on the frame, averaged over the last step, about its origin then."""
+        """Wrench of the tissue on the frame, averaged over the last step, about its origin now.
+
+        Zero in the steps after the one in which it let go.
+        """
         origin = self._begin[1]
         force = -self._force
         # Forces act where the points are: dampers pull beside the line to what they are tied to.
@@ -96,6 +102,23 @@ class Attachment:
         if axes.shape != (3, 3) or not np.abs(axes.T @ axes - np.eye(3)).max() <= _ORTHONORMAL:
             raise ValueError(f"rotation is {rotation!r}; it must be three axes as columns")
         self._end = (axes, _triple("origin", np.array(origin, dtype=np.float64)))
+
+    def follow(self, path: FramePath) -> None:
+        """Have the frame led along a path from now on, without turning, in place of `move`."""
+        self._path, self._seconds, self._start = path, 0.0, self._end[1].copy()
+
+    def advance(self, dt: float) -> None:
+        """Go on along the path, if there is one, by `dt` [s]; at its end let go, if it says so."""
+        if self._path is None:
+            return
+        if self._seconds >= self._path.release_at:
+            self.is_released = True
+        self._seconds += dt
+        self.move(self._start + self._path.at(self._seconds))
+
+    def forget(self) -> None:
+        """Forget the wrench of the last step: it holds no more."""
+        self._force, self._moment = np.zeros(3), np.zeros(3)
 
     def targets(self) -> tuple[FloatArray, FloatArray]:
         """Return what the points are tied to at the begin and the end of the next step [m]."""

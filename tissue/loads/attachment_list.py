@@ -31,12 +31,18 @@ class AttachmentList:
 
     def __init__(self) -> None:
         self._attachments: list[Attachment] = []
+        self._let_go: list[Attachment] = []
         self.arrays: Attachments = no_attachments()
         """What kernels work on; another one where attachments come or go."""
         self.added_frequency_squared = 0.0
         """What they add to w^2 of the body at most [1/s2]."""
         self._edge_length = 0.0
         self._has_strands = self._had_caught = False
+
+    @property
+    def all(self) -> tuple[Attachment, ...]:
+        """Those that hold."""
+        return tuple(self._attachments)
 
     @property
     def n_strands(self) -> int:
@@ -65,9 +71,20 @@ class AttachmentList:
         if attachment not in self._attachments:
             raise ValueError("it does not hold this tissue, or was released before")
         attachment.is_released = True
-        self._drop(body)
+        attachment.forget()
+        self._drop_released(body)
 
-    def begin_step(self) -> None:
+    def begin_step(self, body: Body, dt: float) -> None:
+        """Lead the frames that follow a path by `dt` [s], and write where all go in this step."""
+        for each in self._attachments:
+            each.advance(dt)
+        self._drop_released(body)
+        for each in self._let_go:
+            each.forget()
+        self._let_go.clear()
+        self._write_targets()
+
+    def _write_targets(self) -> None:
         """Write where the frames go in the next step."""
         if self._attachments:
             first, last = zip(*(each.targets() for each in self._attachments), strict=True)
@@ -79,7 +96,7 @@ class AttachmentList:
         self._free(body)
         for each in self._attachments:
             each.stop()
-        self.begin_step()
+        self._write_targets()
 
     def begin_increment(self, body: Body, increment: Increment, has_blade: bool) -> None:
         """Let the blade, which may be gone or another, hold what it has caught."""
@@ -130,16 +147,18 @@ class AttachmentList:
             impulse, turn = (part[rows].sum(axis=0) for part in (arrays.impulse, arrays.turn))
             each.end_step(impulse / dt, turn / dt, arrays.state[rows])
             row += len(each.points)
-        if any(each.is_released for each in self._attachments):
-            self._drop(body)
+        self._drop_released(body)
 
-    def _drop(self, body: Body) -> None:
+    def _drop_released(self, body: Body) -> None:
         """Drop those that were released, and count the energy of their springs."""
+        if not any(each.is_released for each in self._attachments):
+            return
         arrays, begin = self.arrays, 0
         kept: list[int] = []
         for each in self._attachments:
             rows = range(begin, begin + len(each.points))
             if each.is_released:
+                self._let_go.append(each)
                 arrays.released += attached_energy(arrays, body.positions, rows.start, rows.stop)
             else:
                 kept += rows
@@ -170,5 +189,5 @@ class AttachmentList:
             self.arrays.toughness[rows] = each.toughness
             row += n
         self._has_strands = bool(self.arrays.section.any())
-        self.begin_step()
+        self._write_targets()
         self.locate(body)

@@ -197,6 +197,11 @@ class DrivenBody(BodyQueries):
         system.geoms = contact
         return contact
 
+    @property
+    def attachments(self) -> tuple[Attachment, ...]:
+        """The attachments and ligaments that hold, in the order in which they were made."""
+        return self._attachments.all
+
     def release(self, held: Load | Attachment) -> None:
         """End a load of `push`, or let go of an attachment.
 
@@ -300,6 +305,12 @@ class DrivenBody(BodyQueries):
         if self._attachments.act:
             self._attachments.locate(self._body)
             self._take_attachments()
+
+    def _begin_hold(self, dt: float) -> None:
+        """Lead attachments that follow a path, and geoms, in a step of that length [s]."""
+        self._attachments.begin_step(self._body, dt)
+        self._system.geoms.begin_step(self._body, dt)
+        self._take_attachments()
 
     def _end_hold(self, dt: float) -> None:
         """Tell attachments what they did in a step of that length [s], and have geoms stay."""

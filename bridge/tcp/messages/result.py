@@ -1,30 +1,38 @@
 """The reply to a step: its result."""
 
 import struct
+from collections.abc import Sequence
 
 import numpy as np
 
+from bridge.led_frames import FrameLoad
 from bridge.tcp.messages.counts import check_counts
+from bridge.tcp.messages.led_frames import LOAD_BYTES, MAX_FRAMES, pack_loads, unpack_loads
 from bridge.tcp.wire import MessageError
 from tissue import BladeContacts, BodyContacts, Energies, FloatArray, StageTimes, StepResult, Wrench
 
 MAX_CONTACTS = 1 << 16
 """Largest number of contacts of the blade: a thousand times that of a scalpel in an organ."""
 
-_HEAD = struct.Struct("<8q10d")
+_HEAD = struct.Struct("<9q10d")
 _N_FIXED = 9 + 9 + 36 + 3 + 6 + 3
 """Number of floats in the arrays of fixed length."""
 _N_PER_CONTACT = 3 + 3 + 1 + 3 + 1
 """Number of floats of a contact."""
 _N_ENERGIES = len(Energies._fields)
-LARGEST_RESULT = _HEAD.size + 8 * (_N_FIXED + _N_PER_CONTACT * MAX_CONTACTS + _N_ENERGIES)
+LARGEST_RESULT = (
+    _HEAD.size
+    + 8 * (_N_FIXED + _N_PER_CONTACT * MAX_CONTACTS + _N_ENERGIES)
+    + LOAD_BYTES * MAX_FRAMES
+)
 """Largest reply to a step [byte]."""
 
 
-def pack_result(result: StepResult) -> bytes:
+def pack_result(result: StepResult, loads: Sequence[FrameLoad] = ()) -> bytes:
     """Return a reply: the integers of a result, its single floats, its arrays.
 
-    The contacts, of any number, and the energies, which are optional, come last.
+    The contacts, of any number, the energies, which are optional, and the loads on frames come
+    last.
     """
     touch, contacts, energies = result.body_contacts, result.contacts, result.energies
     head = _HEAD.pack(
@@ -36,6 +44,7 @@ def pack_result(result: StepResult) -> bytes:
         touch.n_contacts,
         len(contacts.point),
         energies is not None,
+        len(loads),
         result.anchored_length,
         result.cut_area,
         result.finished_area,
@@ -63,11 +72,11 @@ def pack_result(result: StepResult) -> bytes:
         ),
         dtype="<f8",
     )
-    return head + arrays.tobytes()
+    return head + arrays.tobytes() + pack_loads(loads)
 
 
-def unpack_result(payload: bytes) -> StepResult:
-    """Return the result in a reply.
+def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
+    """Return the result in a reply, and the loads on frames.
 
     Physical quantities are passed on unchanged, NaN included: the coupling handles a tissue that
     has diverged, for both links.
@@ -78,7 +87,8 @@ def unpack_result(payload: bytes) -> StepResult:
     if len(payload) < _HEAD.size:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {_HEAD.size} at least")
     head = _HEAD.unpack_from(payload)
-    n_tetrahedra, n_nodes, n_active, tip_tetrahedron, n_substeps, n_touching, n, audited = head[:8]
+    n_tetrahedra, n_nodes, n_active, tip_tetrahedron, n_substeps, n_touching = head[:6]
+    n, audited, n_frames = head[6:9]
     check_counts(n_nodes, n_tetrahedra)
     if not (0 <= n_active <= n_tetrahedra and -1 <= tip_tetrahedron < n_tetrahedra):
         raise MessageError(
@@ -86,15 +96,20 @@ def unpack_result(payload: bytes) -> StepResult:
         )
     if n_substeps < 0 or n_touching < 0:
         raise MessageError(f"{n_substeps} substeps and {n_touching} contacts; wanted 0 or more")
-    if not (0 <= n <= MAX_CONTACTS and audited in (0, 1)):
+    if not (0 <= n <= MAX_CONTACTS and audited in (0, 1) and 0 <= n_frames <= MAX_FRAMES):
         raise MessageError(
-            f"{n} contacts of the blade (at most {MAX_CONTACTS}), audit flag {audited} (0 or 1)"
+            f"{n} contacts of the blade (at most {MAX_CONTACTS}), audit flag {audited} (0 or 1), "
+            f"{n_frames} frames (at most {MAX_FRAMES})"
         )
-    wanted = _HEAD.size + 8 * (_N_FIXED + _N_PER_CONTACT * n + _N_ENERGIES * audited)
+    n_floats = _N_FIXED + _N_PER_CONTACT * n + _N_ENERGIES * audited
+    of_frames = _HEAD.size + 8 * n_floats
+    wanted = of_frames + LOAD_BYTES * n_frames
     if len(payload) != wanted:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {wanted}")
-    floats = np.frombuffer(payload, "<f8", offset=_HEAD.size).astype(np.float64)  # a copy
-    return StepResult(
+    loads = unpack_loads(payload[of_frames:], n_frames)
+    # a copy
+    floats = np.frombuffer(payload, "<f8", n_floats, _HEAD.size).astype(np.float64)
+    result = StepResult(
         wrench=Wrench(floats[0:3], floats[3:6], floats[6:9]),
         wrench_t1=Wrench(floats[9:12], floats[12:15], floats[15:18]),
         stiffness=floats[18:54].reshape(6, 6),
@@ -105,16 +120,17 @@ def unpack_result(payload: bytes) -> StepResult:
         n_nodes=n_nodes,
         n_active=n_active,
         active_point_tetrahedron=tip_tetrahedron,
-        anchored_length=head[8],
-        cut_area=head[9],
-        finished_area=head[10],
-        work_of_blade=head[11],
-        work_of_cutting=head[12],
+        anchored_length=head[9],
+        cut_area=head[10],
+        finished_area=head[11],
+        work_of_blade=head[12],
+        work_of_cutting=head[13],
         n_substeps=n_substeps,
-        body_contacts=BodyContacts(n_touching, head[13], head[14], floats[63:66]),
-        stage_times=StageTimes(*head[15:]),
+        body_contacts=BodyContacts(n_touching, head[14], head[15], floats[63:66]),
+        stage_times=StageTimes(*head[16:]),
         energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
     )
+    return result, loads
 
 
 def _contacts(floats: FloatArray, n: int) -> BladeContacts:

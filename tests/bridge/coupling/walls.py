@@ -48,7 +48,10 @@ class Wall:
     def chunks(self) -> Chunks:
         return Chunks(np.array([[[-1.0] * 3, [1.0] * 3]]), 0.0)
 
-    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+    def loads(self) -> tuple[()]:
+        return ()
+
+    def step(self, sweep: BladeSweep | None, dt: float, poses: object = ()) -> StepResult:
         assert sweep is not None
         start, end = _points(sweep.t0), _points(sweep.t1)
         each = self._stiffness / N_POINTS

@@ -53,7 +53,7 @@ def answers(address, stream):
 
 def outcome(frame):
     """Return the result of a step as bits, without its wall times."""
-    return bits(unpack_result(frame.payload)._replace(stage_times=None))
+    return bits(unpack_result(frame.payload)[0]._replace(stage_times=None))
 
 
 def resident_bytes(process):

@@ -164,7 +164,7 @@ def test_a_wrench_that_no_tissue_exerts_is_refused_and_the_one_before_stays(size
     model, data, tissue, grip = hanging()
     advance(model, data, tissue, [grip], 5)
     before = data.xfrc_applied[1].copy()
-    grip.attachment.end_step(np.array([size, 0.0, 0.0]), np.zeros(3))
+    grip.attachment.end_step(np.array([size, 0.0, 0.0]), np.zeros(3), np.zeros(9, int))
     with pytest.raises(GripError, match="the hold: a wrench of"):
         grip.apply()
     np.testing.assert_array_equal(data.xfrc_applied[1], before)

@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from tissue import (
     BladeSegment,
     BladeSweep,
+    FramePath,
     Material,
     SolverSettings,
     Tissue,
@@ -254,3 +255,48 @@ def test_the_hierarchical_relaxation_knows_no_attachments():
     tissue = Tissue(CUBE, springs, solver=SolverSettings(relaxation="hierarchical"))
     with pytest.raises(ValueError, match="not attached with relaxation='hierarchical'"):
         tissue.attach(TOP, stiffness=100.0)
+
+
+# Frames that are led along a path
+
+
+def test_a_frame_on_a_path_is_where_one_is_that_is_moved_by_hand():
+    """2 mm up in 50 ms, back in 100 ms, then it stays."""
+    led, moved = cube(), cube()
+    grips = [each.attach(TOP, stiffness=500.0, damping=5.0) for each in (led, moved)]
+    start = grips[0].wrench.point
+    grips[0].follow(FramePath([0.05, 0.15], [[0, 0, 2e-3], [0, 0, 0]]))
+    for i in range(1, 200):
+        height = np.interp(1e-3 * i, [0.0, 0.05, 0.15], [0.0, 2e-3, 0.0])
+        grips[1].move(start + by(0, 0, height))
+        led.step(None, DT)
+        moved.step(None, DT)
+        np.testing.assert_allclose(grips[0].wrench.force, grips[1].wrench.force, atol=1e-9)
+        if i == 50:
+            assert grips[0].wrench.force[2] < -0.05
+
+
+def test_a_path_lets_go_when_it_says_so():
+    tissue = cube()
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
+    grip.follow(FramePath([0.01], [[0, 0, 1e-3]], release_at=0.02))
+    assert settled(tissue, 0.02) and grip.n_points == 25 and tissue.attachments == (grip,)
+    assert grip.wrench.force[2] < 0.0
+    tissue.step(None, DT)
+    assert grip.n_points == 0 and tissue.attachments == ()
+    np.testing.assert_array_equal(grip.wrench.force, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "ways", "release_at", "expected"),
+    [
+        ([0.1], [[0, 0, 0], [0, 0, 1]], 1.0, "1 times for 2 displacements"),
+        ([0.2, 0.1], [[0, 0, 0], [0, 0, 1]], 1.0, "begin above 0 and increase"),
+        ([0.0], [[0, 0, 0]], 1.0, "begin above 0 and increase"),
+        ([0.1], [[0, 0, np.nan]], 1.0, "not finite"),
+        ([0.1], [[0, 0, 0]], -1.0, "release_at is -1.0 s"),
+    ],
+)
+def test_a_path_that_makes_no_sense_is_refused(times, ways, release_at, expected):
+    with pytest.raises(ValueError, match=expected):
+        FramePath(times, ways, release_at=release_at)

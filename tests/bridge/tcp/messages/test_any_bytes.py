@@ -5,6 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from bridge import FrameLoad, FramePose, Hold
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     pack_pieces,
@@ -16,13 +17,22 @@ from bridge.tcp.messages.body import (
 )
 from bridge.tcp.messages.chunks import pack_chunks, unpack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report, unpack_cut_report
+from bridge.tcp.messages.led_frames import (
+    pack_hold,
+    pack_loads,
+    pack_number,
+    unpack_hold,
+    unpack_loads,
+    unpack_number,
+)
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error, unpack_description, unpack_error
 from bridge.tcp.wire import MessageError
 from tests.bridge.tcp.serve_block import block_tissue
-from tissue import BladeSegment, BladeSweep
+from tissue import BladeSegment, BladeSweep, Wrench
 
+LOADS = [FrameLoad(Wrench(*np.arange(9.0).reshape(3, 3)), n) for n in (7, 0)]
 N_MUTATIONS = 2000
 """Number of changed copies of each message."""
 
@@ -35,7 +45,14 @@ def real_messages():
     described = TissueDescription("block", tissue.material, tissue.bounds, 72, 36)
     return {
         "step": (pack_step(BladeSweep(edge, edge), 1e-3), unpack_step),
-        "result": (pack_result(result), unpack_result),
+        "step with a frame": (
+            pack_step(None, 1e-3, [FramePose(np.zeros(3), np.eye(3))]),
+            lambda payload: unpack_step(payload, 1),
+        ),
+        "hold": (pack_hold(Hold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))), unpack_hold),
+        "loads": (pack_loads(LOADS), lambda payload: unpack_loads(payload, 2)),
+        "number": (pack_number(1), lambda payload: unpack_number(payload, 2)),
+        "result": (pack_result(result, LOADS), unpack_result),
         "snapshot": (pack_snapshot(tissue.snapshot()), unpack_snapshot),
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
@@ -83,15 +100,25 @@ def test_a_changed_message_is_refused_or_decodes_to_valid_values(what):
 
 def is_valid(what, value):
     """Return whether the values of a decoded message are in the ranges that its users rely on."""
-    if what == "step":
-        sweep, dt = value
+    if what in ("step", "step with a frame"):
+        sweep, dt, poses = value
+        if not all(np.isfinite(pose.origin).all() for pose in poses):
+            return False
         return 0.0 < dt <= 1.0 and (sweep is None or np.isfinite(np.array(sweep)).all())
     if what == "snapshot":
         return value.tetrahedra.min() >= 0 and value.tetrahedra.max() < len(value.positions)
     if what == "surface":
         return value.triangles.min() >= 0 and value.triangles.max() < len(value.positions)
     if what == "result":
-        return -1 <= value.active_point_tetrahedron < value.n_tetrahedra
+        value, loads = value
+        return (
+            all(load.n_points >= 0 for load in loads)
+            and -1 <= value.active_point_tetrahedron < value.n_tetrahedra
+        )
+    if what == "hold":
+        return np.isfinite([value.stiffness, value.damping]).all() and bool(value.where)
+    if what == "loads":
+        return all(load.n_points >= 0 for load in value)
     if what == "chunks":
         return np.isfinite(value.boxes).all() and 0.0 <= value.fastest < np.inf
     if what == "description":

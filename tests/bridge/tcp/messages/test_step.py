@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
+from bridge import FramePose
 from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
@@ -30,11 +32,42 @@ def sweeps(draw):
 
 @given(sweeps(), st.floats(1e-6, 1.0))
 def test_a_sweep_arrives_bit_for_bit(sweep, dt):
-    assert bits(unpack_step(pack_step(sweep, dt))) == bits((sweep, dt))
+    assert bits(unpack_step(pack_step(sweep, dt))[:2]) == bits((sweep, dt))
 
 
 def test_no_blade_arrives_as_no_blade():
-    assert unpack_step(pack_step(None, 1e-3)) == (None, 1e-3)
+    assert unpack_step(pack_step(None, 1e-3)) == (None, 1e-3, [])
+
+
+POSES = [
+    FramePose(np.array([0.1, 0.2, -0.3 * i]), Rotation.from_rotvec([0.1 * i, 0.3, 1.0]).as_matrix())
+    for i in range(3)
+]
+
+
+@pytest.mark.parametrize("n", range(4))
+@pytest.mark.parametrize("has_blade", [True, False])
+def test_poses_of_frames_arrive_bit_for_bit(n, has_blade):
+    edge = BladeSegment(np.zeros(3), np.array([0.0, 0.0, 0.1]), np.array([0.0, 1.0, 0.0]))
+    sweep = BladeSweep(edge, edge) if has_blade else None
+    found = unpack_step(pack_step(sweep, 1e-3, POSES[:n]), n)
+    assert bits((found[0], tuple(found[2]))) == bits((sweep, tuple(POSES[:n])))
+
+
+@pytest.mark.parametrize(("sent", "led"), [(0, 1), (1, 0), (2, 1), (1, 2), (3, 2)])
+def test_poses_of_another_number_of_frames_are_refused(sent, led):
+    with pytest.raises(MessageError, match=f"96 for each of {led} frames that are led"):
+        unpack_step(pack_step(None, 1e-3, POSES[:sent]), led)
+
+
+@pytest.mark.parametrize("place", range(12))
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 2e3])
+def test_a_pose_with_one_impossible_number_is_refused(place, bad):
+    numbers = [*POSES[0].origin, *POSES[0].rotation.ravel()]
+    numbers[place] = bad
+    payload = struct.pack("<13d", 1e-3, *numbers)
+    with pytest.raises(MessageError, match=r"a frame is not within|are no rotation"):
+        unpack_step(payload, 1)
 
 
 def step_numbers(**changes):
