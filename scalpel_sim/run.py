@@ -173,6 +173,7 @@ def _facts(
         counters=bridge.counters.as_numbers(),
         touched=simulation.touching.frames,
         settings=settings,
+        held_points=[load.n_points for load in bridge.frame_loads],
     )
 
 

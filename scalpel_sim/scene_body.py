@@ -1,6 +1,9 @@
 """The tissue of a scene: held, stretched, and settled."""
 
 import logging
+import math
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -8,8 +11,12 @@ from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.strokes.stroke import from_csv
+from scalpel_sim.tables.attachment import AttachmentTable, times_of
+from scalpel_sim.tables.problems import naming_table
 from tissue import (
+    Attachment,
     FloatArray,
+    FramePath,
     Geom,
     Material,
     SolverSettings,
@@ -78,9 +85,13 @@ def make_tissue(scene: Scene) -> Tissue:
     table = tabletop_of(scene, tissue.bounds)
     if table is not None:
         tissue.collide_with([table.geom], [table.centre])
-    if fixed.any() or table is not None:
+    attachments = _attached(tissue, scene.attachments)
+    if fixed.any() or table is not None or attachments:
         tissue.settle()
         _warn_of_collapse(tissue, scene.material)
+    for attachment, row in zip(attachments, scene.attachments, strict=True):
+        ends = math.inf if row.release_at is None else row.release_at
+        attachment.follow(FramePath(times_of(row), row.displacements or (), release_at=ends))
     return tissue
 
 
@@ -100,6 +111,42 @@ def tabletop_of(scene: Scene, bounds: FloatArray) -> Tabletop | None:
     centre = np.array([*np.round(middle[:2], 3), scene.table - TABLE_HALF_THICKNESS])
     geom = Geom("tabletop", "box", (*size.tolist(), TABLE_HALF_THICKNESS), float(friction))
     return Tabletop(geom, centre)
+
+
+def _attached(tissue: Tissue, tables: Sequence[AttachmentTable]) -> list[Attachment]:
+    """Attach what holds the tissue, before it settles.
+
+    Raises:
+        UsageError: one cannot be attached; the message names its table.
+    """
+    return [
+        naming_table(f"[[attachment]] number {i + 1}", partial(_attach, tissue, table))
+        for i, table in enumerate(tables)
+    ]
+
+
+def _attach(tissue: Tissue, table: AttachmentTable) -> Attachment:
+    """Make one attachment, or ligament."""
+    breaks_at = math.inf if table.breaks_at is None else table.breaks_at
+    if table.to is None:
+        return tissue.attach(
+            table.where,
+            stiffness=table.stiffness,
+            damping=table.damping,
+            rest_length=table.rest_length or 0.0,
+            breaks_at=breaks_at,
+        )
+    assert table.area is not None and table.toughness is not None
+    return tissue.tie(
+        table.where,
+        table.to,
+        stiffness=table.stiffness,
+        damping=table.damping,
+        rest_length=table.rest_length,
+        breaks_at=breaks_at,
+        area=table.area,
+        toughness=table.toughness,
+    )
 
 
 def _warn_of_collapse(tissue: Tissue, material: Material) -> None:
@@ -137,6 +184,9 @@ def check_scene(scene: Scene) -> None:
     mesh = scene.mesh()
     fixed_nodes(mesh, scene.fixed)
     pulled_apart(mesh.positions, scene.fixed, scene.stretch)
+    for i, attachment in enumerate(scene.attachments):
+        region = partial(fixed_nodes, mesh, attachment.where)
+        naming_table(f"[[attachment]] number {i + 1}", region)
     drag = highest_toughness(scene) / scene.material.young_modulus
     extent = float(np.median(np.ptp(mesh.positions, axis=0)))
     if drag > LONG_DRAG * extent and not scene.material.stiffens:

@@ -14,7 +14,7 @@ from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.led_grasper import LedGrasper
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
-from scalpel_sim.output.recording import Recording, columns_of_hand
+from scalpel_sim.output.recording import Recording, columns_of_hand, held_columns
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
@@ -84,7 +84,7 @@ class Simulation:
         self.touching = CollisionMonitor(arm, fixtures)
         """Collisions of the arm with fixtures and with itself."""
         self._rows = FrameRows(frame)
-        self.recording = Recording()
+        self.recording = Recording(others=held_columns(len(self.bridge.frame_loads)))
         """What happened in each frame so far."""
         self.graspers: list[LedGrasper] = []
         """Graspers of other arms: see `add_grasper`."""
@@ -111,7 +111,8 @@ class Simulation:
         self.graspers.append(grasper)
         self.partners.append(grasper)
         names = [name for each in self.graspers for name in columns_of_hand(each.name)]
-        self.recording = Recording(others=names)
+        held = held_columns(self.recording.n_held)
+        self.recording = Recording(others=[*held, *names])
 
     @property
     def duration(self) -> float:
@@ -187,10 +188,18 @@ class Simulation:
             result,
             WallTimes(*stages, *wall_seconds),
         )
+        held = self._forces_on_attachments()
         row.append(time.perf_counter() - start)
+        row += held
         for grasper in self.graspers:
             row += grasper.record()
         self.recording.append(row)
+
+    def _forces_on_attachments(self) -> list[float]:
+        """Return the forces of the tissue on what holds it by its own scene [N], world frame."""
+        loads = self.bridge.frame_loads[: self.recording.n_held]
+        forces = [self.frame.vectors_to_world(load.wrench.force) for load in loads]
+        return [number for force in forces for number in force.tolist()]
 
     def _wrench_on(self, segment: BladeSegment) -> Wrench:
         """Return the wrench of the tissue; where there is none, take the last one off the arm."""

@@ -46,6 +46,7 @@ _UNKNOWN_TO_CLIENT = frozenset(
         "threads",
         "blade",
         "audit",
+        "attachments",
     }
 )
 """Settings of a scene that a server knows and does not send."""

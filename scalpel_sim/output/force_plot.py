@@ -19,6 +19,8 @@ PARTS = (
     ("pressing_force", "faces, pressing", "#56b4e9"),
     ("friction_force", "faces, friction", "#e69f00"),
 )
+HELD = ("#222222", "#009e73", "#0072b2", "#d55e00")
+"""Colours of the forces on attachments; more than these are not drawn."""
 MAGNITUDE = "#222222"
 _AREA = "#aa3377"
 LIMITED = "#d55e00"
@@ -100,9 +102,12 @@ def _plot_parts(axes: Axes, time: np.ndarray, recording: Recording) -> None:
     for name, label, colour in PARTS:
         size = np.linalg.norm(recording.vector(name), axis=1)
         axes.plot(time, size, color=colour, lw=1.2, label=label)
-    axes.set_ylabel("of which [N]")
+    for i in range(min(recording.n_held, len(HELD))):
+        size = np.linalg.norm(recording.vector(f"held_{i}"), axis=1)
+        axes.plot(time, size, color=HELD[i], lw=1.0, ls="--", label=f"attachment {i + 1}")
+    axes.set_ylabel("of which [N]" if recording.n_held == 0 else "of which; held [N]")
     axes.set_ylim(bottom=0.0)
-    legend(axes, 3)
+    legend(axes, 3 + min(recording.n_held, len(HELD)))
 
 
 def _plot_area(axes: Axes, time: np.ndarray, recording: Recording) -> None:

@@ -1,5 +1,6 @@
 """What happened in each frame, as one table of numbers."""
 
+import re
 import struct
 from collections.abc import Sequence
 from pathlib import Path
@@ -52,6 +53,14 @@ relaxation and rendering. `frame_s` is the wall time of the whole frame without 
 and without the recording of its row (`recording_s`)."""
 
 
+def held_columns(n: int) -> tuple[str, ...]:
+    """Return the columns of a run with `n` attachments: the force of the tissue on each, world.
+
+    They come after `COLUMNS`, averaged over the frame.
+    """
+    return tuple(name for i in range(n) for name in _vector(f"held_{i}", "n"))
+
+
 def columns_of_hand(name: str) -> tuple[str, ...]:
     """Return the columns of a grasper, which follow after all others.
 
@@ -62,6 +71,11 @@ def columns_of_hand(name: str) -> tuple[str, ...]:
     return (*vectors, f"{name}_opening_m", f"{name}_points")
 
 
+def _n_held(columns: Sequence[str]) -> int:
+    """Return the number of attachments that have columns."""
+    return sum(re.fullmatch(r"held_\d+_x_n", name) is not None for name in columns)
+
+
 FRAMES_AT_FIRST = 1024
 
 
@@ -70,12 +84,14 @@ class Recording:
 
     Args:
         n_frames: Room at first.
-        others: Further columns: see `columns_of_hand`.
+        others: Further columns: see `held_columns` and `columns_of_hand`, in this order.
     """
 
     def __init__(self, n_frames: int = FRAMES_AT_FIRST, others: Sequence[str] = ()) -> None:
         self.columns = (*COLUMNS, *others)
         """Names and units of all columns."""
+        self.n_held = _n_held(self.columns)
+        """Number of attachments."""
         self._row = struct.Struct(f"{len(self.columns)}d")
         self._n = 0
         self._take_rows(np.zeros((max(n_frames, 1), len(self.columns))))
@@ -137,7 +153,8 @@ def read_forces(path: Path) -> Recording:
         columns = header.split(",")
         others = columns[len(COLUMNS) :]
         hands = [each.removesuffix("_opening_m") for each in others if each.endswith("_opening_m")]
-        if columns != [*COLUMNS, *(name for hand in hands for name in columns_of_hand(hand))]:
+        of_hands = [name for hand in hands for name in columns_of_hand(hand)]
+        if columns != [*COLUMNS, *held_columns(_n_held(columns)), *of_hands]:
             raise ValueError(
                 f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )

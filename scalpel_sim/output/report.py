@@ -183,6 +183,11 @@ def _add_cut(rows: _Rows, summary: Summary) -> None:
         rows.add("area paid for", f"{paid * _MM2_PER_M2:,.0f} mm², {share}")
     rows.add("peak force", f"{summary.force_peak_n:.3f} N")
     rows.add("mean force", f"{summary.force_mean_n:.3f} N")
+    for number, each in enumerate(summary.attachments, 1):
+        name = f"attachment {number}" + (f", {each['where']}" if each["where"] else "")
+        peak, end = each["force_peak_n"], each["force_at_end_n"]
+        left = "" if each["points"] else ", let go"
+        rows.add(name, f"{peak:.3f} N at most, {end:.3f} N at the end{left}")
     for hand in summary.hands:
         held = f"{hand['points_held_most']:,} points held at most"
         rows.add(f"peak force, {hand['name']}", f"{hand['force_peak_n']:.3f} N, {held}")

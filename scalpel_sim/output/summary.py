@@ -57,6 +57,8 @@ class Summary(NamedTuple):
     """Largest force on the blade, after the device's limits."""
     force_mean_n: float
     """Mean magnitude of the force on the blade over the frames in which there was any."""
+    attachments: list[dict[str, Any]]
+    """Of each attachment: what it held, how many points in the end, and its forces."""
     work_of_blade_j: float
     energies_j: dict[str, float] | None
     """The energy account: the terms of `tissue.Energies`, and their `residual`. None without an
@@ -102,6 +104,8 @@ class RunFacts(NamedTuple):
     """In how many frames each pair of parts collided."""
     settings: dict[str, Any]
     """The resolved settings of the run."""
+    held_points: Sequence[int] = ()
+    """Number of points that each attachment holds at the end."""
 
 
 def summarise(recording: Recording, facts: RunFacts) -> Summary:
@@ -133,6 +137,7 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
+        attachments=_attachments(recording, facts),
         work_of_blade_j=work,
         energies_j=energies,
         residual_of_work=_residual_of_work(recording, energies, work),
@@ -170,6 +175,23 @@ def hand_figures(recording: Recording, name: str) -> dict[str, Any]:
         "points_held_most": int(points.max(initial=0.0)),
         "points_held_at_end": int(points[-1]) if len(points) else 0,
     }
+
+
+def _attachments(recording: Recording, facts: RunFacts) -> list[dict[str, Any]]:
+    """Return the figures of the attachments."""
+    tables = facts.settings.get("attachments", [])
+    found = []
+    for i in range(recording.n_held):
+        sizes = np.linalg.norm(recording.vector(f"held_{i}"), axis=1)
+        found.append(
+            {
+                "where": tables[i]["where"] if i < len(tables) else "",
+                "points": facts.held_points[i] if i < len(facts.held_points) else None,
+                "force_peak_n": float(sizes.max(initial=0.0)),
+                "force_at_end_n": float(sizes[-1]) if len(sizes) else 0.0,
+            }
+        )
+    return found
 
 
 def _area_paid_for(energies: dict[str, float] | None, material: dict[str, float]) -> float | None:

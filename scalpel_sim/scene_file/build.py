@@ -66,6 +66,7 @@ def scene_in(file: SceneFile) -> Scene:
         stretch=stretch,
         cut=naming_table("[solver]", lambda: _cut(tables.solver)),
         blade=naming_table("[blade]", lambda: _blade(tables.blade)),
+        attachments=tuple(tables.attachment),
         strokes=tuple(_located(stroke, file.folder) for stroke in tables.stroke),
         graspers=tuple(_with_model(grasper, file.folder) for grasper in tables.grasper),
         **{key: value for key, value in given.items() if value is not None},

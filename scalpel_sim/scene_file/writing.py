@@ -42,6 +42,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
     for stroke in strokes:
         if "file" in stroke:
             stroke["file"] = _relative(Path(stroke["file"]), folder)
+    attachments = [given_in(attachment) for attachment in scene.attachments]
     graspers = [given_in(grasper) for grasper in scene.graspers]
     for grasper in graspers:
         if "model" in grasper:
@@ -91,6 +92,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
                 "passivity": scene.passivity,
             }
         ),
+        **({"attachment": attachments} if attachments else {}),
         **({"grasper": graspers} if graspers else {}),
         "stroke": strokes,
     }

@@ -20,6 +20,7 @@ from scalpel_sim.scene_parts.choices import (
     check_scheme,
 )
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
+from scalpel_sim.tables.attachment import AttachmentTable, check_attachment
 from scalpel_sim.tables.grasper import GrasperTable, check_graspers
 from scalpel_sim.tables.material import given_in
 from scalpel_sim.tables.stroke import DEFAULT_SPEED, StrokeTable, check_stroke, stroke_called
@@ -95,6 +96,8 @@ class Scene:
     """The blade as a body; None: a line, as in the paper."""
     audit: bool = False
     """Whether an account of the energy is kept."""
+    attachments: Sequence[AttachmentTable] = ()
+    """What holds the tissue beside the fixed nodes."""
     strokes: Sequence[StrokeTable] = (StrokeTable(),)
     """What is done with the blade, in turn."""
     arm: str = "auto"
@@ -162,6 +165,8 @@ class Scene:
             raise UsageError("the scene has no stroke; give at least one [[stroke]]")
         for i, stroke in enumerate(self.strokes):
             check_stroke(stroke, f"[[stroke]] number {i + 1}")
+        for i, attachment in enumerate(self.attachments):
+            check_attachment(attachment, f"[[attachment]] number {i + 1}")
         check_graspers(self.graspers)
 
     @property
@@ -199,6 +204,7 @@ class Scene:
         del found["name"], found["mesh"]
         return found | {
             "stroke": self.stroke,
+            "attachments": [given_in(attachment) for attachment in self.attachments],
             "strokes": [given_in(stroke) for stroke in self.strokes],
             "graspers": [given_in(grasper) for grasper in self.graspers],
             "material": asdict(self.material),

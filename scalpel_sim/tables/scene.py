@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta, field
 
 from bridge import MAX_FRAMES_PER_ANSWER
+from scalpel_sim.tables.attachment import AttachmentTable
 from scalpel_sim.tables.body import BodyTable
 from scalpel_sim.tables.grasper import GrasperTable
 from scalpel_sim.tables.material import BladeTable, PresetMaterialTable
@@ -117,5 +118,6 @@ class SceneContent(TomlTable, kw_only=True, frozen=True):
     world: WorldTable = field(default_factory=WorldTable)
     solver: SolverTable = field(default_factory=SolverTable)
     arm: ArmTable = field(default_factory=ArmTable)
+    attachment: list[AttachmentTable] = field(default_factory=list)
     grasper: list[GrasperTable] = field(default_factory=list)
     stroke: list[StrokeTable] = field(default_factory=lambda: [StrokeTable()])

@@ -20,6 +20,7 @@ from scalpel_sim.scene_file.reading import (
     shipped_scene,
 )
 from scalpel_sim.scene_file.writing import scene_text
+from scalpel_sim.tables.attachment import AttachmentTable
 from scalpel_sim.tables.grasper import GrasperTable, WaypointTable
 from scalpel_sim.tables.material import BladeTable
 from scalpel_sim.tables.scene import (
@@ -45,6 +46,7 @@ TABLES = (
     WorldTable,
     SolverTable,
     ArmTable,
+    AttachmentTable,
     GrasperTable,
     WaypointTable,
     StrokeTable,

@@ -4,6 +4,14 @@ import pytest
 
 from scalpel_sim.cli.app import command_line
 
+ATTACHED = (
+    "[[attachment]]\n",
+    'where = "top"\n',
+    "stiffness = 100.0\n",
+    "times = [0.5]\n",
+    "displacements = [[0.0, 0.0, 1e-3]]\n",
+)
+TIED = "to = [0.02, 0.02, 0.08]\narea = 1e-6\nstiffness = 100.0\n"
 FILE = """\
 about = "a block"
 [body]
@@ -34,6 +42,7 @@ kind = "points"
 points = [[0.02, -0.01, 0.01], [0.02, 0.05, 0.01]]
 length = 0.05
 """
+FILE += "".join(ATTACHED)
 
 WRONG = {
     "no toml": ("[body]", "[body", "is not valid TOML"),
@@ -98,6 +107,17 @@ WRONG = {
     "a stroke at the speed of sound": ("length =", "speed = 340.0\nlength =", "at most 1"),
     "a stroke along its edge": ("[0.02, 0.05, 0.01]", "[0.02, -0.01, 0.03]", "give the direction"),
     "a stroke beside the body": ("0.02, -0.01, 0.01], [0.02", "0.2, -0.01, 0.01], [0.2", "mm away"),
+    "an attachment without a stiffness": (ATTACHED[2], "", "number 1 has no stiffness"),
+    "an attachment of nothing": ('"top"', '"sphere:1,1,1,0.01"', "no node is in the sphere"),
+    "an attachment of a side of nobody": ('"top"', '"tpo"', "Did you mean 'top'"),
+    "an attachment in single brackets": (ATTACHED[0], "[attachment]\n", "it must be tables: [[att"),
+    "a ligament without a toughness": (ATTACHED[2], TIED, "has to and no toughness"),
+    "a toughness of no ligament": (ATTACHED[2], "toughness = 5.0\n" + ATTACHED[2], "and no to;"),
+    "a way without times": (ATTACHED[3], "", "give either times or a speed"),
+    "a way with too many times": ("times = [0.5]", "times = [0.5, 1.0]", "2 times for 1"),
+    "a way back in time": ("times = [0.5]", "times = [0.0]", "begin above 0 and increase"),
+    "times of no way": (ATTACHED[4], "", "has times and no displacements"),
+    "a region of two numbers": ('"top"', "[0.1, 0.2]", "it must be a region"),
     "a grasper that waits": ('"attachment"', '"suction"', 'must be "attachment" or "friction"'),
     "friction with a spring": (
         'holds = "attachment"',

@@ -1,0 +1,153 @@
+"""Scenes with `[[attachment]]`: tissue that is held, pulled and tied, as files."""
+
+import json
+import threading
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridge import TcpLink
+from bridge.tcp.server import TissueServer
+from scalpel_sim import prepare, read_scene
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.errors import UsageError
+from scalpel_sim.output.recording import COLUMNS, held_columns, read_forces
+from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.tables.attachment import AttachmentTable, check_attachment, times_of
+
+FILE = """\
+seconds = 0.6
+[body]
+shape = "block"
+cells = [4, 2, 2]
+size = [0.04, 0.02, 0.02]
+fixed = "left"
+
+[material]
+law = "neo_hookean"
+young_modulus = 20e3
+toughness = 20.0
+viscous_damping = 40.0
+
+[[attachment]]
+where = "right"
+stiffness = 2000.0
+damping = 5.0
+displacements = [[0.002, 0.0, 0.0], [0.001, 0.0, 0.0]]
+times = [0.1, 0.2]
+release_at = 0.5
+
+[[attachment]]
+where = "sphere:0.02,0.01,0.02,0.001"
+to = [0.05, 0.01, 0.03]
+stiffness = 100.0
+damping = 0.1
+area = 1e-6
+toughness = 50.0
+
+[[stroke]]
+kind = "points"
+points = [[0.031, -0.005, 0.015], [0.031, 0.025, 0.015]]
+length = 0.04
+speed = 0.2
+"""
+"""The blade cuts the ligament, and a slit of 5 mm below it."""
+
+N_TIMES = 6
+"""Columns of wall times, the last of `COLUMNS`."""
+
+
+def untimed(recording):
+    n = len(COLUMNS)
+    return np.delete(recording.rows, slice(n - N_TIMES, n), axis=1)
+
+
+@pytest.fixture(scope="module")
+def first(tmp_path_factory):
+    """The folder of a run of that file."""
+    folder = tmp_path_factory.mktemp("held")
+    (folder / "held.toml").write_text(FILE, encoding="utf-8")
+    words = ["run", str(folder / "held.toml"), "-q", "--out", str(folder / "out")]
+    assert command_line(words) == 0
+    return folder / "out"
+
+
+def test_the_forces_on_attachments_have_columns_of_their_own_at_the_end(first):
+    recording = read_forces(first / "forces.csv")
+    assert recording.columns == COLUMNS + held_columns(2)
+    right, tie = recording.vector("held_0"), recording.vector("held_1")
+    time = recording.column("time_s")
+    assert right[abs(time - 0.1).argmin(), 0] < -0.2  # pulled back while it is led away
+    assert (right[time > 0.502] == 0.0).all()  # let go at 0.5 s
+    assert tie[0, 0] < -1e-3 and tie[0, 2] < -1e-3  # a part of the weight of the body
+    assert (tie[-1] == 0.0).all()
+
+
+def test_the_summary_says_what_each_held_and_at_which_force(first):
+    summary = json.loads((first / "summary.json").read_text())
+    right, tie = summary["attachments"]
+    assert right["where"] == "right" and right["points"] == 0
+    recording = read_forces(first / "forces.csv")
+    largest = np.linalg.norm(recording.vector("held_0"), axis=1).max()
+    assert right["force_peak_n"] == pytest.approx(largest)
+    assert tie["where"].startswith("sphere") and tie["force_at_end_n"] == 0.0
+    energies = summary["energies_j"]
+    assert energies["breaking"] > 50.0 * 1e-6  # the ligament's, and of the skin
+    assert energies["work_of_loads"] > 1e-5
+    works = energies["work_of_blade"] + energies["work_of_loads"]
+    assert abs(energies["residual"]) < 5e-3 * works
+
+
+def test_the_scene_that_a_run_writes_gives_the_same_bits_again(first, tmp_path):
+    words = ["run", str(first / "scene.toml"), "-q", "--out", str(tmp_path / "again")]
+    assert command_line(words) == 0
+    runs = [read_forces(folder / "forces.csv") for folder in (first, tmp_path / "again")]
+    np.testing.assert_array_equal(untimed(runs[0]), untimed(runs[1]))
+    assert (tmp_path / "again" / "scene.toml").read_text() == (first / "scene.toml").read_text()
+
+
+@pytest.fixture
+def served():
+    """A server of that scene, in a thread, and the scene."""
+
+    def start(scene):
+        server = TissueServer(lambda: make_tissue(scene), scene=scene.name, port=0)
+        threading.Thread(target=server.run, daemon=True).start()
+        return server.address
+
+    return start
+
+
+def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first, served):
+    scene = read_scene(first / "scene.toml")
+    here = prepare(scene)
+    here.run(0.15)
+    with closing(TcpLink(served(scene))) as link:
+        there = prepare(scene, link)
+        there.run(0.15)
+    assert there.recording.n_held == 2
+    np.testing.assert_array_equal(untimed(here.recording), untimed(there.recording))
+
+
+def test_a_body_that_only_attachments_hold_hangs_from_them(first):
+    scene = read_scene(first / "scene.toml")
+    hook = AttachmentTable(where="top", stiffness=500.0, damping=2.0)
+    tissue = make_tissue(replace(scene, fixed="none", stretch=0.0, attachments=(hook,)))
+    for _ in range(50):
+        tissue.step(None, 1e-3)
+    (attachment,) = tissue.attachments
+    weight = 9.81 * tissue.snapshot().masses.sum()
+    np.testing.assert_allclose(attachment.wrench.force, [0, 0, -weight], atol=0.01 * weight)
+
+
+def test_a_speed_gives_the_times_of_the_ways():
+    """3, 4 and 5 mm at 1 mm/s."""
+    ways = [(3e-3, 0.0, 0.0), (3e-3, 4e-3, 0.0), (0.0, 0.0, 0.0)]
+    table = AttachmentTable(where="top", stiffness=1.0, displacements=ways, speed=1e-3)
+    assert times_of(table) == pytest.approx([3.0, 7.0, 12.0])
+    check_attachment(table, "it")
+    same = AttachmentTable(where="top", stiffness=1.0, displacements=[ways[0]] * 2, speed=1e-3)
+    with pytest.raises(UsageError, match="two displacements in turn that are equal"):
+        check_attachment(same, "it")
