@@ -67,6 +67,8 @@ class KernelSet(NamedTuple):
     contact: str | None = None
     relaxes: bool = False
     """Whether the stress of the material relaxes."""
+    is_held: bool = False
+    """Whether attachments hold the body."""
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
@@ -74,7 +76,8 @@ class KernelSet(NamedTuple):
         has_sides = scene.blade is not None
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
         how = (scene.audit, has_sides, scene.precision, scene.contact)
-        return cls(law, scheme, relaxation, *how, relaxes=bool(scene.material.prony))
+        relaxes, is_held = bool(scene.material.prony), bool(scene.attachments)
+        return cls(law, scheme, relaxation, *how, relaxes=relaxes, is_held=is_held)
 
     @property
     def _prony(self) -> tuple[tuple[float, float], ...]:
@@ -175,6 +178,8 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     """Settle a small block, cut it through in steps of `dt` [s], and measure it."""
     tissue = kernels.body(block((2, 2, 2), (_SIDE, _SIDE, _SIDE)), "left,right")
     if dt > 0.0:
+        if kernels.is_held:
+            _hold(tissue)
         tissue.settle()
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 1.5, N_STEPS):
@@ -191,6 +196,14 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     tissue.snapshot()
     tissue.n_pieces()
     tissue.cut_report()
+
+
+def _hold(tissue: Tissue) -> None:
+    """Attach the block, and tie it by a strand across the way of the edge."""
+    tissue.attach("right", stiffness=10.0)
+    middle = _SIDE / 2.0
+    beyond = (_SIDE, middle, 1.5 * _SIDE)
+    tissue.tie([[0.0, middle, _SIDE]], beyond, stiffness=10.0, area=1e-6, toughness=10.0)
 
 
 def _incise_and_cut(kernels: KernelSet) -> None:

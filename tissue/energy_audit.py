@@ -102,6 +102,8 @@ def _write_amounts(
 def _attached(system: System) -> float:
     """Return the energy in the springs of attachments [J]."""
     attachments = system.attachments
+    if not len(attachments.nodes):
+        return 0.0
     return attached_energy(attachments, system.body.positions, 0, len(attachments.nodes))
 
 
