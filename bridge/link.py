@@ -79,7 +79,11 @@ class TissueLink(Protocol):
         """
 
     def release(self, number: int) -> None:
-        """Let the frame of that number go, which keeps its number; again it does nothing."""
+        """Let the frame of that number go, which keeps its number; again it does nothing.
+
+        Raises:
+            ValueError: there is no such frame; `LinkError`, where the tissue is elsewhere.
+        """
 
     def loads(self) -> Sequence[FrameLoad]:
         """Return what the body did to each frame in the last step, in the order of numbers.
@@ -163,6 +167,8 @@ class InProcessLink:
 
     def release(self, number: int) -> None:
         """Let the frame of that number go."""
+        if not 0 <= number < len(self._frames):
+            raise ValueError(f"there is no frame {number}; there are {len(self._frames)}")
         frame = self._frames[number]
         if frame.n_points:
             self._tissue.release(frame)

@@ -239,8 +239,8 @@ class StepResult(NamedTuple):
     force_on_tissue: FloatArray
     """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
     bounds: FloatArray
-    """Lowest and highest corner of a box around the tissue at t1 [m], shape (2, 3). Where parts of
-    the tissue are frozen the box may be a little larger than the tissue."""
+    """Lowest and highest corner of a box around the tissue and its ligaments at t1 [m], shape (2,
+    3). Where parts of the tissue are frozen the box may be a little larger than the tissue."""
     n_tetrahedra: int
     """Number of tetrahedra."""
     n_nodes: int

@@ -37,7 +37,7 @@ soft = Material(law="neo_hookean", young_modulus=20e3, toughness=10.0, viscous_d
 tissue = Tissue(bar, soft, gravity=(0.0, 0.0, 0.0))
 bridge = Bridge(tissue)
 blade = Blade(model, data, forward=(0.0, 1.0, 0.0))
-hands = [Grip(data, side, tissue, side, stiffness=4e3, damping=10.0) for side in ("left", "right")]
+hands = [Grip(data, side, bridge, side, stiffness=4e3, damping=10.0) for side in ("left", "right")]
 
 pulls = []
 while data.time < 2.0:

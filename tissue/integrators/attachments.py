@@ -290,3 +290,19 @@ def _largest_rate(attachments: Attachments, each: FloatArray, masses: FloatArray
     shares = each[:, None] * attachments.weights
     sums = np.bincount(places.ravel(), weights=shares.ravel())
     return float((sums / masses[touched]).max())
+
+
+def strand_boxes(attachments: Attachments, positions: FloatArray) -> FloatArray:
+    """Return lowest and highest corner of each strand after a step [m], shape (n, 2, 3).
+
+    Args:
+        attachments: Of which those with a cross-section are strands.
+        positions: Positions of the nodes [m].
+    """
+    rows = np.flatnonzero((attachments.section > 0.0) & (attachments.state != SEVERED))
+    nodes, weights = attachments.nodes[rows], attachments.weights[rows]
+    points = np.einsum("nk,nkx->nx", weights, positions[nodes])
+    is_caught = attachments.state[rows, None] == CAUGHT
+    bends = np.where(is_caught, attachments.bend[rows], points)
+    ends = np.stack((points, attachments.end[rows], bends), axis=1)
+    return np.stack((ends.min(axis=1), ends.max(axis=1)), axis=1)

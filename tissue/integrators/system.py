@@ -21,7 +21,7 @@ from tissue.cut_settings import MeshMeasures
 from tissue.elasticity.elasticity import Elasticity
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.mass_scaling import added_mass_shares
-from tissue.integrators.attachments import no_attachments
+from tissue.integrators.attachments import no_attachments, strand_boxes
 from tissue.integrators.damping import Damping
 from tissue.integrators.losses import ContactLoss
 from tissue.integrators.stability import damping_rate, stable_step
@@ -210,13 +210,18 @@ class System:
         self.geoms.grow(n_nodes, n_tetrahedra)
 
     def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
-        """Return what a time step of `dt` [s] came to for the blade."""
+        """Return what a time step of `dt` [s] came to for the blade; bounds hold strands too."""
         strands, positions = self.attachments, self.body.positions
-        if strands.n_caught == 0:
+        if not strands.section.any():
             return self.interaction.report(blade, edge, dt)
-        return self.interaction.report(
+        found = self.interaction.report(
             blade, edge, dt, lambda report: report_strands(report, strands, positions, edge)
         )
+        boxes = strand_boxes(strands, positions)
+        low = boxes[:, 0].min(axis=0, initial=math.inf)
+        high = boxes[:, 1].max(axis=0, initial=-math.inf)
+        bounds = (np.minimum(found.bounds[0], low), np.maximum(found.bounds[1], high))
+        return found._replace(bounds=np.stack(bounds))
 
     def measures(self, method: int) -> MeshMeasures:
         """Return what bounds the time step of the body now.

@@ -10,6 +10,7 @@ from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_contact import GeomContact
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.simd import room_for_points
+from tissue.integrators.attachments import strand_boxes
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.options import Hierarchical
 from tissue.integrators.step_context import Increment
@@ -23,6 +24,7 @@ from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.mesh.body import Body
 from tissue.mesh.body_queries import BodyQueries
 from tissue.solver_settings import SolverSettings
+from tissue.types import Chunks
 
 HOLDS = "nodes are supports where `Tissue(fixed=...)` says so"
 
@@ -201,6 +203,12 @@ class DrivenBody(BodyQueries):
     def attachments(self) -> tuple[Attachment, ...]:
         """The attachments and ligaments that hold, in the order in which they were made."""
         return self._attachments.all
+
+    def chunks(self) -> Chunks:
+        """Return boxes that together hold the body and its ligaments; see `BodyQueries.chunks`."""
+        found = super().chunks()
+        boxes = strand_boxes(self._system.attachments, self._body.positions)
+        return found._replace(boxes=np.concatenate((found.boxes, boxes))) if len(boxes) else found
 
     def release(self, held: Load | Attachment) -> None:
         """End a load of `push`, or let go of an attachment.

@@ -71,7 +71,9 @@ def _pose(numbers: tuple[float, ...]) -> FramePose:
         if not -LARGEST_COORDINATE <= x <= LARGEST_COORDINATE:
             raise MessageError(f"a frame is not within {LARGEST_COORDINATE:g} m: {numbers[:3]}")
     rotation = np.array(numbers[3:]).reshape(3, 3)
-    if not np.abs(rotation.T @ rotation - np.eye(3)).max() <= _LARGEST_SKEW:
+    # Entries first: the squares of large ones are not finite.
+    is_small = np.abs(rotation).max() <= 1.0 + _LARGEST_SKEW
+    if not (is_small and np.abs(rotation.T @ rotation - np.eye(3)).max() <= _LARGEST_SKEW):
         raise MessageError(f"the axes of a frame are no rotation: {numbers[3:]}")
     return FramePose(np.array(numbers[:3]), rotation)
 

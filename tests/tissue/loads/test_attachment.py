@@ -174,6 +174,19 @@ def test_an_attachment_lets_go_at_its_force():
         tissue.release(grip)
 
 
+def test_the_account_counts_the_spring_of_an_attachment_that_lets_go_as_released():
+    tissue = cube(audit=True)
+    grip = tissue.attach(TOP, stiffness=500.0, damping=0.1, breaks_at=0.5)
+    grip.follow(FramePath([1.0], [[0.0, 0.0, 0.02]]))
+    while not grip.is_released:
+        tissue.step(None, DT)
+    energies = settled(tissue).energies
+    # F^2 / 2k, and a little more: the springs are not stretched alike.
+    assert 1.0 < energies.released / (0.5 * 0.5**2 / 500.0) < 1.1
+    assert energies.held == 0.0
+    assert abs(energies.residual) < 5e-3 * energies.work_of_loads
+
+
 def test_released_tissue_goes_back():
     tissue = cube()
     grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
