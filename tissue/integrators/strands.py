@@ -9,13 +9,14 @@ The edge goes into the strand where that force in the plane of the blade exceeds
 
     F = toughness * section / diameter,
 
-as an edge that cuts a bar of that width does (Atkins, The Science and Engineering of Cutting, 2009,
-chapter 2: the work of cutting is toughness times area). The bend then lags behind the edge until
-the force is F, and the energy that the string loses is spent on cutting: the strand is severed when
+as an edge does that cuts a bar of that width: the work of cutting is toughness times area (A. G.
+Atkins, The Science and Engineering of Cutting, 2009). The bend then lags behind the edge until the
+force is F, and the energy that the string loses is spent on cutting: the strand is severed when
 toughness times section is spent, neither more nor less. So the blade pays as it moves, at any
-speed, and a slack strand is not cut before it is taut. A strand of section A is round: its diameter
-is 2 sqrt(A / pi). An impulse of the whole energy in one step would have to be E / v on a blade of
-speed v: unbounded on a slow one.
+speed, and a slack strand is not cut before it is taut. Until it is cut the bend stays at its place
+on the edge, so that an edge that is drawn along itself pulls, and cuts, too. A strand of section A
+is round: its diameter is 2 sqrt(A / pi). An impulse of the whole energy in one step would have to
+be E / v on a blade of speed v: unbounded on a slow one.
 """
 
 import math
