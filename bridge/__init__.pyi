@@ -18,9 +18,9 @@ from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.passivity import PassivityCounters as PassivityCounters
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
 from .frames import TissueFrame as TissueFrame
+from .led_frames import FrameHold as FrameHold
 from .led_frames import FrameLoad as FrameLoad
 from .led_frames import FramePose as FramePose
-from .led_frames import Hold as Hold
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
 from .link import TissueDescription as TissueDescription
@@ -47,7 +47,7 @@ __all__ = [
     "FrameLoad",
     "FramePose",
     "GeomShape",
-    "Hold",
+    "FrameHold",
     "InProcessLink",
     "LedGrip",
     "LinkError",

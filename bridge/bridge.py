@@ -23,7 +23,7 @@ from bridge.coupling.passivity import Travel
 from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
-from bridge.led_frames import FrameLoad, FramePose, Hold, plain_region
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, plain_region
 from bridge.link import InProcessLink, TissueLink, link_to
 from bridge.poses import Pose, checked_pose, pose_of, six
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
@@ -191,7 +191,9 @@ class Bridge:
             LinkError: the tissue is in another one, and refuses that or did not answer.
         """
         self._query.wait()
-        grip = self._grips.attach(Hold(plain_region(where), stiffness, damping, breaks_at, origin))
+        grip = self._grips.attach(
+            FrameHold(plain_region(where), stiffness, damping, breaks_at, origin)
+        )
         self._path = [part._replace(frames=(*part.frames, grip.pose)) for part in self._path]
         return grip
 

@@ -28,7 +28,7 @@ class FrameLoad(NamedTuple):
     """Number of points of the tissue through which it acts now; 0 once it has let go."""
 
 
-class Hold(NamedTuple):
+class FrameHold(NamedTuple):
     """How a frame holds tissue: what `tissue.Tissue.attach` takes."""
 
     where: str | list[int] | list[list[float]]
@@ -44,7 +44,7 @@ class Hold(NamedTuple):
 
 
 def plain_region(where: str | npt.ArrayLike) -> str | list[int] | list[list[float]]:
-    """Return what `Hold.where` takes; a mask of nodes becomes their numbers."""
+    """Return what `FrameHold.where` takes; a mask of nodes becomes their numbers."""
     if isinstance(where, str):
         return where
     array = np.asarray(where)

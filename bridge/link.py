@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 
 import numpy as np
 
-from bridge.led_frames import FrameLoad, FramePose, Hold, expect_each
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
 from tissue import (
     BladeShape,
     BladeSweep,
@@ -68,7 +68,7 @@ class TissueLink(Protocol):
             LinkError: the tissue is in another process and did not answer, or refuses the request.
         """
 
-    def attach(self, hold: Hold) -> int:
+    def attach(self, hold: FrameHold) -> int:
         """Attach a frame to the body, which the caller leads from now on; return its number.
 
         That is its place in `loads`, where those of the tissue's own scene come first.
@@ -152,7 +152,7 @@ class InProcessLink:
             frame.move(pose.origin, pose.rotation)
         return self._tissue.step(sweep, dt)
 
-    def attach(self, hold: Hold) -> int:
+    def attach(self, hold: FrameHold) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
         where = hold.where if isinstance(hold.where, str) else np.array(hold.where)
         attachment = self._tissue.attach(

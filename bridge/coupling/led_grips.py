@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from bridge.input_checks import finite
 from bridge.input_checks import rotation as checked_rotation
-from bridge.led_frames import FrameLoad, FramePose, Hold
+from bridge.led_frames import FrameHold, FrameLoad, FramePose
 from bridge.link import TissueLink
 from tissue import FloatArray, Wrench
 
@@ -76,7 +76,7 @@ class LedGrips:
         """Where the frames are led; tissue frame."""
         return tuple([grip.pose for grip in self._grips])
 
-    def attach(self, hold: Hold) -> LedGrip:
+    def attach(self, hold: FrameHold) -> LedGrip:
         """Let a frame hold tissue; see `TissueLink.attach`."""
         number = self._link.attach(hold)
         self.loads = self._link.loads()

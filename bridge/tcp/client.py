@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from bridge.led_frames import FrameLoad, FramePose, Hold, expect_each
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
 from bridge.link import LinkError, TissueDescription
 from bridge.tcp.address import is_loopback, parse_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
@@ -105,7 +105,7 @@ class TcpLink:
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
-    def attach(self, hold: Hold) -> int:
+    def attach(self, hold: FrameHold) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
         before = self.loads()
         reply = self._ask(MessageKind.ATTACH, pack_hold(hold), LOAD_BYTES, _one_load)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import msgspec
 
-from bridge.led_frames import FrameLoad, Hold
+from bridge.led_frames import FrameHold, FrameLoad
 from bridge.tcp.wire import LARGEST_REPLY, MessageError
 from tissue import Wrench
 
@@ -24,7 +24,7 @@ _Node = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_REPLY)]
 _Place = tuple[float, float, float]
 
 
-class _Hold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+class _FrameHold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """A request to attach a frame; one of region, nodes and points says what it holds."""
 
     stiffness: float
@@ -36,10 +36,10 @@ class _Hold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     points: Annotated[list[_Place], msgspec.Meta(min_length=1)] | None = None
 
 
-_decoder = msgspec.json.Decoder(_Hold)
+_decoder = msgspec.json.Decoder(_FrameHold)
 
 
-def pack_hold(hold: Hold) -> bytes:
+def pack_hold(hold: FrameHold) -> bytes:
     """Return the request to attach a frame, JSON."""
     found: dict[str, object] = {
         "stiffness": hold.stiffness,
@@ -55,7 +55,7 @@ def pack_hold(hold: Hold) -> bytes:
     return msgspec.json.encode(found | {kind: where})
 
 
-def unpack_hold(payload: bytes) -> Hold:
+def unpack_hold(payload: bytes) -> FrameHold:
     """Return what a request to attach a frame asks for.
 
     Raises:
@@ -71,7 +71,7 @@ def unpack_hold(payload: bytes) -> Hold:
     points = [list(point) for point in found.points or ()]
     where = found.region or found.nodes or points
     breaks_at = math.inf if found.breaks_at is None else found.breaks_at
-    return Hold(where, found.stiffness, found.damping, breaks_at, found.origin)
+    return FrameHold(where, found.stiffness, found.damping, breaks_at, found.origin)
 
 
 def pack_loads(loads: Sequence[FrameLoad]) -> bytes:

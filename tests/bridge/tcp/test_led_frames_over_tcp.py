@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from bridge import Bridge, Hold, InProcessLink, LinkError, TcpLink
+from bridge import Bridge, FrameHold, InProcessLink, LinkError, TcpLink
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.wire import FrameReader, MessageKind, pack_frame
 from scalpel_sim import Grip
@@ -90,7 +90,7 @@ def test_a_jaw_of_mujoco_holds_tissue_over_any_link(link):
 
 
 def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
-    link.attach(Hold("top", 100.0))
+    link.attach(FrameHold("top", 100.0))
     with pytest.raises(ValueError, match="poses of 0 frames, and 1 are led"):
         link.step(None, DT)
     assert link.step(None, DT, [pose(0)]).n_tetrahedra == 72
@@ -99,11 +99,11 @@ def test_a_wrong_number_of_poses_is_refused_and_the_link_stays(link):
 @pytest.mark.parametrize(
     ("hold", "expected"),
     [
-        (Hold("tpo", 100.0), "Did you mean 'top'"),
-        (Hold("top", -1.0), "stiffness is -1.0"),
-        (Hold("top", np.nan), "Expected `float`, got `null` - at `\\$.stiffness`"),
-        (Hold([1000], 100.0), "there is no node 1000"),
-        (Hold([[9.0, 9.0, 9.0]], 100.0), "outside the body"),
+        (FrameHold("tpo", 100.0), "Did you mean 'top'"),
+        (FrameHold("top", -1.0), "stiffness is -1.0"),
+        (FrameHold("top", np.nan), "Expected `float`, got `null` - at `\\$.stiffness`"),
+        (FrameHold([1000], 100.0), "there is no node 1000"),
+        (FrameHold([[9.0, 9.0, 9.0]], 100.0), "outside the body"),
     ],
 )
 def test_what_cannot_be_held_is_refused_and_the_link_stays(link, hold, expected):
@@ -146,4 +146,4 @@ def test_each_client_gets_a_tissue_that_nobody_holds(server):
     for _ in range(2):
         with contextlib.closing(link_once_free(server.address)) as link:
             assert isinstance(link, TcpLink) and len(link.loads()) == 0
-            link.attach(Hold("top", 100.0))
+            link.attach(FrameHold("top", 100.0))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bridge import FrameLoad, FramePose, Hold
+from bridge import FrameHold, FrameLoad, FramePose
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     pack_pieces,
@@ -49,7 +49,10 @@ def real_messages():
             pack_step(None, 1e-3, [FramePose(np.zeros(3), np.eye(3))]),
             lambda payload: unpack_step(payload, 1),
         ),
-        "hold": (pack_hold(Hold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))), unpack_hold),
+        "hold": (
+            pack_hold(FrameHold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))),
+            unpack_hold,
+        ),
         "loads": (pack_loads(LOADS), lambda payload: unpack_loads(payload, 2)),
         "number": (pack_number(1), lambda payload: unpack_number(payload, 2)),
         "result": (pack_result(result, LOADS), unpack_result),
