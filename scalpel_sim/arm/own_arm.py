@@ -181,7 +181,7 @@ def move_to_start(arm: LedArm, stroke: Stroke, frame: TissueFrame) -> None:
     raise PlacementError(
         f"the arm '{arm.name}' does not reach the stroke: at {when:.2f} s of it the edge stays "
         f"{miss * 1e3 * _NEAR:.3g} mm away, a turn of {_NEAR_TURN / _NEAR * 1e-3:.2g} rad counted "
-        "as a millimetre. Move the tissue ([world] pos, quat), or choose a smaller stroke"
+        "as a millimetre. Move it or the tissue (pos, quat of the scene), or choose a smaller one"
     )
 
 
