@@ -70,6 +70,8 @@ def own_arm(
     led = partial(LedArm, heel=heel, tip=tip, forward=forward)
     try:
         usual = led(own_spec(path), path.stem, limits)
+        expect_angles(usual.model)
+        usual.reset(_at_first(usual))
         firm = firm_impedance(usual)
         arm = led(own_spec(path), path.stem, limits, firm, others=others)
     except ValueError as error:
@@ -96,8 +98,12 @@ def own_spec(path: Path) -> mujoco.MjSpec:
     return spec
 
 
-def _expect_angles(model: mujoco.MjModel) -> None:
-    """Refuse joints whose position is not one number."""
+def expect_angles(model: mujoco.MjModel) -> None:
+    """Refuse joints whose position is not one number.
+
+    Raises:
+        ValueError: one is no hinge and no slide.
+    """
     kinds = set(model.jnt_type.tolist())
     if kinds - {int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE)}:
         raise ValueError("it has other joints than hinges and slides")
@@ -117,14 +123,9 @@ def firm_impedance(arm: LedArm) -> Impedance:
     3:43), and are critical.
 
     Args:
-        arm: The arm, alone in its model; it is moved to the configuration of its first keyframe.
-
-    Raises:
-        ValueError: a joint is no hinge and no slide.
+        arm: The arm, alone in its model, in a configuration in which it will work.
     """
-    _expect_angles(arm.model)
     model, data = arm.model, arm.data
-    arm.reset(_at_first(arm))
     site = model.site(EDGE).id
     position, rotation = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacSite(model, data, position, rotation, site)

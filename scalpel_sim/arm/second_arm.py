@@ -23,7 +23,7 @@ from scalpel_sim.arm.grasper import (
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.own_arm import firm_impedance, move_to_start, own_spec
+from scalpel_sim.arm.own_arm import expect_angles, firm_impedance, move_to_start, own_spec
 from scalpel_sim.arm.place_search import Spheres
 from scalpel_sim.arm.placement import Placement, covered, place_beside
 from scalpel_sim.errors import UsageError
@@ -121,14 +121,14 @@ def model_with_grasper(
     led = partial(LedArm, heel=GRASPER_HEEL, tip=GRASPER_TIP, forward=FORWARD)
     try:
         alone = led(spec_with_grasper(), path.stem, DeviceLimits())
-        firm = firm_impedance(alone)
-        spec = spec_with_grasper()
-        add_hand(spec, firm, GRASPER_HEEL, GRASPER_TIP, FORWARD)
+        expect_angles(alone.model)
     except ValueError as error:
         raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error
     half = 0.5 * PAD_LENGTH
     tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
     move_to_start(alone, motion.stroke(half, half), tissue_in_model)
+    spec = spec_with_grasper()
+    add_hand(spec, firm_impedance(alone), GRASPER_HEEL, GRASPER_TIP, FORWARD)
     qpos = np.array(alone.data.qpos)
     for side in ("low", "high"):
         joint = alone.model.joint(f"{GRASPER}jaw_{side}")
