@@ -71,7 +71,10 @@ def prepare(
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
         others = arms_with_graspers(scene.graspers, motions, bounds, frame, None)
-        standing_there = [*others, *_table_of(scene, bounds, frame)]
+        standing_there: list[HeldArm | Tabletop] = [
+            *others,
+            *_table_of(scene, bounds, frame),
+        ]
         if standing_there:
             start = np.array(arm.data.qpos)
             arm, _ = _own(scene.own_arm, standing_there)

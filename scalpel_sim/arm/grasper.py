@@ -110,7 +110,9 @@ class Grasper:
         name = prefix + GRASPER
         self.body = f"{name}shaft"
         """Name of the body that carries shaft and jaws."""
-        bodies = [model.body(name + part).id for part in _PARTS]
+        self.bodies = tuple(name + part for part in _PARTS)
+        """Names of all its bodies."""
+        bodies = [model.body(body).id for body in self.bodies]
         pinch = model.site(f"{name}pinch").id
         joints = [model.joint(f"{name}jaw_{side}") for side in ("low", "high")]
         servo = int(model.actuator_ctrladr[model.actuator(f"{name}jaws").id])

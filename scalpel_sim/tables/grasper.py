@@ -63,7 +63,7 @@ class GrasperTable(TomlTable, kw_only=True, frozen=True):
     holds: Annotated[Literal["attachment", "friction"], one_of("attachment", "friction")] = (
         "attachment"
     )
-    """Whether what the jaws close on is tied to them, or friction alone holds it."""
+    """Whether what the jaws close on is tied to them, or they touch it and friction holds it."""
     stiffness: Positive | None = None
     """Of that hold [N/m]."""
     damping: NotNegative | None = None

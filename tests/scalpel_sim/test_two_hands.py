@@ -1,5 +1,7 @@
 """Scenes of two hands: what must be true at their end, and that both arms reach and stay apart."""
 
+from dataclasses import replace
+
 import msgspec
 import numpy as np
 import pytest
@@ -92,6 +94,24 @@ def test_the_lump_is_what_the_arc_encloses_but_for_how_far_the_sheet_gives(excis
 )
 def test_hands_that_start_up_to_three_millimetres_away_do_it_too(scene, check):
     check(done(moved(scene, np.random.default_rng(1))))
+
+
+def test_a_lump_that_the_jaws_hold_by_friction_alone_is_cut_out_lifted_and_put_down_too():
+    (left,) = EXCISE.graspers
+    closing = [
+        msgspec.structs.replace(row, opening=0.0) if row.opening == 0.007 else row
+        for row in left.motion
+    ]
+    pinching = msgspec.structs.replace(
+        left, holds="friction", closed=None, force=0.5, motion=closing
+    )
+    simulation = done(replace(EXCISE, graspers=(pinching,)))
+    _, lump = pieces(simulation)
+    assert lump.centre[1] > 0.07 and abs(lump.centre[2] + 0.01) < 0.002
+    assert (simulation.recording.column("left_points") == 0.0).all()
+    energies = simulation.result.energies
+    lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
+    assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
 
 
 # What the hands feel

@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bridge import TissueFrame
+from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.grasper import (
     FORWARD,
     GRASPER_HEEL,
@@ -50,10 +51,10 @@ def rows(*given):
     return GraspMotion([Waypoint(t, (0.0, 0.0, z), UP, X, gap) for t, z, gap in given], "left")
 
 
-def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008)):
+def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008), force=None):
     """A grasper on a gantry, at the start of its motion."""
     spec = mujoco.MjSpec.from_string(GANTRY)
-    add_grasper(spec, "arm")
+    add_grasper(spec, "arm", force=force)
     add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
     model = spec.compile()
     data = mujoco.MjData(model)
@@ -66,24 +67,27 @@ def led(motion, tissue, frame=TissueFrame(), hold=Hold(closed=0.008)):
     return LedGrasper(grasper, data, motion, tissue, frame, hold)
 
 
-def run(hand, tissue, seconds):
-    """Do frames, and return the force on the grasper in each."""
-    data, forces = hand._data, []
+def run(hand, tissue, seconds, *others):
+    """Do frames with a grasper and other partners; return the force on the grasper in each."""
+    data, forces, partners = hand._data, [], [hand, *others]
     for _ in range(round(seconds / DT)):
         hand.lead(data.time)
         mujoco.mj_step1(data.model, data)
-        hand.follow()
+        for partner in partners:
+            partner.follow()
         tissue.step(None, DT)
-        hand.apply()
+        for partner in partners:
+            partner.apply()
         mujoco.mj_step2(data.model, data)
         forces.append(hand.wrench.force)
     return np.array(forces)
 
 
-def hanging(audit=False):
-    """A block around the axis, 30 mm high, in gravity, held by nothing."""
+def hanging(audit=False, gravity=-9.81):
+    """A block around the axis, 30 mm high, in gravity along z, held by nothing."""
     positions = BLOCK.positions - [0.003, 0.003, 0.0]
-    return Tissue(BLOCK._replace(positions=positions), GEL, solver=SolverSettings(audit=audit))
+    mesh, solver = BLOCK._replace(positions=positions), SolverSettings(audit=audit)
+    return Tissue(mesh, GEL, gravity=(0.0, 0.0, gravity), solver=solver)
 
 
 # Which points
@@ -185,11 +189,21 @@ def test_what_is_pulled_harder_than_it_is_held_slips_out():
     assert hand.n_points == 0 and np.abs(hand.wrench.force).max() < 1e-12
 
 
-def test_held_by_friction_alone_nothing_is_tied():
-    tissue = hanging()
-    hand = led(rows((0.0, 0.005, 0.007)), tissue, hold=None)
-    run(hand, tissue, 0.02)
+@pytest.mark.parametrize(("share", "holds"), [(3.0, True), (0.3, False)])
+def test_friction_holds_what_weighs_less_than_both_pads_press_times_its_coefficient(share, holds):
+    """Pads of friction 0.6: Coulomb. Gravity pulls the block out of the jaws, along the shaft."""
+    tissue = hanging(gravity=9.81)
+    weight = tissue.pieces()[0].mass * 9.81
+    force = share * weight / (2.0 * 0.6)
+    hand = led(rows((0.0, 0.005, 0.006), (0.01, 0.005, 0.0)), tissue, hold=None, force=force)
+    coupling = GeomCoupling(hand._data, tissue, hand.grasper.bodies)
+    forces = run(hand, tissue, 0.4, coupling)
     assert hand.n_points == 0
+    falls = tissue.pieces()[0].velocity[2] > 1.0
+    assert falls != holds
+    if holds:
+        assert forces[-100:].mean(axis=0) == pytest.approx([0.0, 0.0, weight], abs=0.1 * weight)
+        assert hand.grasper.opening == pytest.approx(0.006, rel=0.1)  # as wide as the block
 
 
 def test_a_turned_world_changes_nothing():
