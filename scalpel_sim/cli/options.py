@@ -13,15 +13,15 @@ from cyclopts import Group, Parameter
 SceneName = Annotated[
     str | None,
     Parameter(
-        help="organ (default), incision, retract, excise, a specimen of a material (liver, kidney, "
-        "skin, fat, muscle, gelatin, silicone), slab, grid2 or grid7; or a FILE.toml, which the "
-        "command `new` writes."
+        help="organ (default), incision, retract, excise, taut_incision, a specimen of a material "
+        "(liver, kidney, skin, fat, muscle, gelatin, silicone), slab, grid2 or grid7; or a "
+        "FILE.toml, which the command `new` writes."
     ),
 ]
 
 FigureNumber = Annotated[
-    Literal[10, 11, 12, "organ", "retract", "excise"],
-    Parameter(help="10, 11, 12, organ, retract or excise."),
+    Literal[10, 11, 12, "organ", "retract", "excise", "taut_incision"],
+    Parameter(help="10, 11, 12, organ, retract, excise or taut_incision."),
 ]
 
 Flag = Annotated[bool, Parameter(negative="", show_default=False)]

@@ -22,8 +22,8 @@ def figure(
 
     Figure 10: four frames of a cut through 4 x 6 x 4 cells. Figure 11: the mesh in the first and
     the last of them. Figure 12: arbitrary paths through 2 x 2 x 2 and 7 x 7 x 7 cells. organ: two
-    frames of a cut through the organ, which is the picture of the README. retract, excise: two
-    moments of the scene of that name, with both instruments.
+    frames of a cut through the organ, which is the picture of the README. retract, excise,
+    taut_incision: two moments of the scene of that name, with both instruments.
 
     For example:
 
@@ -32,7 +32,7 @@ def figure(
     ```
 
     Args:
-        number: 10, 11, 12, organ, retract or excise.
+        number: 10, 11, 12, organ, retract, excise or taut_incision.
         output: The file [default: figure10.png (11, ...) in this folder].
         scheme: How the mesh is cut: stellar, or paper for the paper's own scheme.
     """
@@ -53,7 +53,7 @@ def figure(
             say(f"cutting and drawing figure {number}: about half a minute")
         if number == "organ":
             drawn = draw_organ(path, scheme)
-        elif number == "retract" or number == "excise":
+        elif number == "retract" or number == "excise" or number == "taut_incision":
             drawn = draw_two_hands(number, path)
         else:
             drawn = draw_figure(number, path, scheme)

@@ -15,6 +15,7 @@ SHIPPED_SCENES = (
     "incision",
     "retract",
     "excise",
+    "taut_incision",
     "liver",
     "kidney",
     "skin",

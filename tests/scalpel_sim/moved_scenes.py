@@ -12,12 +12,15 @@ FARTHEST = 3e-3
 def moved(scene, rng):
     """Return a scene in which each hand does what it does at a place of its own, up to 3 mm away.
 
-    Each is moved as a whole, in a random direction: its start, and all that follows.
+    Each is moved as a whole, in a random direction: its start, and all that follows. A stroke that
+    is planned for the body stays.
     """
     graspers = [_moved_grasper(grasper, _way(rng)) for grasper in scene.graspers]
     by = _way(rng)
     strokes = [
         msgspec.structs.replace(stroke, points=[_moved(point, by) for point in stroke.points])
+        if stroke.points
+        else stroke
         for stroke in scene.strokes
     ]
     return replace(scene, graspers=tuple(graspers), strokes=tuple(strokes))
