@@ -43,6 +43,12 @@ def test_two_hands_stretch_a_bar_and_each_keeps_its_piece(run):
     assert (after, pieces, held) == (0.0, 2.0, [16.0, 16.0])
 
 
+def test_a_parallel_jaw_lifts_a_block_and_carries_its_weight(run):
+    way, carried = numbers(run("parallel_jaw.py"))
+    assert way == pytest.approx(20.0, abs=1.0)  # hand and tissue sag
+    assert carried == pytest.approx(0.05 * 9.81, rel=0.02)
+
+
 def test_an_attached_arm_cuts_a_block_in_two_with_a_force_set_by_toughness(run):
     peak, area, pieces = re.search(
         r"peak ([\d.]+) N, cut (\d+) mm2, (\d+) pieces", run("attach_mjcf.py")
