@@ -50,8 +50,8 @@ def validate(
         out: Folder for the report, its data and the plots; out/validate by default, with a case
             out/ and the name of its file.
         only: Only this scene; may be given several times. beam, stretch, steady,
-            symmetry, rate, slicing, puncture, spine, reaction, audit, coupling, liver, gel,
-            tension.
+            symmetry, rate, slicing, puncture, spine, reaction, contact, audit, coupling,
+            liver, incision, gel, tension.
         quick: A few checks of each scene, in a minute or two instead of seven.
     """
     if case is not None:

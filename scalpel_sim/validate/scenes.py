@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from scalpel_sim.errors import unknown
 from scalpel_sim.validate.audit import AUDIT_SCENE
 from scalpel_sim.validate.beam import BEAM_SCENE
+from scalpel_sim.validate.contact import CONTACT_SCENE
 from scalpel_sim.validate.coupling import COUPLING_SCENE
 from scalpel_sim.validate.findings import ValidationScene
 from scalpel_sim.validate.gel import GEL_SCENE
@@ -32,6 +33,7 @@ VALIDATION_SCENES: dict[str, ValidationScene] = {
         PUNCTURE_SCENE,
         SPINE_SCENE,
         REACTION_SCENE,
+        CONTACT_SCENE,
         AUDIT_SCENE,
         COUPLING_SCENE,
         LIVER_SCENE,
