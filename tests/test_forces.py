@@ -12,11 +12,11 @@ from tests.bodies import sides
 from tests.materials import SPRINGS
 from tissue import (
     MATERIALS,
-    BladeContacts,
     BladeSegment,
     BladeShape,
     BladeSweep,
     Material,
+    RigidContacts,
     SolverSettings,
     TetrahedralMesh,
     Tissue,
@@ -58,7 +58,7 @@ def mirrored(cells):
 
 def with_own_contacts(result):
     """Return a result whose contacts are copies: they are views until the next step."""
-    return result._replace(contacts=BladeContacts(*map(np.copy, result.contacts)))
+    return result._replace(contacts=RigidContacts(*map(np.copy, result.contacts)))
 
 
 class Run:

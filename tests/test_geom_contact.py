@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tissue import Geom, Material, SolverSettings, Tissue, TissueError, block, fixed_nodes
+from tissue import (
+    BladeSegment,
+    BladeSweep,
+    Geom,
+    Material,
+    SolverSettings,
+    Tissue,
+    TissueError,
+    block,
+    fixed_nodes,
+)
 
 DT = 1e-3
 GEL = Material(
@@ -91,6 +101,35 @@ def test_the_torque_on_a_geom_is_the_moment_of_its_contacts():
     found = touch.forces()
     moment = np.cross(found.point, -found.force).sum(axis=0)
     assert touch.wrench(0).torque == pytest.approx(moment, abs=1e-7)
+
+
+def test_a_step_reports_the_force_of_each_contact_with_the_number_of_its_geom():
+    tissue = brick(gravity=(0.0, 0.0, 0.0), fixed="back")
+    pads = [Geom("a", "box", (0.003, 0.012, 0.008), 0.5), Geom("b", "sphere", (0.01,), 0.3)]
+    touch = tissue.collide_with(pads, [[-0.0031, 0.014, 0.011], [0.0501, 0.016, 0.011]])
+    blade = [edge_at(-0.003 + 1e-4 * k) for k in range(61)]
+    for k, sweep in enumerate(map(BladeSweep, blade, blade[1:])):
+        touch.move([[-0.0031 + 2e-5 * k, 0.014, 0.011], [0.0501 - 2e-5 * k, 0.016, 0.011]])
+        result = tissue.step(sweep, DT)
+    contacts = result.contacts
+    force = contacts.normal_force[:, None] * contacts.normal + contacts.friction
+    for geom, on_geom in enumerate(touch.wrenches()[0]):
+        mine = contacts.geom == geom
+        assert mine.any() and not contacts.cut_area[mine].any()
+        assert force[mine].sum(axis=0) == pytest.approx(-on_geom, abs=1e-12)
+    assert np.einsum("ni,ni->n", contacts.friction, contacts.normal) == pytest.approx(0, abs=1e-12)
+    of_blade = contacts.of_blade
+    assert len(of_blade.geom) > 2 and (of_blade.geom == -1).all()
+    assert len(of_blade.geom) == (contacts.geom == -1).sum()
+    assert (-force[contacts.geom == -1]).sum(axis=0) == pytest.approx(
+        result.wrench_t1.force, abs=1e-12
+    )
+
+
+def edge_at(y):
+    """An upright edge through the middle of the brick."""
+    ends = np.array([[0.0213, y, -0.01], [0.0213, y, 0.03]])
+    return BladeSegment(*ends, np.array([0.0, 1.0, 0.0]))
 
 
 def test_the_work_of_a_drop_is_accounted_for():

@@ -46,13 +46,13 @@ from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
-from .types import BladeContacts as BladeContacts
 from .types import BladeSegment as BladeSegment
 from .types import BladeSweep as BladeSweep
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
 from .types import Energies as Energies
 from .types import Piece as Piece
+from .types import RigidContacts as RigidContacts
 from .types import SchemeStatistics as SchemeStatistics
 from .types import Snapshot as Snapshot
 from .types import StageTimes as StageTimes
@@ -63,7 +63,6 @@ from .types import TissueError as TissueError
 from .types import Wrench as Wrench
 
 __all__ = [
-    "BladeContacts",
     "BladeSegment",
     "BladeShape",
     "BladeSweep",
@@ -94,6 +93,7 @@ __all__ = [
     "Piece",
     "Preset",
     "SameTypes",
+    "RigidContacts",
     "SchemeStatistics",
     "Snapshot",
     "SolverSettings",

@@ -322,6 +322,7 @@ class Tissue(DrivenBody):
         amounts, change = report.amounts, incision.scheme.change
         return LazyResult.of(
             report,
+            system.geoms if system.geoms.act else None,
             int(amounts.n_tetrahedra),
             int(amounts.n_nodes),
             incision.scheme.n_active,

@@ -125,25 +125,31 @@ def _arrays_of(vectors: Any) -> list[FloatArray]:
     return arrays
 
 
-class BladeContacts(NamedTuple):
-    """Where the blade acts on the tissue at the end of a step. Views, valid until the next step.
+class RigidContacts(NamedTuple):
+    """Where the blade and rigid geoms act on the tissue. Valid until the next step.
 
     First the samples of the edge that hold tissue, then the points of the tissue that touch the
-    faces of the blade.
+    faces of the blade: views, at the end of the step. Then contacts with geoms, averaged over it.
     """
 
     point: FloatArray
     """Points of contact [m], shape (n, 3)."""
     normal: FloatArray
-    """Unit normals out of the blade into the tissue, shape (n, 3): forward at samples of the edge,
-    out of the face at other points."""
+    """Unit normals into the tissue, shape (n, 3): forward at the edge, else out of the face."""
     normal_force: FloatArray
-    """Force of the blade on the tissue along the normal [N], shape (n,)."""
+    """Force on the tissue along the normal [N], shape (n,)."""
     friction: FloatArray
-    """Tangential force of the blade on the tissue [N], shape (n, 3): friction, and at the edge also
-    the elastic forces sideways and along it."""
+    """Force on it across the normal [N], shape (n, 3): friction; at the edge also elastic force."""
     cut_area: FloatArray
     """Area that each sample of the edge has cut in this step [m2], 0 for others; shape (n,)."""
+    geom: IntArray
+    """Number of the geom in the order of `Tissue.collide_with`, -1 for the blade; shape (n,)."""
+
+    @property
+    def of_blade(self) -> "RigidContacts":
+        """Those of the blade."""
+        n = int(np.searchsorted(self.geom, 0))
+        return self if n == len(self.geom) else RigidContacts._make(each[:n] for each in self)
 
 
 N_WORKS = 3
@@ -234,8 +240,8 @@ class StepResult(NamedTuple):
     """Stiffness of the contacts of blade and tissue while the tissue itself stands still, shape (6,
     6), symmetric and positive. A small displacement [m] and rotation [rad] of the blade about the
     point change `wrench_t1` by -stiffness times them. For slower motion it is an upper bound."""
-    contacts: BladeContacts
-    """Where the blade acts on the tissue at the end of the step."""
+    contacts: RigidContacts
+    """Where blade and rigid geoms act on the tissue."""
     force_on_tissue: FloatArray
     """Sum of the forces on the tissue's nodes that the blade exerts [N], shape (3,)."""
     bounds: FloatArray

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridge.frames import wrench_about
 from bridge.poses import motion
-from tissue import BladeContacts, BladeSegment, FloatArray, StepResult, Wrench
+from tissue import BladeSegment, FloatArray, RigidContacts, StepResult, Wrench
 
 MAX_FRAMES_PER_ANSWER = 100
 """Largest number of frames between two answers. With fewer answers the hand would move by
@@ -75,7 +75,7 @@ class LocalModel:
         self._pose = pose
         self._wrench = wrench
         self._stiffness = result.stiffness.copy()  # a view, valid until the next step
-        self._push = _one_sided_push(result.contacts)
+        self._push = _one_sided_push(result.contacts.of_blade)
         self._has_left = False
 
     def wrench(self, pose: BladeSegment) -> FloatArray:
@@ -106,7 +106,7 @@ class LocalModel:
         return min(max(float((self._wrench - wrench)[:3] @ whole) / square, 0.0), 1.0)
 
 
-def _one_sided_push(contacts: BladeContacts) -> FloatArray:
+def _one_sided_push(contacts: RigidContacts) -> FloatArray:
     """Return the sum of the normal forces on the blade [N], shape (3,), if they push to one side.
 
     Zero without contacts, and where they push from more than one side: such contacts hold the blade

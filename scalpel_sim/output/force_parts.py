@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tissue import BladeContacts, FloatArray, kernel
+from tissue import FloatArray, RigidContacts, kernel
 
 EDGE_COSINE = 0.9
 """Cosine of the angle between a contact's normal and the blade's forward direction above which the
@@ -23,11 +23,11 @@ class ForceParts(NamedTuple):
     """Friction along the faces of the blade [N], shape (3,)."""
 
 
-def force_parts(contacts: BladeContacts, forward: FloatArray) -> ForceParts:
+def force_parts(contacts: RigidContacts, forward: FloatArray) -> ForceParts:
     """Return the parts of the force that these contacts add up to.
 
     Args:
-        contacts: Contacts of one step.
+        contacts: Contacts of the blade in one step.
         forward: Unit vector in which the blade cuts at the end of the step, in the frame of the
             contacts; shape (3,).
     """
@@ -47,9 +47,9 @@ def add_up(
     """Write `ForceParts`, one vector after the other, contact by contact.
 
     Args:
-        normal: See `BladeContacts`.
-        normal_force: See `BladeContacts`.
-        friction: See `BladeContacts`.
+        normal: See `RigidContacts`.
+        normal_force: See `RigidContacts`.
+        friction: See `RigidContacts`.
         forward: Unit vector in which the blade cuts.
         parts: The first nine numbers are written [N].
     """

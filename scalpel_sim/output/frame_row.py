@@ -76,7 +76,7 @@ class FrameRows:
 
     def _columns_at_blade(self, result: StepResult, blade: BladeSegment) -> list[float]:
         """Return the parts of the force [N], and the stiffness against displacement [N/m]."""
-        frame, contacts, columns = self._frame, result.contacts, self._at_blade
+        frame, contacts, columns = self._frame, result.contacts.of_blade, self._at_blade
         if frame.is_rotated:
             parts = force_parts(contacts, frame.vectors_to_tissue(blade.forward))
             columns[:9] = frame.vectors_to_world(np.array(parts)).ravel()

@@ -65,7 +65,7 @@ def _balance(tissue: Tissue, poses: list[BladeSegment]) -> Balance:
     size = (tissue.n_nodes, tissue.n_tetrahedra, 0.0)
     for t0, t1 in itertools.pairwise(poses):
         result = tissue.step(BladeSweep(t0, t1), _DT)
-        wrench, contacts = result.wrench, result.contacts
+        wrench, contacts = result.wrench, result.contacts.of_blade
         torque = wrench.torque + np.cross(wrench.point, wrench.force)
         before, momenta = momenta, _momenta(tissue)
         momentum_rate, angular_rate = (

@@ -13,7 +13,7 @@ def readings(simulation: Simulation) -> Readings | None:
     wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
     if result is None:
         return None
-    contacts = result.contacts
+    contacts = result.contacts.of_blade
     on_tissue = contacts.normal_force[:, None] * contacts.normal + contacts.friction
     forward = frame.vectors_to_tissue(simulation.arm.blade.segment().forward)
     return Readings(

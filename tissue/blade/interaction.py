@@ -37,7 +37,7 @@ from tissue.mesh.changes import Change
 from tissue.mesh.moved_nodes import Moved, forget_moved
 from tissue.mesh.star import Visits
 from tissue.mesh.tetrahedron_grid import build_grid, no_grid
-from tissue.types import BladeContacts
+from tissue.types import RigidContacts
 
 SAMPLES_PER_NODE_SIZE = 6.0
 """Samples of the cutting edge per mean node size. Fewer make the force ripple where the edge
@@ -93,7 +93,7 @@ class BladeInteraction:
     def _renew_report(self) -> None:
         """Make a report with room for all contacts that the blade may have."""
         self._report = new_report(self.state, self._n_strands)
-        self._views: dict[int, BladeContacts] = {}
+        self._views: dict[int, RigidContacts] = {}
 
     def make_room_for_strands(self, n: int) -> None:
         """Make room for that many contacts with strands."""

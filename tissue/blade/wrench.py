@@ -33,7 +33,7 @@ from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
-from tissue.types import BladeContacts, Wrench
+from tissue.types import RigidContacts, Wrench
 
 
 class WrenchReport(Arrays):
@@ -119,8 +119,8 @@ class BladeReport(NamedTuple):
     """Mean wrench of the tissue on the blade in the time step, about the tip."""
     stiffness: FloatArray
     """Change of the wrench at the end of the step with the pose of the blade, shape (6, 6)."""
-    contacts: BladeContacts
-    """The contacts at the end of the step; views of the report, which the next step overwrites."""
+    contacts: RigidContacts
+    """The blade's contacts at the end of the step; views of the report, which the next changes."""
     bounds: FloatArray
     """Lowest and highest corner of a box around the tissue [m], shape (2, 3)."""
     amounts: Amounts
@@ -140,7 +140,7 @@ class BladeReport(NamedTuple):
         return np.array(self.plain[15:18])
 
 
-def blade_report(report: WrenchReport, views: dict[int, BladeContacts]) -> BladeReport:
+def blade_report(report: WrenchReport, views: dict[int, RigidContacts]) -> BladeReport:
     """Return a copy of what was reported last.
 
     `views`: views of the first contacts of the report by their number, as far as they were made.
@@ -161,14 +161,15 @@ def blade_report(report: WrenchReport, views: dict[int, BladeContacts]) -> Blade
     )
 
 
-def contacts_of(report: WrenchReport, n: int) -> BladeContacts:
+def contacts_of(report: WrenchReport, n: int) -> RigidContacts:
     """Return views of the first `n` contacts of a report."""
-    return BladeContacts(
+    return RigidContacts(
         report.point[:n],
         report.normal[:n],
         report.normal_force[:n],
         report.friction[:n],
         report.cut_area[:n],
+        np.full(n, -1),
     )
 
 

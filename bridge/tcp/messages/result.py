@@ -9,15 +9,23 @@ from bridge.led_frames import FrameLoad
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.messages.led_frames import LOAD_BYTES, MAX_FRAMES, pack_loads, unpack_loads
 from bridge.tcp.wire import MessageError
-from tissue import BladeContacts, BodyContacts, Energies, FloatArray, StageTimes, StepResult, Wrench
+from tissue import (
+    BodyContacts,
+    Energies,
+    FloatArray,
+    RigidContacts,
+    StageTimes,
+    StepResult,
+    Wrench,
+)
 
 MAX_CONTACTS = 1 << 16
-"""Largest number of contacts of the blade: a thousand times that of a scalpel in an organ."""
+"""Largest number of contacts of blade and geoms: a thousand times that of a scalpel in an organ."""
 
 _HEAD = struct.Struct("<9q10d")
 _N_FIXED = 9 + 9 + 36 + 3 + 6 + 3
 """Number of floats in the arrays of fixed length."""
-_N_PER_CONTACT = 3 + 3 + 1 + 3 + 1
+_N_PER_CONTACT = 3 + 3 + 1 + 3 + 1 + 1
 """Number of floats of a contact."""
 _N_ENERGIES = len(Energies._fields)
 LARGEST_RESULT = (
@@ -68,6 +76,7 @@ def pack_result(result: StepResult, loads: Sequence[FrameLoad] = ()) -> bytes:
             contacts.normal_force,
             contacts.friction.ravel(),
             contacts.cut_area,
+            contacts.geom,
             energies or (),
         ),
         dtype="<f8",
@@ -98,8 +107,8 @@ def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
         raise MessageError(f"{n_substeps} substeps and {n_touching} contacts; wanted 0 or more")
     if not (0 <= n <= MAX_CONTACTS and audited in (0, 1) and 0 <= n_frames <= MAX_FRAMES):
         raise MessageError(
-            f"{n} contacts of the blade (at most {MAX_CONTACTS}), audit flag {audited} (0 or 1), "
-            f"{n_frames} frames (at most {MAX_FRAMES})"
+            f"{n} contacts of blade and geoms (at most {MAX_CONTACTS}), audit flag {audited} "
+            f"(0 or 1), {n_frames} frames (at most {MAX_FRAMES})"
         )
     n_floats = _N_FIXED + _N_PER_CONTACT * n + _N_ENERGIES * audited
     of_frames = _HEAD.size + 8 * n_floats
@@ -133,12 +142,23 @@ def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
     return result, loads
 
 
-def _contacts(floats: FloatArray, n: int) -> BladeContacts:
-    """Return the contacts whose floats follow one another by quantity."""
-    return BladeContacts(
+def _contacts(floats: FloatArray, n: int) -> RigidContacts:
+    """Return the contacts whose floats follow one another by quantity.
+
+    Raises:
+        MessageError: the number of a geom is none.
+    """
+    geom = floats[11 * n :]
+    if not ((geom >= -1) & (geom < MAX_CONTACTS) & (geom == np.floor(geom))).all():
+        raise MessageError(
+            f"the geoms of contacts are {geom.tolist()}; wanted whole numbers from -1 to "
+            f"{MAX_CONTACTS - 1}"
+        )
+    return RigidContacts(
         point=floats[: 3 * n].reshape(n, 3),
         normal=floats[3 * n : 6 * n].reshape(n, 3),
         normal_force=floats[6 * n : 7 * n],
         friction=floats[7 * n : 10 * n].reshape(n, 3),
-        cut_area=floats[10 * n :],
+        cut_area=floats[10 * n : 11 * n],
+        geom=geom.astype(np.int64),
     )

@@ -4,13 +4,13 @@ import numpy as np
 
 from bridge.link import TissueDescription
 from tissue import (
-    BladeContacts,
     BladeSegment,
     BladeSweep,
     BodyContacts,
     Chunks,
     FloatArray,
     Material,
+    RigidContacts,
     StageTimes,
     StepResult,
     Wrench,
@@ -72,12 +72,13 @@ class Wall:
             wrench=wrench,
             wrench_t1=self._wrench(forces_t1, lever, sweep.t1.tip),
             stiffness=self._reported * each * touching.T @ touching,
-            contacts=BladeContacts(
+            contacts=RigidContacts(
                 point=end[depth_t1 > 0.0],
                 normal=np.tile(-self._normal, (n, 1)),
                 normal_force=forces_t1[depth_t1 > 0.0],
                 friction=np.zeros((n, 3)),
                 cut_area=np.zeros(n),
+                geom=np.full(n, -1),
             ),
             force_on_tissue=-wrench.force,
             bounds=self.describe().bounds,

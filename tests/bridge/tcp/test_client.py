@@ -28,7 +28,7 @@ from tests.bridge.tcp.bare_sockets import (
     read_all,
 )
 from tests.bridge.tcp.serve_block import block_tissue as make_block
-from tissue import BladeContacts, BladeSegment, BladeSweep
+from tissue import BladeSegment, BladeSweep, RigidContacts
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def cut(link, upright):
     for i in range(250):
         bridge.step(upright(0.009, -0.002 + 0.05 * DT * i), DT)
         result = bridge.result._replace(stage_times=None)
-        results.append(result._replace(contacts=BladeContacts(*map(np.copy, result.contacts))))
+        results.append(result._replace(contacts=RigidContacts(*map(np.copy, result.contacts))))
     return results
 
 

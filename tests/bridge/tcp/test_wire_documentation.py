@@ -15,7 +15,7 @@ from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, S
 from bridge.tcp.server import MAX_CONNECTIONS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.tcp.serve_block import block_tissue
-from tissue import BladeContacts, Energies
+from tissue import Energies, RigidContacts
 
 DOCS = Path(__file__).parents[3] / "docs"
 WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
@@ -71,7 +71,8 @@ def test_the_limits_are_those_of_the_server():
 
 def test_the_numbers_of_a_result_are_where_the_table_says():
     random, n = np.random.default_rng(0), 3
-    contacts = BladeContacts(*(random.random(shape) for shape in ((n, 3), (n, 3), n, (n, 3), n)))
+    shapes = ((n, 3), (n, 3), n, (n, 3), n)
+    contacts = RigidContacts(*map(random.random, shapes), geom=np.arange(n) - 1)
     result = (
         block_tissue().step(None, 1e-3)._replace(contacts=contacts, energies=Energies(*range(14)))
     )
@@ -106,7 +107,7 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
         "force on the tissue": result.force_on_tissue,
         "lowest and highest corner of the body": result.bounds.ravel(),
         "force of the floor on the body": result.body_contacts.force_of_floor,
-        "contacts of the blade": np.concatenate([array.ravel() for array in contacts]),
+        "contacts of blade and geoms": np.concatenate([array.ravel() for array in contacts]),
         "energies where the server audits them": np.arange(14.0),
     }
     assert set(found) == set(expected)

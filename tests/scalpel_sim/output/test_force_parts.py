@@ -5,19 +5,20 @@ from scalpel_sim import SCALPEL, SCENES, Simulation, prepare
 from scalpel_sim.output.force_parts import EDGE_COSINE, force_parts
 from scalpel_sim.output.recording import COLUMNS
 from scalpel_sim.scene_parts.scene import changed
-from tissue import BladeContacts
+from tissue import RigidContacts
 
 FORWARD = np.array([0.0, 1.0, 0.0])
 
 
 def test_the_parts_are_the_force_of_the_edge_the_pressure_on_the_faces_and_friction():
     """A sample of the edge resists with 2 N; faces are pressed by 3 N, one has friction of 1 N."""
-    contacts = BladeContacts(
+    contacts = RigidContacts(
         point=np.zeros((3, 3)),
         normal=np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]),
         normal_force=np.array([2.0, 3.0, 3.0]),
         friction=np.array([[0.5, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]),
         cut_area=np.zeros(3),
+        geom=np.full(3, -1),
     )
     parts = force_parts(contacts, FORWARD)
     assert parts.edge == pytest.approx([-0.5, -2.0, 0.0])
@@ -27,7 +28,8 @@ def test_the_parts_are_the_force_of_the_edge_the_pressure_on_the_faces_and_frict
 
 def test_the_face_of_the_steepest_bevel_does_not_count_as_edge():
     steep = np.array([[0.5, np.sin(np.radians(60.0)), 0.0]])
-    contacts = BladeContacts(np.zeros((1, 3)), steep, np.ones(1), np.zeros((1, 3)), np.zeros(1))
+    none, zero = np.zeros((1, 3)), np.zeros(1)
+    contacts = RigidContacts(none, steep, np.ones(1), none, zero, np.full(1, -1))
     assert not force_parts(contacts, FORWARD).edge.any()
 
 
@@ -38,8 +40,8 @@ def test_the_parts_are_the_sums_of_numpy(n):
     normal = rng.normal(size=(n, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     normal[::2] = FORWARD
-    contacts = BladeContacts(
-        np.zeros((n, 3)), normal, rng.normal(size=n), normal + 1.0, np.zeros(n)
+    contacts = RigidContacts(
+        np.zeros((n, 3)), normal, rng.normal(size=n), normal + 1.0, np.zeros(n), np.full(n, -1)
     )
     pressing = contacts.normal_force[:, None] * normal
     is_edge = normal @ FORWARD > EDGE_COSINE

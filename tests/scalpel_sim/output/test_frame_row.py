@@ -9,7 +9,7 @@ from bridge import TissueFrame
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.output.recording import COLUMNS
-from tissue import BladeContacts, BladeSegment, Wrench
+from tissue import BladeSegment, RigidContacts, Wrench
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 FRAMES = {
@@ -23,8 +23,13 @@ def result_of(rng, n):
     """Return what a row takes of a step with `n` contacts."""
     normal = rng.normal(size=(n, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    contacts = BladeContacts(
-        np.zeros((n, 3)), normal, rng.normal(size=n), rng.normal(size=(n, 3)), np.zeros(n)
+    contacts = RigidContacts(
+        np.zeros((n, 3)),
+        normal,
+        rng.normal(size=n),
+        rng.normal(size=(n, 3)),
+        np.zeros(n),
+        np.full(n, -1),
     )
     half = rng.normal(size=(6, 6))
     return SimpleNamespace(

@@ -40,7 +40,7 @@ from tissue.core.jit import SameTypes, kernel
 from tissue.core.vec3 import vec3
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import Change
-from tissue.types import Wrench
+from tissue.types import RigidContacts, Wrench
 
 CONTACTS_AT_FIRST = 64
 """Contacts that there is room for at first."""
@@ -247,6 +247,13 @@ class GeomContact:
             arrays.normal[rows],
             arrays.impulse[rows] / seconds,
         )
+
+    def contacts(self) -> RigidContacts:
+        """Return the same contacts as rows of `StepResult.contacts`."""
+        geom, point, normal, force = self.forces()
+        press = np.einsum("ni,ni->n", force, normal)
+        friction = force - press[:, None] * normal
+        return RigidContacts(point, normal, press, friction, np.zeros(len(geom)), geom)
 
     def mesh_changed(self, body: Body, change: Change) -> None:
         """Take the faces that a pass of a cut made."""

@@ -9,7 +9,7 @@ from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
 from tests.bridge.tcp.serve_block import block_tissue
-from tissue import BladeContacts, BodyContacts, Energies, StageTimes, StepResult, Wrench
+from tissue import BodyContacts, Energies, RigidContacts, StageTimes, StepResult, Wrench
 
 any_float = st.floats(allow_nan=True, allow_infinity=True)
 
@@ -32,12 +32,13 @@ def results(draw):
         wrench=Wrench(*vectors[:3]),
         wrench_t1=Wrench(*draw(rows(3, any_float))),
         stiffness=draw(rows(12, any_float)).reshape(6, 6),
-        contacts=BladeContacts(
+        contacts=RigidContacts(
             draw(rows(n_contacts, any_float)),
             draw(rows(n_contacts, any_float)),
             draw(rows(n_contacts, any_float))[:, 0],
             draw(rows(n_contacts, any_float)),
             draw(rows(n_contacts, any_float))[:, 1],
+            np.arange(n_contacts) - 1,
         ),
         force_on_tissue=vectors[3],
         bounds=vectors[4:6],
@@ -82,7 +83,7 @@ def test_a_result_with_impossible_counts_is_refused(change, why):
     )
     body_contacts = BodyContacts(0, 0.0, 0.0, zeros)
     none = np.zeros((0, 3))
-    contacts = BladeContacts(none, none, np.zeros(0), none, np.zeros(0))
+    contacts = RigidContacts(none, none, np.zeros(0), none, np.zeros(0), np.zeros(0, int))
     at_t1 = (wrench, np.zeros((6, 6)), contacts)
     counts_and_floats = (3, 6, 1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 1)
     good = StepResult(
@@ -94,13 +95,26 @@ def test_a_result_with_impossible_counts_is_refused(change, why):
 
 @pytest.mark.parametrize(
     ("place", "value", "why"),
-    [(6, -1, "-1 contacts of the blade"), (6, 2**16 + 1, "65537 contacts"), (7, 2, "audit flag 2")],
+    [
+        (6, -1, "-1 contacts of blade and geoms"),
+        (6, 2**16 + 1, "65537 contacts"),
+        (7, 2, "audit flag 2"),
+    ],
 )
-def test_a_result_with_an_impossible_number_of_blade_contacts_is_refused(place, value, why):
+def test_a_result_with_an_impossible_number_of_contacts_is_refused(place, value, why):
     packed = bytearray(pack_result(block_tissue().step(None, 1e-3)))
     struct.pack_into("<q", packed, 8 * place, value)
     with pytest.raises(MessageError, match=why):
         unpack_result(bytes(packed))
+
+
+@pytest.mark.parametrize("geom", [-2.0, 0.5, float("nan"), float("inf")])
+def test_a_contact_with_an_impossible_number_of_a_geom_is_refused(geom):
+    one = (np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 3)), np.zeros(1))
+    contacts = RigidContacts(*one, np.array([geom]))
+    result = block_tissue().step(None, 1e-3)._replace(contacts=contacts)
+    with pytest.raises(MessageError, match="geoms of contacts are"):
+        unpack_result(pack_result(result))
 
 
 def test_a_result_without_its_last_number_is_refused():
