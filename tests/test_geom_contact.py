@@ -60,6 +60,20 @@ def test_what_rests_on_a_table_presses_with_its_weight(relaxation, contact):
     assert tissue.bounds[0, 2] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("relaxation", ["global", "verlet"])
+@pytest.mark.parametrize("thickness", [0.01, 0.02])
+def test_what_rests_on_a_table_does_not_begin_to_tremble(relaxation, thickness):
+    gel = Material(law="neo_hookean", young_modulus=50e3, poisson_ratio=0.0, viscous_damping=0.0)
+    tissue = Tissue(
+        block((4, 3, 2), (0.04, 0.03, thickness)), gel, solver=SolverSettings(relaxation=relaxation)
+    )
+    tissue.collide_with([TABLE])
+    tissue.settle()
+    for _ in range(1500):
+        tissue.step(None, DT)
+    assert np.abs(tissue.snapshot().velocities).max() < 1e-6
+
+
 @pytest.mark.parametrize(("degrees", "slides"), [(26.565 - 1.0, False), (26.565 + 1.0, True)])
 def test_a_block_slips_at_the_angle_whose_tangent_is_the_friction(degrees, slides):
     tissue, _ = on_incline(degrees)

@@ -13,7 +13,7 @@ z = np.array([-0.02, 0.04])
 places = [[[0.018, y, height] for height in z] for y in (-0.02, 0.05)]
 tissue.incise(places, forward=(0.0, 1.0, 0.0))
 
-for _ in range(1000):  # one second
+for _ in range(2000):  # two seconds
     result = tissue.step(None, 1e-3)
 
 held, loose = sorted(tissue.pieces(), key=lambda piece: not piece.is_held)

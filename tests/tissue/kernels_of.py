@@ -8,6 +8,7 @@ import numpy as np
 from tissue import BoolArray, FloatArray, Material, TetrahedralMesh
 from tissue.blade.anchors import Anchors, new_anchors
 from tissue.blade.blade_state import BladeState, new_blade_state
+from tissue.contact.geoms.geom_contact import no_geoms
 from tissue.contact.penalty.contact_forces import new_penalty_forces
 from tissue.contact.self_contact import SelfContact
 from tissue.core.thread_team import new_team
@@ -146,6 +147,7 @@ class Network(NamedTuple):
             elastic=elastic_of(self.springs),
             blade=self.blade,
             contacts=new_penalty_forces(0, 0.0, 0.0),
+            geoms=no_geoms(self.body, 1.0).arrays,
             surroundings=self.surroundings,
             damping=Damping(
                 interval=1,
