@@ -42,7 +42,7 @@ def ends_right(name: str, simulation: Simulation, asked: float) -> bool:
     most = simulation.recording.column("left_points").max()
     if name == "taut_incision":
         opened = float(simulation.recording.column("cut_area_m2")[-1])
-        return held == [True] and most > 100 and opened > LEAST_OPENED * asked
+        return held == [True] and most > 0 and opened > LEAST_OPENED * asked
     if held != [True, False]:
         return False
     off = pieces[1]
