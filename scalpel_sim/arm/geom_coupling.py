@@ -9,6 +9,7 @@ import numpy as np
 from bridge import NearGeoms, TissueFrame
 from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from scalpel_sim.arm.collision_geoms import WORLD
+from scalpel_sim.arm.model_bodies import body_number
 from tissue import FloatArray, Geom, GeomContact, IntArray, Tissue, Wrench
 
 _SHAPES: dict[int, tuple[str, int]] = {
@@ -75,11 +76,11 @@ class GeomCoupling:
         model: mujoco.MjModel = data.model
         self._data, self._frame, self._tissue = data, frame, tissue
         if bodies is None:
-            left_out = {_body_id(model, name) for name in without}
+            left_out = {body_number(model, name, GeomCouplingError) for name in without}
             chosen = [i for i in range(model.nbody) if i not in left_out]
             chosen = [i for i in chosen if int(model.body_mocapid[i]) < 0]  # a hand is not solid
         else:
-            chosen = [_body_id(model, name) for name in bodies]
+            chosen = [body_number(model, name, GeomCouplingError) for name in bodies]
         found = {body: _geoms_of_body(model, body) for body in chosen}
         if bodies is not None:
             for body, ids in found.items():
@@ -127,16 +128,17 @@ class GeomCoupling:
         self._data.xfrc_applied += now - self._of_tissue
         self._of_tissue = now
 
-    def wrench(self, body: str | int) -> Wrench:
+    def wrench(self, body: str) -> Wrench:
         """Return the wrench of the tissue on a body in the last step, about its origin, world.
-
-        Args:
-            body: Its name, or MuJoCo's number.
 
         Raises:
             GeomCouplingError: the model has no such body.
         """
-        number = _body_id(self._data.model, body) if isinstance(body, str) else body
+        number = (
+            body_number(self._data.model, body, GeomCouplingError)
+            if isinstance(body, str)
+            else body
+        )
         return self._wrench_on(number, *self.contact.wrenches())
 
     def forces(self) -> GeomForceList:
@@ -164,20 +166,6 @@ class GeomCoupling:
         places = self._data.geom_xpos[self.geom_ids]
         axes = self._data.geom_xmat[self.geom_ids].reshape(-1, 3, 3)
         return self._frame.points_to_tissue(places), self._frame.rotation.T @ axes
-
-
-def _body_id(model: mujoco.MjModel, name: str) -> int:
-    """Return MuJoCo's number of a body.
-
-    Raises:
-        GeomCouplingError: there is no such body.
-    """
-    number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name))
-    if number < 0:
-        names = [model.body(i).name for i in range(model.nbody)]
-        there = ", ".join(f"'{each}'" for each in names if each)
-        raise GeomCouplingError(f"the model has no body '{name}'. It has: {there}")
-    return number
 
 
 def _geoms_of_body(model: mujoco.MjModel, body: int) -> list[int]:

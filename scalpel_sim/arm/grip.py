@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from bridge import Bridge, LedGrip, TissueFrame
 from scalpel_sim.arm.body_wrench import about_centre_of_mass
+from scalpel_sim.arm.model_bodies import body_number
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
 
@@ -49,12 +50,7 @@ class Grip:
         damping: float = 0.0,
         breaks_at: float = math.inf,
     ) -> None:
-        model: mujoco.MjModel = data.model
-        body_id = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body)
-        if body_id < 0:
-            names = [model.body(i).name for i in range(1, model.nbody)]
-            there = ", ".join(f"'{name}'" for name in names if name) or "none with a name"
-            raise GripError(f"the model has no body '{body}'. It has: {there}")
+        body_id = body_number(data.model, body, GripError)
         self._frame = frame = tissue.frame if isinstance(tissue, Bridge) else frame
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._position = data.xpos[body_id]

@@ -91,7 +91,10 @@ def test_a_command_has_an_example(command):
 @pytest.mark.parametrize("example", examples())
 def test_an_example_is_a_command(example):
     """It has all that it needs, and no option that there is not."""
-    app.parse_args(shlex.split(example), exit_on_error=False, print_error=False)
+    words = shlex.split(example)
+    command, *_ = app.parse_args(words, exit_on_error=False, print_error=False)
+    _, parts, _ = app.parse_commands(words)
+    assert command is parts[-1].default_command
 
 
 def test_there_is_no_seed_because_nothing_is_random():

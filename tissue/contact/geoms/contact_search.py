@@ -12,13 +12,12 @@ from tissue.contact.geoms.contact_impulses import note_velocities, weighted
 from tissue.contact.geoms.deepest_point import Deepest, deepest_point, is_flat_at
 from tissue.contact.geoms.geom import PLANE
 from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts, Geoms
-from tissue.contact.geoms.geom_motion import place_geoms
+from tissue.contact.geoms.geom_motion import place_geoms, way_of
 from tissue.contact.geoms.near_nodes import (
     GeomSearch,
     find_near_faces,
     find_near_nodes,
     reach_of,
-    way_of,
 )
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.jit import kernel

@@ -13,8 +13,7 @@ CAPSULE: Final = 2
 CYLINDER: Final = 3
 ELLIPSOID: Final = 4
 BOX: Final = 5
-CONVEX_MESH: Final = 6
-"""Numbers of the shapes for kernels."""
+"""Numbers of the shapes for kernels; a mesh has the next."""
 
 N_SIZES = {"plane": 0, "sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 """How many sizes each shape has but for the mesh; the shapes are in the order of their numbers."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tissue.contact.geoms.geom import Geom, planes_of, shape_number
+from tissue.contact.geoms.geom import Geom, half_thickness, planes_of, shape_number
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.structs import Arrays, FloatCell, IntCell
 
@@ -27,6 +27,8 @@ class Geoms(Arrays):
     """Middle of a box around each, in its own frame [m], shape (n, 3)."""
     half: FloatArray
     """Half the sizes of that box [m], infinite for a plane; shape (n, 3)."""
+    half_thickness: FloatArray
+    """How deep the deepest point of each is in it [m], infinite for a plane; shape (n,)."""
     is_near: IntArray
     """1 if tissue may touch it in this time step, else 0; shape (n,)."""
     origin_t0: FloatArray
@@ -99,6 +101,13 @@ class GeomContacts(Arrays):
     """Angular impulse on it about the origin [N m s], shape (2 * capacity, 3)."""
 
 
+_WHOLE = ("geom", "face", "touches", "sticks", "is_held")
+_NUMBERS = ("gap", "mobility", "slop")
+_VECTORS = ("weight", "force", "pressed", "anchor", "normal", "point", "impulse", "moment")
+_OF_ROWS = ("node", *_WHOLE, *_NUMBERS, *_VECTORS)
+"""Fields of `GeomContacts` with a row for each contact."""
+
+
 def new_geoms(geoms: list[Geom]) -> Geoms:
     """Return geoms at the origin, at rest.
 
@@ -119,6 +128,7 @@ def new_geoms(geoms: list[Geom]) -> Geoms:
         plane=np.concatenate([np.zeros((0, 4)), *planes]),
         middle=np.array([middle for middle, _ in boxes]).reshape(n, 3),
         half=np.array([half for _, half in boxes]).reshape(n, 3),
+        half_thickness=np.array([half_thickness(geom) for geom in geoms]),
         is_near=np.ones(n, np.int64),
         axes_t0=np.tile(np.eye(3).ravel(), (n, 1)),
         axes=np.tile(np.eye(3).ravel(), (n, 1)),
@@ -129,8 +139,6 @@ def new_geoms(geoms: list[Geom]) -> Geoms:
 def new_geom_contacts(geoms: Geoms, capacity: int, n_nodes: int) -> GeomContacts:
     """Return no contacts, with room for that many, of a body with room for `n_nodes`."""
     rows = 2 * capacity
-    of_one = ("geom", "face", "touches", "sticks", "is_held")
-    of_three = ("weight", "force", "anchor", "normal", "point", "impulse", "moment", "pressed")
     return GeomContacts(
         first=0,
         n_contacts=0,
@@ -139,11 +147,9 @@ def new_geom_contacts(geoms: Geoms, capacity: int, n_nodes: int) -> GeomContacts
         dissipated=0.0,
         geoms=geoms,
         node=np.zeros((rows, 3), np.int64),
-        gap=np.zeros(rows),
-        slop=np.zeros(rows),
-        mobility=np.zeros(rows),
-        **{name: np.zeros(rows, np.int64) for name in of_one},
-        **{name: np.zeros((rows, 3)) for name in of_three},
+        **{name: np.zeros(rows) for name in _NUMBERS},
+        **{name: np.zeros(rows, np.int64) for name in _WHOLE},
+        **{name: np.zeros((rows, 3)) for name in _VECTORS},
         velocity=np.zeros((n_nodes, 3)),
         resistance=np.zeros((n_nodes, 3)),
     )
@@ -154,20 +160,7 @@ def grown_geom_contacts(contacts: GeomContacts, capacity: int, n_nodes: int) -> 
     larger, n = new_geom_contacts(contacts.geoms, capacity, n_nodes), contacts.n_contacts
     larger.velocity[: len(contacts.velocity)] = contacts.velocity
     used = slice(contacts.first, contacts.first + n)
-    of_rows = (
-        "geom",
-        "face",
-        "node",
-        "weight",
-        "force",
-        "anchor",
-        "is_held",
-        "normal",
-        "slop",
-        "touches",
-        "sticks",
-    )
-    for name in (*of_rows, "impulse", "moment"):
+    for name in _OF_ROWS:
         getattr(larger, name)[:n] = getattr(contacts, name)[used]
     for name in ("n_contacts", "are_coupled", "work", "dissipated"):
         setattr(larger, name, getattr(contacts, name))

@@ -17,7 +17,7 @@ from tissue.contact.faces import (
 )
 from tissue.contact.geoms.contact_impulses import sum_wrenches
 from tissue.contact.geoms.contact_search import LIST_IS_FULL, find_geom_contacts
-from tissue.contact.geoms.geom import Geom, half_thickness
+from tissue.contact.geoms.geom import Geom
 from tissue.contact.geoms.geom_arrays import (
     GeomContacts,
     Geoms,
@@ -30,6 +30,7 @@ from tissue.contact.geoms.geom_motion import (
     ORIGIN_NOT_FINITE,
     TAKEN,
     TURNS_TOO_FAR,
+    largest_way,
     lead_geoms,
     place_geoms,
 )
@@ -102,7 +103,6 @@ class GeomContact:
         n_nodes, all_geoms = len(body.rest), new_geoms(list(self.geoms))
         self.arrays: GeomContacts = new_geom_contacts(all_geoms, CONTACTS_AT_FIRST, n_nodes)
         """What kernels work on; another one where it grows."""
-        self._thickness = np.array([half_thickness(geom) for geom in self.geoms])
         self._faces: Faces = with_skin(new_faces(len(body.tetrahedra)), body)
         of_nodes = ("near", "near_at", "listed")
         self._search = GeomSearch(
@@ -125,36 +125,33 @@ class GeomContact:
             **{name: np.zeros(n_nodes, np.int64) for name in of_nodes},
         )
         self._find, self._lead = SameTypes(find_geom_contacts), SameTypes(lead_geoms)
-        self._sum = SameTypes(sum_wrenches)
+        self._sum, self._way = SameTypes(sum_wrenches), SameTypes(largest_way)
         self._seconds = 0.0
         n = len(self.geoms)
         self._origins = np.zeros((n, 3))
         self._rotations = np.tile(np.eye(3), (n, 1, 1))
-        self.move(
-            self._origins if origins is None else origins,
-            self._rotations if rotations is None else rotations,
-            is_turn_limited=False,
-        )
+        at_first = self._origins if origins is None else origins
+        self._lead_to(at_first, rotations, largest_turn=math.inf)
         self.stop()
         self._expect_outside(body)
 
-    def move(
-        self,
-        origins: npt.ArrayLike,
-        rotations: npt.ArrayLike | None = None,
-        *,
-        is_turn_limited: bool = True,
-    ) -> None:
+    def move(self, origins: npt.ArrayLike, rotations: npt.ArrayLike | None = None) -> None:
         """Move all geoms in the next step, at even speeds, to where they then stay.
 
         Args:
             origins: Origin of each at the end of the step [m], shape (n, 3).
             rotations: Axes of each as columns, shape (n, 3, 3); None: as they are.
-            is_turn_limited: Whether a turn by more than `LARGEST_TURN` is refused.
 
         Raises:
-            ValueError: a number is not finite, a rotation is none, or turns too far.
+            ValueError: a number is not finite, a rotation is none, or turns by more than
+                `LARGEST_TURN`.
         """
+        self._lead_to(origins, rotations, LARGEST_TURN)
+
+    def _lead_to(
+        self, origins: npt.ArrayLike, rotations: npt.ArrayLike | None, largest_turn: float
+    ) -> None:
+        """Do `move`, with turns up to that angle [rad]."""
         n = len(self.geoms)
         places = np.array(origins, np.float64)
         axes = self._rotations if rotations is None else np.array(rotations, np.float64)
@@ -163,8 +160,8 @@ class GeomContact:
                 f"origins {places.shape} and rotations {axes.shape} of {n} geoms; they have the "
                 f"shapes ({n}, 3) and ({n}, 3, 3)"
             )
-        most = LARGEST_TURN if is_turn_limited else math.inf
-        fault, g = self._lead.call(self.arrays.geoms, places, axes.reshape(n, 9), most)
+        rows = axes.reshape(n, 9)
+        fault, g = self._lead.call(self.arrays.geoms, places, rows, largest_turn)
         if fault != TAKEN:
             what = f"geom '{self.geoms[g].name}'"
             raise ValueError(
@@ -202,13 +199,9 @@ class GeomContact:
     @property
     def n_increments(self) -> int:
         """Into how many increments the next step is divided, so that no geom passes unseen."""
-        arrays = self.arrays.geoms
-        if not len(arrays.shape):
+        if not self.geoms:
             return 1
-        far = np.linalg.norm(arrays.way, axis=1) + np.linalg.norm(arrays.turn, axis=1) * (
-            np.linalg.norm(np.where(np.isfinite(arrays.half), arrays.half, 0.0), axis=1)
-        )
-        return max(1, math.ceil(float((far / self._thickness).max()) / FARTHEST_IN_A_SUBSTEP))
+        return max(1, math.ceil(self._way.call(self.arrays.geoms) / FARTHEST_IN_A_SUBSTEP))
 
     def begin_step(self, body: Body, dt: float) -> None:
         """Find the contacts of a step of that length [s]."""
@@ -279,11 +272,6 @@ class GeomContact:
     def _rows(self) -> IntArray:
         first = self.arrays.first
         return np.arange(first, first + self.arrays.n_contacts)
-
-    def _now(self) -> tuple[FloatArray, FloatArray]:
-        """Return origins and axes of the geoms at the begin of the next step."""
-        arrays = self.arrays.geoms
-        return arrays.origin_t0, arrays.axes_t0.reshape(-1, 3, 3)
 
     def _expect_outside(self, body: Body) -> None:
         """Refuse geoms that are inside the body.

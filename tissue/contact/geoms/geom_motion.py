@@ -6,6 +6,7 @@ In a time step a geom moves at an even speed and turns about an even axis at an 
 import math
 from typing import Final
 
+from tissue.contact.geoms.geom import PLANE
 from tissue.contact.geoms.geom_arrays import Geoms
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import inlined, kernel
@@ -135,3 +136,21 @@ def turned_from_geom(axes: FloatArray, g: int, a: Vec3) -> Vec3:
 def geom_motion_at(geoms: Geoms, g: int, x: Vec3) -> Vec3:
     """Return how far geom `g` would move in a whole time step where point `x` is now [m]."""
     return add(vec3(geoms.way, g), cross(vec3(geoms.turn, g), sub(x, vec3(geoms.origin, g))))
+
+
+@kernel
+def way_of(geoms: Geoms, g: int) -> float:
+    """Return how far a point of geom `g` moves in the time step at most [m]."""
+    turn, way = norm(vec3(geoms.turn, g)), norm(vec3(geoms.way, g))
+    if turn == 0.0 or geoms.shape[g] == PLANE:
+        return float(way)
+    return float(way + turn * (norm(vec3(geoms.middle, g)) + norm(vec3(geoms.half, g))))
+
+
+@kernel
+def largest_way(geoms: Geoms) -> float:
+    """Return how far a point of a geom moves in the time step at most, per half its thickness."""
+    largest = 0.0
+    for g in range(len(geoms.shape)):
+        largest = max(largest, way_of(geoms, g) / geoms.half_thickness[g])
+    return largest

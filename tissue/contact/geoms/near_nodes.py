@@ -5,11 +5,12 @@ from typing import Final
 from tissue.contact.faces import NO_FACE, Faces
 from tissue.contact.geoms.geom import PLANE
 from tissue.contact.geoms.geom_arrays import Geoms
+from tissue.contact.geoms.geom_motion import way_of
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, FloatCell, IntCell
-from tissue.core.vec3 import Vec3, axpy, cross, norm, store, sub, vec3
+from tissue.core.vec3 import Vec3, axpy, cross, store, sub, vec3
 from tissue.mesh.body import Body
 
 MARGIN: Final = 0.25
@@ -116,15 +117,6 @@ def reach_of(search: GeomSearch, geoms: Geoms, g: int) -> float:
     """Return how far from geom `g` a node is at most that it may touch before the next search."""
     speed = search.fastest * search.seconds + way_of(geoms, g)
     return float(MARGIN * search.node_size + speed)
-
-
-@kernel
-def way_of(geoms: Geoms, g: int) -> float:
-    """Return how far a point of geom `g` moves in the time step at most [m]."""
-    turn, way = norm(vec3(geoms.turn, g)), norm(vec3(geoms.way, g))
-    if turn == 0.0 or geoms.shape[g] == PLANE:
-        return float(way)
-    return float(way + turn * (norm(vec3(geoms.middle, g)) + norm(vec3(geoms.half, g))))
 
 
 @kernel
