@@ -58,6 +58,7 @@ def prepare(
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
     bounds = link.describe().bounds
+    _warn_of_table(stroke, tabletop_of(scene, bounds))
     held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
     if scene.own_arm is None:
@@ -149,6 +150,23 @@ def _own(own: OwnArm, others: Sequence[HeldArm | Tabletop] = ()) -> tuple[LedArm
         raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
     mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
     return arm, TissueFrame(axes.reshape(3, 3), np.array(own.pos))
+
+
+def _warn_of_table(stroke: Stroke, table: Tabletop | None) -> None:
+    """Say before the start that a stroke leads the edge into the table, which stops it."""
+    if table is None:
+        return
+    poses = [stroke.pose(t) for t in stroke.times.tolist()]
+    ends = np.array([end for pose in poses for end in (pose.tip, pose.heel)])
+    half = np.array(table.geom.size)
+    over = (np.abs(ends - table.centre)[:, :2] <= half[:2]).all(axis=1)
+    depth = float((table.centre[2] + half[2] - ends[over, 2]).max(initial=0.0))
+    if depth > 0.0:
+        _log.warning(
+            "the stroke goes %.2g mm below the table, which stops the blade: what is to be cut "
+            "there stays whole. Lower [world] table, or end the stroke above it",
+            1e3 * depth,
+        )
 
 
 def _warn_of_weakness(needed: ExpectedForce, arm: LedArm) -> None:

@@ -28,7 +28,10 @@ class Tabletop(NamedTuple):
         """Have it stand in the world of a model that is yet to be compiled.
 
         It collides with what a user's model lets collide, and with instruments and arms of ours.
+        The models of ours have contact switched off: with a table it is on, and nothing but the
+        table collides with them.
         """
+        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         quaternion, frame = np.empty(4), self.frame
         mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
         spec.worldbody.add_geom(

@@ -1,0 +1,43 @@
+"""A table in a scene: bodies lie on it, and a stroke through it is told so."""
+
+import logging
+
+import numpy as np
+import pytest
+
+from scalpel_sim import SCENES, StrokeTable, prepare
+from scalpel_sim.arm.tabletop import TABLETOP
+from scalpel_sim.scene_parts.scene import changed
+
+SLAB = changed(SCENES["slab"], table=-1e-4)
+
+
+def through(depth):
+    """A scene in which the tip is let down beside the body, that deep below the table [m]."""
+    low = SLAB.table - depth
+    points = [[0.02, -0.01, 0.005], [0.02, -0.01, low], [0.02, 0.05, low]]
+    stroke = StrokeTable(kind="points", points=points, length=0.045, forward=[0.0, 1.0, 0.0])
+    return changed(SLAB, strokes=(stroke,))
+
+
+def test_the_table_stands_in_the_model_where_the_tissue_has_it():
+    simulation = prepare(SLAB)
+    board = simulation.arm.data.geom(TABLETOP)
+    half = simulation.arm.model.geom(TABLETOP).size
+    top = board.xpos + np.array([0.0, 0.0, half[2]])
+    assert simulation.frame.points_to_tissue(top)[2] == pytest.approx(SLAB.table, abs=1e-12)
+
+
+@pytest.mark.parametrize(("depth", "said"), [(0.003, True), (-5e-4, False)])
+def test_a_stroke_below_the_table_gets_a_warning(depth, said, caplog):
+    with caplog.at_level(logging.WARNING, "scalpel_sim"):
+        prepare(through(depth))
+    assert ("3 mm below the table" in caplog.text) == said
+
+
+def test_the_table_stops_the_blade():
+    simulation = prepare(through(0.003))
+    simulation.run(simulation.duration)
+    tip = simulation.recording.vector("tip")[:, 2].min()
+    height = simulation.frame.points_to_world(np.array([0.0, 0.0, SLAB.table]))[2]
+    assert tip > height - 1e-3
