@@ -27,7 +27,7 @@ from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import FloatArray, TetrahedralMesh, Tissue
+from tissue import TetrahedralMesh, Tissue
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -58,24 +58,23 @@ def prepare(
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
     bounds = link.describe().bounds
-    _warn_of_table(stroke, tabletop_of(scene, bounds))
+    table = tabletop_of(scene, bounds)
+    _warn_of_table(stroke, table)
+    boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
     held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
     if scene.own_arm is None:
-        placement = place(stroke, bounds, scene.arm, force=needed.force)
+        placement = place(stroke, boxes, scene.arm, force=needed.force)
         frame = TissueFrame(origin=placement.tissue_origin)
         first = placement, stroke
-        others = arms_with_graspers(scene.graspers, motions, bounds, frame, first)
-        arm: LedArm = placement.arm(others=[*others, *_table_of(scene, bounds, frame)])
+        others = arms_with_graspers(scene.graspers, motions, boxes, frame, first)
+        arm: LedArm = placement.arm(others=[*others, *_in_world(table, frame)])
     else:
         arm, frame = _own(scene.own_arm)
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
-        others = arms_with_graspers(scene.graspers, motions, bounds, frame, None)
-        standing_there: list[HeldArm | Tabletop] = [
-            *others,
-            *_table_of(scene, bounds, frame),
-        ]
+        others = arms_with_graspers(scene.graspers, motions, boxes, frame, None)
+        standing_there: list[HeldArm | Tabletop] = [*others, *_in_world(table, frame)]
         if standing_there:
             start = np.array(arm.data.qpos)
             arm, _ = _own(scene.own_arm, standing_there)
@@ -128,9 +127,8 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _table_of(scene: Scene, bounds: FloatArray, frame: TissueFrame) -> list[Tabletop]:
-    """Return the table of a scene where the tissue lies, or none."""
-    table = tabletop_of(scene, bounds)
+def _in_world(table: Tabletop | None, frame: TissueFrame) -> list[Tabletop]:
+    """Return a table where the tissue lies in the world, or none."""
     return [] if table is None else [table._replace(frame=frame)]
 
 
@@ -158,9 +156,9 @@ def _warn_of_table(stroke: Stroke, table: Tabletop | None) -> None:
         return
     poses = [stroke.pose(t) for t in stroke.times.tolist()]
     ends = np.array([end for pose in poses for end in (pose.tip, pose.heel)])
-    half = np.array(table.geom.size)
-    over = (np.abs(ends - table.centre)[:, :2] <= half[:2]).all(axis=1)
-    depth = float((table.centre[2] + half[2] - ends[over, 2]).max(initial=0.0))
+    low, high = table.bounds
+    over = ((ends >= low) & (ends <= high))[:, :2].all(axis=1)
+    depth = float((high[2] - ends[over, 2]).max(initial=0.0))
     if depth > 0.0:
         _log.warning(
             "the stroke goes %.2g mm below the table, which stops the blade: what is to be cut "

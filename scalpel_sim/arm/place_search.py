@@ -22,10 +22,10 @@ MOUNT_ANGLES = (0.0, math.pi / 4.0, math.pi / 2.0)
 bent. No one angle suits both a blade that stands and one that lies."""
 
 BASE_RADIUS = 0.08
-"""Radius about the axis of the waist in which the body must not lie [m]."""
+"""Radius about the axis of the waist in which neither body nor board must lie [m]."""
 
 LINK_CLEARANCE = 0.01
-"""Smallest distance of the axes of upper arm and forearm from the box around the body [m]."""
+"""Smallest distance of the axes of upper arm and forearm from the boxes around these [m]."""
 
 LINK_RADIUS = 0.02
 """Radius of the spheres that cover upper arm, forearm and stylus [m]: capsules of 8 mm, of which
@@ -63,9 +63,9 @@ class InstrumentPath(NamedTuple):
     axes: FloatArray
     """Axes of the blade's body as columns, shape (n, 3, 3)."""
     lowest: float
-    """Lowest height of the blade and of the tissue along the stroke [m]."""
-    bounds: FloatArray
-    """Lowest and highest corner of the tissue [m], shape (2, 3)."""
+    """Lowest height of the blade along the stroke, and of what lies there [m]."""
+    boxes: FloatArray
+    """Lowest and highest corners of what lies there: tissue, a table's board [m], (n, 2, 3)."""
     table: float | None = None
     """Height of a table that is there [m]; None: it is where the arm needs it."""
 
@@ -92,13 +92,13 @@ class Found(NamedTuple):
 
 
 def blade_path(
-    stroke: Stroke, bounds: FloatArray, edge_height: float, times: FloatArray
+    stroke: Stroke, boxes: FloatArray, edge_height: float, times: FloatArray
 ) -> InstrumentPath:
     """Return where the blade's body is along the stroke.
 
     Args:
         stroke: The stroke.
-        bounds: Lowest and highest corner of the tissue [m], shape (2, 3).
+        boxes: Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3).
         edge_height: How far the edge lies off the axis of the blade [m].
         times: Instants [s].
     """
@@ -108,8 +108,9 @@ def blade_path(
     edges = (tips - heels) / stroke.blade_length
     backs = -np.array([pose.forward for pose in poses])
     axes = np.stack([np.cross(edges, backs), edges, backs], axis=2)
-    lowest = min(float(heels[:, 2].min()), float(tips[:, 2].min()), float(bounds[0][2]))
-    return InstrumentPath(heels - edge_height * backs, axes, lowest, bounds)
+    boxes = boxes.reshape(-1, 2, 3)
+    lowest = min(float(z.min()) for z in (heels[:, 2], tips[:, 2], boxes[:, 0, 2]))
+    return InstrumentPath(heels - edge_height * backs, axes, lowest, boxes)
 
 
 def search_place(measures: Geometry, path: InstrumentPath, others: Sequence[Spheres] = ()) -> Found:
@@ -185,7 +186,7 @@ def _scores(
     positions, axes = in_base(path, places)
     reached = reach(measures, positions, axes, mount_angle)
     base = base_of(path, places)
-    stands_beside = _distance_to_box(base[:, :2], path.bounds[:, :2]) >= BASE_RADIUS
+    stands_beside = _distance_to_boxes(base[:, :2], path.boxes[..., :2]) >= BASE_RADIUS
     if path.table is None:
         on_column = base[:, 2] > path.lowest - TABLE_CLEARANCE
     else:
@@ -193,7 +194,7 @@ def _scores(
         on_column = base[:, 2] > path.table + TABLE_ROUNDING
     links = _links(measures, reached.angles)
     in_tissue = np.einsum("pij,pnkj->pnki", _turns(places.yaws), links) + base[:, None, None]
-    through = _distance_to_box(in_tissue, path.bounds) < LINK_CLEARANCE
+    through = _distance_to_boxes(in_tissue, path.boxes) < LINK_CLEARANCE
     score = reached.margin.min(axis=1) - AWKWARD * on_column - AWKWARD * through.any(axis=(1, 2))
     return np.asarray(np.where(stands_beside, score, -np.inf))
 
@@ -234,7 +235,10 @@ def _links(measures: Geometry, angles: FloatArray) -> FloatArray:
     return np.stack([-np.sin(waist) * out, np.cos(waist) * out, up], axis=-1)
 
 
-def _distance_to_box(points: FloatArray, box: FloatArray) -> FloatArray:
-    """Return how far points are from a box [m]; 0 inside."""
-    outside = np.maximum(np.maximum(box[0] - points, points - box[1]), 0.0)
-    return np.asarray(np.linalg.norm(outside, axis=-1))
+def _distance_to_boxes(points: FloatArray, boxes: FloatArray) -> FloatArray:
+    """Return how far points are from the nearest box [m]; 0 inside."""
+    apart = [
+        np.linalg.norm(np.maximum(np.maximum(low - points, points - high), 0.0), axis=-1)
+        for low, high in boxes
+    ]
+    return np.asarray(np.min(apart, axis=0))

@@ -98,14 +98,15 @@ class Placement(NamedTuple):
 
 
 def place(
-    stroke: Stroke, bounds: FloatArray, preset: str = AUTO, *, force: float = 0.0
+    stroke: Stroke, boxes: FloatArray, preset: str = AUTO, *, force: float = 0.0
 ) -> Placement:
     """Return the place from which an arm reaches the stroke with the most room in its joints.
 
     Args:
         stroke: In the tissue frame.
-        bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3). The base
-            stands beside it, and it lies above the table.
+        boxes: Lowest and highest corners of what lies there, tissue frame [m], shape (2, 3) or
+            (n, 2, 3): of the tissue, and of the board under it. The base stands beside them, and
+            they lie above the table that it stands on.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches, and renders the force.
         force: Expected force on the blade [N], toughness times the length of edge in the tissue. It
             only matters to `auto`; where no arm reaches and renders it, the largest that reaches is
@@ -119,20 +120,20 @@ def place(
         raise unknown("arm", preset, [*ARMS, AUTO])
     found = None
     for name in ARMS if preset == AUTO else (preset,):
-        placement = _place(stroke, bounds, name)
+        placement = _place(stroke, boxes, name)
         if placement.margin >= NEEDED_MARGIN:
             found = placement
             if ARMS[name].force >= force:
                 break
     if found is None:  # `name` is the largest arm that was asked for
-        raise PlacementError(_advice(stroke, bounds, name))
+        raise PlacementError(_advice(stroke, boxes, name))
     return found
 
 
 def covered(
     placement: Placement,
     stroke: Stroke,
-    bounds: FloatArray,
+    boxes: FloatArray,
     times: FloatArray,
     *,
     edge_height: float | None = None,
@@ -142,20 +143,20 @@ def covered(
     Args:
         placement: Where it stands.
         stroke: Its stroke, tissue frame.
-        bounds: Lowest and highest corner of the tissue [m], shape (2, 3).
+        boxes: Lowest and highest corners of what lies there [m], shape (2, 3) or (n, 2, 3).
         times: Instants [s].
         edge_height: How far the edge lies from the axis of the instrument [m]; None: that of the
             scalpel.
     """
     measures, of_scalpel = _measured(placement.preset)
-    path = blade_path(stroke, bounds, of_scalpel if edge_height is None else edge_height, times)
+    path = blade_path(stroke, boxes, of_scalpel if edge_height is None else edge_height, times)
     base = placement.base_position - placement.tissue_origin
     return spheres_along(measures, path, base, placement.base_yaw, placement.mount_angle)
 
 
 def place_beside(
     stroke: Stroke,
-    bounds: FloatArray,
+    boxes: FloatArray,
     preset: str,
     times: FloatArray,
     *,
@@ -167,7 +168,7 @@ def place_beside(
     Args:
         stroke: The motion of the grasper, as that of an edge from where the arm holds it to the end
             of its pads; tissue frame.
-        bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3).
+        boxes: See `place`.
         preset: One of `arm.ARMS`, or `auto`: the smallest that reaches.
         times: Instants at which it must reach, and be clear of the others [s].
         table: Height of the table on which it stands, tissue frame [m]; None: of its own.
@@ -181,7 +182,7 @@ def place_beside(
         raise unknown("arm", preset, [*ARMS, AUTO])
     for name in ARMS if preset == AUTO else (preset,):
         measures, _ = _measured(name)
-        path = blade_path(stroke, bounds, 0.0, times)._replace(table=table)
+        path = blade_path(stroke, boxes, 0.0, times)._replace(table=table)
         found = search_place(measures, path, others)
         placement = _placed(found, measures, name, path)
         if placement.margin >= NEEDED_MARGIN and math.isfinite(found.score):
@@ -199,12 +200,12 @@ def place_beside(
     )
 
 
-def _place(stroke: Stroke, bounds: FloatArray, preset: str) -> Placement:
+def _place(stroke: Stroke, boxes: FloatArray, preset: str) -> Placement:
     """Return the best place for one arm, whether or not it reaches."""
     measures, edge_height = _measured(preset)
     few, many = (np.linspace(0.0, stroke.duration, n) for n in (SAMPLES, DENSE_SAMPLES))
-    found = search_place(measures, blade_path(stroke, bounds, edge_height, few))
-    placement = _placed(found, measures, preset, blade_path(stroke, bounds, edge_height, many))
+    found = search_place(measures, blade_path(stroke, boxes, edge_height, few))
+    placement = _placed(found, measures, preset, blade_path(stroke, boxes, edge_height, many))
     return placement._replace(blade_length=stroke.blade_length)
 
 
@@ -233,10 +234,10 @@ def _measured(preset: str) -> tuple[Geometry, float]:
     return geometry(model), float(model.site("heel").pos[2])
 
 
-def _advice(stroke: Stroke, bounds: FloatArray, preset: str) -> str:
+def _advice(stroke: Stroke, boxes: FloatArray, preset: str) -> str:
     """Return the message that an arm does not reach, by how much, and what to do."""
     measures, edge_height = _measured(preset)
-    path = blade_path(stroke, bounds, edge_height, np.linspace(0.0, stroke.duration, SAMPLES))
+    path = blade_path(stroke, boxes, edge_height, np.linspace(0.0, stroke.duration, SAMPLES))
     extent = 1e3 * np.ptp(path.positions, axis=0)
     message = (
         f"the {preset} arm does not reach the whole stroke '{stroke.name}': a blade of "
@@ -266,11 +267,11 @@ def _reaches(measures: Geometry, path: InstrumentPath) -> bool:
 
 
 def _scaled(path: InstrumentPath, scale: float) -> InstrumentPath:
-    """Return the path and the body, shrunk towards the middle of the body."""
-    middle = (path.bounds[0] + path.bounds[1]) / 2.0
+    """Return the path and what lies there, shrunk towards the middle of the body."""
+    middle = path.boxes[0].mean(axis=0)
     return InstrumentPath(
         middle + scale * (path.positions - middle),
         path.axes,
         float(middle[2] + scale * (path.lowest - middle[2])),
-        middle + scale * (path.bounds - middle),
+        middle + scale * (path.boxes - middle),
     )

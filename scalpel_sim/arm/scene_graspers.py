@@ -49,7 +49,7 @@ def _waypoints(grasper: GrasperTable) -> list[Waypoint]:
 def arms_with_graspers(
     graspers: Sequence[GrasperTable],
     motions: Sequence[GraspMotion],
-    bounds: FloatArray,
+    boxes: FloatArray,
     frame: TissueFrame,
     first: tuple[Placement, Stroke] | None,
 ) -> list[HeldArm]:
@@ -58,7 +58,8 @@ def arms_with_graspers(
     Args:
         graspers: What the scene says of them.
         motions: Where they go, tissue frame.
-        bounds: Lowest and highest corner of the tissue, tissue frame [m], shape (2, 3).
+        boxes: Lowest and highest corners of what lies there, tissue frame [m]; see
+            `placement.place`.
         frame: Where the tissue lies in the world.
         first: Where an arm of the project stands that does a stroke, and that stroke; its table is
             that of all. None: there is none, and each arm has its own table.
@@ -72,13 +73,13 @@ def arms_with_graspers(
         last = max(last, first[1].duration)
     times = np.linspace(0.0, last, WATCHED_INSTANTS)
     table = None if first is None else -float(first[0].tissue_origin[2])
-    taken = [] if first is None else [covered(*first, bounds, times)]
+    taken = [] if first is None else [covered(*first, boxes, times)]
     found = []
     for grasper, motion in zip(graspers, motions, strict=True):
         if grasper.model is None:
             preset = grasper.preset or AUTO
             place, spheres = place_of_grasper(
-                motion, bounds, preset, times, table=table, others=taken
+                motion, boxes, preset, times, table=table, others=taken
             )
             taken.append(spheres)
             found.append(preset_with_grasper(motion, place, frame, force=grasper.force))

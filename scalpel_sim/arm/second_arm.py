@@ -62,7 +62,7 @@ def preset_with_grasper(
 
 def place_of_grasper(
     motion: GraspMotion,
-    bounds: FloatArray,
+    boxes: FloatArray,
     preset: str,
     times: FloatArray,
     *,
@@ -73,15 +73,15 @@ def place_of_grasper(
 
     Args:
         motion: Where the grasper goes.
-        bounds: See `place_beside`, as the rest.
+        boxes: See `place_beside`, as the rest.
         preset: The arm.
         times: Instants [s].
         table: Height of the table.
         others: What covers other arms.
     """
     path = path_of_grasper(motion)
-    place = place_beside(path, bounds, preset, times, table=table, others=others)
-    return place, covered(place, path, bounds, times, edge_height=0.0)
+    place = place_beside(path, boxes, preset, times, table=table, others=others)
+    return place, covered(place, path, boxes, times, edge_height=0.0)
 
 
 def path_of_grasper(motion: GraspMotion) -> Stroke:

@@ -24,6 +24,12 @@ class Tabletop(NamedTuple):
     frame: TissueFrame = TissueFrame()
     """Where the tissue lies in the world."""
 
+    @property
+    def bounds(self) -> FloatArray:
+        """Its lowest and highest corner, tissue frame [m], shape (2, 3)."""
+        half = np.array(self.geom.size)
+        return np.stack([self.centre - half, self.centre + half])
+
     def stand_in(self, spec: mujoco.MjSpec) -> None:
         """Have it stand in the world of a model that is yet to be compiled.
 

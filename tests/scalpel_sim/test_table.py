@@ -28,6 +28,17 @@ def test_the_table_stands_in_the_model_where_the_tissue_has_it():
     assert simulation.frame.points_to_tissue(top)[2] == pytest.approx(SLAB.table, abs=1e-12)
 
 
+@pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])
+def test_arms_stand_clear_of_the_board_on_their_whole_ways(name):
+    simulation = prepare(SCENES[name])
+    data, still = simulation.arm.data, simulation.link.step(None, simulation.dt)
+    simulation.link.step = lambda sweep, dt, poses=(): still  # only the arms move
+    simulation.partners.clear()
+    touching = []
+    simulation.run(simulation.duration, lambda now: touching.append(data.ncon))
+    assert not any(touching)
+
+
 @pytest.mark.parametrize(("depth", "said"), [(0.003, True), (-5e-4, False)])
 def test_a_stroke_below_the_table_gets_a_warning(depth, said, caplog):
     with caplog.at_level(logging.WARNING, "scalpel_sim"):
