@@ -41,7 +41,7 @@ changes its volume; held at its sides the softest scene keeps 0.99."""
 _HARDLY_COMPRESSIBLE = 0.45
 """Poisson's ratio that most presets have [1]."""
 
-TABLE_MARGIN = 0.05
+TABLE_MARGIN = 0.08
 """How far a table reaches beyond the body [m]: as far as pieces are put down beside it."""
 
 TABLE_HALF_THICKNESS = 0.005
