@@ -49,7 +49,8 @@ def ends_right(name: str, simulation: Simulation, asked: float) -> bool:
     if name == "retract":  # it hangs from the grasper, and swings
         hangs = left.n_points == most > 0
         return bool(hangs and off.centre[2] > 0.03 and np.linalg.norm(off.velocity) < 0.15)
-    lies = off.centre[1] > 0.07 and abs(off.centre[2] + 0.01) < 0.002
+    # Its half depth is 9 mm: it is clear of the sheet, which ends at 40 mm, by 1 cm.
+    lies = off.centre[1] > 0.06 and abs(off.centre[2] + 0.01) < 0.002
     return bool(lies and np.linalg.norm(off.velocity) < 0.01 and left.n_points == 0)
 
 

@@ -47,10 +47,10 @@ def check_retract(simulation):
 
 
 def check_excise(simulation):
-    """The lump came out whole, and lies on the table behind the sheet."""
+    """The lump came out whole, and lies on the table 1 cm behind the sheet: it is 18 mm deep."""
     sheet, lump = pieces(simulation)
     assert sheet.rest_volume + lump.rest_volume == pytest.approx(60 * 40 * 8e-9, rel=1e-6)
-    assert lump.centre[1] > 0.07 and abs(lump.centre[2] + 0.01) < 0.002
+    assert lump.centre[1] > 0.06 and abs(lump.centre[2] + 0.01) < 0.002
     assert np.linalg.norm(lump.velocity) < 0.01
     assert simulation.recording.column("left_points").max() > 0
     assert simulation.graspers[0].n_points == 0
@@ -107,7 +107,7 @@ def test_a_lump_that_the_jaws_hold_by_friction_alone_is_cut_out_lifted_and_put_d
     )
     simulation = done(replace(EXCISE, graspers=(pinching,)))
     _, lump = pieces(simulation)
-    assert lump.centre[1] > 0.07 and abs(lump.centre[2] + 0.01) < 0.002
+    assert lump.centre[1] > 0.06 and abs(lump.centre[2] + 0.01) < 0.002
     assert (simulation.recording.column("left_points") == 0.0).all()
     energies = simulation.result.energies
     lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
