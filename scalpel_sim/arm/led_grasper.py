@@ -22,7 +22,14 @@ _ROUNDING = 1e-9
 """Barycentric weight below zero at which a point still is in a tetrahedron: else rounding leaves
 out points on the faces between two."""
 
+_MEETING = 1e-4
+"""Opening below which pads have met [m]: what lies between them holds thicker tissue apart, and an
+equality of MuJoCo that couples the jaws gives by less."""
+
 _log = logging.getLogger("scalpel_sim")
+
+
+_NOTHING_THERE = "the jaws of the grasper '%s' closed, and no tissue was there"
 
 
 class Hold(NamedTuple):
@@ -68,6 +75,8 @@ class LedGrasper:
         """What ties tissue to it now; None while it holds none."""
         self._data, self._tissue, self._frame, self._hold = data, tissue, frame, hold
         self._was_closed = False
+        self._had_met = False
+        self._holds_some = False
         half = 0.5 * PAD_LENGTH
         self._follower = StrokeFollower(grasper.hand, motion.stroke(half, half), frame)
 
@@ -96,10 +105,17 @@ class LedGrasper:
     def follow(self) -> None:
         """Take what the jaws have closed on, or let go where they have opened; lead what is held.
 
+        It is said where the jaws have closed on nothing, and where what they held slipped out.
+
         Raises:
             ValueError: the tissue cannot be held; see `tissue.Tissue.attach`.
         """
-        if self._hold is not None:
+        if self._hold is None:
+            has_met = self.grasper.opening < _MEETING
+            if has_met and not self._had_met:
+                _log.warning(_NOTHING_THERE, self.name)
+            self._had_met = has_met
+        else:
             is_closed = self.grasper.opening < self._hold.closed
             if is_closed and not self._was_closed:
                 self._take(self._hold)
@@ -108,6 +124,14 @@ class LedGrasper:
             self._was_closed = is_closed
         if self.grip is not None:
             self.grip.follow()
+            if self._holds_some and not self.n_points:
+                _log.warning(
+                    "at %.3f s the tissue slipped out of the grasper '%s': it pulled with more "
+                    "than its breaks_at",
+                    self._data.time,
+                    self.name,
+                )
+        self._holds_some = self.n_points > 0
 
     def apply(self) -> None:
         """Apply to it what the tissue did in the last step.
@@ -128,7 +152,7 @@ class LedGrasper:
         """Tie what lies between the pads to the grasper."""
         places = between_pads(self._tissue, self.grasper.pads, self._frame)
         if not len(places):
-            _log.warning("the jaws of the grasper '%s' closed, and no tissue was there", self.name)
+            _log.warning(_NOTHING_THERE, self.name)
             return
         self.grip = Grip(
             self._data,

@@ -173,20 +173,22 @@ def test_it_takes_what_is_there_each_time_it_closes():
     assert hand.n_points > 0 and hand.grip is not first
 
 
-def test_jaws_that_close_on_nothing_say_so_once(caplog):
+@pytest.mark.parametrize("hold", [Hold(closed=0.008), None], ids=["tied", "by friction"])
+def test_jaws_that_close_on_nothing_say_so_once(hold, caplog):
     tissue = hanging()
-    hand = led(rows((0.0, 0.2, 0.007)), tissue)
-    run(hand, tissue, 0.02)
+    hand = led(rows((0.0, 0.2, 0.007), (0.05, 0.2, 0.0)), tissue, hold=hold)
+    run(hand, tissue, 0.2)
     assert hand.n_points == 0
     assert caplog.text.count("the jaws of the grasper 'left' closed, and no tissue was there") == 1
 
 
-def test_what_is_pulled_harder_than_it_is_held_slips_out():
+def test_what_is_pulled_harder_than_it_is_held_slips_out_and_that_is_said_once(caplog):
     tissue = hanging()
     weight = tissue.pieces()[0].mass * 9.81
     hand = led(rows((0.0, 0.005, 0.007)), tissue, hold=Hold(closed=0.008, breaks_at=0.5 * weight))
     run(hand, tissue, 0.3)
     assert hand.n_points == 0 and np.abs(hand.wrench.force).max() < 1e-12
+    assert caplog.text.count("the tissue slipped out of the grasper 'left'") == 1
 
 
 @pytest.mark.parametrize(("share", "holds"), [(3.0, True), (0.3, False)])
