@@ -197,6 +197,8 @@ class Simulation:
 
     def _forces_on_attachments(self) -> list[float]:
         """Return the forces of the tissue on what holds it by its own scene [N], world frame."""
+        if not self.recording.n_held:
+            return []
         loads = self.bridge.frame_loads[: self.recording.n_held]
         forces = [self.frame.vectors_to_world(load.wrench.force) for load in loads]
         return [number for force in forces for number in force.tolist()]

@@ -148,8 +148,9 @@ class RigidContacts(NamedTuple):
     @property
     def of_blade(self) -> "RigidContacts":
         """Those of the blade."""
-        n = int(np.searchsorted(self.geom, 0))
-        return self if n == len(self.geom) else RigidContacts._make(each[:n] for each in self)
+        if not len(self.geom) or self.geom.item(-1) < 0:
+            return self
+        return RigidContacts._make(each[: np.searchsorted(self.geom, 0)] for each in self)
 
 
 N_WORKS = 3
@@ -390,8 +391,7 @@ class SchemeStatistics(NamedTuple):
     """Split tetrahedra whose centre would have been flat or inverted, so that their face nodes were
     moved towards the centroids."""
     n_own_face_nodes: int
-    """Face nodes that the guard made for one tetrahedron alone, beside the node of its
-    neighbour."""
+    """Face nodes that the guard made for one tetrahedron, beside the node of its neighbour."""
     n_unsupported: int
     """Tetrahedra that stayed whole because their cut edges are none of the 37 codes."""
     n_waiting: int

@@ -104,7 +104,7 @@ class GlobalStepper:
         edge, dt, begin, end = increment
         choice = self._choice_for(system)
         if increment.span > 0.0 and not choice.is_at_rest and contact.wakes(system.body):
-            choice = self._find_contacts(system, increment)
+            choice = self._find_contacts(system, increment, choice)
         if self._threads is not None:
             self._threads.join(system.context)
         while True:
@@ -124,7 +124,8 @@ class GlobalStepper:
 
     def advance(self, system: System, increment: Increment) -> int:
         """Advance the motion by an increment; return the steps taken."""
-        choice, context = self._find_contacts(system, increment), system.context
+        choice = self._find_contacts(system, increment, self._choice_for(system))
+        context = system.context
         begin_increment(choice, context, *increment[1:])
         while next_part(choice, context):
             part = increment._replace(begin=choice.begin, end=choice.part_end)
@@ -146,9 +147,11 @@ class GlobalStepper:
                 return
             contact.make_room()
 
-    def _find_contacts(self, system: System, increment: Increment) -> StepChoice:
+    def _find_contacts(
+        self, system: System, increment: Increment, choice: StepChoice
+    ) -> StepChoice:
         """Find the contacts of an increment; return the choice of steps with what they add."""
-        room = _ROOM.call(self._choice_for(system), system.context, increment.span)
+        room = _ROOM.call(choice, system.context, increment.span)
         system.find_contacts(increment.span, room)
         return self._choice_for(system)
 

@@ -94,6 +94,8 @@ class System:
         """Whether fixed nodes move, and their work."""
         self.attachments = no_attachments()
         """Points that are tied to what moves from outside."""
+        self.has_strands = False
+        """Whether any of them is a strand, which the blade can cut."""
         self.geoms = no_geoms(body, node_size)
         """Contact with rigid geoms."""
         self.added_by_attachments = 0.0
@@ -211,9 +213,9 @@ class System:
 
     def report(self, blade: BladeContext, edge: Edge, dt: float) -> BladeReport:
         """Return what a time step of `dt` [s] came to for the blade; bounds hold strands too."""
-        strands, positions = self.attachments, self.body.positions
-        if not strands.section.any():
+        if not self.has_strands:
             return self.interaction.report(blade, edge, dt)
+        strands, positions = self.attachments, self.body.positions
         found = self.interaction.report(
             blade, edge, dt, lambda report: report_strands(report, strands, positions, edge)
         )

@@ -37,7 +37,9 @@ class AttachmentList:
         self.added_frequency_squared = 0.0
         """What they add to w^2 of the body at most [1/s2]."""
         self._edge_length = 0.0
-        self._has_strands = self._had_caught = False
+        self.has_strands = False
+        """Whether any is a strand that the blade can cut."""
+        self._had_caught = False
 
     @property
     def all(self) -> tuple[Attachment, ...]:
@@ -53,6 +55,11 @@ class AttachmentList:
     def act(self) -> bool:
         """Whether there are any."""
         return bool(self._attachments)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether a step has none to lead, and none to forget that has let go."""
+        return not (self._attachments or self._let_go)
 
     def add(self, attachment: Attachment, body: Body) -> None:
         """Let an attachment hold from now on."""
@@ -101,7 +108,7 @@ class AttachmentList:
     def begin_increment(self, body: Body, increment: Increment, has_blade: bool) -> None:
         """Let the blade, which may be gone or another, hold what it has caught."""
         self.arrays.work = 0.0
-        if not self._has_strands:
+        if not self.has_strands:
             return
         edge = increment.edge
         if not (has_blade and abs(edge.length - self._edge_length) <= _SAME * edge.length):
@@ -115,7 +122,7 @@ class AttachmentList:
 
     def end_increment(self, body: Body, increment: Increment) -> None:
         """Catch the strands that the blade has met."""
-        if self._has_strands and self._edge_length > 0.0:
+        if self.has_strands and self._edge_length > 0.0:
             _, _, begin, end = increment
             catch_strands(self.arrays, body.positions, increment.edge, begin, end)
 
@@ -188,6 +195,6 @@ class AttachmentList:
             self.arrays.section[rows] = each.sections
             self.arrays.toughness[rows] = each.toughness
             row += n
-        self._has_strands = bool(self.arrays.section.any())
+        self.has_strands = bool(self.arrays.section.any())
         self._write_targets()
         self.locate(body)

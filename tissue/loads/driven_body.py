@@ -207,6 +207,8 @@ class DrivenBody(BodyQueries):
     def chunks(self) -> Chunks:
         """Return boxes that together hold the body and its ligaments; see `BodyQueries.chunks`."""
         found = super().chunks()
+        if not self._system.has_strands:
+            return found
         boxes = strand_boxes(self._system.attachments, self._body.positions)
         return found._replace(boxes=np.concatenate((found.boxes, boxes))) if len(boxes) else found
 
@@ -284,8 +286,15 @@ class DrivenBody(BodyQueries):
             )
         return self.material_points(np.flatnonzero(mask))
 
+    @property
+    def _is_driven(self) -> bool:
+        """Whether there is anything that could act on the body, beside the blade."""
+        return self._loads.act or self._attachments.act or bool(self._system.geoms.geoms)
+
     def _begin_driving(self, increment: Increment, has_blade: bool) -> float:
         """Let loads act, and what is held move, in an increment; return `Loads.virtual_work`."""
+        if not self._is_driven:
+            return 0.0
         loads, system = self._loads, self._system
         if loads.act or self._attachments.act or system.geoms.act:
             self._global_stepper.wake()
@@ -301,6 +310,8 @@ class DrivenBody(BodyQueries):
 
         `before`: what `_begin_driving` said.
         """
+        if not self._is_driven:
+            return 0.0
         system = self._system
         self._attachments.end_increment(system.body, increment)
         touched = system.geoms.arrays
@@ -316,9 +327,10 @@ class DrivenBody(BodyQueries):
 
     def _begin_hold(self, dt: float) -> None:
         """Lead attachments that follow a path, and geoms, in a step of that length [s]."""
-        self._attachments.begin_step(self._body, dt)
         self._system.geoms.begin_step(self._body, dt)
-        self._take_attachments()
+        if not self._attachments.is_idle:
+            self._attachments.begin_step(self._body, dt)
+            self._take_attachments()
 
     def _end_hold(self, dt: float) -> None:
         """Tell attachments what they did in a step of that length [s], and have geoms stay."""
@@ -329,8 +341,9 @@ class DrivenBody(BodyQueries):
 
     def _take_attachments(self) -> None:
         """Let the integrator work on the arrays of the attachments."""
-        self._system.attachments = self._attachments.arrays
-        self._system.added_by_attachments = self._attachments.added_frequency_squared
+        system, attachments = self._system, self._attachments
+        system.attachments, system.has_strands = attachments.arrays, attachments.has_strands
+        system.added_by_attachments = attachments.added_frequency_squared
 
     def _supports_at(self, where: str | npt.ArrayLike) -> IntArray:
         """Return the fixed nodes of a region, or of a list."""

@@ -197,6 +197,17 @@ def test_released_tissue_goes_back():
     np.testing.assert_allclose(tissue.snapshot().positions, CUBE.positions, atol=2e-5)
 
 
+def test_what_was_released_does_no_more_work_and_feels_nothing():
+    tissue = cube(audit=True)
+    grip = tissue.attach(TOP, stiffness=500.0, damping=5.0)
+    grip.move(grip.wrench.point + by(0, 0, 2e-3))
+    at_last = settled(tissue, 0.05).energies.work_of_loads
+    assert at_last > 0.0
+    tissue.release(grip)
+    assert settled(tissue, 0.05).energies.work_of_loads == at_last
+    np.testing.assert_array_equal(grip.wrench.force, 0.0)
+
+
 def test_settling_takes_attachments_into_account():
     tissue = cube("none", gravity=(0, 0, -9.81))
     grip = tissue.attach(TOP, stiffness=500.0)

@@ -178,6 +178,8 @@ class GeomContact:
 
     def stop(self) -> None:
         """Have every geom where it was to be at the end of the next step."""
+        if not self.geoms:
+            return
         arrays = self.arrays.geoms
         arrays.origin_t0[:] = self._origins
         arrays.axes_t0[:] = self._rotations.reshape(-1, 9)
@@ -194,7 +196,7 @@ class GeomContact:
     @property
     def act(self) -> bool:
         """Whether any node is near a geom."""
-        return self.arrays.n_contacts > 0
+        return bool(self.geoms) and self.arrays.n_contacts > 0
 
     @property
     def n_increments(self) -> int:

@@ -179,11 +179,13 @@ def grown_penalty_forces(forces: PenaltyForces, capacity: int) -> PenaltyForces:
     return larger
 
 
+@kernel
 def clear_contact_totals(forces: PenaltyForces) -> None:
     """Begin to count impulses and penetration."""
     forces.pressure_impulse = forces.penetration = 0.0
     forces.n_pressing = 0
-    forces.floor_impulse[:] = 0.0
+    for x in range(3):
+        forces.floor_impulse[x] = 0.0
 
 
 @kernel

@@ -191,21 +191,24 @@ def _mark_of(folds: Folds, faces: Faces, body: Body, node: int, size: float) -> 
         size: Mean node size [m].
     """
     p, rest, piece = vec3(body.positions, node), vec3(body.rest, node), _piece(faces, body, node)
-    near, apart, mark = NEAR * size, APART * size, FLAT
+    near, apart, mark, outward = NEAR * size, APART * size, FLAT, vec3(folds.outward, node)
     within = cells_in(folds.cells, widened(Aabb(p, p), near))
     for z in range(within.z0, within.z1 + 1):
         for y in range(within.y0, within.y1 + 1):
             begin, end = row_of(folds.cells, within, y, z)
             for i in range(begin, end):
                 other = folds.sorted[i]
+                # What they are at rest is asked first: most are beside each other.
+                d = sub(vec3(body.rest, other), rest)
+                is_across = _is_across_notch(outward, vec3(folds.outward, other), d)
+                if not is_across and (mark == FOLDED or dot(d, d) <= apart * apart):
+                    continue
                 d = sub(vec3(body.positions, other), p)
                 if dot(d, d) >= near * near or _are_apart(piece, _piece(faces, body, other)):
                     continue
-                d = sub(vec3(body.rest, other), rest)
-                if _is_across_notch(vec3(folds.outward, node), vec3(folds.outward, other), d):
+                if is_across:
                     return NOTCHED
-                if dot(d, d) > apart * apart:
-                    mark = FOLDED
+                mark = FOLDED
     return mark
 
 

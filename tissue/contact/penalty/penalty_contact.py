@@ -61,10 +61,11 @@ CAPACITY_OF_PAIRS = 1 << 12
 
 
 _SEARCH, _FOLDS = SameTypes(search_contacts), SameTypes(look_for_folds)
-_NEARS_FLOOR = SameTypes(floor_changes)
+_NEARS_FLOOR, _CLEAR = SameTypes(floor_changes), SameTypes(clear_contact_totals)
 
-_NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, np.zeros(3))
-_NOTHING_TOUCHES.force_of_floor.setflags(write=False)  # many results share it
+_NO_FORCE = np.zeros(3)
+_NO_FORCE.setflags(write=False)  # many results share it
+_NOTHING_TOUCHES = BodyContacts(0, 0.0, 0.0, _NO_FORCE)
 
 
 class PenaltyContact:
@@ -164,7 +165,7 @@ class PenaltyContact:
     def begin(self) -> None:
         """Clear the totals, and search before the next substep."""
         if self._has_touched:
-            clear_contact_totals(self.forces)
+            _CLEAR.call(self.forces)
         self._has_touched = self._n_contacts > 0
         self._is_searched = self._has_looked = False
 
@@ -174,11 +175,12 @@ class PenaltyContact:
             return _NOTHING_TOUCHES
         forces = self.forces
         per_second = 1.0 / dt if dt > 0.0 else 0.0
+        has_floor = self._search.floor > -np.inf
         return BodyContacts(
             n_contacts=forces.n_pressing,
             penetration=forces.penetration,
             force=forces.pressure_impulse * per_second,
-            force_of_floor=forces.floor_impulse * per_second,
+            force_of_floor=forces.floor_impulse * per_second if has_floor else _NO_FORCE,
         )
 
     def prepare(

@@ -6,8 +6,8 @@ import pytest
 from tests.test_contact import joined
 from tissue import TetrahedralMesh, block
 from tissue.contact.faces import new_faces, with_found_pieces
-from tissue.contact.penalty.folds import APART, NEAR, look_for_folds, new_folds
-from tissue.contact.penalty.node_ways import NOTCHED, new_node_ways
+from tissue.contact.penalty.folds import APART, NEAR, OPPOSITE, look_for_folds, new_folds
+from tissue.contact.penalty.node_ways import FLAT, FOLDED, NOTCHED, new_node_ways
 from tissue.mesh.body import build_body
 
 pytestmark = pytest.mark.kernel
@@ -158,3 +158,37 @@ def test_walls_that_are_farther_apart_than_near_are_no_fold_until_they_are_near(
     assert not strip.look()
     strip.body.positions[:, 0] *= 0.7
     assert strip.look()
+
+
+def marks_by_definition(strip: Strip) -> np.ndarray:
+    """Return the mark of each node of the one piece, from all pairs of nodes of its skin."""
+    rest, outward = strip.body.rest, strip.folds.outward
+    skin = strip.folds.skin[: strip.folds.n_skin]
+    marks = np.full(strip.body.n_nodes, FLAT)
+    for node in skin:
+        d = rest[skin] - rest[node]
+        now = np.linalg.norm(strip.body.positions[skin] - strip.body.positions[node], axis=1)
+        is_near, apart = now < NEAR * SIZE, np.linalg.norm(d, axis=1)
+        own, others = outward[node], outward[skin]
+        sizes = np.linalg.norm(own) * np.linalg.norm(others, axis=1)
+        is_across = (d @ own > 0.0) & ((d * others).sum(axis=1) < 0.0)
+        is_across &= others @ own < OPPOSITE * sizes
+        if (is_near & is_across).any():
+            marks[node] = NOTCHED
+        elif (is_near & (apart > APART * SIZE)).any():
+            marks[node] = FOLDED
+    return marks
+
+
+@pytest.mark.parametrize("make", [Strip, lambda: notched(2), lambda: notched(1, 0.2)])
+@pytest.mark.parametrize("seed", range(3))
+def test_marks_are_those_of_all_pairs_of_nodes_of_the_skin(make, seed):
+    strip, random = make(), np.random.default_rng(seed)
+    if make is Strip:
+        strip.fold(0.5 * SIZE)
+    strip.body.positions[:, 0] *= random.uniform(0.6, 1.0)
+    strip.body.positions += 0.3 * SIZE * random.standard_normal(strip.body.positions.shape)
+    assert strip.look()
+    expected = marks_by_definition(strip)
+    assert (strip.ways.is_folded == expected).all()
+    assert len(np.unique(expected)) > 1
