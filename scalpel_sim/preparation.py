@@ -54,11 +54,13 @@ def prepare(
         link = InProcessLink(make_tissue(scene), scene.name)
     body = link.snapshot()
     mesh = TetrahedralMesh(body.positions, body.tetrahedra)
-    stroke = stroke_through(mesh, scene.strokes, link.describe().material)
-    check_meets(stroke, mesh)
-    needed = _needed(stroke, mesh, scene)
     bounds = link.describe().bounds
     table = tabletop_of(scene, bounds)
+    stops = [height for height in (scene.table, scene.floor) if height is not None]
+    lowest = max(stops, default=-math.inf)
+    stroke = stroke_through(mesh, scene.strokes, link.describe().material, lowest)
+    check_meets(stroke, mesh)
+    needed = _needed(stroke, mesh, scene)
     _warn_of_table(stroke, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
     held = tissue_held(scene, link)

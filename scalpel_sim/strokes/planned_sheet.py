@@ -56,10 +56,32 @@ class PlannedSheet(NamedTuple):
         """Return how far along the blade the points are, from its crossing with the motion [m]."""
         return (points - self.origin) @ self.down / math.cos(self.rake)
 
+    @property
+    def edge(self) -> FloatArray:
+        """Unit vector from heel to tip, shape (3,); where the sheet is bent too, it never turns."""
+        return math.cos(self.rake) * self.down - math.sin(self.rake) * self.motion
+
+    def ending_at(self, height: float, end: float, heel: float, tip: float) -> tuple[float, float]:
+        """Return travel of the end and depth of the tip [m], with no part of the edge lower.
+
+        A blade that moves down ends its way there, any other its edge.
+
+        Args:
+            height: The lowest that the edge may be [m].
+            end: Travel at the end, before.
+            heel: Depth of the heel, which is above.
+            tip: Depth of the tip, before.
+        """
+        below = float(height - self.origin[2])
+        rise, fall = float(self.edge[2]), float(self.motion[2])
+        if fall < 0.0:
+            return min(end, (below - min(heel * rise, tip * rise)) / fall), tip
+        return end, min(tip, below / rise) if rise < 0.0 else tip
+
     def blade(self, travel: FloatArray, heel: float, tip: float) -> list[BladeSegment]:
         """Return the edge from depth `heel` to depth `tip`, at each `travel`."""
         height, slope = self.bulge(travel)
-        edge = math.cos(self.rake) * self.down - math.sin(self.rake) * self.motion
+        edge = self.edge
         middle = self.origin + np.outer(travel, self.motion) + np.outer(height, self.normal)
         tangent = self.motion + np.outer(slope, self.normal)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)

@@ -83,6 +83,7 @@ def plan_stroke(
     speed: float = DEFAULT_SPEED,
     material: Material = Material(),
     depth: float | None = None,
+    lowest: float = -math.inf,
 ) -> Stroke:
     """Return the stroke of that name, placed through (or against) the middle of the body.
 
@@ -98,6 +99,8 @@ def plan_stroke(
             go.
         depth: Depth of a press [m], None for half of what would cut; or of an incision, None for
             8 mm, or a share of a thin body.
+        lowest: Height below which the edge is not led [m]: the upper side of a table or a floor
+            that stops it. An incision does not come near it.
 
     Raises:
         UsageError: no stroke has this name.
@@ -130,8 +133,10 @@ def plan_stroke(
         _check_positive("depth", depth, "m")
         end = first + depth
     margin = _BLADE_MARGIN + BLADE_MARGIN_SHARE * thickness + SLIP_SHARE * displacement
+    heel, tip = float(depths.min()) - margin, float(depths.max()) + margin
+    end, tip = sheet.ending_at(lowest, end, heel, tip)
     times, travels = _timed(sheet, start, end, speed)
-    segments = sheet.blade(travels, float(depths.min()) - margin, float(depths.max()) + margin)
+    segments = sheet.blade(travels, heel, tip)
     if name == "press":
         times, segments = np.append(times, times[-1] + PRESS_DWELL), [*segments, segments[-1]]
     asked = None if name in ("stop", "press") else [(0.0, float(times[-1]))]

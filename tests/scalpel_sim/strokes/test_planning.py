@@ -247,3 +247,20 @@ def test_a_stroke_that_begins_and_ends_inside_meets_the_body():
         for y in (0.05, 0.055)
     ]
     check_meets(Stroke([0.0, 1.0], poses), mesh)
+
+
+@pytest.mark.parametrize("name", THROUGH)
+@pytest.mark.parametrize("body", ["slab", "organ", "sheet on edge"])
+def test_on_a_table_the_edge_goes_down_to_it_and_no_further(body, name):
+    mesh = BODIES[body]()
+    table = mesh.positions[:, 2].min()
+    poses = plan_stroke(name, mesh, lowest=table).poses(200)
+    lowest = min(min(pose.tip[2], pose.heel[2]) for pose in poses)
+    assert lowest == pytest.approx(table, abs=1e-12)
+
+
+def test_a_table_far_below_the_body_changes_no_stroke():
+    mesh = BODIES["slab"]()
+    usual, above = plan_stroke("slanted", mesh), plan_stroke("slanted", mesh, lowest=-0.1)
+    np.testing.assert_array_equal(usual.pose(0.3).tip, above.pose(0.3).tip)
+    assert above.duration == usual.duration
