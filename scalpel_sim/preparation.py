@@ -11,11 +11,12 @@ import numpy as np
 from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.geom_coupling import GeomCoupling
-from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
 from scalpel_sim.arm.placement import place
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
+from scalpel_sim.arm.standing import Standing
+from scalpel_sim.arm.standing_fixture import StandingFixture
 from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
@@ -52,55 +53,51 @@ def prepare(
     """
     if link is None:
         link = InProcessLink(make_tissue(scene), scene.name)
-    body = link.snapshot()
-    mesh = TetrahedralMesh(body.positions, body.tetrahedra)
-    bounds = link.describe().bounds
+    body, tissue = link.snapshot(), link.describe()
+    mesh, bounds = TetrahedralMesh(body.positions, body.tetrahedra), tissue.bounds
     table = tabletop_of(scene, bounds)
     stops = [height for height in (scene.table, scene.floor) if height is not None]
-    lowest = max(stops, default=-math.inf)
-    stroke = stroke_through(mesh, scene.strokes, link.describe().material, lowest)
+    stroke = stroke_through(mesh, scene.strokes, tissue.material, max(stops, default=-math.inf))
     check_meets(stroke, mesh)
     needed = _needed(stroke, mesh, scene)
     _warn_of_table(stroke, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
     held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
+    floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
+    around = [*fixtures, *floor]
+    others: list[Standing] = []
     if scene.own_arm is None:
         placement = place(stroke, boxes, scene.arm, force=needed.force)
         frame = TissueFrame(origin=placement.tissue_origin)
-        first = placement, stroke
-        others = arms_with_graspers(scene.graspers, motions, boxes, frame, first)
-        arm: LedArm = placement.arm(others=[*others, *_in_world(table, frame)])
+        others += arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, stroke))
+        others += _in_world(table, around, frame)
+        arm: LedArm = placement.arm(others=others)
     else:
         arm, frame = _own(scene.own_arm)
         stroke = lengthened(stroke, arm.blade.length)
         move_to_start(arm, stroke, frame)
-        others = arms_with_graspers(scene.graspers, motions, boxes, frame, None)
-        standing_there: list[HeldArm | Tabletop] = [*others, *_in_world(table, frame)]
-        if standing_there:
+        others += arms_with_graspers(scene.graspers, motions, boxes, frame, None)
+        others += _in_world(table, around, frame)
+        if others:
             start = np.array(arm.data.qpos)
-            arm, _ = _own(scene.own_arm, standing_there)
+            arm, _ = _own(scene.own_arm, others)
             arm.reset(start)
     _warn_of_weakness(needed, arm)
-    tissue = link.describe()
-    floor = [] if tissue.floor is None else [floor_below(tissue.bounds, tissue.floor)]
-    world = TissueFrame(
-        frame.rotation.T, frame.points_to_tissue(np.zeros(3))
-    )  # as the tissue sees it
-    standing = [world.fixture_to_tissue(fixture) for fixture in (*fixtures, *floor)]
+    standing = [each for each in others if isinstance(each, StandingFixture)]
     simulation = Simulation(
         arm,
         stroke,
         link,
         frame,
-        standing,
+        [each.fixture for each in standing],
         tissue_every=scene.tissue_every,
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
     if held is not None:
-        blade = arm.model.body(arm.blade.body_id).name
-        simulation.partners.append(GeomCoupling(arm.data, held, without=[blade], frame=frame))
+        known = [arm.model.body(arm.blade.body_id).name, *(each.body for each in standing)]
+        simulation.partners.append(GeomCoupling(arm.data, held, without=known, frame=frame))
         for grasper in led_graspers(scene.graspers, motions, arm, held, frame):
             simulation.add_grasper(grasper)
     return simulation
@@ -129,12 +126,20 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 
-def _in_world(table: Tabletop | None, frame: TissueFrame) -> list[Tabletop]:
-    """Return a table where the tissue lies in the world, or none."""
-    return [] if table is None else [table._replace(frame=frame)]
+def _in_world(
+    table: Tabletop | None, fixtures: Sequence[Fixture], frame: TissueFrame
+) -> list[Standing]:
+    """Return a table and fixtures of the tissue's frame where they stand in the world."""
+    world = TissueFrame(
+        frame.rotation.T, frame.points_to_tissue(np.zeros(3))
+    )  # as the tissue sees it
+    found: list[Standing] = [
+        StandingFixture(world.fixture_to_tissue(fixture)) for fixture in fixtures
+    ]
+    return found if table is None else [table._replace(frame=frame), *found]
 
 
-def _own(own: OwnArm, others: Sequence[HeldArm | Tabletop] = ()) -> tuple[LedArm, TissueFrame]:
+def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[LedArm, TissueFrame]:
     """Return an arm of the user's own, and where the tissue lies in its world."""
     limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
     arm = own_arm(

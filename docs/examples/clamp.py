@@ -1,4 +1,4 @@
-"""Put a clamp in front of the body, and count the frames in which the blade meets it."""
+"""Put a clamp in front of the body, which stops the blade, and count the frames of that."""
 
 import numpy as np
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from bridge import DeviceLimits
 from scalpel_sim.arm.hand import Impedance
-from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.tabletop import Tabletop
+from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import unknown
 from tissue import FloatArray
 
@@ -43,7 +42,8 @@ class Arm(LedArm):
         base_position: Middle of the base's underside [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
-        others: What else stands in its world: arms, each with a grasper, and a table.
+        others: What else stands in its world: arms, each with a grasper, a
+            table, fixtures.
 
     Raises:
         UsageError: no preset has this name.
@@ -58,7 +58,7 @@ class Arm(LedArm):
         base_position: Sequence[float] | FloatArray = (0.0, 0.0, 0.0),
         base_yaw: float = 0.0,
         impedance: Impedance = Impedance(),
-        others: Sequence[HeldArm | Tabletop] = (),
+        others: Sequence[Standing] = (),
     ) -> None:
         if preset not in ARMS:
             raise unknown("arm", preset, ARMS)

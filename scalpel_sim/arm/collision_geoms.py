@@ -5,7 +5,8 @@ import numpy as np
 
 from bridge import ArmGeom, FixtureBox, GeomShape
 from scalpel_sim.arm.joint_reach import JointReach, hinge_displacement
-from tissue import FloatArray, SameTypes, kernel
+from scalpel_sim.arm.standing_fixture import PREFIX
+from tissue import FloatArray, IntArray, SameTypes, kernel
 
 _SHAPES: dict[int, tuple[GeomShape, int]] = {
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
@@ -44,14 +45,19 @@ class ArmParts:
             if int(model.geom_type[i]) in _SHAPES
             and int(model.geom_bodyid[i]) != WORLD
             and model.body_mocapid[model.geom_bodyid[i]] < 0  # the hand is no solid body
+            and not model.body(int(model.geom_bodyid[i])).name.startswith(PREFIX)  # no part of arms
         ]
         self.parts = []
+        self.names = [_name(model, i) for i in range(model.ngeom)]
+        """Names of all geoms of the model, those of the parts among them."""
+        self.numbers = {self.names[i]: i for i in self._geoms}
+        """MuJoCo's number of each part, by its name."""
         for i in self._geoms:
             body = int(model.geom_bodyid[i])
             shape, n_sizes = _SHAPES[int(model.geom_type[i])]
             self.parts.append(
                 ArmGeom(
-                    model.geom(i).name or f"{model.body(body).name} geom {i}",
+                    self.names[i],
                     shape,
                     tuple(model.geom_size[i][:n_sizes].tolist()),
                     is_instrument=_carries(model, instrument, body),
@@ -118,6 +124,16 @@ def _remain_within(
     return True
 
 
+def arms_of_geoms(model: mujoco.MjModel) -> IntArray:
+    """Return for each geom the body of the world that carries it; `WORLD` for what is no arm.
+
+    Arms are told apart by it: each stands on one body of the world.
+    """
+    roots = model.body_rootid[model.geom_bodyid].astype(np.int64)
+    no_arm = [model.body(int(root)).name.startswith(PREFIX) for root in roots]
+    return np.where(no_arm, WORLD, roots)
+
+
 def instrument_body(model: mujoco.MjModel, blade: int) -> int:
     """Return the body that the last joint before the blade moves: the handle, or the blade."""
     body = blade
@@ -148,6 +164,11 @@ def tables(model: mujoco.MjModel) -> list[FixtureBox]:
                 )
             )
     return found
+
+
+def _name(model: mujoco.MjModel, geom: int) -> str:
+    """Return the name of a geom, or that of its body with its number."""
+    return model.geom(geom).name or f"{model.body(int(model.geom_bodyid[geom])).name} geom {geom}"
 
 
 def _carries(model: mujoco.MjModel, carrier: int, body: int) -> bool:

@@ -4,12 +4,21 @@ import logging
 from collections import Counter
 from collections.abc import Iterable
 
+import mujoco
 import numpy as np
 
 from bridge import Collisions, Fixture, FixtureBox
-from scalpel_sim.arm.collision_geoms import TABLE_THICKNESS, ArmParts, tables
+from scalpel_sim.arm.collision_geoms import (
+    TABLE_THICKNESS,
+    WORLD,
+    ArmParts,
+    arms_of_geoms,
+    tables,
+)
+from scalpel_sim.arm.collision_groups import collide
 from scalpel_sim.arm.led_arm import LedArm
-from tissue import FloatArray
+from scalpel_sim.arm.standing_fixture import PREFIX
+from tissue import FloatArray, IntArray
 
 FLOOR_MARGIN = 0.02
 """How far the floor reaches beyond the body [m]. For the tissue it is infinite, but it must not
@@ -19,14 +28,28 @@ CLEARANCE_SHARE = 0.9
 """Share of a clearance that the arm may use up before it is tested again. The rest is far above the
 rounding of both lengths."""
 
+_PUSH = (
+    ": they push each other, and the blade may not follow its stroke. Move the stroke, or what is "
+    "in its way"
+)
+_PASS = (
+    ", and MuJoCo lets them pass through each other (contype, conaffinity), where the device would "
+    "stop. Move the stroke, or let them collide"
+)
+"""What happens where a pair meets."""
+
 _log = logging.getLogger("scalpel_sim")
 
 
 class CollisionMonitor:
     """Detects in each frame which parts of an arm collide with fixtures or with each other.
 
-    Nothing pushes back where they collide, for neither MuJoCo nor the tissue knows of it: such a
-    run is not what the device would do, so its user gets a warning.
+    MuJoCo has them push each other, and the blade may leave its way: the user gets a warning. It
+    says so where nothing pushes, for a model of the user's own may let its geoms pass through each
+    other, and so does a fixture that does not stand in it (`LedArm`).
+
+    Of parts of two arms those are tested that the blade's instrument may collide with; what else
+    of them collides is MuJoCo's answer.
 
     As long as the joints cannot have moved the parts as far as the clearance that was found in the
     last test (`JointReach`), nothing can collide, and nothing is tested.
@@ -43,6 +66,8 @@ class CollisionMonitor:
         self._arm = arm
         self._parts = ArmParts(arm.model, arm.data, arm.blade.body_id)
         self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])
+        self._data = arm.data
+        self._arm_of = arms_of_geoms(arm.model)
         self._free_way = 0.0
         self._has_passed = False
         self._now: tuple[tuple[str, str], ...] = ()
@@ -59,26 +84,54 @@ class CollisionMonitor:
         return {", ".join(pair): n for pair, n in self._frames.items()}
 
     def check(self) -> None:
-        """Detect the collisions of the arm as it is now. The first one of each pair is logged."""
+        """Detect the collisions of the arm as it is now. The first one of each pair is logged.
+
+        Those of two arms are MuJoCo's: of the last `mj_step1`.
+        """
+        between_arms = self._between_arms() if self._data.ncon else ()
         parts, collisions = self._parts, self._collisions
         if parts.remain_within(self._free_way):
             self._has_passed = True
+            self._count(between_arms)
             return
         if self._has_passed:
             collisions.pass_by(*parts.before())
             self._has_passed = False
-        self._now = collisions.colliding_pairs(parts.positions(), parts.axes())
-        self._free_way = 0.0 if self._now else CLEARANCE_SHARE * collisions.clearance()
+        found = collisions.colliding_pairs(parts.positions(), parts.axes())
+        self._free_way = 0.0 if found else CLEARANCE_SHARE * collisions.clearance()
         parts.reach.begin()
-        for pair in self._now:
+        known = {frozenset(pair) for pair in found}
+        self._count((*found, *(pair for pair in between_arms if frozenset(pair) not in known)))
+
+    def _count(self, pairs: tuple[tuple[str, str], ...]) -> None:
+        """Take the pairs of this frame, and log those that are new."""
+        self._now = pairs
+        for pair in pairs:
             if pair not in self._frames:
-                _log.warning(
-                    "at %.3f s the %s meets the %s, and nothing pushes back there: the device "
-                    "would stop. Move the stroke, or what is in its way",
-                    self._arm.time,
-                    *pair,
-                )
+                happens = _PUSH if self._push_each_other(*pair) else _PASS
+                _log.warning("at %.3f s the %s meets the %s%s", self._arm.time, *pair, happens)
             self._frames[pair] += 1
+
+    def _between_arms(self) -> tuple[tuple[str, str], ...]:
+        """Return the pairs of parts of two arms that MuJoCo has push each other now."""
+        geoms: IntArray = self._data.contact.geom[: self._data.ncon]
+        arms = self._arm_of[geoms]
+        of_two = (arms[:, 0] != arms[:, 1]) & (arms != WORLD).all(axis=1)
+        name = self._parts.names
+        pairs = ((name[one], name[other]) for one, other in geoms[of_two].tolist())
+        return tuple(dict.fromkeys(pairs))
+
+    def _push_each_other(self, part: str, other: str) -> bool:
+        """Whether MuJoCo has a part, and another or a fixture, push each other where they meet."""
+        model, numbers = self._arm.model, self._parts.numbers
+        geom = numbers[part]
+        if other in numbers:
+            return collide(model, geom, numbers[other])
+        for name in (PREFIX + other, f"{PREFIX}{other}_0", other):
+            number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+            if number >= 0:
+                return collide(model, geom, number)
+        return False
 
 
 def floor_below(bounds: FloatArray, height: float) -> FixtureBox:

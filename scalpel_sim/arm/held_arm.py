@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import mujoco
 
+from scalpel_sim.arm.collision_groups import collide_as_one_arm
 from scalpel_sim.arm.grasper import GuidedGrasper
 from scalpel_sim.arm.model_options import take_options
 from tissue import FloatArray
@@ -32,7 +33,10 @@ class HeldArm(NamedTuple):
         """Have it stand in the world of a model that is yet to be compiled.
 
         What its own world has to look at, planes and lights, is left out, and so are keyframes:
-        in a model of more joints they have too few numbers.
+        in a model of more joints they have too few numbers. It collides with the other arms.
+
+        Raises:
+            ValueError: there are too many arms.
         """
         for key in list(spec.keys):
             spec.delete(key)
@@ -44,6 +48,7 @@ class HeldArm(NamedTuple):
         for part in (*own.worldbody.lights, *own.keys):
             own.delete(part)
         own.nkey = spec.nkey
+        collide_as_one_arm(own, spec)
         place = spec.worldbody.add_frame(pos=self.position, quat=self.quaternion)
         spec.attach(own, prefix=self.prefix, frame=place)
 

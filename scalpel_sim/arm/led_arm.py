@@ -8,10 +8,11 @@ import numpy as np
 
 from bridge import DeviceLimits
 from scalpel_sim.arm.blade import Blade
+from scalpel_sim.arm.collision_groups import collide_as_one_arm
 from scalpel_sim.arm.hand import Hand, Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
-from scalpel_sim.arm.tabletop import Tabletop
+from scalpel_sim.arm.standing import Standing
 from tissue import FloatArray
 
 
@@ -33,7 +34,8 @@ class LedArm:
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
-        others: What else stands in its world: arms, each with a grasper, and a table.
+        others: What else stands in its world, and what it collides with: arms, each with a
+            grasper, a table, fixtures. Contact is on for them where the model has it off.
 
     Raises:
         ValueError: the model has no such sites, or cannot be compiled.
@@ -49,11 +51,14 @@ class LedArm:
         heel: str = "heel",
         tip: str = "tip",
         forward: Sequence[float] = (0.0, 0.0, -1.0),
-        others: Sequence[HeldArm | Tabletop] = (),
+        others: Sequence[Standing] = (),
     ) -> None:
         route_warnings()
         add_hand(spec, impedance, heel, tip, forward)
         self._n_own = len(spec.joints)
+        collide_as_one_arm(spec, spec)
+        if others:
+            spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         for other in others:
             other.stand_in(spec)
         self.name = name

@@ -16,10 +16,9 @@ import numpy as np
 
 from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.hand import EDGE, Impedance
-from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
-from scalpel_sim.arm.tabletop import Tabletop
+from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray
@@ -52,7 +51,7 @@ def own_arm(
     heel: str = "heel",
     tip: str = "tip",
     forward: Sequence[float] = (0.0, 0.0, -1.0),
-    others: Sequence[HeldArm | Tabletop] = (),
+    others: Sequence[Standing] = (),
 ) -> LedArm:
     """Return the arm of an MJCF file, in the configuration of its first keyframe if it has one.
 
@@ -62,7 +61,8 @@ def own_arm(
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
-        others: What else stands in its world: arms, each with a grasper, and a table.
+        others: What else stands in its world: arms, each with a grasper, a
+            table, fixtures.
 
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.

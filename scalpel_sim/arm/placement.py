@@ -9,7 +9,6 @@ import numpy as np
 
 from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.hand import Impedance
-from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.inverse_kinematics import Geometry, geometry, reach
 from scalpel_sim.arm.place_search import (
     TABLE_CLEARANCE,
@@ -23,7 +22,7 @@ from scalpel_sim.arm.place_search import (
     search_place,
     spheres_along,
 )
-from scalpel_sim.arm.tabletop import Tabletop
+from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.stroke import DRAWN_STROKES
@@ -76,13 +75,14 @@ class Placement(NamedTuple):
     def arm(
         self,
         impedance: Impedance = Impedance(),
-        others: Sequence[HeldArm | Tabletop] = (),
+        others: Sequence[Standing] = (),
     ) -> Arm:
         """Return an arm that stands there, with its blade at the start of the stroke.
 
         Args:
             impedance: How firmly the hand holds the blade.
-            others: What else stands in its world: arms, each with a grasper, and a table.
+            others: What else stands in its world: arms, each with a grasper, a
+            table, fixtures.
         """
         arm = Arm(
             self.preset,

@@ -6,6 +6,8 @@ import mujoco
 import numpy as np
 
 from bridge import TissueFrame
+from scalpel_sim.arm.collision_groups import STANDING
+from scalpel_sim.arm.standing_fixture import STEEL
 from tissue import FloatArray, Geom
 
 TABLETOP = "tabletop"
@@ -33,11 +35,8 @@ class Tabletop(NamedTuple):
     def stand_in(self, spec: mujoco.MjSpec) -> None:
         """Have it stand in the world of a model that is yet to be compiled.
 
-        It collides with what a user's model lets collide, and with instruments and arms of ours.
-        The models of ours have contact switched off: with a table it is on, and nothing but the
-        table collides with them.
+        It collides with arms and what they hold.
         """
-        spec.option.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         quaternion, frame = np.empty(4), self.frame
         mujoco.mju_mat2Quat(quaternion, frame.rotation.ravel())
         spec.worldbody.add_geom(
@@ -47,7 +46,8 @@ class Tabletop(NamedTuple):
             pos=frame.points_to_world(self.centre),
             quat=quaternion,
             friction=[self.geom.friction, 0.005, 0.0001],
-            contype=1,
+            solref=STEEL,
+            contype=1 | STANDING,
             conaffinity=1,
             rgba=_COLOUR,
         )

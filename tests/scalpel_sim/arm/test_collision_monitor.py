@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bridge import FixtureBox
-from scalpel_sim import SCENES, prepare
+from scalpel_sim import SCENES, StrokeTable, prepare
 from scalpel_sim.arm.arm import ARMS, Arm
 from scalpel_sim.arm.collision_monitor import FLOOR_MARGIN, CollisionMonitor, floor_below
 from scalpel_sim.scene_parts.scene import changed
@@ -37,7 +37,7 @@ def test_a_blade_that_is_led_into_the_table_is_counted_and_gets_one_warning(capl
     warnings = [
         record.message for record in caplog.records if "blade meets the table" in record.message
     ]
-    assert len(warnings) == 1 and "nothing pushes back" in warnings[0]
+    assert len(warnings) == 1 and "they push each other" in warnings[0]
 
 
 def test_a_handle_that_touches_a_clamp_is_named_with_it():
@@ -70,11 +70,15 @@ def test_in_the_scenes_nothing_is_touched(scene):
     assert simulation.touching.frames == {}
 
 
-def test_a_blade_that_passes_below_the_body_touches_the_floor():
-    simulation = prepare(changed(SCENES["grid2"], floor=-0.001))
-    simulation.run(0.02)
-    assert ("blade", "floor") in simulation.touching.now
-    assert simulation.touching.frames["blade, floor"] == 20
+def test_a_blade_that_is_led_below_the_floor_meets_it_and_is_stopped(caplog):
+    points = [[0.02, -0.005, 0.005], [0.02, -0.005, -0.006], [0.02, 0.02, -0.006]]
+    drawn = StrokeTable(kind="points", points=points, length=0.06, forward=[0.0, 1.0, 0.0])
+    simulation = prepare(changed(SCENES["grid2"], floor=-0.001, strokes=(drawn,)))
+    simulation.run(simulation.duration)
+    height = simulation.frame.points_to_world(np.array([0.0, 0.0, -0.001]))[2]
+    assert simulation.touching.frames["blade, floor"] > 20
+    assert simulation.recording.vector("tip")[:, 2].min() > height - 1e-3
+    assert "the blade meets the floor: they push each other" in caplog.text
 
 
 def test_the_floor_extends_below_the_body_and_a_margin_around_it():

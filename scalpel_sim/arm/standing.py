@@ -1,0 +1,12 @@
+"""What stands in the world of an arm beside it."""
+
+from typing import Protocol
+
+import mujoco
+
+
+class Standing(Protocol):
+    """An arm, a table, a fixture: anything that can be put into a model."""
+
+    def stand_in(self, spec: mujoco.MjSpec) -> None:
+        """Have it stand in the world of a model that is yet to be compiled."""
