@@ -43,8 +43,13 @@ class StandingFixture(NamedTuple):
         """Have it stand in the world of a model that is yet to be compiled. It does not move.
 
         A mesh becomes a thin plate for each triangle: as one geom it would be its convex hull.
+
+        Raises:
+            ValueError: another fixture there has its name.
         """
         fixture, common = self.fixture, dict(_COMMON)
+        if spec.body(self.body) is not None:
+            raise ValueError(f"two fixtures have the name {fixture.name!r}")
         body = spec.worldbody.add_body(name=self.body)
         if isinstance(fixture, FixtureBox):
             quaternion = np.empty(4)

@@ -69,6 +69,12 @@ def test_a_fixture_that_does_not_stand_in_the_model_is_told_to_let_the_blade_thr
     assert "pass through each other" in caplog.text
 
 
+def test_fixtures_of_one_name_are_refused_by_it():
+    box = StandingFixture(FixtureBox("block", SIZE, np.array([0.5, 0.0, 0.0])))
+    with pytest.raises(ValueError, match="two fixtures have the name 'block'"):
+        Arm("touch", others=[box, box])
+
+
 def test_two_instruments_stop_each_other_and_action_is_reaction(caplog):
     simulation = prepare(SCENES["retract"])
     arm, grasper = simulation.arm, simulation.arm.graspers[0]
