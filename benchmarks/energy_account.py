@@ -47,7 +47,7 @@ def main() -> int:
         ratio = 0.45 if options.law == "neo_hookean" else 0.25
         material = replace(material, law=options.law, poisson_ratio=ratio)
     how = {"relaxation": options.relaxation, "contact": options.contact, "audit": True}
-    tissue = make_tissue(replace(scene, material=material, floor=STROKE_FLOOR, **how))
+    tissue = make_tissue(replace(scene, material=material, floor=STROKE_FLOOR, table=None, **how))
     random = np.random.default_rng(options.seed)
     table = Table(
         title=f"organ, law {material.law}, relaxation {options.relaxation}; % of the work"

@@ -10,6 +10,7 @@ The last line is the ratio of the medians of the later half of the frames.
 import argparse
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,7 +48,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--frames", type=int, default=600)
     options = parser.parse_args()
-    alone, touched = make_tissue(SCENES["organ"]), make_tissue(SCENES["organ"])
+    scene = replace(SCENES["organ"], table=None)
+    alone, touched = make_tissue(scene), make_tissue(scene)
     for tissue in (alone, touched):
         tissue.push("top", (0.0, 0.0, -1e-6))
     geoms, places = instruments(touched)

@@ -54,7 +54,7 @@ def main() -> int:
     relaxation = options.relaxation or scene.relaxation
     contact = options.contact
     scene = replace(scene, material=material, relaxation=relaxation, contact=contact)
-    tissue = make_tissue(replace(scene, floor=STROKE_FLOOR))
+    tissue = make_tissue(replace(scene, floor=STROKE_FLOOR, table=None))
     random = np.random.default_rng(options.seed)
     how = f"relaxation {relaxation}, contact {contact or 'by default'}"
     table = Table(title=f"organ, law {material.law}, {how}")

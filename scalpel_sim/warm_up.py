@@ -31,6 +31,7 @@ from tissue import (
     BladeSegment,
     BladeShape,
     BladeSweep,
+    Geom,
     SolverSettings,
     TetrahedralMesh,
     Tissue,
@@ -69,6 +70,8 @@ class KernelSet(NamedTuple):
     """Whether the stress of the material relaxes."""
     is_held: bool = False
     """Whether attachments hold the body."""
+    has_table: bool = True
+    """Whether the body lies on a table."""
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
@@ -77,7 +80,8 @@ class KernelSet(NamedTuple):
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
         how = (scene.audit, has_sides, scene.precision, scene.contact)
         relaxes, is_held = bool(scene.material.prony), bool(scene.attachments)
-        return cls(law, scheme, relaxation, *how, relaxes=relaxes, is_held=is_held)
+        has_table = scene.table is not None
+        return cls(law, scheme, relaxation, *how, relaxes, is_held, has_table)
 
     @property
     def _prony(self) -> tuple[tuple[float, float], ...]:
@@ -111,7 +115,7 @@ USUAL_SETS = (KernelSet(), KernelSet(relaxation="verlet", audit=False))
 
 def kernels_are_compiled(kernels: KernelSet) -> bool:
     """Return whether the cache has all kernels of a set, compiled from exactly these sources."""
-    return _mark(kernels).exists()
+    return _mark(kernels).exists() or _mark(kernels._replace(has_table=True)).exists()
 
 
 def prepare_kernels(
@@ -180,6 +184,9 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     if dt > 0.0:
         if kernels.is_held:
             _hold(tissue)
+        if kernels.has_table:
+            board = Geom("board", "box", (_SIDE, _SIDE, _SIDE), 0.5)
+            tissue.collide_with([board], [[0.5 * _SIDE, 0.5 * _SIDE, -_SIDE]])
         tissue.settle()
     before = _edge(-0.1)
     for fraction in np.linspace(-0.1, 1.5, N_STEPS):

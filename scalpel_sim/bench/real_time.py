@@ -192,7 +192,8 @@ def _random_stroke_frames(
     name: str, material: str, counts: Sequence[int], seconds: float | None, watch: Watch
 ) -> list[tuple[TimedRun, Frames]]:
     """Time frames after random strokes on one body: at rest, and in the stroke that follows."""
-    tissue = make_tissue(replace(_scene(name, material), audit=False, floor=STROKE_FLOOR))
+    scene = replace(_scene(name, material), audit=False, floor=STROKE_FLOOR, table=None)
+    tissue = make_tissue(scene)  # no table: strokes come from all sides
     random = np.random.default_rng(_SEED)
     found, done = [], 0
     for count in counts:

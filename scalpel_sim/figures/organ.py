@@ -13,12 +13,13 @@ from scalpel_sim.scenes import SCENES
 from scalpel_sim.strokes.cuts import PlannedCut
 
 ORGAN = PlannedCut(
-    replace(SCENES["organ"], stretch=0.15),
+    replace(SCENES["organ"], stretch=0.15, table=None),
     path=np.array([[0.55, -0.15], [0.42, 1.25]]),
     depth=1.15,
     lean=-0.15,
 )
-"""Clean through the organ; it leans so that one sees into the cut, which is pulled open."""
+"""Clean through the organ; it leans so that one sees into the cut, which is pulled open, and
+hangs between its ends: the blade passes below it."""
 _MOMENTS = (0.5, 0.72)
 """Shares of the stroke: half way, and shortly before the organ falls in two."""
 _COLOURS = 256
