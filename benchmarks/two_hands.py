@@ -3,8 +3,9 @@
 Usage: PYTHONPATH=. python benchmarks/two_hands.py SCENE [--runs N] [--seed N] [--set KEY=VALUE]
 
 SCENE is retract, excise or taut_incision. In each run each hand does what it does at a place of its
-own, moved as a whole by up to 3 mm in a random direction. A row shows how it ended, and by how much
-the account of the energy is off, as a share of the work of all hands. The last line counts.
+own, moved as a whole by up to 3 mm in a random direction. A row shows how it ended, what is not as
+it should be, and by how much the account of the energy is off, as a share of the work of all hands.
+The last line counts.
 """
 
 import argparse
@@ -19,7 +20,7 @@ from scalpel_sim.scene_file.layers import with_settings
 from scalpel_sim.scene_file.reading import shipped_scene
 from scalpel_sim.strokes.asked_area import asked_area
 from tests.scalpel_sim.moved_scenes import moved
-from tissue import pieces_of
+from tissue import Piece, pieces_of
 
 CLOSED = 0.005
 """Largest residual of an account that closes, as a share of the work of all hands."""
@@ -34,24 +35,55 @@ SCENES = ("retract", "excise", "taut_incision")
 """The scenes."""
 
 
-def ends_right(name: str, simulation: Simulation, asked: float) -> bool:
-    """Return whether a scene ended as it should; `asked`: what its stroke is to cut [m2]."""
+def what_is_wrong(name: str, simulation: Simulation, asked: float) -> list[str]:
+    """Return what is not as it should be at the end of a scene; `asked`: what to cut [m2]."""
     pieces = pieces_of(simulation.link.snapshot())
-    held = [piece.is_held for piece in pieces]
+    are_held = [piece.is_held for piece in pieces]
     (left,) = simulation.graspers
-    most = simulation.recording.column("left_points").max()
+    most = int(simulation.recording.column("left_points").max())
+    wrong = {"the left hand never held anything": most == 0}
+    if name != "excise":  # there it puts down what it holds
+        wrong[f"the left hand holds {left.n_points} of {most} points"] = left.n_points < most
     if name == "taut_incision":
-        opened = float(simulation.recording.column("cut_area_m2")[-1])
-        return held == [True] and most > 0 and opened > LEAST_OPENED * asked
-    if held != [True, False]:
-        return False
-    off = pieces[1]
+        wrong |= _wrong_of_incision(simulation, are_held, asked)
+    elif are_held != [True, False]:
+        wrong[f"{len(pieces)} pieces, {sum(are_held)} of them held, not 2 and 1"] = True
+    else:
+        wrong |= _wrong_of_piece(name, pieces[1], left.n_points)
+    return [what for what, is_so in wrong.items() if is_so]
+
+
+def _wrong_of_incision(
+    simulation: Simulation, are_held: list[bool], asked: float
+) -> dict[str, bool]:
+    """Return what may be wrong after an incision, and whether it is."""
+    opened = simulation.recording.column("cut_area_m2")
+    is_cutting = (opened > 0.0) & (opened < opened[-1])
+    # The tissue draws the hand to the left, where it is held, if it is taut.
+    pull = -simulation.recording.vector("left_force")[is_cutting, 0]
+    least = float(pull.min(initial=np.inf))
+    cut = f"{1e6 * opened[-1]:.0f} of {1e6 * asked:.0f} mm2 are cut"
+    return {
+        f"{len(are_held)} pieces, {sum(are_held)} of them held, not one": are_held != [True],
+        cut: not opened[-1] > LEAST_OPENED * asked,
+        f"slack during the cut: the hand feels {least:.2f} N": least <= 0.0,
+    }
+
+
+def _wrong_of_piece(name: str, off: Piece, n_points: int) -> dict[str, bool]:
+    """Return what may be wrong with the piece that came off, and whether it is."""
+    where = f"its centre is at {np.round(1e3 * off.centre, 1).tolist()} mm"
+    speed = float(np.linalg.norm(off.velocity))
+    moves = f"the piece moves at {1e3 * speed:.0f} mm/s"
     if name == "retract":  # it hangs from the grasper, and swings
-        hangs = left.n_points == most > 0
-        return bool(hangs and off.centre[2] > 0.03 and np.linalg.norm(off.velocity) < 0.15)
+        return {f"the piece hangs too low: {where}": off.centre[2] <= 0.03, moves: speed >= 0.15}
     # Its half depth is 9 mm: it is clear of the sheet, which ends at 40 mm, by 1 cm.
     lies = off.centre[1] > 0.06 and abs(off.centre[2] + 0.01) < 0.002
-    return bool(lies and np.linalg.norm(off.velocity) < 0.01 and left.n_points == 0)
+    return {
+        f"the lump does not lie behind the sheet: {where}": not lies,
+        moves: speed >= 0.01,
+        f"the left hand still holds {n_points} points": n_points > 0,
+    }
 
 
 def main() -> int:
@@ -74,10 +106,10 @@ def main() -> int:
         assert energies is not None
         work = energies.work_of_blade + abs(energies.work_of_loads)
         off = energies.residual / work
-        is_right = ends_right(options.scene, simulation, asked)
-        n_right += is_right
+        wrong = what_is_wrong(options.scene, simulation, asked)
+        n_right += not wrong
         n_closed += abs(off) <= CLOSED
-        mark = "as it should" if is_right else "NOT as it should"
+        mark = f"NOT as it should ({'; '.join(wrong)})" if wrong else "as it should"
         console.print(
             f"{i:3}  ends {mark}, pieces {simulation.link.n_pieces()}, residual {1e2 * off:.2f} % "
             f"of {1e3 * work:.3g} mJ, touched {dict(simulation.touching.frames)}"
