@@ -12,7 +12,7 @@ from scalpel_sim.preparation import prepare
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.simulation import Simulation
 
-TWO_HANDS = {"retract": (3.6, 4.2), "excise": (1.75, 3.3), "taut_incision": (2.2, 3.0)}
+TWO_HANDS = {"retract": (3.6, 4.2), "excise": (1.75, 3.3), "taut_incision": (2.4, 3.2)}
 """Scenes that have such a picture, and its moments [s]: as the blade cuts, and when the left hand
 has what came off; or as the blade is in, and when it is out."""
 

@@ -24,7 +24,8 @@ SLOPE = math.radians(35.0)
 a pen."""
 
 INSERTED_AT, WITHDRAWN_AT = 0.2, 0.73
-"""Where the tip goes in and out, as shares of the body's length: 48 mm of the organ."""
+"""Where the tip goes in and out, as shares of the body's length, where nothing is said of it: 48 mm
+of the organ."""
 
 DRAG_SHARE = 0.15
 """How far the tip is drawn on beyond that, as a share of toughness / Young's modulus, because the
@@ -32,7 +33,11 @@ edge runs ahead of the material that it cuts. Without it the incision in liver, 
 came out 5 mm short, of 35 mm."""
 
 WITHDRAWN_LATEST = 0.85
-"""Where the tip goes out at the latest, as a share of the body's length."""
+"""How far the drag may draw the tip, as a share of the body's length from the side where it comes
+from."""
+
+LEAST_LENGTH = 0.05
+"""Least length of an incision, as a share of the body's: shorter, it is a stab."""
 
 _GAP = 4e-3
 """How far above the surface the tip starts, and ends [m]."""
@@ -52,7 +57,12 @@ it jerk."""
 
 
 def plan_incision(
-    mesh: TetrahedralMesh, *, speed: float, depth: float | None = None, drag: float = 0.0
+    mesh: TetrahedralMesh,
+    *,
+    speed: float,
+    depth: float | None = None,
+    drag: float = 0.0,
+    along: tuple[float, float] = (INSERTED_AT, WITHDRAWN_AT),
 ) -> Stroke:
     """Return an incision along the middle of a body's longer side, seen from above.
 
@@ -62,20 +72,29 @@ def plan_incision(
         depth: Depth of the tip below the surface [m]; None for `DEPTH`.
         drag: How far the edge runs ahead of the material that it cuts [m]: as much farther the tip
             is drawn, for the cut to be as long as asked.
+        along: Where the tip goes in and out, as shares of the body's length. Where the second is
+            the smaller, the blade is drawn, and leans, the other way.
 
     Raises:
-        StrokeError: the body's upper side has a gap there.
+        StrokeError: the body's upper side has a gap there, or the tip goes in and out at one place.
     """
     low, high = mesh.positions.min(axis=0), mesh.positions.max(axis=0)
     extent = high - low
     axis = 0 if extent[0] >= extent[1] else 1
+    inserted_at, withdrawn_at = along
+    if abs(withdrawn_at - inserted_at) < LEAST_LENGTH:
+        raise StrokeError(
+            f"the incision goes in at {inserted_at:g} of the body's length, and out at "
+            f"{withdrawn_at:g}; it must be at least {LEAST_LENGTH:g} long"
+        )
+    way = math.copysign(1.0, withdrawn_at - inserted_at)
     if depth is None:
         depth = min(DEPTH, DEPTH_SHARE * float(extent[2]))
-    ahead, up = np.eye(3)[axis], np.eye(3)[2]
-    withdrawn_at = min(WITHDRAWN_AT + drag / float(extent[axis]), WITHDRAWN_LATEST)
-    at = low[axis] + np.linspace(INSERTED_AT, withdrawn_at, _POINTS) * extent[axis]
+    ahead, up = way * np.eye(3)[axis], np.eye(3)[2]
+    drawn_to = _drawn_to(withdrawn_at, way, drag / float(extent[axis]))
+    at = low[axis] + np.linspace(inserted_at, drawn_to, _POINTS) * extent[axis]
     surface = _smooth(at, _surface(mesh, at, axis))
-    below = np.outer(at, ahead) + np.outer(surface - depth, up)
+    below = np.outer(at, np.eye(3)[axis]) + np.outer(surface - depth, up)
     below[:, 1 - axis] = 0.5 * (low + high)[1 - axis]
     rise = (depth + _GAP) * up
     legs = [np.array([below[0] + rise, below[0]]), below, np.array([below[-1], below[-1] + rise])]
@@ -84,9 +103,22 @@ def plan_incision(
     forward = math.sin(SLOPE) * ahead - math.cos(SLOPE) * up
     length = _REACH * depth / math.sin(SLOPE)
     poses = [BladeSegment(tip, tip + length * edge, forward) for tip in tips]
-    asked_end = low[axis] + WITHDRAWN_AT * extent[axis]
-    asked_until = float(np.interp(asked_end, tips[:, axis], times))
+    asked_end = low[axis] + withdrawn_at * extent[axis]
+    asked_until = float(np.interp(way * asked_end, way * tips[:, axis], times))
     return Stroke(times, poses, "incision", asked=[(0.0, asked_until)])
+
+
+def _drawn_to(withdrawn_at: float, way: float, drag: float) -> float:
+    """Return where the tip goes out, as a share of the body's length.
+
+    Args:
+        withdrawn_at: Where it is asked to.
+        way: 1 if it is drawn towards the far end of the body, -1 if towards the near one.
+        drag: How far the edge runs ahead of the material, as a share of the body's length.
+    """
+    asked = withdrawn_at if way > 0.0 else 1.0 - withdrawn_at
+    drawn = max(asked, min(asked + drag, WITHDRAWN_LATEST))
+    return drawn if way > 0.0 else 1.0 - drawn
 
 
 def _surface(mesh: TetrahedralMesh, at: FloatArray, axis: int) -> FloatArray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from scalpel_sim.errors import unknown
 from scalpel_sim.strokes.expected_force import is_inside
-from scalpel_sim.strokes.incision import DRAG_SHARE, plan_incision
+from scalpel_sim.strokes.incision import DRAG_SHARE, INSERTED_AT, WITHDRAWN_AT, plan_incision
 from scalpel_sim.strokes.planned_sheet import PlannedSheet, is_above, mesh_edges, section
 from scalpel_sim.strokes.stroke import Stroke, StrokeError
 from scalpel_sim.strokes.timing import SPEED_UP_TIME, timed
@@ -84,6 +84,7 @@ def plan_stroke(
     material: Material = Material(),
     depth: float | None = None,
     lowest: float = -math.inf,
+    along: tuple[float, float] = (INSERTED_AT, WITHDRAWN_AT),
 ) -> Stroke:
     """Return the stroke of that name, placed through (or against) the middle of the body.
 
@@ -101,6 +102,7 @@ def plan_stroke(
             8 mm, or a share of a thin body.
         lowest: Height below which the edge is not led [m]: the upper side of a table or a floor
             that stops it. An incision does not come near it.
+        along: Where an incision goes in and out, as shares of the body's length.
 
     Raises:
         UsageError: no stroke has this name.
@@ -113,7 +115,7 @@ def plan_stroke(
         if depth is not None:
             _check_positive("depth", depth, "m")
         drag = DRAG_SHARE * material.toughness / material.young_modulus
-        return plan_incision(mesh, speed=speed, depth=depth, drag=drag)
+        return plan_incision(mesh, speed=speed, depth=depth, drag=drag, along=along)
     edges = mesh_edges(mesh.tetrahedra)
     sheet = _sheet(name, mesh, edges)
     cut = section(mesh.positions, edges, sheet.height(mesh.positions))

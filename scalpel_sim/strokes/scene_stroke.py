@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 
 from scalpel_sim.strokes.drawn import drawn_stroke
+from scalpel_sim.strokes.incision import INSERTED_AT, WITHDRAWN_AT
 from scalpel_sim.strokes.planning import plan_stroke
 from scalpel_sim.strokes.sequence import in_turn
 from scalpel_sim.strokes.stroke import Stroke
@@ -39,6 +40,12 @@ def _path(mesh: TetrahedralMesh, table: StrokeTable, material: Material, lowest:
     speed = DEFAULT_SPEED if table.speed is None else table.speed
     if table.kind in PLANNED_STROKES:
         return plan_stroke(
-            table.kind, mesh, speed=speed, material=material, depth=table.depth, lowest=lowest
+            table.kind,
+            mesh,
+            speed=speed,
+            material=material,
+            depth=table.depth,
+            along=table.along or (INSERTED_AT, WITHDRAWN_AT),
+            lowest=lowest,
         )
     return drawn_stroke(table, speed)

@@ -10,6 +10,7 @@ from scalpel_sim.tables.values import (
     Text,
     ThreeNumbers,
     TomlTable,
+    TwoShares,
 )
 
 PLANNED_STROKES = {
@@ -37,7 +38,7 @@ _OF_PATH = KeysOfKind(
 
 KEYS_OF_STROKE = {
     **dict.fromkeys(PLANNED_STROKES, KeysOfKind((), ("speed",))),
-    "incision": KeysOfKind((), ("speed", "depth")),
+    "incision": KeysOfKind((), ("speed", "depth", "along")),
     "press": KeysOfKind((), ("speed", "depth")),
     "points": _OF_PATH,
     "spline": _OF_PATH,
@@ -61,6 +62,8 @@ class StrokeTable(TomlTable, kw_only=True, frozen=True):
     """Speed of the tip between its ramps [m/s]; None: `DEFAULT_SPEED`."""
     depth: Positive | None = None
     """How deep a press, an incision or a stab goes [m]."""
+    along: TwoShares | None = None
+    """Where an incision goes in and out, as shares of the body's length."""
     points: RowsOfThree | None = None
     """Where the tip goes [m]."""
     length: Positive | None = None

@@ -37,6 +37,9 @@ Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST, description="a number abov
 NotNegative = Annotated[float, Meta(ge=0.0, le=_LARGEST, description="a number, 0 or more")]
 Ratio = Annotated[float, Meta(ge=0.0, lt=0.5, description="a number from 0 to below 0.5")]
 Share = Annotated[float, Meta(ge=0.0, le=1.0, description="a number from 0 to 1")]
+TwoShares = Annotated[
+    tuple[Share, Share], Meta(description="two numbers from 0 to 1: [begin, end]")
+]
 Whole = Annotated[int, Meta(ge=1, le=10_000, description="a whole number from 1 to 10000")]
 _Three = tuple[Finite, Finite, Finite]
 ThreeNumbers = Annotated[_Three, Meta(description="three numbers: [x, y, z]")]

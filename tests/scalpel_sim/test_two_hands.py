@@ -14,6 +14,7 @@ from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.layers import with_settings
 from scalpel_sim.scene_file.reading import shipped_scene
+from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.moved_scenes import moved
@@ -22,7 +23,8 @@ from tissue import pieces_of
 ACCOUNT = ("solver.audit=true",)
 RETRACT = scene_in(with_settings(shipped_scene("retract"), ACCOUNT))
 EXCISE = scene_in(with_settings(shipped_scene("excise"), (*ACCOUNT, "body.cells=[18, 12, 2]")))
-BOTH = pytest.mark.parametrize("scene", [RETRACT, EXCISE], ids=["retract", "excise"])
+TAUT = scene_in(with_settings(shipped_scene("taut_incision"), ACCOUNT))
+EACH = pytest.mark.parametrize("scene", [RETRACT, EXCISE, TAUT], ids=["retract", "excise", "taut"])
 
 
 def done(scene):
@@ -56,6 +58,18 @@ def check_excise(simulation):
     assert simulation.graspers[0].n_points == 0
 
 
+def check_taut(simulation, asked):
+    """One piece, cut as asked, whose end the left hand still holds, and held taut all the while."""
+    (piece,) = pieces_of(simulation.link.snapshot())
+    assert piece.is_held
+    recording, (left,) = simulation.recording, simulation.graspers
+    assert left.n_points == recording.column("left_points").max() > 0
+    cut = recording.column("cut_area_m2")
+    assert cut[-1] == pytest.approx(asked, rel=0.1)
+    is_cutting = (cut > 0.0) & (cut < cut[-1])
+    assert (recording.vector("left_force")[is_cutting, 0] < 0.0).all()
+
+
 @pytest.fixture(scope="module")
 def retract():
     return done(RETRACT)
@@ -66,7 +80,18 @@ def excise():
     return done(EXCISE)
 
 
+@pytest.fixture(scope="module")
+def taut():
+    return done(TAUT)
+
+
 # How they end
+
+
+def test_the_lobe_is_cut_as_asked_while_the_left_hand_holds_it_taut(taut):
+    body = InProcessLink(make_tissue(TAUT)).snapshot()
+    check_taut(taut, asked_area(taut.stroke, body))
+    assert taut.touching.frames == {}
 
 
 def test_the_lobe_is_cut_off_under_the_edge_that_the_left_hand_lifts(retract):
@@ -130,7 +155,7 @@ def test_the_left_hand_feels_nothing_before_it_is_there(retract):
     assert (retract.recording.vector("left_force")[:150] == 0.0).all()
 
 
-@pytest.mark.parametrize("name", ["retract", "excise"])
+@pytest.mark.parametrize("name", ["retract", "excise", "taut"])
 def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(name, request):
     simulation = request.getfixturevalue(name)
     energies = simulation.result.energies
@@ -141,7 +166,7 @@ def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(name,
 # Where the arms stand
 
 
-@BOTH
+@EACH
 def test_links_of_the_two_arms_stay_apart_on_their_whole_ways(scene):
     """Upper arms and forearms, from joint to joint, at every hundredth frame."""
     simulation = prepare(scene)
@@ -175,7 +200,7 @@ def still(simulation):
     return lambda sweep, dt, poses=(): result
 
 
-@BOTH
+@EACH
 def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_begin(scene):
     simulation = prepare(scene)
     data, frame = simulation.arm.data, simulation.frame
@@ -188,7 +213,7 @@ def test_both_arms_stand_on_one_table_with_their_instruments_where_their_ways_be
     assert simulation.arm.blade.segment().tip == pytest.approx(tip, abs=1e-5)
 
 
-@BOTH
+@EACH
 def test_the_camera_stands_before_neither_arm(scene):
     simulation = prepare(scene)
     model, data, surface = simulation.arm.model, simulation.arm.data, simulation.link.surface()

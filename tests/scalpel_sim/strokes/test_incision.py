@@ -48,6 +48,32 @@ def test_the_tip_is_drawn_on_by_the_drag_and_not_out_of_the_body():
     assert tips(SLAB, drag=1.0)[-1, 1] == pytest.approx(longest)
 
 
+@pytest.mark.parametrize("along", [(0.3, 0.6), (0.7, 0.25)])
+def test_the_tip_goes_in_and_out_where_it_is_asked_to(along):
+    path = tips(SLAB, along=along)
+    np.testing.assert_allclose([path[0, 1], path[-1, 1]], 0.06 * np.array(along))
+
+
+def test_an_incision_that_is_drawn_the_other_way_is_the_mirror_image():
+    """The tip, the lean of the edge, the drag and where it ends at the latest; the area too."""
+    here, there = (
+        plan_incision(SLAB, speed=SPEED, drag=4e-3, along=along)
+        for along in ((0.2, 0.8), (0.8, 0.2))
+    )
+    mirror = np.array([1.0, -1.0, 1.0])
+    for pose, other in zip(here.poses(50), there.poses(50), strict=True):
+        np.testing.assert_allclose(other.tip, [0.0, 0.06, 0.0] + mirror * pose.tip, atol=1e-12)
+        np.testing.assert_allclose(other.heel, [0.0, 0.06, 0.0] + mirror * pose.heel, atol=1e-12)
+        np.testing.assert_allclose(other.forward, mirror * pose.forward, atol=1e-12)
+    assert there.asked[0][1] == pytest.approx(here.asked[0][1])
+    assert there.pose(there.duration).tip[1] == pytest.approx(0.06 * (1.0 - WITHDRAWN_LATEST))
+
+
+def test_an_incision_of_no_length_is_refused():
+    with pytest.raises(StrokeError, match=r"goes in at 0\.5 of the body's length"):
+        plan_incision(SLAB, speed=SPEED, along=(0.5, 0.52))
+
+
 def test_the_edge_slopes_with_its_heel_ahead_and_faces_forward_and_down():
     for pose in plan_incision(SLAB, speed=SPEED).poses(5):
         edge = (pose.heel - pose.tip) / np.linalg.norm(pose.heel - pose.tip)
