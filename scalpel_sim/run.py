@@ -83,7 +83,12 @@ def perform(
     outputs.write_mesh(INITIAL, at_first)
     # What graspers move is elsewhere when the blade comes.
     asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
-    replay = ReplayWriter(simulation.arm.model, title=title, frame=simulation.frame)
+    replay = ReplayWriter(
+        simulation.arm.model,
+        title=title,
+        frame=simulation.frame,
+        views=() if scene is None else scene.views,
+    )
     simulation.pictures.append(into_replay(replay))
     _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame)

@@ -136,6 +136,7 @@ def _view(
                 frame=simulation.frame,
                 wireframe=wireframe,
                 port=port,
+                views=prepared.scene.views,
             ) as viewer:
                 show_in(viewer, simulation)
                 simulation.pictures.append(into_viewer(viewer))

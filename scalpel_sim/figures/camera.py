@@ -1,9 +1,11 @@
 """A camera, which projects points in space to the picture."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from scalpel_sim.tables.view import ViewTable
 from tissue import FloatArray
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -86,6 +88,20 @@ def fit_view(
     return view
 
 
+def view_from(camera: ViewTable, width: int, height: int) -> View:
+    """Return the perspective view of a scene's camera; lengths in the frame of the tissue.
+
+    Args:
+        camera: Where it is, and how it is turned.
+        width: Width of the picture [pixels].
+        height: Height of the picture [pixels].
+    """
+    eye = np.array(camera.eye)
+    axes = _axes(np.array(camera.target) - eye, np.array(camera.up))
+    scale = 0.5 * height / math.tan(0.5 * math.radians(camera.fov_degrees))
+    return View(*axes, eye, scale, width, height)
+
+
 def _box(view: View, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the corners of the bounding box of the projected points [pixels]."""
     seen = view.project(points)[:, :2]
@@ -104,10 +120,12 @@ def parallel_view(direction: FloatArray, points: FloatArray, n_pixels: int) -> V
     return View(right, up, forward, eye, scale, n_pixels, n_pixels, is_parallel=True)
 
 
-def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the unit vectors right, up and forward of a view in a direction."""
+def _axes(
+    direction: FloatArray, upward: FloatArray = UP
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the unit vectors right, up and forward of a view in a direction, the right way up."""
     forward = direction / np.linalg.norm(direction)
-    right = np.cross(forward, UP)
+    right = np.cross(forward, upward)
     if np.linalg.norm(right) < 1e-9:  # straight up or down: any direction can be right
         right = np.array([1.0, 0.0, 0.0])
     right = right / np.linalg.norm(right)

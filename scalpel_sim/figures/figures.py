@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from scalpel_sim.errors import RunError
-from scalpel_sim.figures.camera import Margins, View, fit_view
+from scalpel_sim.figures.camera import Margins, View, fit_view, view_from
 from scalpel_sim.figures.cuts import (
     FIGURE_10,
     FIGURE_10_MOMENTS,
@@ -22,6 +22,7 @@ from scalpel_sim.figures.cuts import (
 from scalpel_sim.figures.mesh_drawing import draw_mesh
 from scalpel_sim.figures.rendering import SceneObject, render, texture_of
 from scalpel_sim.figures.table import table_below
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.scene_packets import TILES_PER_BODY
 from scalpel_sim.viewer.texture_mapping import map_texture
@@ -109,8 +110,10 @@ def _drawn(caption: str, seen: Sequence[Moment], prefixes: Sequence[str]) -> Dra
     return Drawn(caption, labels, counts)
 
 
-def view_of(seen: Sequence[Moment], margins: Margins) -> View:
-    """Return the view in which the body fills the picture at all moments."""
+def view_of(seen: Sequence[Moment], margins: Margins, cameras: Sequence[ViewTable] = ()) -> View:
+    """Return the view of the first camera; without one, that in which the body always fills it."""
+    if cameras:
+        return view_from(cameras[0], _WIDTH, HEIGHT)
     points = np.concatenate([moment.surface.positions for moment in seen])
     return fit_view(points, _diagonal(seen[0]) * TOWARDS_EYE, _WIDTH, HEIGHT, margins)
 

@@ -30,7 +30,7 @@ def draw_two_hands(name: str, path: Path) -> Drawn:
     scene = SCENES[name]
     simulation = prepare(scene)
     seen = [_at(simulation, seconds) for seconds in TWO_HANDS[name]]
-    view = view_of(seen, WITH_TOOL)
+    view = view_of(seen, WITH_TOOL, scene.views)
     panels = [picture(view, moment, with_tool=True) for moment in seen]
     gap = np.ones((view.height, GAP, 3))
     shades = np.clip(np.concatenate([panels[0], gap, panels[1]], axis=1), 0.0, 1.0)

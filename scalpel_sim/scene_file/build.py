@@ -69,6 +69,7 @@ def scene_in(file: SceneFile) -> Scene:
         attachments=tuple(tables.attachment),
         strokes=tuple(_located(stroke, file.folder) for stroke in tables.stroke),
         graspers=tuple(_with_model(grasper, file.folder) for grasper in tables.grasper),
+        views=tuple(tables.view),
         **{key: value for key, value in given.items() if value is not None},
     )
 

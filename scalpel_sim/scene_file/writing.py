@@ -95,7 +95,14 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         **({"attachment": attachments} if attachments else {}),
         **({"grasper": graspers} if graspers else {}),
         "stroke": strokes,
+        **_views(scene),
     }
+
+
+def _views(scene: Scene) -> dict[str, Any]:
+    """Return the rows of `[[view]]`, if there are any."""
+    views = [given_in(view) for view in scene.views]
+    return {"view": views} if views else {}
 
 
 def _arm(scene: Scene, folder: Path) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from scalpel_sim.tables.attachment import AttachmentTable, check_attachment
 from scalpel_sim.tables.grasper import GrasperTable, check_graspers
 from scalpel_sim.tables.material import given_in
 from scalpel_sim.tables.stroke import DEFAULT_SPEED, StrokeTable, check_stroke, stroke_called
+from scalpel_sim.tables.view import ViewTable, check_views
 from tissue import (
     MATERIALS,
     BladeShape,
@@ -106,6 +107,9 @@ class Scene:
     """An arm of the user's own, in place of those."""
     graspers: Sequence[GrasperTable] = ()
     """Other arms, each with a grasper, and what they do."""
+    views: Sequence[ViewTable] = ()
+    """Where pages and pictures look at it from, the first of them at the start; none: from beside
+    the arms."""
     tissue_every: int = 1
     """Number of frames after which the tissue is asked again."""
     coupling: str = "rigid"
@@ -168,6 +172,7 @@ class Scene:
         for i, attachment in enumerate(self.attachments):
             check_attachment(attachment, f"[[attachment]] number {i + 1}")
         check_graspers(self.graspers)
+        check_views(self.views)
 
     @property
     def stroke(self) -> str:
@@ -207,6 +212,7 @@ class Scene:
             "attachments": [given_in(attachment) for attachment in self.attachments],
             "strokes": [given_in(stroke) for stroke in self.strokes],
             "graspers": [given_in(grasper) for grasper in self.graspers],
+            "views": [given_in(view) for view in self.views],
             "material": asdict(self.material),
             "cut": asdict(self.cut),
             "blade": None if self.blade is None else asdict(self.blade),

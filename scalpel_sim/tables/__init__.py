@@ -3,6 +3,7 @@
 values    what a key may hold
 material  [material] and the measures of [blade]
 body      [body]: the geometry
+view      [[view]]: where a scene is looked at from
 problems  says what is wrong with a value, and where
 toml      reads a file
 """

@@ -22,6 +22,7 @@ from scalpel_sim.tables.values import (
     TrueOrFalse,
     Whole,
 )
+from scalpel_sim.tables.view import ViewTable
 
 _NameOfScene = Annotated[
     str,
@@ -121,3 +122,4 @@ class SceneContent(TomlTable, kw_only=True, frozen=True):
     attachment: list[AttachmentTable] = field(default_factory=list)
     grasper: list[GrasperTable] = field(default_factory=list)
     stroke: list[StrokeTable] = field(default_factory=lambda: [StrokeTable()])
+    view: list[ViewTable] = field(default_factory=list)

@@ -1,10 +1,12 @@
 """Messages between a run and the process of its live viewer."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
 
 from bridge import TissueFrame
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import Readings
 from tissue import FloatArray, Surface
@@ -26,6 +28,8 @@ class ViewerSettings(NamedTuple):
     """Whether the edges of the tissue's triangles are drawn at the start."""
     port: int | None
     """Port of the page; None for the first free port."""
+    views: Sequence[ViewTable] = ()
+    """Cameras that the page offers."""
 
 
 class SceneState(NamedTuple):

@@ -2,13 +2,14 @@
 
 import base64
 import gzip
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
 
 from bridge import TissueFrame
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.messages import SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
@@ -57,6 +58,7 @@ class ReplayWriter:
         title: str = "scalpel_sim",
         frame: TissueFrame | None = None,
         wireframe: bool = False,
+        views: Sequence[ViewTable] = (),
     ) -> None:
         """Prepare a replay.
 
@@ -65,11 +67,13 @@ class ReplayWriter:
             title: Heading of the page.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
+            views: Cameras that the page offers, as a scene has them; it begins with the first.
         """
         self._model = model
         self._title = title
         self._tissue_frame = frame
         self._wireframe = wireframe
+        self._views = tuple(views)
         self._frames: list[_Frame] = []
         self._interval = 1.0 / FRAMES_PER_SECOND
         self._last: _Frame | None = None
@@ -126,7 +130,9 @@ class ReplayWriter:
         """Yield the script elements that hold the run: the opening packet, then the frames."""
         # The shapes are made here and not at the start, which loading trimesh would delay by 0.3 s.
         shapes = shapes_of(self._model)
-        packets = ScenePackets(shapes, self._tissue_frame, wireframe=self._wireframe)
+        packets = ScenePackets(
+            shapes, self._tissue_frame, wireframe=self._wireframe, views=self._views
+        )
         first = frames[0].state
         opening = packets.opening(first.surface, first.body_poses)
         yield _script(opening, frames[0].time)

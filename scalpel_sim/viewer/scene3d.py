@@ -12,7 +12,7 @@ ever set, and waits for a reply to each command.
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import msgspec
@@ -20,6 +20,7 @@ import numpy as np
 
 from scalpel_sim.output.energy_terms import TERMS
 from scalpel_sim.output.force_parts import ForceParts
+from scalpel_sim.tables.view import DEFAULT_FOV
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
@@ -74,6 +75,21 @@ class Readings(NamedTuple):
     """The force in parts: of the edge, of the faces, and of friction."""
     energies: Energies | None = None
     """Energy balance: where the work of the blade went. None without an audit."""
+
+
+class Camera(NamedTuple):
+    """Where the scene is looked at from, world frame."""
+
+    name: str
+    """What the page calls it."""
+    eye: FloatArray
+    """Position [m], shape (3,)."""
+    target: FloatArray
+    """Point in the middle of the picture [m], shape (3,)."""
+    up: FloatArray = np.array([0.0, 0.0, 1.0])
+    """Direction to the upper side of the picture, shape (3,)."""
+    fov: float = DEFAULT_FOV
+    """Angle from the lower to the upper side of the picture [deg]."""
 
 
 class Scene3D:
@@ -139,15 +155,24 @@ class Scene3D:
         matrix[:3, 3] = position
         self._add("set_transform", path=path, matrix=matrix.T.ravel().tolist())
 
-    def set_camera(self, eye: FloatArray, target: FloatArray, extent: float) -> None:
-        """Set camera and lights.
+    def set_cameras(self, cameras: Sequence[Camera], extent: float) -> None:
+        """Set the cameras that the page offers; it uses the first, and lights that suit it.
 
         Args:
-            eye: Position of the camera [m], shape (3,).
-            target: Point that the camera looks at [m], shape (3,).
+            cameras: One or more.
             extent: Size of the scene [m], which the lights suit.
         """
-        self._add("set_camera", eye=eye.tolist(), target=target.tolist(), extent=extent)
+        as_lists = [
+            {
+                "name": camera.name,
+                "eye": camera.eye.tolist(),
+                "target": camera.target.tolist(),
+                "up": camera.up.tolist(),
+                "fov": camera.fov,
+            }
+            for camera in cameras
+        ]
+        self._add("set_cameras", cameras=as_lists, extent=extent)
 
     def set_wireframe(self, is_on: bool) -> None:
         """Switch the wireframe on or off: the edges of the tissue's triangles."""

@@ -1,14 +1,15 @@
 """Packets of scene commands that show a run: the arm, the table, the tissue and the forces."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import mujoco
 import numpy as np
 
 from bridge import TissueFrame
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import Appearance, Readings, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Camera, Readings, Scene3D
 from scalpel_sim.viewer.texture_mapping import map_texture
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Surface
@@ -79,6 +80,7 @@ class ScenePackets:
         frame: TissueFrame | None = None,
         *,
         wireframe: bool = False,
+        views: Sequence[ViewTable] = (),
     ) -> None:
         """Prepare the packets of one run.
 
@@ -86,10 +88,12 @@ class ScenePackets:
             shapes: Visible shapes of the MuJoCo model, from `model_shapes.shapes_of`.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
+            views: Cameras that the page offers beside its own; it begins with the first.
         """
         self._shapes = list(shapes)
         self._frame = frame or TissueFrame()
         self._wireframe = wireframe
+        self._views = tuple(views)
         self._bodies = sorted({shape.body for shape in self._shapes})
         self._diagonal = 1.0
 
@@ -108,7 +112,8 @@ class ScenePackets:
         for shape in self._shapes:
             self._set_shape(scene, shape, centre, body_poses[shape.body])
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
-        scene.set_camera(self._eye(centre, body_poses), centre, self._diagonal)
+        beside_arms = Camera("beside the arms", self._eye(centre, body_poses), centre)
+        scene.set_cameras([*map(self._camera, self._views), beside_arms], self._diagonal)
         scene.set_wireframe(self._wireframe)
         return scene.take()
 
@@ -146,6 +151,12 @@ class ScenePackets:
         scene.set_appearance(appearance, _appearance_of(shape))
         scene.set_mesh(path, mesh, appearance)
         scene.set_pose(path, position, rotation)
+
+    def _camera(self, view: ViewTable) -> Camera:
+        """Return the camera of a view, in the frame of the world."""
+        eye, target = self._frame.points_to_world(np.array([view.eye, view.target]))
+        up = self._frame.vectors_to_world(np.array(view.up))
+        return Camera(view.name, eye, target, up, view.fov_degrees)
 
     def _arms(self, body_poses: FloatArray) -> list[FloatArray]:
         """Return where each arm is, seen from above: the mean of its bodies [m], shape (2,)."""

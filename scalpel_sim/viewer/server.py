@@ -162,7 +162,9 @@ class PageRequest(tornado.web.RequestHandler):
 
 async def serve(settings: ViewerSettings, newest: NewestState) -> None:
     """Serve scene states until the input has ended. Prints the `StartReply` first."""
-    packets = ScenePackets(settings.shapes, settings.frame, wireframe=settings.wireframe)
+    packets = ScenePackets(
+        settings.shapes, settings.frame, wireframe=settings.wireframe, views=settings.views
+    )
     open_pages = OpenPages(packets)
     reply = _start(settings, open_pages)
     print(msgspec.json.encode(reply).decode(), flush=True)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import IO, cast
 
@@ -15,6 +16,7 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.messages import UPDATES_PER_SECOND, SceneState, StartReply, ViewerSettings
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.scene3d import Readings
@@ -52,6 +54,7 @@ class Viewer:
         frame: TissueFrame | None = None,
         wireframe: bool = False,
         port: int | None = None,
+        views: Sequence[ViewTable] = (),
     ) -> None:
         """Start the viewer's process and learn its address.
 
@@ -61,6 +64,7 @@ class Viewer:
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
+            views: Cameras that the page offers, as a scene has them; it begins with the first.
 
         Raises:
             UsageError: the port does not exist.
@@ -70,7 +74,7 @@ class Viewer:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
         self._process = _start_process()  # it starts while the shapes are made here
         shapes = list(shapes_of(model))
-        settings = ViewerSettings(title, shapes, frame or TissueFrame(), wireframe, port)
+        settings = ViewerSettings(title, shapes, frame or TissueFrame(), wireframe, port, views)
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
         self._waiting: ViewerSettings | SceneState | None = settings

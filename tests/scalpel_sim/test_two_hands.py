@@ -221,7 +221,8 @@ def test_the_camera_stands_before_neither_arm(scene):
     opening = msgspec.msgpack.decode(
         packets.opening(surface, body_poses(data)), ext_hook=lambda code, body: bytes(body)
     )
-    (camera,) = [each for each in opening["commands"] if each["type"] == "set_camera"]
+    (cameras,) = [each for each in opening["commands"] if each["type"] == "set_cameras"]
+    (camera,) = cameras["cameras"]
     towards_eye = np.subtract(camera["eye"], camera["target"])[:2]
     for base in (data.body("base"), data.body("left_base")):
         towards_base = (base.xpos - camera["target"])[:2]

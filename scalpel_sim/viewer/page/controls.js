@@ -31,7 +31,18 @@ window.addEventListener("error", (event) => {
     element("status").textContent = `This browser cannot draw the scene: ${event.message}`;
 });
 
-const sceneView = new SceneView(element("meshcat-pane"), showReadings);
+// A choice of cameras, where there are several.
+function offerCameras(cameras) {
+    element("view").replaceChildren(...cameras.map((camera, i) => new Option(camera.name, i)));
+    element("view").parentElement.hidden = cameras.length < 2;
+}
+
+function chooseCamera(number) {
+    element("view").value = number;
+    sceneView.chooseCamera(number);
+}
+
+const sceneView = new SceneView(element("meshcat-pane"), showReadings, offerCameras);
 window.viewer = sceneView.viewer; // the name that meshcat's own page uses
 
 function setWireframe(on) {
@@ -46,9 +57,11 @@ function setContacts(on) {
 
 element("wireframe").addEventListener("change", (event) => setWireframe(event.target.checked));
 element("contacts").addEventListener("change", (event) => setContacts(event.target.checked));
-element("home").addEventListener("click", () => sceneView.setCamera(sceneView.initialView));
+element("home").addEventListener("click", () => chooseCamera(sceneView.chosen));
+element("view").addEventListener("change", (event) => chooseCamera(Number(event.target.value)));
 window.addEventListener("keydown", (event) => {
     if (event.key === "w") setWireframe(!sceneView.wireframe);
     if (event.key === "c") setContacts(!sceneView.showsContacts);
-    if (event.key === "h") sceneView.setCamera(sceneView.initialView);
+    if (event.key === "h") chooseCamera(sceneView.chosen);
+    if (/^[1-9]$/.test(event.key) && event.key <= sceneView.cameras.length) chooseCamera(event.key - 1);
 });

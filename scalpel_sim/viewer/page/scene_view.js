@@ -19,9 +19,12 @@ const SMALLEST_ARROW = 0.02; // [N]; the arrow of a smaller force would be too s
 
 // A decoded command keeps its geometry, so that a replay uploads each geometry once.
 class SceneView {
-    constructor(pane, onReadings) {
+    constructor(pane, onReadings, onCameras) {
         this.viewer = new MeshCat.Viewer(pane);
         this.onReadings = onReadings;
+        this.onCameras = onCameras;
+        this.cameras = [];
+        this.chosen = 0;
         this.appearances = new Map();
         this.wires = new Map();
         this.wireframe = false;
@@ -32,7 +35,7 @@ class SceneView {
             batch: (command) => command.commands.forEach((c) => this.viewer.handle_command(c)),
             set_appearance: (command) => this.setAppearance(command),
             set_object: (command) => this.setObject(command) || meshcatHandles(command),
-            set_camera: (command) => this.setCamera(command),
+            set_cameras: (command) => this.setCameras(command),
             set_wireframe: (command) => this.setWireframe(command.on),
             set_readings: (command) => this.setReadings(command),
         };
@@ -127,21 +130,35 @@ class SceneView {
         this.viewer.set_dirty();
     }
 
+    setCameras({ cameras, extent }) {
+        this.cameras = cameras;
+        this.extent = extent;
+        this.chooseCamera(0);
+        this.onCameras(cameras);
+    }
+
+    chooseCamera(number) {
+        this.chosen = number;
+        this.setCamera(this.cameras[number], this.extent);
+        this.viewer.set_dirty();
+    }
+
     // Up is z in the scene and y in three.js. meshcat turns the scene; the camera is turned here.
-    setCamera({ eye, target, extent }) {
+    setCamera({ eye, target, up, fov }, extent) {
         const turned = ([x, y, z]) => new THREE.Vector3(x, z, -y);
         const { camera, controls } = this.viewer;
+        const distance = Math.hypot(...eye.map((x, axis) => x - target[axis]));
         camera.position.copy(turned(eye));
-        camera.fov = 38;
-        camera.near = extent / 100;
-        camera.far = extent * 100;
+        camera.up.copy(turned(up)).normalize();
+        camera.fov = fov;
+        camera.near = Math.min(extent, distance) / 100;
+        camera.far = extent * 100 + distance;
         camera.updateProjectionMatrix();
         controls.target.copy(turned(target));
-        controls.minDistance = extent / 10;
-        controls.maxDistance = extent * 20;
+        controls.minDistance = Math.min(extent / 10, distance);
+        controls.maxDistance = Math.max(extent * 20, distance);
         controls.update();
         this.light(new THREE.Vector3(...target), new THREE.Vector3(...eye), extent);
-        this.initialView = { eye, target, extent };
     }
 
     // The lamp hangs above and to the left of the camera; the rim light comes from behind the body.

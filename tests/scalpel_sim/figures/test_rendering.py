@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.figures.camera import Margins, fit_view
+from scalpel_sim.figures.camera import Margins, fit_view, view_from
 from scalpel_sim.figures.light import SurfacePoints, illuminate, make_lights
 from scalpel_sim.figures.rendering import SceneObject, render
 from scalpel_sim.figures.table import table_below
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -72,3 +73,16 @@ def test_a_red_plate_on_a_white_table_is_red_with_a_shadow_and_white_far_away():
     x, y = view.project(np.array([0.065, 0.0, 0.0]))[:2].astype(int)  # the lamp is on the left
     assert image[y, x].max() < 0.85
     assert image[-1, 0].min() > 0.95
+
+
+def test_the_camera_of_a_scene_spans_its_angle_with_its_target_in_the_middle():
+    camera = ViewTable(
+        name="above",
+        eye=(0.1, 0.2, 0.5),
+        target=(0.1, 0.2, 0.0),
+        up=(1.0, 0.0, 0.0),
+        fov_degrees=90,
+    )
+    corners = np.array([[0.1, 0.2, 0.0], [0.6, 0.2, 0.0], [0.1, -0.3, 0.0]])
+    seen = view_from(camera, 200, 100).project(corners)[:, :2]
+    assert seen == pytest.approx(np.array([[100.0, 50.0], [100.0, 0.0], [150.0, 50.0]]))

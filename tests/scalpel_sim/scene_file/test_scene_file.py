@@ -36,6 +36,7 @@ from scalpel_sim.tables.stroke import (
     PLANNED_STROKES,
     StrokeTable,
 )
+from scalpel_sim.tables.view import ViewTable
 from tissue import pieces_of
 
 ROOT = Path(__file__).parents[3]
@@ -50,6 +51,7 @@ TABLES = (
     GrasperTable,
     WaypointTable,
     StrokeTable,
+    ViewTable,
 )
 SLAB = shipped_scene("slab")
 
@@ -97,6 +99,16 @@ def test_odd_numbers_read_back_to_the_same_bits(tmp_path):
         blade=replace(scene.blade, bevel_angle=float(bevel)),
         floor=-0.1,
         seconds=0.1 + 0.2,
+        views=(
+            ViewTable(name="Ä 1", eye=(1 / 3, 0.0, 0.0), target=(0.0, 0.1, 0.0)),
+            ViewTable(
+                name="above",
+                eye=(0.0, 0.0, 0.3),
+                target=(0.0, 0.0, 0.0),
+                up=(0.0, 1.0, 0.0),
+                fov_degrees=100 / 3,
+            ),
+        ),
     )
     assert replace(read_back(odd, tmp_path / "scene.toml"), mesh=odd.mesh) == odd
 

@@ -42,7 +42,13 @@ kind = "points"
 points = [[0.02, -0.01, 0.01], [0.02, 0.05, 0.01]]
 length = 0.05
 """
-FILE += "".join(ATTACHED)
+VIEW = """[[view]]
+name = "side"
+eye = [0.2, -0.2, 0.2]
+target = [0.0, 0.0, 0.0]
+fov_degrees = 40.0
+"""
+FILE += "".join(ATTACHED) + VIEW
 
 WRONG = {
     "no toml": ("[body]", "[body", "is not valid TOML"),
@@ -169,6 +175,21 @@ motion = [{ time = 0.0, at = [0.0, 0.0, 0.1], opening = 0.01 }]
 [[stroke]]""",
         "has the name 'helper' of another",
     ),
+    "an eye at its target": ("[0.2, -0.2, 0.2]", "[0, 0, 0]", "number 1 has its eye at its target"),
+    "a view along its up": (
+        "[0.2, -0.2, 0.2]",
+        "[0, 0, 0.2]",
+        "[[view]] number 1 looks along its up, [0.0, 0.0, 1.0]; give another up, such as [0, 1, 0]",
+    ),
+    "an up of no direction": ("fov_degrees", "up = [0, 0, 0]\nfov_degrees", "up is [0, 0, 0]"),
+    "an eye out of this world": ("[0.2, -0.2, 0.2]", "[1.7e308, 1.7e308, 0]", "too large"),
+    "a view of everything": ("= 40.0", "= 180.0", "an angle above 0 and below 180 degrees"),
+    "a view of nothing": ("= 40.0", "= 0.0", "[[view]] number 1 fov_degrees is 0.0; it must be"),
+    "a view without a name": ('name = "side"\n', "", "[[view]] number 1 has no name"),
+    "a view of two lines": ('"side"', '"a\\nb"', "a name of one line"),
+    "an unknown key of a view": ("target =", "taget =", "'taget'. Did you mean 'target'"),
+    "two views of one name": (VIEW, VIEW + VIEW, "number 2 has the name 'side' of another"),
+    "a view in single brackets": ("[[view]]", "[view]", "it must be tables: [[view]]"),
     "an hour and more": ("about", "seconds = 4000.0\nabout", "at most 3600"),
 }
 

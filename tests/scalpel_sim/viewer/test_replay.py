@@ -7,6 +7,7 @@ import pytest
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.output.force_parts import ForceParts
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import page
 from scalpel_sim.viewer import replay as replay_module
 from scalpel_sim.viewer.model_shapes import body_poses
@@ -138,6 +139,52 @@ def test_each_contact_is_a_line_along_its_force_and_can_be_switched_off(tab, tmp
     assert bars == ["cutting: toughness x area: 3.00 mJ", "friction on the blade: 1.00 mJ"]
     tab.uncheck("#contacts")
     assert not tab.evaluate("sceneView.contacts.visible")
+
+
+@pytest.mark.browser
+def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
+    above = ViewTable(name="above", eye=(0.02, 0.03, 0.3), target=(0.02, 0.03, 0.0), up=(0, 1, 0))
+    side = ViewTable(name="<side>", eye=(0.3, 0, 0), target=(0, 0, 0), fov_degrees=20.0)
+    replay = ReplayWriter(little_arm()[0], frame=FRAME, views=[above, side])
+    replay.add(0.0, cut_tissue()[0], body_poses(little_arm()[1]), readings(0.0))
+    replay.write(tmp_path / "replay.html")
+    tab.goto(local_file(tmp_path / "replay.html"))
+    tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
+    select = tab.get_by_label("view", exact=True)
+    names = select.evaluate("(list) => [...list.options].map((option) => option.text)")
+    assert names == ["above", "<side>", "beside the arms"]
+
+    def seen(point):  # across and up in the picture, from -1 to 1
+        return tab.evaluate(SEEN, FRAME.points_to_world(np.array(point)).tolist())
+
+    across, up = seen([0.02, 0.04, 0.0])
+    assert across == pytest.approx(0.0, abs=1e-6)
+    assert up == pytest.approx(0.01 / (0.3 * np.tan(np.radians(19.0))), rel=1e-4)
+    tab.keyboard.press("2")
+    assert select.input_value() == "1"
+    height = 0.01 / (0.3 * np.tan(np.radians(10.0)))
+    assert seen([0.0, 0.0, 0.01]) == pytest.approx([0.0, height], abs=1e-6)
+    select.select_option("beside the arms")
+    own = tab.evaluate("viewer.camera.position.toArray()")
+    tab.keyboard.press("9")
+    assert tab.evaluate("viewer.camera.position.toArray()") == own
+    tab.evaluate("viewer.camera.position.set(1, 1, 1)")
+    tab.click("#home")
+    assert tab.evaluate("viewer.camera.position.toArray()") == pytest.approx(own)
+
+
+@pytest.mark.browser
+def test_a_page_with_its_own_view_alone_offers_no_choice(replay_tab):
+    assert not replay_tab.is_visible("#view")
+    assert replay_tab.evaluate("[viewer.camera.fov, viewer.camera.up.toArray()]") == [38, [0, 1, 0]]
+
+
+SEEN = """(point) => {
+    viewer.camera.updateMatrixWorld();
+    const [x, y, z] = point;
+    const seen = new THREE.Vector3(x, z, -y).project(viewer.camera);
+    return [seen.x, seen.y];
+}"""
 
 
 @pytest.fixture(scope="module")

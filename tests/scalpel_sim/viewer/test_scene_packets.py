@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bridge import TissueFrame
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 from tests.scalpel_sim.cut_block import cut_block
@@ -27,7 +28,7 @@ def opening(surface, frame=FRAME):
 @pytest.mark.parametrize("size", [0.1, 1.0, 30.0])
 def test_the_camera_frames_bodies_of_any_size(size):
     block = cut_block(0.0)
-    camera = opening(block._replace(positions=block.positions * size))["set_camera"]
+    camera = opening(block._replace(positions=block.positions * size))["set_cameras"]["cameras"][0]
     centre = np.array([0.02, 0.03, 0.02]) * size + FRAME.origin
     diagonal = np.linalg.norm([0.04, 0.06, 0.04]) * size
     assert camera["target"] == pytest.approx(centre)
@@ -38,9 +39,25 @@ def test_the_camera_frames_bodies_of_any_size(size):
 
 def test_the_camera_turns_with_the_tissue():
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    turned = opening(cut_block(0.0), TissueFrame(rotation=quarter))["set_camera"]
+    turned = opening(cut_block(0.0), TissueFrame(rotation=quarter))["set_cameras"]["cameras"][0]
     view = np.subtract(turned["eye"], turned["target"]) @ quarter
     assert abs(view[1]) > abs(view[0]), "along the cut rather than across it"
+
+
+def test_views_stand_in_the_frame_of_the_tissue_before_the_pages_own():
+    quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    frame = TissueFrame(rotation=quarter, origin=np.array([0.0, 0.0, 1.0]))
+    view = ViewTable(name="side", eye=(0.2, 0.0, 0.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
+    model, data = little_arm()
+    packets = ScenePackets(shapes_of(model), frame, views=[view])
+    opening = commands(packets.opening(cut_block(0.0), body_poses(data)))["set_cameras"]
+    first, own = opening["cameras"]
+    assert first["name"] == "side"
+    assert first["eye"] == pytest.approx([0.0, 0.2, 1.0])
+    assert first["target"] == pytest.approx([0.0, 0.0, 1.0])
+    assert first["up"] == pytest.approx([-1.0, 0.0, 0.0])
+    alone = ScenePackets(shapes_of(model), frame).opening(cut_block(0.0), body_poses(data))
+    assert commands(alone)["set_cameras"]["cameras"] == [own]
 
 
 def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
@@ -71,5 +88,7 @@ def test_textures_are_sent_once_and_geometry_with_every_frame():
 
 def test_a_model_without_shapes_is_accepted():
     packets = ScenePackets([])
-    camera = commands(packets.opening(cut_block(0.0), np.zeros((1, 7))))["set_camera"]
+    camera = commands(packets.opening(cut_block(0.0), np.zeros((1, 7))))["set_cameras"]["cameras"][
+        0
+    ]
     assert np.isfinite(camera["eye"]).all()
