@@ -150,7 +150,7 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     replay.write(tmp_path / "replay.html")
     tab.goto(local_file(tmp_path / "replay.html"))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown === 0")
-    select = tab.get_by_label("view", exact=True)
+    select = tab.get_by_role("combobox", name="view", exact=True)
     names = select.evaluate("(list) => [...list.options].map((option) => option.text)")
     assert names == ["above", "<side>", "beside the arms"]
 
