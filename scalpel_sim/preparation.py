@@ -32,6 +32,9 @@ from tissue import TetrahedralMesh, Tissue
 
 _log = logging.getLogger("scalpel_sim")
 
+_ON_TABLE = 1e-9
+"""How far below a table an edge may be that ends on it [m]: that is rounding, and no warning."""
+
 
 def prepare(
     scene: Scene, link: TissueLink | None = None, fixtures: Iterable[Fixture] = ()
@@ -166,7 +169,7 @@ def _warn_of_table(stroke: Stroke, table: Tabletop | None) -> None:
     low, high = table.bounds
     over = ((ends >= low) & (ends <= high))[:, :2].all(axis=1)
     depth = float((high[2] - ends[over, 2]).max(initial=0.0))
-    if depth > 0.0:
+    if depth > _ON_TABLE:
         _log.warning(
             "the stroke goes %.2g mm below the table, which stops the blade: what is to be cut "
             "there stays whole. Lower [world] table, or end the stroke above it",

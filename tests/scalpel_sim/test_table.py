@@ -46,6 +46,15 @@ def test_a_stroke_below_the_table_gets_a_warning(depth, said, caplog):
     assert ("3 mm below the table" in caplog.text) == said
 
 
+@pytest.mark.parametrize("kind", ["straight", "slanted", "curved"])
+def test_a_planned_stroke_ends_on_the_table_without_a_warning(kind, caplog):
+    with caplog.at_level(logging.WARNING, "scalpel_sim"):
+        simulation = prepare(changed(SCENES["organ"], strokes=(StrokeTable(kind=kind),)))
+    poses = map(simulation.stroke.pose, simulation.stroke.times.tolist())
+    lowest = min(min(pose.tip[2], pose.heel[2]) for pose in poses)
+    assert lowest == pytest.approx(SCENES["organ"].table, abs=1e-12) and caplog.text == ""
+
+
 def test_the_table_stops_the_blade():
     simulation = prepare(through(0.003))
     simulation.run(simulation.duration)
