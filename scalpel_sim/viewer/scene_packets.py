@@ -33,6 +33,10 @@ ARM_AZIMUTH = float(np.radians(80.0))
 """Best angle between the directions from the body to the camera and to the arm, seen from above
 [rad]: from the side the arm neither hides the cut nor is hidden by the body."""
 
+HIDING_AZIMUTH = float(np.radians(45.0))
+"""Angle between these directions below which the arm stands before the body [rad]: with two arms
+the best compromise is none where it looks past the back of one."""
+
 TABLE_RADIUS = 4.5
 """Half width of a plane, in diagonals of the body. Planes are infinite in MuJoCo, whatever size the
 model gives; the plane that is drawn fades out around the body."""
@@ -175,7 +179,7 @@ class ScenePackets:
         for arm in self._arms(body_poses) or [centre[:2]]:
             towards_arm = (arm - centre[:2]) / max(float(np.linalg.norm(arm - centre[:2])), 1e-9)
             between = np.arccos(np.clip(level @ towards_arm, -1.0, 1.0))
-            deviations += np.abs(between - ARM_AZIMUTH)
+            deviations += np.abs(between - ARM_AZIMUTH) + np.pi * (between < HIDING_AZIMUTH)
         flat, up = np.cos(CAMERA_ELEVATION), np.sin(CAMERA_ELEVATION)
         direction = np.array([*(flat * level[deviations.argmin()]), up])
         return centre + CAMERA_DISTANCE * self._diagonal * direction
