@@ -110,10 +110,11 @@ def test_a_tissue_in_another_process_is_cut_in_two():
 
 def test_a_robot_of_your_own_is_the_left_hand_and_carries_what_is_cut_off(run):
     printed = run("own_grasper.py")
-    pieces, held, weight = re.search(
-        r"(\d) pieces; .* (\d+) points .*\n.* ([\d.]+) N", printed
+    pieces, held, weight, grams = re.search(
+        r"(\d) pieces; .* (\d+) points .*\n.* ([\d.]+) N and has ([\d.]+) g", printed
     ).groups()
     assert int(pieces) == 2 and int(held) > 100
-    assert float(weight) == pytest.approx(7.3e-3 * 9.81, rel=0.1)  # 6.9 cm3
+    assert 5.0 < float(grams) < 20.0
+    assert float(weight) == pytest.approx(1e-3 * float(grams) * 9.81, rel=0.1)  # it swings
     code = (FOLDER / "own_grasper.py").read_text(encoding="utf-8").splitlines()
     assert sum(bool(line) and not line.startswith(('"""', "import", "from")) for line in code) < 15

@@ -21,4 +21,5 @@ simulation.run(simulation.duration + 0.5)
 left = simulation.graspers[0]
 print(f"{simulation.link.n_pieces()} pieces; the robot holds {left.n_points} points of one,")
 force = simulation.recording.vector("left_force")[-500:].mean(axis=0)  # it swings
-print(f"which weighs {-force[2]:.3f} N")
+mass = simulation.link.tissue.pieces()[1].mass
+print(f"which pulls with {-force[2]:.3f} N and has {1e3 * mass:.2f} g")
