@@ -68,6 +68,7 @@ class CollisionMonitor:
         self._collisions = Collisions(self._parts.parts, [*tables(arm.model), *fixtures])
         self._data = arm.data
         self._arm_of = arms_of_geoms(arm.model)
+        self._has_two = len(set(self._arm_of.tolist()) - {WORLD}) > 1
         self._free_way = 0.0
         self._has_passed = False
         self._now: tuple[tuple[str, str], ...] = ()
@@ -88,7 +89,7 @@ class CollisionMonitor:
 
         Those of two arms are MuJoCo's: of the last `mj_step1`.
         """
-        between_arms = self._between_arms() if self._data.ncon else ()
+        between_arms = self._between_arms() if self._has_two and self._data.ncon else ()
         parts, collisions = self._parts, self._collisions
         if parts.remain_within(self._free_way):
             self._has_passed = True

@@ -14,6 +14,7 @@ from scalpel_sim.tables.values import (
     Text,
     ThreeNumbers,
     TomlTable,
+    check_own_name,
     one_of,
 )
 
@@ -90,8 +91,7 @@ def check_graspers(graspers: Sequence[GrasperTable]) -> None:
     for i, grasper in enumerate(graspers):
         where = f"[[grasper]] number {i + 1}"
         _check(grasper, where)
-        if grasper.name in [other.name for other in graspers[:i]]:
-            raise UsageError(f"{where} has the name '{grasper.name}' of another; give each its own")
+        check_own_name(grasper.name, [other.name for other in graspers[:i]], where)
 
 
 def _check(grasper: GrasperTable, where: str) -> None:

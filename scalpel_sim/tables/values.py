@@ -4,11 +4,13 @@ The description of each is what an error says the value must be.
 """
 
 import sys
+from collections.abc import Sequence
 from typing import Annotated, get_args
 
 import msgspec
 from msgspec import Meta
 
+from scalpel_sim.errors import UsageError
 from tissue import Law
 
 _LARGEST = sys.float_info.max  # refuses infinity
@@ -65,3 +67,18 @@ Region = Annotated[
     ),
 ]
 LawName = Annotated[Law, one_of(*get_args(Law))]
+
+
+def check_own_name(name: str, taken: Sequence[str], where: str) -> None:
+    """Check that no other row has this name.
+
+    Args:
+        name: Its name.
+        taken: Names of the rows before it.
+        where: Which row it is, for the message.
+
+    Raises:
+        UsageError: another has it.
+    """
+    if name in taken:
+        raise UsageError(f"{where} has the name '{name}' of another; give each its own")

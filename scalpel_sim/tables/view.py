@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import Meta
 
 from scalpel_sim.errors import UsageError
-from scalpel_sim.tables.values import ThreeNumbers, TomlTable
+from scalpel_sim.tables.values import ThreeNumbers, TomlTable, check_own_name
 
 DEFAULT_FOV = 38.0
 """Angle that a picture spans from its lower to its upper side, where a view says nothing [deg]."""
@@ -52,8 +52,7 @@ def check_views(views: Sequence[ViewTable]) -> None:
     for i, view in enumerate(views):
         where = f"[[view]] number {i + 1}"
         _check(view, where)
-        if view.name in [other.name for other in views[:i]]:
-            raise UsageError(f"{where} has the name '{view.name}' of another; give each its own")
+        check_own_name(view.name, [other.name for other in views[:i]], where)
 
 
 def _check(view: ViewTable, where: str) -> None:
