@@ -42,8 +42,7 @@ class Arm(LedArm):
         base_position: Middle of the base's underside [m].
         base_yaw: Angle by which the base is turned about +z [rad]; at 0 the arm reaches towards +y.
         impedance: How firmly the hand holds the blade.
-        others: What else stands in its world: arms, each with a grasper, a
-            table, fixtures.
+        others: What else stands in its world: arms, each with a grasper, a table, fixtures.
 
     Raises:
         UsageError: no preset has this name.

@@ -23,8 +23,8 @@ _ROUNDING = 1e-9
 out points on the faces between two."""
 
 _MEETING = 1e-4
-"""Opening below which pads have met [m]: what lies between them holds thicker tissue apart, and an
-equality of MuJoCo that couples the jaws gives by less."""
+"""Opening below which pads have met [m]. Tissue between them keeps them farther apart; the equality
+that couples the jaws gives by less."""
 
 _log = logging.getLogger("scalpel_sim")
 

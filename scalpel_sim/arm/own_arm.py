@@ -61,8 +61,7 @@ def own_arm(
         heel: Site at the handle's end of the edge.
         tip: Site at the sharp end.
         forward: Direction in which the edge cuts, in the frame of its body.
-        others: What else stands in its world: arms, each with a grasper, a
-            table, fixtures.
+        others: What else stands in its world: arms, each with a grasper, a table, fixtures.
 
     Raises:
         UsageError: the file cannot be read, is no model, or has no such blade.
