@@ -165,6 +165,55 @@ def test_the_work_of_a_squeeze_is_accounted_for():
     assert abs(energies.residual) < 0.005 * energies.work_of_loads
 
 
+@pytest.mark.parametrize(
+    ("relaxation", "friction", "share"),
+    [("global", 0.0, 0.005), ("global", 0.6, 0.005), ("verlet", 0.6, 0.01)],
+)
+def test_the_work_of_jaws_that_close_on_an_edge_is_accounted_for(relaxation, friction, share):
+    mesh = block((10, 8, 4), (0.04, 0.03, 0.014))
+    tissue = Tissue(
+        mesh,
+        GEL,
+        gravity=(0.0, 0.0, 0.0),
+        fixed=fixed_nodes(mesh, "left"),
+        solver=SolverSettings(audit=True, relaxation=relaxation),
+    )
+    pads = [Geom(name, "box", (0.005, 0.005, 0.001), friction) for name in ("upper", "lower")]
+    jaws = tissue.collide_with(pads, between_jaws(0.0142))
+    for opening in [*np.linspace(0.0142, 0.010, 100), *[0.010] * 50]:
+        jaws.move(between_jaws(opening))
+        energies = tissue.step(None, DT).energies
+    assert energies.work_of_loads > 1e-3
+    assert abs(energies.residual) < share * energies.work_of_loads
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.05, 0.5])
+def test_the_work_of_pads_that_slip_along_a_block_is_accounted_for(friction):
+    mesh = block((8, 4, 2), (0.072, 0.036, 0.018))
+    tissue = Tissue(
+        mesh,
+        Material(law="neo_hookean", young_modulus=20e3, poisson_ratio=0.45, viscous_damping=20.0),
+        gravity=(0.0, 0.0, 0.0),
+        fixed=fixed_nodes(mesh, "left"),
+        solver=SolverSettings(audit=True),
+    )
+    pads = [Geom(name, "box", (0.008, 0.008, 0.002), friction) for name in ("upper", "lower")]
+    middle = np.array([0.04, 0.017, 0.009])
+    pinch = tissue.collide_with(pads, middle + np.array([[0, 0, 0.0111], [0, 0, -0.0111]]))
+    ways = [(depth, 0.0) for depth in np.linspace(0.0, 0.0026, 100)]
+    ways += [(0.0026, x) for x in np.linspace(0.0, 0.02, 200)]
+    for depth, x in ways:
+        pinch.move(middle + np.array([[x, 0, 0.0111 - depth], [x, 0, depth - 0.0111]]))
+        energies = tissue.step(None, DT).energies
+    assert pinch.wrench(0).force[2] > 2.0
+    assert abs(energies.residual) < 0.005 * energies.work_of_loads
+
+
+def between_jaws(opening):
+    """Centres of two pads of 2 mm on the edge of a block of 14 mm, so far apart [m]."""
+    return [[0.036, 0.015, 0.007 + side * (opening / 2 + 0.001)] for side in (1.0, -1.0)]
+
+
 TURNED = Rotation.from_rotvec([np.pi, 0.0, 0.0]).as_matrix()
 """Axes of a plane that faces down."""
 

@@ -293,6 +293,11 @@ def _go_on(
             store(contacts.normal, c, vec3(contacts.normal, old))
         store(contacts.anchor, c, vec3(contacts.anchor, old))
         contacts.is_held[c] = contacts.is_held[old]
+    else:
+        # What a node was displaced by when it was listed before has long passed.
+        for q in range(3):
+            store(contacts.displacement, contacts.node[c, q], nothing)
+            contacts.half_work[contacts.node[c, q]] = 0.0
     note_velocities(contacts, body, c)
 
 

@@ -95,6 +95,16 @@ class GeomContacts(Arrays):
     """Velocity of each listed node after the last substep [m/s], shape (n_nodes, 3)."""
     resistance: FloatArray
     """Mean force of the rest of the tissue on it in the substep [N], shape (n_nodes, 3)."""
+    reaction: FloatArray
+    """Force on the tissue in the stage asked for last [N], shape (2 * capacity, 3)."""
+    acceleration: FloatArray
+    """Acceleration of each listed node that touches, then [m/s2], shape (n_nodes, 3)."""
+    is_noted: IntArray
+    """1 for a node whose acceleration is noted, scratch; shape (n_nodes,)."""
+    displacement: FloatArray
+    """By how much each listed node was corrected after the last substep [m], shape (n_nodes, 3)."""
+    half_work: FloatArray
+    """Half of the work of the tissue on that way, by its force before [J], shape (n_nodes,)."""
     impulse: FloatArray
     """Impulse on the tissue in this time step [N s], shape (2 * capacity, 3)."""
     moment: FloatArray
@@ -103,7 +113,17 @@ class GeomContacts(Arrays):
 
 _WHOLE = ("geom", "face", "touches", "sticks", "is_held")
 _NUMBERS = ("gap", "mobility", "slop")
-_VECTORS = ("weight", "force", "pressed", "anchor", "normal", "point", "impulse", "moment")
+_VECTORS = (
+    "weight",
+    "force",
+    "reaction",
+    "pressed",
+    "anchor",
+    "normal",
+    "point",
+    "impulse",
+    "moment",
+)
 _OF_ROWS = ("node", *_WHOLE, *_NUMBERS, *_VECTORS)
 """Fields of `GeomContacts` with a row for each contact."""
 
@@ -152,13 +172,19 @@ def new_geom_contacts(geoms: Geoms, capacity: int, n_nodes: int) -> GeomContacts
         **{name: np.zeros((rows, 3)) for name in _VECTORS},
         velocity=np.zeros((n_nodes, 3)),
         resistance=np.zeros((n_nodes, 3)),
+        acceleration=np.zeros((n_nodes, 3)),
+        displacement=np.zeros((n_nodes, 3)),
+        half_work=np.zeros(n_nodes),
+        is_noted=np.zeros(n_nodes, np.int64),
     )
 
 
 def grown_geom_contacts(contacts: GeomContacts, capacity: int, n_nodes: int) -> GeomContacts:
     """Return the contacts with room for that many; the first list is the one in use."""
     larger, n = new_geom_contacts(contacts.geoms, capacity, n_nodes), contacts.n_contacts
-    larger.velocity[: len(contacts.velocity)] = contacts.velocity
+    for name in ("velocity", "displacement", "half_work"):
+        of_nodes = getattr(contacts, name)
+        getattr(larger, name)[: len(of_nodes)] = of_nodes
     used = slice(contacts.first, contacts.first + n)
     for name in _OF_ROWS:
         getattr(larger, name)[:n] = getattr(contacts, name)[used]

@@ -15,7 +15,13 @@ dry friction in finite freedom dynamics, for impacts and friction in terms of ve
 
 from typing import Final
 
-from tissue.contact.geoms.contact_impulses import note_velocities, push, weighted
+from tissue.contact.geoms.contact_impulses import (
+    SWEEPS,
+    mobility_at,
+    note_velocities,
+    push,
+    weighted,
+)
 from tissue.contact.geoms.geom_arrays import NODE_CONTACT, GeomContacts
 from tissue.contact.geoms.geom_motion import (
     geom_motion_at,
@@ -28,14 +34,11 @@ from tissue.core.jit import kernel
 from tissue.core.vec3 import Vec3, add, axpy, dot, norm, scale, store, sub, vec3
 from tissue.mesh.body import Body
 
-_SWEEPS: Final = 8
-"""Sweeps over contacts that share nodes. Fewer: a face that is pressed between its nodes sinks in
-by some percent of what it moves in a substep; more: time for nothing that shows."""
-
-_PUSH_OF_FACE: Final = 0.3
+_PUSH_OF_FACE: Final = 0.03
 """Share of its depth by which a face is put out of a geom in a substep; a node is so wholly. Faces
 that meet under a sharp geom are pushed in different directions. Larger: each undoes what the others
-did, which is work on the tissue; smaller: a thin rod that is pressed into a coarse mesh sinks."""
+did, which is work on the tissue, at 0.3 up to a fifth of that of a rod; smaller: what sank in as a
+geom came suddenly stays in for longer than a few time steps."""
 
 _SLIDING: Final = 1.0 - 1e-9
 """Share of the limit of friction above which a contact slides: the rest is rounding."""
@@ -61,7 +64,7 @@ def end_geom_substep(
         store(contacts.pressed, c, Vec3(0.0, 0.0, 0.0))
         _locate(contacts, body, c, seconds, dt)
     _note_resistances(contacts, body, seconds)
-    n_sweeps = _SWEEPS if contacts.are_coupled == 1 else 1
+    n_sweeps = SWEEPS if contacts.are_coupled == 1 else 1
     # First positions: the velocities still tell with which forces the tissue resists.
     for _ in range(n_sweeps):
         for c in rows:
@@ -93,12 +96,15 @@ def _locate(contacts: GeomContacts, body: Body, c: int, seconds: float, dt: floa
     relative = axpy(-1.0 / dt, motion, weighted(contacts, c, body.velocities))
     # Twice the way: contacts beside may push the point this way.
     if dot(force, force) > 0.0 or contacts.gap[c] <= 2.0 * seconds * norm(relative):
-        contacts.mobility[c] = _mobility(contacts, body, c)
+        contacts.mobility[c] = mobility_at(contacts, body, c)
 
 
 @kernel
 def _note_resistances(contacts: GeomContacts, body: Body, seconds: float) -> None:
-    """Note with which forces the rest of the tissue acted on the nodes of contacts."""
+    """Note with which forces the rest of the tissue acted on the nodes of contacts.
+
+    They tell what it was to displace the nodes after the last substep, too.
+    """
     rows, resistance = (
         range(contacts.first, contacts.first + contacts.n_contacts),
         contacts.resistance,
@@ -113,17 +119,23 @@ def _note_resistances(contacts: GeomContacts, body: Body, seconds: float) -> Non
             node, weight = contacts.node[c, q], contacts.weight[c, q]
             held = axpy(-weight, vec3(contacts.force, c), vec3(resistance, node))
             store(resistance, node, held)
+    for c in rows:
+        for q in range(3):
+            _correct_work(contacts, contacts.node[c, q])
 
 
 @kernel
-def _mobility(contacts: GeomContacts, body: Body, c: int) -> float:
-    """Return by how much an impulse changes the velocity of the point of contact `c` [1/kg]."""
-    total = 0.0
-    for q in range(3):
-        node, weight = contacts.node[c, q], contacts.weight[c, q]
-        if not body.fixed[node]:
-            total += weight * weight / body.masses[node]
-    return total
+def _correct_work(contacts: GeomContacts, node: int) -> None:
+    """Take the mean of the forces before and after for the work of a node's last displacement.
+
+    With that before alone, a geom that is pressed hard between nodes took or gave up to 9 % of its
+    work that no other term had; the trapezoidal rule leaves 0.9 %.
+    """
+    displacement = vec3(contacts.displacement, node)
+    after = 0.5 * dot(vec3(contacts.resistance, node), displacement)
+    contacts.dissipated += after - contacts.half_work[node]
+    store(contacts.displacement, node, Vec3(0.0, 0.0, 0.0))
+    contacts.half_work[node] = 0.0
 
 
 @kernel
@@ -198,10 +210,16 @@ def _hold(contacts: GeomContacts, body: Body, c: int) -> None:
 
 @kernel
 def _move(contacts: GeomContacts, body: Body, c: int, by: Vec3) -> None:
-    """Move the nodes of contact `c` by a vector over their masses [kg m]; count the work."""
+    """Displace the nodes of contact `c` by a vector over their masses [kg m].
+
+    The work is counted with the forces before. `_correct_work` adds what those after tell.
+    """
     for q in range(3):
         node, weight = contacts.node[c, q], contacts.weight[c, q]
         if weight != 0.0 and not body.fixed[node]:
             way = scale(weight / body.masses[node], by)
             store(body.positions, node, add(vec3(body.positions, node), way))
-            contacts.dissipated += dot(vec3(contacts.resistance, node), way)
+            store(contacts.displacement, node, add(vec3(contacts.displacement, node), way))
+            work = dot(vec3(contacts.resistance, node), way)
+            contacts.dissipated += work
+            contacts.half_work[node] += 0.5 * work
