@@ -93,5 +93,5 @@ def mean_wrench(wrenches: Sequence[Wrench], seconds: Sequence[float]) -> Wrench:
     for wrench, duration in zip(wrenches, seconds, strict=True):
         share = duration / total
         force += share * wrench.force
-        torque += share * (wrench.torque + np.cross(wrench.point - point, wrench.force))
+        torque += share * wrench.about(point).torque
     return Wrench(force, torque, point)

@@ -13,6 +13,9 @@ from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
+from .core.three_vectors import BladeSegment as BladeSegment
+from .core.three_vectors import BladeSweep as BladeSweep
+from .core.three_vectors import Wrench as Wrench
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
@@ -46,8 +49,6 @@ from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .tissue import Tissue as Tissue
-from .types import BladeSegment as BladeSegment
-from .types import BladeSweep as BladeSweep
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
 from .types import Energies as Energies
@@ -60,7 +61,6 @@ from .types import StepResult as StepResult
 from .types import Surface as Surface
 from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
-from .types import Wrench as Wrench
 
 __all__ = [
     "BladeSegment",

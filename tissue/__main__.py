@@ -9,9 +9,10 @@ import numpy as np
 
 from tissue.boundary_conditions import fixed_nodes
 from tissue.core.array_types import FloatArray
+from tissue.core.three_vectors import BladeSegment, BladeSweep
 from tissue.shapes.block import block
 from tissue.tissue import Tissue
-from tissue.types import BladeSegment, BladeSweep, StepResult, TetrahedralMesh, TissueError
+from tissue.types import StepResult, TetrahedralMesh, TissueError
 
 _DT = 1e-3
 """Length of a frame [s]: 1 kHz, the rate of a haptic device."""

@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from tissue.blade.edge import LEAST_SINE, Edge
 from tissue.core.array_types import BoolArray, FloatArray
+from tissue.core.three_vectors import BladeSweep
 from tissue.core.vec3 import Vec3
 from tissue.cutting.scheme import checked_scheme
 from tissue.integrators.options import Global, IntegratorOptions, Verlet, checked_relaxation
 from tissue.material import NEARLY_INCOMPRESSIBLE, Material
 from tissue.solver_settings import PRECISIONS, SolverSettings
-from tissue.types import BladeSweep
 
 TOUGHEST = {"springs": 0.6, "neo_hookean": 2.0}
 """Toughness over Young's modulus, in mean node sizes, up to which steady forces are within 5 % of

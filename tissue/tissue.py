@@ -13,6 +13,7 @@ from tissue.blade.path_tracing import forget_path
 from tissue.blade.prescribed_cut import cut_along
 from tissue.blade_shape import BladeShape
 from tissue.core.array_types import BoolArray, FloatArray
+from tissue.core.three_vectors import BladeSweep
 from tissue.core.vec3 import Vec3
 from tissue.cut_settings import CutReport
 from tissue.cutting.incision import CutHooks, Incision
@@ -54,7 +55,6 @@ from tissue.mesh.validation import expect_sound
 from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
 from tissue.types import (
-    BladeSweep,
     SchemeStatistics,
     StageTimes,
     StepResult,

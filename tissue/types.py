@@ -1,16 +1,15 @@
-"""Plain data that the engine takes and returns: blade, mesh, results of a step, state of the body.
+"""Plain data that the engine takes and returns: mesh, results of a step, state of the body.
 
 SI units. Every vector in this package is in the tissue frame. The suffixes `_t0` and `_t1` mean
 the start and the end of a step.
 """
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
-from tissue.core.lazy_fields import lazy_fields
+from tissue.core.three_vectors import Wrench
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
     from trimesh import Trimesh
@@ -20,109 +19,8 @@ CUT_COLOUR = (212, 68, 60, 255)
 """Red, green, blue and opacity of skin and of cut faces in exported meshes, 0 to 255 (sRGB)."""
 
 
-_T = TypeVar("_T")
-
-
 class TissueError(RuntimeError):
     """The tissue cannot go on: its motion became unstable. What it was before can still be read."""
-
-
-Nine = tuple[float, float, float, float, float, float, float, float, float]
-"""The numbers of three vectors, one after the other."""
-
-
-class BladeSegment(NamedTuple):
-    """The cutting edge at one instant: the paper's thin line, and where it faces."""
-
-    tip: FloatArray
-    """Sharp end of the edge [m], shape (3,)."""
-    heel: FloatArray
-    """End of the edge nearest the handle [m], shape (3,)."""
-    forward: FloatArray
-    """Unit vector across the edge, in the plane of the blade, in which it cuts; shape (3,)."""
-
-    @property
-    def numbers(self) -> Nine:
-        """Tip, heel and forward in plain numbers."""
-        return _numbers_of(self)
-
-    @staticmethod
-    def of_numbers(numbers: Nine) -> "BladeSegment":
-        """Return a segment of such numbers; its arrays are made when they are asked for."""
-        return _of_numbers(_LazySegment, numbers)
-
-
-class BladeSweep(NamedTuple):
-    """The cutting edge at the start and at the end of a step."""
-
-    t0: BladeSegment
-    """The edge at the start."""
-    t1: BladeSegment
-    """The edge at the end."""
-
-
-class Wrench(NamedTuple):
-    """A force and a torque, and the point they act at."""
-
-    force: FloatArray
-    """Force [N], shape (3,)."""
-    torque: FloatArray
-    """Torque about `point` [N m], shape (3,)."""
-    point: FloatArray
-    """Point at which they act [m], shape (3,)."""
-
-    @property
-    def numbers(self) -> Nine:
-        """Force, torque and point in plain numbers."""
-        return _numbers_of(self)
-
-    @staticmethod
-    def of_numbers(numbers: Nine) -> "Wrench":
-        """Return a wrench of such numbers; its arrays are made when they are asked for."""
-        return _of_numbers(_LazyWrench, numbers)
-
-
-def _vector(k: int) -> Callable[[Any], FloatArray]:
-    """Return what makes field `k` of three vectors of numbers."""
-    return lambda vectors: _arrays_of(vectors)[k]
-
-
-def _kept_numbers(vectors: Any) -> Nine:
-    """Return the numbers that vectors were made of, if no array was made of them."""
-    return vectors.__dict__.get("numbers") or _numbers_of(vectors)
-
-
-@lazy_fields(tip=_vector(0), heel=_vector(1), forward=_vector(2))
-class _LazySegment(BladeSegment):
-    numbers = property(_kept_numbers)
-
-
-@lazy_fields(force=_vector(0), torque=_vector(1), point=_vector(2))
-class _LazyWrench(Wrench):
-    numbers = property(_kept_numbers)
-
-
-_new: Any = tuple.__new__
-_NONE_MADE = (None, None, None)
-
-
-def _of_numbers(kind: type[_T], numbers: Nine) -> _T:
-    three: _T = _new(kind, _NONE_MADE)
-    three.__dict__["numbers"] = numbers
-    return three
-
-
-def _numbers_of(vectors: tuple[FloatArray, FloatArray, FloatArray]) -> Nine:
-    u, v, w = vectors
-    (a, b, c), (d, e, f), (g, h, i) = u.tolist(), v.tolist(), w.tolist()
-    return a, b, c, d, e, f, g, h, i
-
-
-def _arrays_of(vectors: Any) -> list[FloatArray]:
-    """Make the arrays, and forget the numbers: whoever has an array may change it."""
-    arrays = [*np.array(vectors.__dict__.pop("numbers")).reshape(3, 3)]
-    vectors.__dict__.update(zip(vectors._fields, arrays, strict=True))
-    return arrays
 
 
 class RigidContacts(NamedTuple):

@@ -22,13 +22,7 @@ def about_centre_of_mass(wrench: Wrench, centre_of_mass: FloatArray) -> SixNumbe
             `MAX_PLAUSIBLE_TORQUE`.
     """
     # The last guard: MuJoCo accepts 1e3 N silently, and resets itself at 1e9 N or NaN.
-    # Plain floats: np.cross and small-array arithmetic would cost 31 us here instead of 2.
-    fx, fy, fz, tx, ty, tz, px, py, pz = wrench.numbers
-    cx, cy, cz = centre_of_mass.tolist()
-    rx, ry, rz = px - cx, py - cy, pz - cz
-    tx += ry * fz - rz * fy
-    ty += rz * fx - rx * fz
-    tz += rx * fy - ry * fx
+    fx, fy, fz, tx, ty, tz, *_ = wrench.about(centre_of_mass).numbers
     force, torque = math.hypot(fx, fy, fz), math.hypot(tx, ty, tz)
     if not (force <= MAX_PLAUSIBLE_FORCE and torque <= MAX_PLAUSIBLE_TORQUE):  # catches NaN too
         raise ValueError(

@@ -154,10 +154,10 @@ class GeomCoupling:
     def _wrench_on(self, body: int, forces: FloatArray, torques: FloatArray) -> Wrench:
         """Return the wrench on a body, of forces and torques on all geoms; see `wrench`."""
         origin = self._frame.points_to_tissue(self._data.xpos[body])
-        mine = self._bodies == body
-        force = forces[mine].sum(axis=0)
-        levers = np.cross(self._origins[mine] - origin, forces[mine])
-        torque = (torques[mine] + levers).sum(axis=0)
+        force, torque = np.zeros(3), np.zeros(3)
+        for geom in np.flatnonzero(self._bodies == body):
+            force += forces[geom]
+            torque += Wrench(forces[geom], torques[geom], self._origins[geom]).about(origin).torque
         to_world = self._frame.vectors_to_world
         return Wrench(to_world(force), to_world(torque), self._data.xpos[body].copy())
 

@@ -150,7 +150,7 @@ class Grasper:
         force, torque = np.zeros(3), np.zeros(3)
         for applied, centre in zip(self._applied, self._centres, strict=True):
             force += applied[:3]
-            torque += applied[3:] + np.cross(centre - self._pinch, applied[:3])
+            torque += Wrench(applied[:3], applied[3:], centre).about(self._pinch).torque
         return Wrench(force, torque, self._pinch.copy())
 
 

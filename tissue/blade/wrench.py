@@ -31,9 +31,10 @@ from tissue.blade.side_contact import (
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.structs import Arrays, IntCell
+from tissue.core.three_vectors import Wrench
 from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub
 from tissue.mesh.body import Body
-from tissue.types import RigidContacts, Wrench
+from tissue.types import RigidContacts
 
 
 class WrenchReport(Arrays):

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.three_vectors import Wrench
 from tissue.integrators.attachments import SEVERED
 from tissue.loads.frame_path import FramePath
 from tissue.loads.material_points import MaterialPoints
-from tissue.types import Wrench
 
 _ORTHONORMAL = 1e-6
 """How far a rotation may be from one, by rounding."""
@@ -80,10 +80,8 @@ class Attachment:
 
         Zero in the steps after the one in which it let go.
         """
-        origin = self._begin[1]
-        force = -self._force
         # Forces act where the points are: dampers pull beside the line to what they are tied to.
-        return Wrench(force, -self._moment - np.cross(origin, force), origin.copy())
+        return Wrench(-self._force, -self._moment, np.zeros(3)).about(self._begin[1])
 
     def move(
         self, origin: Sequence[float] | FloatArray, rotation: npt.ArrayLike | None = None

@@ -38,10 +38,11 @@ from tissue.contact.geoms.near_nodes import GeomSearch
 from tissue.contact.geoms.signed_distance import distance_to
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.core.jit import SameTypes, kernel
+from tissue.core.three_vectors import Wrench
 from tissue.core.vec3 import vec3
 from tissue.mesh.body import Body, grown
 from tissue.mesh.changes import Change
-from tissue.types import RigidContacts, Wrench
+from tissue.types import RigidContacts
 
 CONTACTS_AT_FIRST = 64
 """Contacts that there is room for at first."""
