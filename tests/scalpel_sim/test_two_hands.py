@@ -33,6 +33,11 @@ def done(scene):
     return simulation
 
 
+def done_from_elsewhere(scene):
+    """The scene, with hands that start up to three millimetres from where it has them."""
+    return done(moved(scene, np.random.default_rng(1)))
+
+
 def pieces(simulation):
     """The piece that is held by the supports, and the one that came off."""
     found = pieces_of(simulation.link.snapshot())
@@ -72,17 +77,29 @@ def check_taut(simulation, asked):
 
 @pytest.fixture(scope="module")
 def retract():
-    return done(RETRACT)
+    return done_from_elsewhere(RETRACT)
 
 
 @pytest.fixture(scope="module")
 def excise():
-    return done(EXCISE)
+    return done_from_elsewhere(EXCISE)
+
+
+@pytest.fixture(scope="module")
+def pinched():
+    """The same lump where the scene has it, held by friction alone."""
+    (left,) = EXCISE.graspers
+    closing = [
+        msgspec.structs.replace(row, opening=0.0) if row.opening == 0.007 else row
+        for row in left.motion
+    ]
+    jaws = msgspec.structs.replace(left, holds="friction", closed=None, force=0.5, motion=closing)
+    return done(replace(EXCISE, graspers=(jaws,)))
 
 
 @pytest.fixture(scope="module")
 def taut():
-    return done(TAUT)
+    return done_from_elsewhere(TAUT)
 
 
 # How they end
@@ -104,39 +121,18 @@ def test_the_lump_is_cut_out_lifted_and_put_down(excise):
     assert excise.touching.frames == {}
 
 
-def test_the_lump_is_what_the_arc_encloses_but_for_how_far_the_sheet_gives(excise):
+def test_the_lump_is_what_the_arc_encloses_but_for_how_far_the_sheet_gives(pinched):
     """A segment of a circle of 18 mm, 14 mm high, through 8 mm; the sheet is taut, and opens."""
     radius, height = 18.0, 14.0
     chord = np.sqrt(2.0 * radius * height - height**2)
     area = radius**2 * np.arccos(1.0 - height / radius) - (radius - height) * chord
-    assert 0.75 < pieces(excise)[1].rest_volume / (8e-9 * area) < 1.0
+    assert 0.75 < pieces(pinched)[1].rest_volume / (8e-9 * area) < 1.0
 
 
-@pytest.mark.parametrize(
-    ("scene", "check"),
-    [(RETRACT, check_retract), (EXCISE, check_excise)],
-    ids=["retract", "excise"],
-)
-def test_hands_that_start_up_to_three_millimetres_away_do_it_too(scene, check):
-    check(done(moved(scene, np.random.default_rng(1))))
-
-
-def test_a_lump_that_the_jaws_hold_by_friction_alone_is_cut_out_lifted_and_put_down_too():
-    (left,) = EXCISE.graspers
-    closing = [
-        msgspec.structs.replace(row, opening=0.0) if row.opening == 0.007 else row
-        for row in left.motion
-    ]
-    pinching = msgspec.structs.replace(
-        left, holds="friction", closed=None, force=0.5, motion=closing
-    )
-    simulation = done(replace(EXCISE, graspers=(pinching,)))
-    _, lump = pieces(simulation)
+def test_a_lump_that_the_jaws_hold_by_friction_alone_is_cut_out_lifted_and_put_down_too(pinched):
+    _, lump = pieces(pinched)
     assert lump.centre[1] > 0.06 and abs(lump.centre[2] + 0.01) < 0.002
-    assert (simulation.recording.column("left_points") == 0.0).all()
-    energies = simulation.result.energies
-    lifted = np.abs(simulation.recording.column("work_of_loads_j")).max()
-    assert abs(energies.residual) < 5e-3 * (energies.work_of_blade + lifted)
+    assert (pinched.recording.column("left_points") == 0.0).all()
 
 
 # What the hands feel
@@ -155,7 +151,7 @@ def test_the_left_hand_feels_nothing_before_it_is_there(retract):
     assert (retract.recording.vector("left_force")[:150] == 0.0).all()
 
 
-@pytest.mark.parametrize("name", ["retract", "excise", "taut"])
+@pytest.mark.parametrize("name", ["retract", "excise", "pinched", "taut"])
 def test_the_account_closes_within_half_a_percent_of_the_work_of_all_hands(name, request):
     simulation = request.getfixturevalue(name)
     energies = simulation.result.energies
