@@ -75,6 +75,10 @@ _PAINT = {"specular": 0x555555, "shininess": 60, "reflectivity": 0.05, "combine"
 """Properties of the material of painted parts."""
 
 
+OWN_VIEW = "beside the arms"
+"""Name of the page's own camera; a scene that has a view of this name replaces it."""
+
+
 class ScenePackets:
     """Makes the packets that show a run on a page: an opening packet, then one packet a frame."""
 
@@ -116,8 +120,10 @@ class ScenePackets:
         for shape in self._shapes:
             self._set_shape(scene, shape, centre, body_poses[shape.body])
         scene.set_pose(TISSUE, self._frame.origin, self._frame.rotation)
-        beside_arms = Camera("beside the arms", self._eye(centre, body_poses), centre)
-        scene.set_cameras([*map(self._camera, self._views), beside_arms], self._diagonal)
+        cameras = [*map(self._camera, self._views)]
+        if OWN_VIEW not in [camera.name for camera in cameras]:
+            cameras.append(Camera(OWN_VIEW, self._eye(centre, body_poses), centre))
+        scene.set_cameras(cameras, self._diagonal)
         scene.set_wireframe(self._wireframe)
         return scene.take()
 

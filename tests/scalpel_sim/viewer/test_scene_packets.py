@@ -60,6 +60,14 @@ def test_views_stand_in_the_frame_of_the_tissue_before_the_pages_own():
     assert commands(alone)["set_cameras"]["cameras"] == [own]
 
 
+def test_a_view_with_the_name_of_the_pages_own_stands_in_its_place():
+    view = ViewTable(name="beside the arms", eye=(0.2, 0.0, 0.0), target=(0.0, 0.0, 0.0))
+    model, data = little_arm()
+    packets = ScenePackets(shapes_of(model), FRAME, views=[view])
+    opening = commands(packets.opening(cut_block(0.0), body_poses(data)))["set_cameras"]
+    assert [camera["fov"] for camera in opening["cameras"]] == [view.fov_degrees]
+
+
 def test_tissue_is_drawn_in_its_own_frame_and_the_arm_in_the_world():
     model, data = little_arm()
     packets = ScenePackets(shapes_of(model), FRAME)
