@@ -4,8 +4,8 @@ Where tissue touches a geom, each stage has the force that keeps it from being a
 geom, and along it within Coulomb's cone: what rests is in balance whatever the step is, as if it
 were held. That it touches, and in which direction that pushes, was found after the last substep
 (`tissue.contact.geoms.kinematic_contact`). Contacts that share nodes are solved together, by Gauss
-and Seidel's method on accelerations: did faces keep the force of the last substep, they would sink
-in, and putting them out again would be work of nobody, four fifths of that of a jaw that closes.
+and Seidel's method on accelerations. If faces kept the force of the last substep, they would sink
+in, and putting them out again would add energy: up to four fifths of the work of a closing jaw.
 
 Source: Baraff (1994), Fast contact force computation for nonpenetrating rigid bodies, for contact
 in terms of accelerations.
