@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridge import NearGeoms
+from bridge import GeomPoses, TouchedGeoms
 from scalpel_sim import SCENES
 from scalpel_sim.scene_body import make_tissue
 from tissue import FloatArray, Geom, Tissue
@@ -53,9 +53,8 @@ def main() -> int:
     for tissue in (alone, touched):
         tissue.push("top", (0.0, 0.0, -1e-6))
     geoms, places = instruments(touched)
-    contact = touched.collide_with(geoms, places)
-    broad_phase = NearGeoms(geoms, touched.node_size)
     rotations = np.tile(np.eye(3), (len(geoms), 1, 1))
+    contact = TouchedGeoms(touched, geoms, GeomPoses(places, rotations))
     seconds = np.zeros((2, options.frames))
     for k in range(options.frames):
         now = time.perf_counter()
@@ -64,12 +63,9 @@ def main() -> int:
         origins = places.copy()
         origins[1:, 2] -= SINKING * min(k, LOWEST)
         now = time.perf_counter()
-        near = broad_phase.near(origins, rotations, touched.bounds)
-        if near is not None:
-            contact.consider(near)
-        contact.move(origins, rotations)
+        contact.move(GeomPoses(origins, rotations))
         touched.step(None, DT)
-        contact.wrenches()
+        _ = contact.loads
         seconds[1, k] = time.perf_counter() - now
     before, after = np.median(seconds[:, options.frames // 2 :], axis=1)
     found = contact.forces()

@@ -7,12 +7,13 @@ from .collision.collisions import Collisions as Collisions
 from .collision.fixtures import Fixture as Fixture
 from .collision.fixtures import FixtureBox as FixtureBox
 from .collision.fixtures import FixtureMesh as FixtureMesh
-from .collision.near_geoms import NearGeoms as NearGeoms
+from .collision.touched_geoms import TouchedGeoms as TouchedGeoms
 from .counters import Counters as Counters
 from .coupling.coupling import MAX_PLAUSIBLE_FORCE as MAX_PLAUSIBLE_FORCE
 from .coupling.coupling import MAX_PLAUSIBLE_TORQUE as MAX_PLAUSIBLE_TORQUE
 from .coupling.coupling import CouplingError as CouplingError
-from .coupling.led_grips import LedGrip as LedGrip
+from .coupling.led_contact import LedContact as LedContact
+from .coupling.led_grip import LedGrip as LedGrip
 from .coupling.limits import DeviceLimits as DeviceLimits
 from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.passivity import PassivityCounters as PassivityCounters
@@ -21,6 +22,8 @@ from .frames import TissueFrame as TissueFrame
 from .led_frames import FrameHold as FrameHold
 from .led_frames import FrameLoad as FrameLoad
 from .led_frames import FramePose as FramePose
+from .led_geoms import GeomLoads as GeomLoads
+from .led_geoms import GeomPoses as GeomPoses
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
 from .link import TissueDescription as TissueDescription
@@ -46,21 +49,24 @@ __all__ = [
     "FixtureMesh",
     "FrameLoad",
     "FramePose",
+    "GeomLoads",
+    "GeomPoses",
     "GeomShape",
     "FrameHold",
     "InProcessLink",
+    "LedContact",
     "LedGrip",
     "LinkError",
     "MAX_FRAMES_PER_ANSWER",
     "MAX_PLAUSIBLE_FORCE",
     "MAX_PLAUSIBLE_TORQUE",
-    "NearGeoms",
     "PassivityCounters",
     "SIZES_PER_SHAPE",
     "TcpLink",
     "TissueDescription",
     "TissueFrame",
     "TissueLink",
+    "TouchedGeoms",
     "VirtualCoupling",
     "chosen_key",
     "compiled_arithmetic",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from bridge.arithmetic import PLAIN, Six, compiled_arithmetic
 from bridge.collision.broad_phase import BroadPhase
@@ -16,14 +15,14 @@ from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
 from bridge.coupling.coupling import Coupling, CouplingError
 from bridge.coupling.impulse import ImpulseCompensation
-from bridge.coupling.led_grips import LedGrip, LedGrips
+from bridge.coupling.leading import Leading, PathPart
+from bridge.coupling.led_bodies import LedBodies, loads_over
 from bridge.coupling.limits import DeviceLimits
 from bridge.coupling.local_model import MAX_FRAMES_PER_ANSWER, LocalModel
 from bridge.coupling.passivity import Travel
 from bridge.coupling.query import Query, TimedSweep, TissueAnswer
 from bridge.coupling.virtual_coupling import Proxy, VirtualCoupling
 from bridge.frames import TissueFrame
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, plain_region
 from bridge.link import InProcessLink, TissueLink, link_to
 from bridge.poses import Pose, checked_pose, pose_of, six
 from tissue import BladeSegment, BladeSweep, FloatArray, StepResult, Wrench
@@ -32,18 +31,7 @@ if TYPE_CHECKING:  # the side without the tissue starts without its compiler
     from tissue import Tissue
 
 
-class _Part(NamedTuple):
-    """A part of the path that the tissue has not been asked for yet."""
-
-    blade: Pose
-    """The blade at its end."""
-    seconds: float
-    """How long it takes [s]."""
-    frames: tuple[FramePose, ...]
-    """Where the grips are at its end."""
-
-
-class Bridge:
+class Bridge(Leading):
     """Carries the blade's motion to the tissue and the tissue's wrench back.
 
     By default the tissue is asked in each frame, and the arm feels in the next one the wrench
@@ -104,7 +92,7 @@ class Bridge:
         )
         self._link = link
         self._query = Query(link, waits)
-        self._grips = LedGrips(link)
+        self._led = LedBodies(link)
         self._model = LocalModel(tissue_yields=coupling is None)
         self._impulse = ImpulseCompensation()
         self._correction = np.zeros(6)
@@ -115,7 +103,7 @@ class Bridge:
         self._is_direct = waits and tissue_every == 1 and coupling is None
         self._arm: Pose | None = None
         self._asked_at: Pose | None = None
-        self._path: list[_Part] = []
+        self._path: list[PathPart] = []
         self._result: StepResult | None = None
         self._raw: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._felt = frame.wrench_to_world(Wrench(np.zeros(3), np.zeros(3), np.zeros(3)))
@@ -167,58 +155,10 @@ class Bridge:
         self._felt = self._frame.numbers_to_world(felt, arm.tip)
         return self._felt
 
-    def attach(
-        self,
-        where: str | npt.ArrayLike,
-        *,
-        stiffness: float,
-        damping: float = 0.0,
-        breaks_at: float = math.inf,
-        origin: Sequence[float] | None = None,
-    ) -> LedGrip:
-        """Let a frame hold tissue, over any link; return the grip, which is moved in each step.
-
-        Args:
-            where: A region as text, a mask of nodes, numbers of nodes, or places in the body at
-                rest [m], as for `tissue.Tissue.attach`; tissue frame.
-            stiffness: Of all springs together [N/m].
-            damping: Of all dampers together [N s/m].
-            breaks_at: Force at which it lets go [N].
-            origin: Origin of the frame [m], tissue frame; None: the mean of the points.
-
-        Raises:
-            ValueError: see `tissue.Tissue.attach`, where the tissue is in this process.
-            LinkError: the tissue is in another one, and refuses that or did not answer.
-        """
-        self._query.wait()
-        grip = self._grips.attach(
-            FrameHold(plain_region(where), stiffness, damping, breaks_at, origin)
-        )
-        self._path = [part._replace(frames=(*part.frames, grip.pose)) for part in self._path]
-        return grip
-
-    def release(self, held: LedGrip) -> None:
-        """Let go what a grip holds; again it does nothing.
-
-        Raises:
-            ValueError: it is none of this bridge.
-            LinkError: the tissue is in another process, and did not answer.
-        """
-        self._query.wait()
-        self._grips.release(held)
-
     @property
     def frame(self) -> TissueFrame:
         """Pose of the tissue in the world."""
         return self._frame
-
-    @property
-    def frame_loads(self) -> Sequence[FrameLoad]:
-        """What the tissue did to each frame that acts on it, in its last answer; tissue frame.
-
-        First come those of the tissue's own scene, then the grips.
-        """
-        return self._grips.loads
 
     @property
     def result(self) -> StepResult | None:
@@ -272,17 +212,17 @@ class Bridge:
     def _advance(self, arm: Pose, dt: float) -> Six:
         """Let the tissue do this frame, and return its wrench: where it answers in each frame."""
         before = self._asked_at or arm
-        frames = self._grips.poses
+        led = self._led.poses
         # It stays where a link fails: the next frame then does both.
-        self._path.append(_Part(arm, dt, frames))
+        self._path.append(PathPart(arm, dt, led))
         touches, self._touching = self._broad_phase.overlaps(
             before, arm, dt, engaged=self._engaged()
         )
         self._n_rejected += not touches
         sweep = BladeSweep(before.segment, arm.segment) if touches else None
-        result = self._query.step(sweep, dt, frames)
+        result = self._query.step(sweep, dt, led)
         self._asked_at = arm
-        self._grips.take(self._link.loads())
+        self._led.take(loads_over(self._link), result)
         self._path.clear()
         self._take(result, dt)
         self._answered = True
@@ -294,7 +234,7 @@ class Bridge:
         """Ask the tissue where that is due, and return its wrench, or what it may be by now."""
         balanced = None if self._virtual is None else self._follow(self._virtual, arm, dt)
         blade = arm if self._proxy is None else pose_of(self._proxy.pose)
-        self._path.append(_Part(blade, dt, self._grips.poses))
+        self._path.append(PathPart(blade, dt, self._led.poses))
         query = self._query
         is_due = self._asked_at is None or len(self._path) >= self._tissue_every
         if is_due and not query.is_pending:
@@ -334,7 +274,7 @@ class Bridge:
             seconds = path[0].seconds
             touches, self._touching = overlaps(before, blade, seconds, engaged=engaged)
             sweep = BladeSweep(before.segment, blade.segment) if touches else None
-            parts = [TimedSweep(sweep, seconds, path[0].frames)]
+            parts = [TimedSweep(sweep, seconds, path[0].led)]
         else:
             seconds = sum(part.seconds for part in path)
             if self._holds_as_much and len(path) > 2:
@@ -344,11 +284,11 @@ class Bridge:
             self._touching = tuple(dict.fromkeys(name for one in found for name in one.fixtures))
             touches = any(one.tissue for one in found)
             parts = [
-                TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.frames)
+                TimedSweep(BladeSweep(t0.segment, t1.segment), part.seconds, part.led)
                 for (t0, t1), part in zip(ways, path, strict=True)
             ]
             if not touches:
-                parts = [TimedSweep(None, seconds, path[-1].frames)]
+                parts = [TimedSweep(None, seconds, path[-1].led)]
         self._n_rejected += not touches
         self._query.ask(parts, blade.segment)
         if not self._is_direct:
@@ -358,7 +298,7 @@ class Bridge:
     def _process(self, answer: TissueAnswer) -> None:
         """Update broad phase, local model and impulse from an answer."""
         result = answer.result
-        self._grips.take(answer.loads)
+        self._led.take(answer.loads, result)
         self._take(result, answer.seconds)
         if not self._is_direct:
             self._model.update(result, answer.last_wrench, answer.middle_pose)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tissue import FloatArray
+from tissue import BoolArray, FloatArray
 
 ROTATION_TOLERANCE = 1e-9
 """Largest difference between R^T R and the identity. MuJoCo's matrices are accurate to 1e-15, and a
@@ -44,3 +44,18 @@ def rotation(value: FloatArray, what: str) -> FloatArray:
     if np.linalg.det(matrix) < 0.0:
         raise ValueError(f"{what} is a reflection: its determinant is -1; wanted +1")
     return matrix
+
+
+def are_rotations(axes: FloatArray, tolerance: float) -> BoolArray:
+    """Return which of many matrices are rotations, shape (n,).
+
+    Args:
+        axes: The matrices, shape (n, 3, 3).
+        tolerance: Largest difference between R^T R and the identity.
+    """
+    # Entries first: the squares of large ones are not finite.
+    is_small = np.abs(axes).max(axis=(1, 2), initial=0.0) <= 1.0 + tolerance
+    small = np.where(is_small[:, None, None], axes, 0.0)
+    error = np.abs(small.transpose(0, 2, 1) @ small - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    found: BoolArray = is_small & (error <= tolerance) & (np.linalg.det(small) > 0.0)
+    return found

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
 import numpy as np
 
 from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
+from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
 from tissue import (
     BladeShape,
     BladeSweep,
     Chunks,
     CutReport,
     FloatArray,
+    Geom,
     Material,
     Snapshot,
     StepResult,
@@ -21,6 +23,7 @@ from tissue import (
 )
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
+    from bridge.collision.touched_geoms import TouchedGeoms
     from tissue import Attachment, Tissue
 
 
@@ -54,7 +57,11 @@ class TissueLink(Protocol):
         """Return what the arm side must know of the body now."""
 
     def step(
-        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+        self,
+        sweep: BladeSweep | None,
+        dt: float,
+        poses: Sequence[FramePose] = (),
+        geoms: GeomPoses = NO_GEOMS,
     ) -> StepResult:
         """Advance the tissue by `dt` [s] while the blade does `sweep` (None: no blade is near).
 
@@ -62,9 +69,10 @@ class TissueLink(Protocol):
             sweep: Motion of the blade.
             dt: Length of the step [s].
             poses: Where the frames that were attached are at its end, one for each, in order.
+            geoms: Where the geoms of `collide_with` are at its end.
 
         Raises:
-            ValueError: there is another number of poses.
+            ValueError: there is another number of poses, or a geom cannot move so.
             LinkError: the tissue is in another process and did not answer, or refuses the request.
         """
 
@@ -91,6 +99,21 @@ class TissueLink(Protocol):
         Raises:
             LinkError: the tissue is in another process and did not answer.
         """
+
+    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
+        """Let the body touch rigid geoms from now on, which the caller leads, and no others.
+
+        Args:
+            geoms: The geoms.
+            poses: Where they are now; each step takes where they are at its end.
+
+        Raises:
+            ValueError: see `tissue.Tissue.collide_with`.
+            LinkError: the tissue is in another process, and refuses it or did not answer.
+        """
+
+    def geom_loads(self) -> GeomLoads:
+        """Return what the body did to each of these geoms in the last step."""
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
@@ -124,6 +147,8 @@ class InProcessLink:
         self._scene = scene
         self._frames: list[Attachment] = list(tissue.attachments)
         self._n_own = len(self._frames)
+        self._geoms: TouchedGeoms | None = None
+        self._n_geoms = 0
 
     @property
     def tissue(self) -> Tissue:
@@ -143,11 +168,18 @@ class InProcessLink:
         )
 
     def step(
-        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+        self,
+        sweep: BladeSweep | None,
+        dt: float,
+        poses: Sequence[FramePose] = (),
+        geoms: GeomPoses = NO_GEOMS,
     ) -> StepResult:
         """Advance the tissue by `dt` [s]; see `TissueLink.step`."""
         led = self._frames[self._n_own :]
         expect_each(poses, len(led))
+        expect_pose_of_each(geoms, self._n_geoms)
+        if self._geoms is not None:
+            self._geoms.move(geoms)
         for frame, pose in zip(led, poses, strict=True):
             frame.move(pose.origin, pose.rotation)
         return self._tissue.step(sweep, dt)
@@ -181,6 +213,22 @@ class InProcessLink:
     def n_led(self) -> int:
         """Number of frames that were attached over this link, whose poses each step takes."""
         return len(self._frames) - self._n_own
+
+    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
+        """Let the body touch rigid geoms; see `TissueLink.collide_with`."""
+        from bridge.collision.touched_geoms import TouchedGeoms  # few need its collision library
+
+        expect_pose_of_each(poses, len(geoms))
+        self._geoms, self._n_geoms = TouchedGeoms(self._tissue, geoms, poses), len(geoms)
+
+    def geom_loads(self) -> GeomLoads:
+        """Return what the body did to each of these geoms in the last step."""
+        return no_geom_loads(0) if self._geoms is None else self._geoms.loads
+
+    @property
+    def n_geoms(self) -> int:
+        """Number of geoms of `collide_with`, whose poses each step takes."""
+        return self._n_geoms
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""

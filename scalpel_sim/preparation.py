@@ -28,7 +28,7 @@ from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import TetrahedralMesh, Tissue
+from tissue import TetrahedralMesh
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -65,7 +65,6 @@ def prepare(
     needed = _needed(stroke, mesh, scene)
     _warn_of_table(stroke, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
-    held = tissue_held(scene, link)
     motions = motions_of(scene.graspers)
     floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
     around = [*fixtures, *floor]
@@ -98,28 +97,13 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
-    if held is not None:
+    if scene.graspers:
         known = [arm.model.body(arm.blade.body_id).name, *(each.body for each in standing)]
-        simulation.partners.append(GeomCoupling(arm.data, held, without=known, frame=frame))
-        for grasper in led_graspers(scene.graspers, motions, arm, held, frame):
+        bridge = simulation.bridge
+        simulation.partners.append(GeomCoupling(arm.data, bridge, without=known))
+        for grasper in led_graspers(scene.graspers, motions, arm, bridge):
             simulation.add_grasper(grasper)
     return simulation
-
-
-def tissue_held(scene: Scene, link: TissueLink) -> Tissue | None:
-    """Return the tissue that the graspers of a scene may hold; None where there are none.
-
-    Raises:
-        UsageError: the tissue is in another process.
-    """
-    if not scene.graspers:
-        return None
-    if not isinstance(link, InProcessLink):
-        raise UsageError(
-            "the scene has a [[grasper]], and its tissue is in another process, where nothing can "
-            "be held; run it without --connect"
-        )
-    return link.tissue
 
 
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:

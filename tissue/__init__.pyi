@@ -3,8 +3,8 @@ from .blade.toughness import toughness_law_of as toughness_law_of
 from .blade_shape import BladeShape as BladeShape
 from .boundary_conditions import fixed_nodes as fixed_nodes
 from .contact.geoms.geom import Geom as Geom
+from .contact.geoms.geom import GeomForces as GeomForces
 from .contact.geoms.geom_contact import GeomContact as GeomContact
-from .contact.geoms.geom_contact import GeomForces as GeomForces
 from .core.array_types import BoolArray as BoolArray
 from .core.array_types import FloatArray as FloatArray
 from .core.array_types import IntArray as IntArray

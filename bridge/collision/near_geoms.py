@@ -46,7 +46,8 @@ class NearGeoms:
         }
         self._obstacles = Obstacles({name: (shapes[name], self._objects[name]) for name in shapes})
         self._tissue = MovableBox()
-        radii = np.linalg.norm([np.abs(middle) + half for middle, half in boxes], axis=1)
+        reaches = np.array([np.abs(middle) + half for middle, half in boxes]).reshape(-1, 3)
+        radii = np.linalg.norm(reaches, axis=1)
         # Where no element of a rotation changes by more than d, no point moves by 3 d radius.
         self._radii = 3.0 * np.where(np.isfinite(radii), radii, 0.0)
         self._asked: tuple[FloatArray, FloatArray, FloatArray] | None = None

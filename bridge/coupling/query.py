@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridge.led_frames import FrameLoad, FramePose, combined_loads, mean_wrench
+from bridge.coupling.led_bodies import LedLoads, LedPoses, loads_over, mean_loads
+from bridge.led_frames import mean_wrench
 from bridge.link import TissueLink
 from bridge.poses import motion, moved
 from tissue import BladeSegment, BladeSweep, StageTimes, StepResult, Wrench
@@ -23,8 +24,8 @@ class TimedSweep(NamedTuple):
     """Motion of the blade; None if it is nowhere near the tissue."""
     seconds: float
     """Duration [s]."""
-    poses: Sequence[FramePose] = ()
-    """Where the frames are at its end that the arm's side leads."""
+    led: LedPoses = LedPoses()
+    """Where the frames and geoms are at its end that the arm's side leads."""
 
 
 class TissueAnswer(NamedTuple):
@@ -40,8 +41,8 @@ class TissueAnswer(NamedTuple):
     """Mean wrench over the last part of the path; its point is the tip at the end."""
     last_sweep: BladeSweep | None
     """Last part of the path; None if the blade was nowhere near."""
-    loads: Sequence[FrameLoad]
-    """Mean loads on all frames over the query."""
+    loads: LedLoads
+    """Mean loads on frames and geoms over the query."""
 
     @property
     def middle_pose(self) -> BladeSegment:
@@ -88,14 +89,14 @@ class Query:
             self._future = self._thread.submit(self._step, path, pose)
 
     def step(
-        self, sweep: BladeSweep | None, seconds: float, poses: Sequence[FramePose] = ()
+        self, sweep: BladeSweep | None, seconds: float, led: LedPoses = LedPoses()
     ) -> StepResult:
         """Advance the tissue along one part of a path, and wait for it; see `TimedSweep`.
 
         Raises:
             LinkError: the tissue is in another process, and did not answer.
         """
-        return self._link.step(sweep, min(seconds, _LONGEST_STEP), poses)
+        return self._link.step(sweep, min(seconds, _LONGEST_STEP), *led)
 
     def wait(self) -> None:
         """Wait for the answer, if there is a request: then the link is free for another one."""
@@ -117,11 +118,12 @@ class Query:
         if len(path) == 1:
             result = self.step(*path[0])
             sweep, duration, _ = path[0]
-            return TissueAnswer(result, pose, duration, result.wrench, sweep, self._link.loads())
-        results, loads = [], []
+            loads = loads_over(self._link)
+            return TissueAnswer(result, pose, duration, result.wrench, sweep, loads)
+        results, parts = [], []
         for part in path:
             results.append(self.step(*part))
-            loads.append(self._link.loads())
+            parts.append(loads_over(self._link))
         seconds = [part.seconds for part in path]
         last_wrench, last_sweep = results[-1].wrench, path[-1].sweep
         return TissueAnswer(
@@ -130,7 +132,7 @@ class Query:
             sum(seconds),
             last_wrench,
             last_sweep,
-            combined_loads(loads, seconds),
+            mean_loads(parts, [part.led for part in path], seconds),
         )
 
 

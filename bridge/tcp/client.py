@@ -1,16 +1,18 @@
 """The client's end of the TCP link to a tissue in another process."""
 
 import contextlib
+import functools
 import socket
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
+from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
 from bridge.link import LinkError, TissueDescription
 from bridge.tcp.address import is_loopback, parse_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
-from bridge.tcp.channel import Channel
+from bridge.tcp.channel import LARGEST_PART, Channel
 from bridge.tcp.messages.body import (
     PIECES_BYTES,
     snapshot_bytes,
@@ -21,6 +23,7 @@ from bridge.tcp.messages.body import (
 )
 from bridge.tcp.messages.chunks import LARGEST_CHUNKS, unpack_chunks
 from bridge.tcp.messages.cut_report import CUT_REPORT_BYTES, unpack_cut_report
+from bridge.tcp.messages.geoms import pack_geoms
 from bridge.tcp.messages.led_frames import (
     LOAD_BYTES,
     MAX_FRAMES,
@@ -38,7 +41,7 @@ from bridge.tcp.messages.text import (
     unpack_error,
 )
 from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
-from tissue import BladeSweep, Chunks, CutReport, Snapshot, StepResult, Surface
+from tissue import BladeSweep, Chunks, CutReport, Geom, Snapshot, StepResult, Surface
 
 _Value = TypeVar("_Value")
 
@@ -74,6 +77,7 @@ class TcpLink:
         self._sequence = 0
         self._n_led = 0
         self._loads: Sequence[FrameLoad] | None = None
+        self._geom_loads = no_geom_loads(0)
         self._channel = Channel()
         self._socket: socket.socket | None = _connect(address, timeout, has_key=key is not None)
         try:
@@ -91,17 +95,26 @@ class TcpLink:
         return description
 
     def step(
-        self, sweep: BladeSweep | None, dt: float, poses: Sequence[FramePose] = ()
+        self,
+        sweep: BladeSweep | None,
+        dt: float,
+        poses: Sequence[FramePose] = (),
+        geoms: GeomPoses = NO_GEOMS,
     ) -> StepResult:
         """Advance the tissue by `dt` [s]; see `TissueLink.step`.
 
         Raises:
-            ValueError: there is another number of poses than frames that were attached.
+            ValueError: there is another number of poses than frames that were attached, or geoms
+                that it touches.
             LinkError: the tissue refuses the request, or did not answer.
         """
+        n_geoms = len(self._geom_loads.forces)
         expect_each(poses, self._n_led)
-        request = pack_step(sweep, dt, poses)
-        result, self._loads = self._ask(MessageKind.STEP, request, LARGEST_RESULT, unpack_result)
+        expect_pose_of_each(geoms, n_geoms)
+        request = pack_step(sweep, dt, poses, geoms)
+        unpack = functools.partial(unpack_result, n_geoms=n_geoms)
+        answer = self._ask(MessageKind.STEP, request, LARGEST_RESULT, unpack)
+        result, self._loads, self._geom_loads = answer
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
         return result
 
@@ -125,6 +138,16 @@ class TcpLink:
             limit = LOAD_BYTES * MAX_FRAMES
             self._loads = self._ask(MessageKind.FRAMES, b"", limit, unpack_all_loads)
         return self._loads
+
+    def collide_with(self, geoms: Sequence[Geom], poses: GeomPoses) -> None:
+        """Let the body touch rigid geoms; see `TissueLink.collide_with`."""
+        expect_pose_of_each(poses, len(geoms))
+        self._ask(MessageKind.COLLIDE, pack_geoms(geoms, poses), 0, _nothing)
+        self._geom_loads = no_geom_loads(len(geoms))
+
+    def geom_loads(self) -> GeomLoads:
+        """Return what the body did to each of these geoms in the last step."""
+        return self._geom_loads
 
     def snapshot(self) -> Snapshot:
         """Return the whole state of the body."""
@@ -185,6 +208,11 @@ class TcpLink:
         """
         if self._socket is None:
             raise LinkError(f"the link to the tissue at {self._address} is closed")
+        if len(payload) > LARGEST_PART:
+            raise LinkError(
+                f"a request of {len(payload):,} bytes for the tissue at {self._address}; at most "
+                f"{LARGEST_PART:,} are allowed. Hold fewer points, or give meshes of fewer vertices"
+            )
         sequence = self._sequence
         self._sequence = (sequence + 1) % (1 << 32)
         try:
@@ -231,6 +259,11 @@ class TcpLink:
                 parts.append(frame.payload)
                 if not frame.kind & MORE:
                     return frame._replace(payload=b"".join(parts))
+
+
+def _nothing(payload: bytes) -> None:
+    if payload:
+        raise MessageError(f"a reply of {len(payload)} bytes; wanted none")
 
 
 def _one_load(payload: bytes) -> FrameLoad:

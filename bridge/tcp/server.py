@@ -21,6 +21,7 @@ from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report
+from bridge.tcp.messages.geoms import unpack_geoms
 from bridge.tcp.messages.led_frames import (
     MAX_FRAMES,
     pack_loads,
@@ -261,10 +262,13 @@ class TissueServer:
             MessageError: the request is malformed or of an unknown kind.
         """
         if frame.kind == MessageKind.STEP:
-            result = self._link.step(*unpack_step(frame.payload, self._link.n_led))
-            return pack_result(result, self._link.loads())
+            link = self._link
+            result = link.step(*unpack_step(frame.payload, link.n_led, link.n_geoms))
+            return pack_result(result, link.loads(), link.geom_loads())
         if frame.kind == MessageKind.ATTACH:
             return self._attached(frame.payload)
+        if frame.kind == MessageKind.COLLIDE:
+            return self._touched(frame.payload)
         if frame.kind == MessageKind.RELEASE:
             number = unpack_number(frame.payload, len(self._link.loads()))
             self._link.release(number)
@@ -300,6 +304,19 @@ class TissueServer:
         except ValueError as error:
             raise MessageError(str(error)) from error
         return pack_loads(self._link.loads()[number:])
+
+    def _touched(self, payload: bytes) -> bytes:
+        """Let the tissue touch geoms, and return an empty reply.
+
+        Raises:
+            MessageError: the request is malformed, or the tissue cannot touch them.
+        """
+        geoms, poses = unpack_geoms(payload)
+        try:
+            self._link.collide_with(geoms, poses)
+        except ValueError as error:
+            raise MessageError(str(error)) from error
+        return b""
 
     def _send(
         self, peer: Peer, kind: MessageKind, payload: bytes, sequence: int | None = None

@@ -17,13 +17,13 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 6
+PROTOCOL_VERSION = 7
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
-contacts and energies of a step; 6 added frames that are led."""
+contacts and energies of a step; 6 added frames that are led; 7 added geoms that are led."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be held before it can be checked. A step request
-has 152 bytes and a few frames; a whole body comes in parts."""
+has 152 bytes, and 96 for each frame and geom that is led; a whole body comes in parts."""
 LARGEST_REPLY = 1 << 30
 """Largest reply, all parts [byte]. A snapshot of ten million tetrahedra is half of it. The limit of
 a single reply follows from the mesh: see `snapshot_bytes` and `surface_bytes` in
@@ -54,6 +54,7 @@ class MessageKind(enum.IntEnum):
     ATTACH = 10
     RELEASE = 11
     FRAMES = 12
+    COLLIDE = 13
 
 
 class Frame(NamedTuple):

@@ -6,11 +6,12 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bridge import NearGeoms, TissueFrame
+from bridge import Bridge, GeomLoads, GeomPoses, LedContact, TissueFrame, TouchedGeoms
 from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from scalpel_sim.arm.collision_geoms import WORLD
 from scalpel_sim.arm.model_bodies import body_number
-from tissue import FloatArray, Geom, GeomContact, IntArray, Tissue, Wrench
+from scalpel_sim.arm.tissue_frames import frame_of
+from tissue import FloatArray, Geom, IntArray, Tissue, Wrench
 
 _SHAPES: dict[int, tuple[str, int]] = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", 0),
@@ -47,34 +48,35 @@ class GeomCoupling:
     Geoms push tissue out and rub on it with their own friction, the first of MuJoCo's three, and
     their bodies feel it. A tissue has one coupling at a time: with all that it can touch.
 
-    Call `follow` before the tissue's step and `apply` after it, between `mj_step1` and `mj_step2`:
-    there the bodies are where `qpos` says, and feel the wrench in the same step.
+    Call `follow` before the step of tissue or bridge and `apply` after it, between `mj_step1` and
+    `mj_step2`: there the bodies are where `qpos` says, and feel the wrench in the same step.
 
     Args:
         data: Data of a compiled model, for which `mj_kinematics` or a step was called.
-        tissue: What they touch.
+        tissue: What they touch: a tissue in this process, or a bridge to one anywhere.
         bodies: Names of bodies whose geoms take part; of each those that MuJoCo lets collide, or
             all of its geoms where it lets none. None: all bodies but `without`.
         without: Names of bodies that take no part where `bodies` is None: that of the blade, which
             the tissue knows already.
-        frame: Where the tissue lies in the world.
+        frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
 
     Raises:
         GeomCouplingError: the model has no such body, or a body has no geom that tissue can touch.
         ValueError: a geom is inside the tissue; see `tissue.Tissue.collide_with`.
+        LinkError: the tissue is in another process, and refuses that or did not answer.
     """
 
     def __init__(
         self,
         data: mujoco.MjData,
-        tissue: Tissue,
+        tissue: Tissue | Bridge,
         bodies: Sequence[str] | None = None,
         *,
         without: Sequence[str] = (),
         frame: TissueFrame = TissueFrame(),
     ) -> None:
         model: mujoco.MjModel = data.model
-        self._data, self._frame, self._tissue = data, frame, tissue
+        self._data, self._frame = data, frame_of(tissue, frame)
         if bodies is None:
             left_out = {body_number(model, name, GeomCouplingError) for name in without}
             chosen = [i for i in range(model.nbody) if i not in left_out]
@@ -94,20 +96,17 @@ class GeomCoupling:
         self._bodies = np.array([int(model.geom_bodyid[i]) for i in self.geom_ids], np.int64)
         self._of_tissue: FloatArray = np.zeros((model.nbody, 6))
         geoms = [_geom(model, i) for i in self.geom_ids]
-        origins, rotations = self._poses()
-        self.contact: GeomContact = tissue.collide_with(geoms, origins, rotations)
-        """The contact, in the frame of the tissue."""
-        self._near = NearGeoms(geoms, tissue.node_size)
-        self._origins = origins
+        self._poses = self._poses_now()
+        self._contact: TouchedGeoms | LedContact
+        if isinstance(tissue, Bridge):
+            self._contact = tissue.collide_with(geoms, self._poses)
+        else:
+            self._contact = TouchedGeoms(tissue, geoms, self._poses)
 
     def follow(self) -> None:
         """Lead the geoms to where their bodies are, at even speeds in the next step."""
-        origins, rotations = self._poses()
-        near = self._near.near(origins, rotations, self._tissue.bounds)
-        if near is not None:
-            self.contact.consider(near)
-        self.contact.move(origins, rotations)
-        self._origins = origins
+        self._poses = self._poses_now()
+        self._contact.move(self._poses)
 
     def apply(self) -> None:
         """Apply the forces of the last step to the bodies, beside what others apply to them.
@@ -116,10 +115,10 @@ class GeomCoupling:
             GeomCouplingError: a wrench is not finite, or too large; see `body_wrench`. Those of the
                 call before stay applied.
         """
-        forces, torques = self.contact.wrenches()
+        loads = self._contact.loads
         now = np.zeros_like(self._of_tissue)
-        for body in {int(each) for each in self._bodies[forces.any(axis=1)]} - {WORLD}:
-            wrench = self._wrench_on(body, forces, torques)
+        for body in {int(each) for each in self._bodies[loads.forces.any(axis=1)]} - {WORLD}:
+            wrench = self._wrench_on(body, loads)
             try:
                 now[body] = about_centre_of_mass(wrench, self._data.xipos[body])
             except ValueError as error:
@@ -139,11 +138,11 @@ class GeomCoupling:
             if isinstance(body, str)
             else body
         )
-        return self._wrench_on(number, *self.contact.wrenches())
+        return self._wrench_on(number, self._contact.loads)
 
     def forces(self) -> GeomForceList:
         """Return where tissue touched geoms in the last step, and how it pushed them."""
-        found, to_world = self.contact.forces(), self._frame.vectors_to_world
+        found, to_world = self._contact.forces(), self._frame.vectors_to_world
         return GeomForceList(
             np.array(self.geom_ids, np.int64)[found.geom],
             self._frame.points_to_world(found.point),
@@ -151,21 +150,22 @@ class GeomCoupling:
             to_world(-found.force),
         )
 
-    def _wrench_on(self, body: int, forces: FloatArray, torques: FloatArray) -> Wrench:
-        """Return the wrench on a body, of forces and torques on all geoms; see `wrench`."""
+    def _wrench_on(self, body: int, loads: GeomLoads) -> Wrench:
+        """Return the wrench on a body, of the loads on all geoms; see `wrench`."""
         origin = self._frame.points_to_tissue(self._data.xpos[body])
         force, torque = np.zeros(3), np.zeros(3)
         for geom in np.flatnonzero(self._bodies == body):
-            force += forces[geom]
-            torque += Wrench(forces[geom], torques[geom], self._origins[geom]).about(origin).torque
+            on_geom = Wrench(loads.forces[geom], loads.torques[geom], self._poses.origins[geom])
+            force += on_geom.force
+            torque += on_geom.about(origin).torque
         to_world = self._frame.vectors_to_world
         return Wrench(to_world(force), to_world(torque), self._data.xpos[body].copy())
 
-    def _poses(self) -> tuple[FloatArray, FloatArray]:
-        """Return origins [m] and axes of the geoms now, in the frame of the tissue."""
+    def _poses_now(self) -> GeomPoses:
+        """Return where the geoms are now, in the frame of the tissue."""
         places = self._data.geom_xpos[self.geom_ids]
         axes = self._data.geom_xmat[self.geom_ids].reshape(-1, 3, 3)
-        return self._frame.points_to_tissue(places), self._frame.rotation.T @ axes
+        return GeomPoses(self._frame.points_to_tissue(places), self._frame.rotation.T @ axes)
 
 
 def _geoms_of_body(model: mujoco.MjModel, body: int) -> list[int]:

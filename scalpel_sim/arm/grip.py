@@ -10,6 +10,7 @@ import numpy.typing as npt
 from bridge import Bridge, LedGrip, TissueFrame
 from scalpel_sim.arm.body_wrench import about_centre_of_mass
 from scalpel_sim.arm.model_bodies import body_number
+from scalpel_sim.arm.tissue_frames import frame_of
 from tissue import Attachment, FloatArray, Tissue, Wrench
 
 
@@ -36,6 +37,7 @@ class Grip:
     Raises:
         GripError: the model has no such body.
         ValueError: see `tissue.Tissue.attach`.
+        LinkError: the tissue is in another process, and refuses that or did not answer.
     """
 
     def __init__(
@@ -51,7 +53,7 @@ class Grip:
         breaks_at: float = math.inf,
     ) -> None:
         body_id = body_number(data.model, body, GripError)
-        self._frame = frame = tissue.frame if isinstance(tissue, Bridge) else frame
+        self._frame = frame = frame_of(tissue, frame)
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._position = data.xpos[body_id]
         self._axes = data.xmat[body_id].reshape(3, 3)

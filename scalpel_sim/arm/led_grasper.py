@@ -7,10 +7,11 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from bridge import TissueFrame
+from bridge import Bridge, TissueFrame
 from scalpel_sim.arm.grasper import PAD_LENGTH, GuidedGrasper, Pads
 from scalpel_sim.arm.grip import Grip
 from scalpel_sim.arm.stroke_follower import StrokeFollower
+from scalpel_sim.arm.tissue_frames import frame_of
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from tissue import FloatArray, Tissue, Wrench
 
@@ -54,8 +55,8 @@ class LedGrasper:
         grasper: The grasper.
         data: Data of its model.
         motion: Where it goes, tissue frame; its name is that of the grasper.
-        tissue: What it may hold.
-        frame: Where the tissue lies in the world.
+        tissue: What it may hold: a tissue in this process, or a bridge to one anywhere.
+        frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
         hold: How it is tied to what it closes on; None: it is not, and friction alone holds.
     """
 
@@ -64,7 +65,7 @@ class LedGrasper:
         grasper: GuidedGrasper,
         data: mujoco.MjData,
         motion: GraspMotion,
-        tissue: Tissue,
+        tissue: Tissue | Bridge,
         frame: TissueFrame = TissueFrame(),
         hold: Hold | None = Hold(),
     ) -> None:
@@ -73,7 +74,8 @@ class LedGrasper:
         self.motion = motion
         self.grip: Grip | None = None
         """What ties tissue to it now; None while it holds none."""
-        self._data, self._tissue, self._frame, self._hold = data, tissue, frame, hold
+        self._data, self._tissue, self._hold = data, tissue, hold
+        self._frame = frame = frame_of(tissue, frame)
         self._was_closed = False
         self._had_met = False
         self._holds_some = False
@@ -109,6 +111,7 @@ class LedGrasper:
 
         Raises:
             ValueError: the tissue cannot be held; see `tissue.Tissue.attach`.
+            LinkError: it is in another process, and did not answer.
         """
         if self._hold is None:
             has_met = self.grasper.opening < _MEETING
@@ -166,17 +169,20 @@ class LedGrasper:
         )
 
 
-def between_pads(tissue: Tissue, pads: Pads, frame: TissueFrame = TissueFrame()) -> FloatArray:
+def between_pads(
+    tissue: Tissue | Bridge, pads: Pads, frame: TissueFrame = TissueFrame()
+) -> FloatArray:
     """Return points of the tissue between the pads: where they are in the body at rest [m], (n, 3).
 
     They are on a grid across the space between the pads, so that their number and their places
     depend on the pads and not on the mesh.
 
     Args:
-        tissue: The tissue.
+        tissue: The tissue, or a bridge to it.
         pads: The space between the pads, world frame.
-        frame: Where the tissue lies in the world.
+        frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
     """
+    frame = frame_of(tissue, frame)
     counts = np.maximum(1, np.rint(2.0 * pads.half_size / _SPACING)).astype(int)
     steps = [
         (np.arange(n) + 0.5) / n * 2.0 * half - half

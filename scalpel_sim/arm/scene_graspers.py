@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from bridge import TissueFrame
+from bridge import Bridge, TissueFrame
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.led_grasper import Hold, LedGrasper
@@ -19,7 +19,7 @@ from scalpel_sim.arm.second_arm import (
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.grasper import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
-from tissue import FloatArray, Tissue
+from tissue import FloatArray
 
 WATCHED_INSTANTS = 33
 """Instants at which arms must reach and be clear of each other: between two of them a hand that
@@ -103,8 +103,7 @@ def led_graspers(
     graspers: Sequence[GrasperTable],
     motions: Sequence[GraspMotion],
     arm: LedArm,
-    tissue: Tissue,
-    frame: TissueFrame,
+    bridge: Bridge,
 ) -> list[LedGrasper]:
     """Return what leads the graspers of a scene.
 
@@ -112,11 +111,10 @@ def led_graspers(
         graspers: What the scene says of them.
         motions: Where they go, tissue frame.
         arm: In whose model they are.
-        tissue: What they may hold.
-        frame: Where the tissue lies in the world.
+        bridge: To the tissue that they may hold.
     """
     return [
-        LedGrasper(grasper, arm.data, motion, tissue, frame, _hold(table))
+        LedGrasper(grasper, arm.data, motion, bridge, hold=_hold(table))
         for table, motion, grasper in zip(graspers, motions, arm.graspers, strict=True)
     ]
 

@@ -48,8 +48,8 @@ class DivergedLink(InProcessLink):
         super().__init__(tissue)
         self._spoil = spoil
 
-    def step(self, sweep, dt, poses=()):
-        return self._spoil(super().step(sweep, dt, poses))
+    def step(self, sweep, dt, *led):
+        return self._spoil(super().step(sweep, dt, *led))
 
 
 def test_nothing_is_felt_out_of_contact_and_the_tissue_still_advances(block_tissue, upright):
@@ -242,9 +242,9 @@ class RecordingWall(Wall):
         super().__init__(WALL_AT, BACK, stiffness)
         self.queries = []
 
-    def step(self, sweep, dt, poses=()):
+    def step(self, sweep, dt, *led):
         self.queries.append((sweep, dt))
-        return super().step(sweep, dt, poses)
+        return super().step(sweep, dt, *led)
 
 
 def test_queries_every_ten_frames_cover_the_whole_time_and_path(upright):
@@ -360,9 +360,9 @@ class Silent(RecordingWall):
         self.is_awake = threading.Event()
         self.is_awake.set()
 
-    def step(self, sweep, dt, poses=()):
+    def step(self, sweep, dt, *led):
         assert self.is_awake.wait(10.0)
-        return super().step(sweep, dt, poses)
+        return super().step(sweep, dt, *led)
 
 
 def wait_for(bridge, upright, condition):

@@ -1,21 +1,18 @@
 """Scenes with `[[attachment]]`: tissue that is held, pulled and tied, as files."""
 
 import json
-import threading
-from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bridge import TcpLink
-from bridge.tcp.server import TissueServer
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.recording import COLUMNS, held_columns, read_forces
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.tables.attachment import AttachmentTable, check_attachment, times_of
+from tests.scalpel_sim.served_scenes import served, untimed
 
 FILE = """\
 seconds = 0.6
@@ -54,14 +51,6 @@ length = 0.04
 speed = 0.2
 """
 """The blade cuts the ligament, and a slit of 5 mm below it."""
-
-N_TIMES = 6
-"""Columns of wall times, the last of `COLUMNS`."""
-
-
-def untimed(recording):
-    n = len(COLUMNS)
-    return np.delete(recording.rows, slice(n - N_TIMES, n), axis=1)
 
 
 @pytest.fixture(scope="module")
@@ -108,23 +97,11 @@ def test_the_scene_that_a_run_writes_gives_the_same_bits_again(first, tmp_path):
     assert (tmp_path / "again" / "scene.toml").read_text() == (first / "scene.toml").read_text()
 
 
-@pytest.fixture
-def served():
-    """A server of that scene, in a thread, and the scene."""
-
-    def start(scene):
-        server = TissueServer(lambda: make_tissue(scene), scene=scene.name, port=0)
-        threading.Thread(target=server.run, daemon=True).start()
-        return server.address
-
-    return start
-
-
-def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first, served):
+def test_over_tcp_the_paths_and_the_forces_are_the_same_bits(first):
     scene = read_scene(first / "scene.toml")
     here = prepare(scene)
     here.run(0.15)
-    with closing(TcpLink(served(scene))) as link:
+    with served(scene) as link:
         there = prepare(scene, link)
         there.run(0.15)
     assert there.recording.n_held == 2

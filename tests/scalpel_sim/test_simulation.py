@@ -161,10 +161,10 @@ class BreakingLink(InProcessLink):
         if self.n_steps_left == 0:
             raise LinkError("the server is gone")
 
-    def step(self, sweep, dt, poses=()):
+    def step(self, sweep, dt, *led):
         self._check_connection()
         self.n_steps_left -= 1
-        return super().step(sweep, dt, poses)
+        return super().step(sweep, dt, *led)
 
     def snapshot(self):
         self._check_connection()

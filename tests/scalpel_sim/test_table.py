@@ -31,8 +31,8 @@ def test_the_table_stands_in_the_model_where_the_tissue_has_it():
 @pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])
 def test_arms_stand_clear_of_the_board_on_their_whole_ways(name):
     simulation = prepare(SCENES[name])
-    data, still = simulation.arm.data, simulation.link.step(None, simulation.dt)
-    simulation.link.step = lambda sweep, dt, poses=(): still  # only the arms move
+    data, still = simulation.arm.data, simulation.link.tissue.step(None, simulation.dt)
+    simulation.link.step = lambda sweep, dt, *led: still  # only the arms move
     simulation.partners.clear()
     touching = []
     simulation.run(simulation.duration, lambda now: touching.append(data.ncon))

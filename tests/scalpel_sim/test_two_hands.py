@@ -9,7 +9,6 @@ import pytest
 from bridge import InProcessLink
 from scalpel_sim import prepare
 from scalpel_sim.arm.place_search import LINK_RADIUS
-from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.layers import with_settings
@@ -193,7 +192,7 @@ def still(simulation):
     """A tissue that does nothing: only the arms move."""
     result = simulation.link.tissue.step(None, simulation.dt)
     simulation.partners.clear()
-    return lambda sweep, dt, poses=(): result
+    return lambda sweep, dt, *led: result
 
 
 @EACH
@@ -225,13 +224,3 @@ def test_the_camera_stands_before_neither_arm(scene):
         cosine = towards_eye @ towards_base
         cosine /= np.linalg.norm(towards_eye) * np.linalg.norm(towards_base)
         assert cosine < np.cos(np.radians(40.0))
-
-
-# What cannot be
-
-
-def test_a_scene_with_a_grasper_needs_its_tissue_in_the_same_process():
-    here = InProcessLink(make_tissue(RETRACT))
-    elsewhere = type("Elsewhere", (), {"__getattr__": lambda _, name: getattr(here, name)})()
-    with pytest.raises(UsageError, match="in another process, where nothing can be held"):
-        prepare(RETRACT, elsewhere)

@@ -6,7 +6,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridge.led_frames import FrameLoad
+from bridge.led_geoms import GeomLoads, no_geom_loads
 from bridge.tcp.messages.counts import check_counts
+from bridge.tcp.messages.geoms import (
+    GEOM_LOAD_BYTES,
+    MAX_GEOMS,
+    pack_geom_loads,
+    unpack_geom_loads,
+)
 from bridge.tcp.messages.led_frames import LOAD_BYTES, MAX_FRAMES, pack_loads, unpack_loads
 from bridge.tcp.wire import MessageError
 from tissue import (
@@ -32,15 +39,20 @@ LARGEST_RESULT = (
     _HEAD.size
     + 8 * (_N_FIXED + _N_PER_CONTACT * MAX_CONTACTS + _N_ENERGIES)
     + LOAD_BYTES * MAX_FRAMES
+    + GEOM_LOAD_BYTES * MAX_GEOMS
 )
 """Largest reply to a step [byte]."""
 
 
-def pack_result(result: StepResult, loads: Sequence[FrameLoad] = ()) -> bytes:
+def pack_result(
+    result: StepResult,
+    loads: Sequence[FrameLoad] = (),
+    geom_loads: GeomLoads = no_geom_loads(0),
+) -> bytes:
     """Return a reply: the integers of a result, its single floats, its arrays.
 
-    The contacts, of any number, the energies, which are optional, and the loads on frames come
-    last.
+    The contacts, of any number, the energies, which are optional, and the loads on frames and on
+    the geoms that the client leads come last.
     """
     touch, contacts, energies = result.body_contacts, result.contacts, result.energies
     head = _HEAD.pack(
@@ -81,11 +93,14 @@ def pack_result(result: StepResult, loads: Sequence[FrameLoad] = ()) -> bytes:
         ),
         dtype="<f8",
     )
-    return head + arrays.tobytes() + pack_loads(loads)
+    of_geoms = pack_geom_loads(geom_loads) if len(geom_loads.forces) else b""
+    return head + arrays.tobytes() + pack_loads(loads) + of_geoms
 
 
-def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
-    """Return the result in a reply, and the loads on frames.
+def unpack_result(
+    payload: bytes, n_geoms: int = 0
+) -> tuple[StepResult, list[FrameLoad], GeomLoads]:
+    """Return the result in a reply, and the loads on frames and on `n_geoms` geoms.
 
     Physical quantities are passed on unchanged, NaN included: the coupling handles a tissue that
     has diverged, for both links.
@@ -112,10 +127,12 @@ def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
         )
     n_floats = _N_FIXED + _N_PER_CONTACT * n + _N_ENERGIES * audited
     of_frames = _HEAD.size + 8 * n_floats
-    wanted = of_frames + LOAD_BYTES * n_frames
+    of_geoms = of_frames + LOAD_BYTES * n_frames
+    wanted = of_geoms + GEOM_LOAD_BYTES * n_geoms
     if len(payload) != wanted:
         raise MessageError(f"a step reply of {len(payload)} bytes; wanted {wanted}")
-    loads = unpack_loads(payload[of_frames:], n_frames)
+    loads = unpack_loads(payload[of_frames:of_geoms], n_frames)
+    geom_loads = unpack_geom_loads(payload, of_geoms, n_geoms)
     # a copy
     floats = np.frombuffer(payload, "<f8", n_floats, _HEAD.size).astype(np.float64)
     result = StepResult(
@@ -139,7 +156,7 @@ def unpack_result(payload: bytes) -> tuple[StepResult, list[FrameLoad]]:
         stage_times=StageTimes(*head[16:]),
         energies=Energies(*floats[-_N_ENERGIES:].tolist()) if audited else None,
     )
-    return result, loads
+    return result, loads, geom_loads
 
 
 def _contacts(floats: FloatArray, n: int) -> RigidContacts:

@@ -30,9 +30,9 @@ class SlowWall(Wall):
         super().__init__(np.zeros(3), BACK, 1e3)
         self.may_answer = threading.Event()
 
-    def step(self, sweep, dt, poses=()):
+    def step(self, sweep, dt, *led):
         assert self.may_answer.wait(10.0)
-        return super().step(sweep, dt, poses)
+        return super().step(sweep, dt, *led)
 
 
 def until_answered(query):
@@ -65,7 +65,7 @@ def test_a_query_that_does_not_wait_has_no_answer_until_it_arrives():
 
 def test_the_loss_of_a_tissue_is_raised_where_the_answer_is_taken():
     class Lost(Wall):
-        def step(self, sweep, dt, poses=()):
+        def step(self, sweep, dt, *led):
             raise LinkError("the server is gone")
 
     query = Query(Lost(np.zeros(3), BACK, 1e3), waits=False)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bridge.led_geoms import GeomLoads, no_geom_loads
 from bridge.link import TissueDescription
 from tissue import (
     BladeSegment,
@@ -51,7 +52,10 @@ class Wall:
     def loads(self) -> tuple[()]:
         return ()
 
-    def step(self, sweep: BladeSweep | None, dt: float, poses: object = ()) -> StepResult:
+    def geom_loads(self) -> GeomLoads:
+        return no_geom_loads(0)
+
+    def step(self, sweep: BladeSweep | None, dt: float, *led: object) -> StepResult:
         assert sweep is not None
         start, end = _points(sweep.t0), _points(sweep.t1)
         each = self._stiffness / N_POINTS

@@ -131,11 +131,11 @@ def test_a_server_refuses_poses_and_frames_that_no_client_of_ours_sends(server):
         hold = b'{"region": "top", "stiffness": 10.0}'
         asked(peer, 1, MessageKind.ATTACH, hold)
         bad = struct.pack("<13d", DT, *[np.nan] * 3, *np.eye(3).ravel())
-        assert "a frame is not within" in asked(peer, 2, MessageKind.STEP, bad)
+        assert "frame 0 is not within" in asked(peer, 2, MessageKind.STEP, bad)
         flat = struct.pack("<13d", DT, *[0.0] * 12)
-        assert "are no rotation" in asked(peer, 3, MessageKind.STEP, flat)
+        assert "axes of frame 0 are no rotation" in asked(peer, 3, MessageKind.STEP, flat)
         none = pack_step(None, DT)
-        assert "96 for each of 1 frames" in asked(peer, 4, MessageKind.STEP, none)
+        assert "96 for each of 1 frames and 0 geoms" in asked(peer, 4, MessageKind.STEP, none)
         other = struct.pack("<q", 1)
         assert "there is no frame 1" in asked(peer, 5, MessageKind.RELEASE, other)
         both = b'{"region": "top", "nodes": [1], "stiffness": 10.0}'

@@ -150,7 +150,7 @@ def test_the_broad_phase_changes_no_bit(monkeypatch):
         tissue = cube()
         touch = GeomCoupling(data, tissue)
         if not is_asked:
-            monkeypatch.setattr(touch._near, "near", lambda *_: None)
+            monkeypatch.setattr(touch._contact._near, "near", lambda *_: None)
         for _ in range(80):
             data.ctrl[1:] = 1.0
             frame(model, data, touch, tissue)

@@ -1,11 +1,11 @@
-"""`Geom`: a rigid solid of simple shape that tissue can touch."""
+"""`Geom`: a rigid solid of simple shape that tissue can touch; and the forces between the two."""
 
 import math
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from tissue.core.array_types import FloatArray
+from tissue.core.array_types import FloatArray, IntArray
 
 PLANE: Final = 0
 SPHERE: Final = 1
@@ -63,6 +63,19 @@ class Geom(NamedTuple):
         else:
             half = np.array(self.size)
         return np.zeros(3), half
+
+
+class GeomForces(NamedTuple):
+    """Where tissue touched geoms in a step. Copies."""
+
+    geom: IntArray
+    """Number of the geom of each contact, in the order in which they were given; shape (n,)."""
+    point: FloatArray
+    """Where each is [m], shape (n, 3)."""
+    normal: FloatArray
+    """Unit normal out of the geom, shape (n, 3)."""
+    force: FloatArray
+    """Force on the tissue, averaged over the step [N], shape (n, 3): pressure and friction."""
 
 
 def planes_of(geom: Geom) -> FloatArray:

@@ -33,6 +33,7 @@ TAKEN: Final = 0
 ORIGIN_NOT_FINITE: Final = 1
 NO_ROTATION: Final = 2
 TURNS_TOO_FAR: Final = 3
+MOVES_TOO_FAR: Final = 4
 """What `lead_geoms` found."""
 
 _ORTHONORMAL: Final = 1e-6
@@ -42,7 +43,7 @@ rigid are taken for rigid; smaller: poses in single precision are refused."""
 
 @kernel
 def lead_geoms(
-    geoms: Geoms, origins: FloatArray, axes: FloatArray, largest_turn: float
+    geoms: Geoms, origins: FloatArray, axes: FloatArray, largest_turn: float, farthest: float
 ) -> tuple[int, int]:
     """Let all geoms go to where they are to be at the end of the next time step.
 
@@ -51,6 +52,7 @@ def lead_geoms(
         origins: Their origins then [m], shape (n, 3).
         axes: Their axes then, as rows of numbers, shape (n, 9).
         largest_turn: Angle by which one may turn [rad].
+        farthest: How far a point of one may move, per half its thickness.
 
     Returns:
         TAKEN or what is wrong, and with which geom.
@@ -72,6 +74,8 @@ def lead_geoms(
             return TURNS_TOO_FAR, g
         store(geoms.turn, g, turn)
         store(geoms.way, g, sub(vec3(origins, g), vec3(geoms.origin_t0, g)))
+        if way_of(geoms, g) > farthest * geoms.half_thickness[g]:
+            return MOVES_TOO_FAR, g
     return TAKEN, 0
 
 

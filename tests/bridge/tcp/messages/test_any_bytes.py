@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bridge import FrameHold, FrameLoad, FramePose
+from bridge import FrameHold, FrameLoad, FramePose, GeomLoads, GeomPoses
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     pack_pieces,
@@ -17,6 +17,7 @@ from bridge.tcp.messages.body import (
 )
 from bridge.tcp.messages.chunks import pack_chunks, unpack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report, unpack_cut_report
+from bridge.tcp.messages.geoms import pack_geoms, unpack_geoms
 from bridge.tcp.messages.led_frames import (
     pack_hold,
     pack_loads,
@@ -30,9 +31,13 @@ from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error, unpack_description, unpack_error
 from bridge.tcp.wire import MessageError
 from tests.bridge.tcp.serve_block import block_tissue
-from tissue import BladeSegment, BladeSweep, Wrench
+from tissue import BladeSegment, BladeSweep, Geom, Wrench
 
 LOADS = [FrameLoad(Wrench(*np.arange(9.0).reshape(3, 3)), n) for n in (7, 0)]
+WEDGE = np.array([[0.0, 0, 0], [0.01, 0, 0], [0, 0.01, 0], [0, 0, 0.01]])
+GEOMS = [Geom("ball", "sphere", (0.01,), 0.3), Geom("wedge", "mesh", (), 0.0, WEDGE)]
+PLACES = GeomPoses(np.array([[0.0, 0, 1], [0, 0, 2]]), np.tile(np.eye(3), (2, 1, 1)))
+GEOM_LOADS = GeomLoads(*np.arange(12.0).reshape(2, 2, 3))
 N_MUTATIONS = 2000
 """Number of changed copies of each message."""
 
@@ -49,13 +54,21 @@ def real_messages():
             pack_step(None, 1e-3, [FramePose(np.zeros(3), np.eye(3))]),
             lambda payload: unpack_step(payload, 1),
         ),
+        "step with geoms": (
+            pack_step(None, 1e-3, (), PLACES),
+            lambda payload: unpack_step(payload, 0, 2),
+        ),
+        "geoms": (pack_geoms(GEOMS, PLACES), unpack_geoms),
         "hold": (
             pack_hold(FrameHold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))),
             unpack_hold,
         ),
         "loads": (pack_loads(LOADS), lambda payload: unpack_loads(payload, 2)),
         "number": (pack_number(1), lambda payload: unpack_number(payload, 2)),
-        "result": (pack_result(result, LOADS), unpack_result),
+        "result": (
+            pack_result(result, LOADS, GEOM_LOADS),
+            lambda payload: unpack_result(payload, 2),
+        ),
         "snapshot": (pack_snapshot(tissue.snapshot()), unpack_snapshot),
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
@@ -103,9 +116,11 @@ def test_a_changed_message_is_refused_or_decodes_to_valid_values(what):
 
 def is_valid(what, value):
     """Return whether the values of a decoded message are in the ranges that its users rely on."""
-    if what in ("step", "step with a frame"):
-        sweep, dt, poses = value
+    if what in ("step", "step with a frame", "step with geoms"):
+        sweep, dt, poses, geoms = value
         if not all(np.isfinite(pose.origin).all() for pose in poses):
+            return False
+        if not all(np.isfinite(each).all() for each in geoms):
             return False
         return 0.0 < dt <= 1.0 and (sweep is None or np.isfinite(np.array(sweep)).all())
     if what == "snapshot":
@@ -113,11 +128,16 @@ def is_valid(what, value):
     if what == "surface":
         return value.triangles.min() >= 0 and value.triangles.max() < len(value.positions)
     if what == "result":
-        value, loads = value
+        value, loads, _ = value
         return (
             all(load.n_points >= 0 for load in loads)
             and -1 <= value.active_point_tetrahedron < value.n_tetrahedra
         )
+    if what == "geoms":
+        geoms, poses = value
+        given = [each.vertices for each in geoms if each.vertices is not None]
+        numbers = [*poses, *given, *([*each.size, each.friction] for each in geoms)]
+        return all(np.isfinite(each).all() for each in numbers)
     if what == "hold":
         return np.isfinite([value.stiffness, value.damping]).all() and bool(value.where)
     if what == "loads":

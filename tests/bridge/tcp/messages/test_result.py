@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge import GeomLoads
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
@@ -61,6 +62,15 @@ def results(draw):
 @given(results())
 def test_a_result_arrives_bit_for_bit_even_where_the_tissue_diverged(result):
     assert bits(unpack_result(pack_result(result))[0]) == bits(result)
+
+
+def test_the_loads_on_geoms_arrive_bit_for_bit_even_where_the_tissue_diverged():
+    loads = GeomLoads(np.array([[1.0, -0.0, np.nan], [0.1, 0.2, 0.3]]), np.full((2, 3), np.inf))
+    packed = pack_result(block_tissue().step(None, 1e-3), (), loads)
+    assert bits(unpack_result(packed, 2)[2]) == bits(loads)
+    for n in (0, 1, 3):
+        with pytest.raises(MessageError, match=f"{len(packed)} bytes; wanted"):
+            unpack_result(packed, n)
 
 
 @pytest.mark.parametrize(

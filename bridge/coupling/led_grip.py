@@ -1,4 +1,4 @@
-"""Grips on a tissue behind any link: frames that the arm's side leads."""
+"""A grip on a tissue behind any link: a frame that the arm's side leads."""
 
 from collections.abc import Sequence
 
@@ -7,8 +7,7 @@ import numpy.typing as npt
 
 from bridge.input_checks import finite
 from bridge.input_checks import rotation as checked_rotation
-from bridge.led_frames import FrameHold, FrameLoad, FramePose
-from bridge.link import TissueLink
+from bridge.led_frames import FrameLoad, FramePose
 from tissue import FloatArray, Wrench
 
 
@@ -56,47 +55,3 @@ class LedGrip:
         if rotation is not None:
             axes = checked_rotation(np.asarray(rotation), "the rotation of a grip")
         self.pose = FramePose(at, axes)
-
-
-class LedGrips:
-    """The grips of a bridge.
-
-    Args:
-        link: To the tissue.
-    """
-
-    def __init__(self, link: TissueLink) -> None:
-        self._link = link
-        self._grips: list[LedGrip] = []
-        self.loads: Sequence[FrameLoad] = link.loads()
-        """What the tissue did to all frames in its last answer; tissue frame."""
-
-    @property
-    def poses(self) -> tuple[FramePose, ...]:
-        """Where the frames are led; tissue frame."""
-        return tuple([grip.pose for grip in self._grips])
-
-    def attach(self, hold: FrameHold) -> LedGrip:
-        """Let a frame hold tissue; see `TissueLink.attach`."""
-        number = self._link.attach(hold)
-        self.loads = self._link.loads()
-        grip = LedGrip(number, self.loads[number])
-        self._grips.append(grip)
-        return grip
-
-    def release(self, grip: LedGrip) -> None:
-        """Let go; see `TissueLink.release`.
-
-        Raises:
-            ValueError: it is none of these grips.
-        """
-        if grip not in self._grips:
-            raise ValueError("the grip is not one of this bridge")
-        self._link.release(grip.number)
-        self.take(self._link.loads())
-
-    def take(self, loads: Sequence[FrameLoad]) -> None:
-        """Take what the tissue did to all frames."""
-        self.loads = loads
-        for grip in self._grips:
-            grip.load = loads[grip.number]

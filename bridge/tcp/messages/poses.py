@@ -1,0 +1,53 @@
+"""Poses of frames and geoms in a request: 12 numbers for each, checked together."""
+
+import numpy as np
+
+from bridge.input_checks import are_rotations
+from bridge.tcp.wire import MessageError
+from tissue import FloatArray
+
+LARGEST_COORDINATE = 1e3
+"""Largest coordinate [m]. No body is larger; a blade farther away means an invalid message."""
+
+POSE_BYTES = 12 * 8
+"""Length of a pose [byte]: its origin, and the rows of its rotation."""
+
+_ROTATION_TOLERANCE = 1e-6
+"""Largest difference of R^T R from the identity for a rotation R: the accuracy of single
+precision."""
+
+
+def pack_poses(origins: FloatArray, rotations: FloatArray) -> bytes:
+    """Return poses, one after the other.
+
+    Args:
+        origins: Their origins [m], shape (n, 3).
+        rotations: Their axes as columns, shape (n, 3, 3).
+    """
+    rows = np.empty((len(origins), 12), "<f8")
+    rows[:, :3], rows[:, 3:] = origins, rotations.reshape(-1, 9)
+    return rows.tobytes()
+
+
+def checked_poses(rows: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+    """Return origins [m], shape (n, 3), and rotations, shape (n, 3, 3), of poses. Copies.
+
+    Args:
+        rows: The numbers of each, shape (n, 12).
+        what: Of what they are, for the message.
+
+    Raises:
+        MessageError: an origin is out of range, or a rotation is none.
+    """
+    origins, rotations = rows[:, :3].copy(), rows[:, 3:].reshape(-1, 3, 3).copy()
+    is_near = (np.abs(origins) <= LARGEST_COORDINATE).all(axis=1)  # false for NaN
+    if not is_near.all():
+        i = int(np.argmin(is_near))
+        raise MessageError(
+            f"{what} {i} is not within {LARGEST_COORDINATE:g} m: {origins[i].tolist()}"
+        )
+    are_axes = are_rotations(rotations, _ROTATION_TOLERANCE)
+    if not are_axes.all():
+        i = int(np.argmin(are_axes))
+        raise MessageError(f"the axes of {what} {i} are no rotation: {rotations[i].tolist()}")
+    return origins, rotations
