@@ -22,6 +22,7 @@ from .frames import TissueFrame as TissueFrame
 from .led_frames import FrameHold as FrameHold
 from .led_frames import FrameLoad as FrameLoad
 from .led_frames import FramePose as FramePose
+from .led_frames import FrameTie as FrameTie
 from .led_geoms import GeomLoads as GeomLoads
 from .led_geoms import GeomPoses as GeomPoses
 from .link import InProcessLink as InProcessLink
@@ -53,6 +54,7 @@ __all__ = [
     "GeomPoses",
     "GeomShape",
     "FrameHold",
+    "FrameTie",
     "InProcessLink",
     "LedContact",
     "LedGrip",

@@ -43,6 +43,27 @@ class FrameHold(NamedTuple):
     """Origin of the frame [m]; None: the mean of the points."""
 
 
+class FrameTie(NamedTuple):
+    """How strands tie tissue to a frame: what `tissue.Tissue.tie` takes."""
+
+    where: str | list[int] | list[list[float]]
+    """What `FrameHold.where` takes: where the strands begin."""
+    to: list[list[float]]
+    """Where they end [m]: one place for all, or one for each."""
+    stiffness: float
+    """Of all strands together, along them [N/m]."""
+    area: float
+    """Cross-section of all strands together [m2]."""
+    toughness: float
+    """Energy of cutting them [J/m2]."""
+    damping: float = 0.0
+    """Of all of them together, along them [N s/m]."""
+    rest_length: float | None = None
+    """Length up to which each is slack [m]; None: the distance of its ends."""
+    breaks_at: float = math.inf
+    """Force of all of them at which they let go [N]."""
+
+
 def plain_region(where: str | npt.ArrayLike) -> str | list[int] | list[list[float]]:
     """Return what `FrameHold.where` takes; a mask of nodes becomes their numbers."""
     if isinstance(where, str):

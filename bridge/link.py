@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, Protocol, TypeGuard
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard
 
 import numpy as np
+import numpy.typing as npt
 
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
 from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
 from tissue import (
     BladeShape,
@@ -83,6 +84,14 @@ class TissueLink(Protocol):
 
         Raises:
             ValueError: see `tissue.Tissue.attach`.
+            LinkError: the tissue is in another process, and refuses it or did not answer.
+        """
+
+    def tie(self, tie: FrameTie) -> int:
+        """Tie the body by strands to a frame, which the caller leads from now on, as `attach` does.
+
+        Raises:
+            ValueError: see `tissue.Tissue.tie`.
             LinkError: the tissue is in another process, and refuses it or did not answer.
         """
 
@@ -186,15 +195,32 @@ class InProcessLink:
 
     def attach(self, hold: FrameHold) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
-        where = hold.where if isinstance(hold.where, str) else np.array(hold.where)
         attachment = self._tissue.attach(
-            where,
+            _places(hold.where),
             stiffness=hold.stiffness,
             damping=hold.damping,
             breaks_at=hold.breaks_at,
             origin=hold.origin,
         )
-        self._frames.append(attachment)
+        return self._added(attachment)
+
+    def tie(self, tie: FrameTie) -> int:
+        """Tie the body by strands to a frame; see `TissueLink.tie`."""
+        ligament = self._tissue.tie(
+            _places(tie.where),
+            tie.to[0] if len(tie.to) == 1 else tie.to,
+            stiffness=tie.stiffness,
+            area=tie.area,
+            toughness=tie.toughness,
+            damping=tie.damping,
+            rest_length=tie.rest_length,
+            breaks_at=tie.breaks_at,
+        )
+        return self._added(ligament)
+
+    def _added(self, frame: Attachment) -> int:
+        """Add a frame, and return its number."""
+        self._frames.append(frame)
         return len(self._frames) - 1
 
     def release(self, number: int) -> None:
@@ -252,6 +278,11 @@ class InProcessLink:
 
     def close(self) -> None:
         """Do nothing: the tissue belongs to the caller."""
+
+
+def _places(where: str | list[int] | list[list[float]]) -> str | npt.NDArray[Any]:
+    """Return a region as the tissue takes it."""
+    return where if isinstance(where, str) else np.array(where)
 
 
 def link_to(tissue: Tissue | TissueLink) -> TissueLink:

@@ -4,13 +4,15 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
 import numpy.typing as npt
 
 from bridge.coupling.led_bodies import LedBodies, LedPoses
 from bridge.coupling.led_contact import LedContact
 from bridge.coupling.led_grip import LedGrip
 from bridge.coupling.query import Query
-from bridge.led_frames import FrameHold, FrameLoad, plain_region
+from bridge.input_checks import finite
+from bridge.led_frames import FrameHold, FrameLoad, FrameTie, plain_region
 from bridge.led_geoms import GeomPoses
 from bridge.link import TissueLink
 from bridge.poses import Pose
@@ -63,6 +65,43 @@ class Leading:
         grip = self._led.attach(
             FrameHold(plain_region(where), stiffness, damping, breaks_at, origin)
         )
+        self._add_to_path(grip)
+        return grip
+
+    def tie(
+        self,
+        where: str | npt.ArrayLike,
+        to: npt.ArrayLike,
+        *,
+        stiffness: float,
+        area: float,
+        toughness: float,
+        damping: float = 0.0,
+        rest_length: float | None = None,
+        breaks_at: float = math.inf,
+    ) -> LedGrip:
+        """Tie tissue by strands that the blade can cut, over any link; return what they end at.
+
+        That is a frame at rest, until it is moved; `n_points` is the number of strands.
+
+        Args:
+            where: What `attach` takes.
+            to: Where the strands end [m], tissue frame, shape (3,), or one place for each, (n, 3).
+            stiffness: Of all strands together, along them [N/m].
+            area: Cross-section of all strands together [m2].
+            toughness: Energy of cutting them [J/m2].
+            damping: Of all of them together, along them [N s/m].
+            rest_length: Length up to which each is slack [m]; None: the distance of its ends now.
+            breaks_at: Force of all of them at which they let go [N].
+
+        Raises:
+            ValueError: see `tissue.Tissue.tie`, where the tissue is in this process.
+            LinkError: the tissue is in another one, and refuses that or did not answer.
+        """
+        self._query.wait()
+        ends = finite(np.atleast_2d(np.asarray(to)), (None, 3), "where strands end").tolist()
+        of_strands = (stiffness, area, toughness, damping, rest_length, breaks_at)
+        grip = self._led.tie(FrameTie(plain_region(where), ends, *of_strands))
         self._add_to_path(grip)
         return grip
 

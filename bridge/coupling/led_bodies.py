@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from bridge.coupling.led_contact import LedContact
 from bridge.coupling.led_grip import LedGrip
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, combined_loads
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, combined_loads
 from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, mean_geom_loads
 from bridge.link import TissueLink
 from tissue import Geom, StepResult
@@ -74,7 +74,14 @@ class LedBodies:
 
     def attach(self, hold: FrameHold) -> LedGrip:
         """Let a frame hold tissue; see `TissueLink.attach`."""
-        number = self._link.attach(hold)
+        return self._added(self._link.attach(hold))
+
+    def tie(self, tie: FrameTie) -> LedGrip:
+        """Tie tissue by strands to a frame; see `TissueLink.tie`."""
+        return self._added(self._link.tie(tie))
+
+    def _added(self, number: int) -> LedGrip:
+        """Return the grip of a new frame."""
         self.loads = self._link.loads()
         grip = LedGrip(number, self.loads[number])
         self._grips.append(grip)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from bridge.led_frames import FrameHold, FrameLoad, FramePose, expect_each
+from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
 from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
 from bridge.link import LinkError, TissueDescription
 from bridge.tcp.address import is_loopback, parse_address
@@ -29,6 +29,7 @@ from bridge.tcp.messages.led_frames import (
     MAX_FRAMES,
     pack_hold,
     pack_number,
+    pack_tie,
     unpack_all_loads,
     unpack_loads,
 )
@@ -120,8 +121,16 @@ class TcpLink:
 
     def attach(self, hold: FrameHold) -> int:
         """Attach a frame to the body; see `TissueLink.attach`."""
+        return self._added(MessageKind.ATTACH, pack_hold(hold))
+
+    def tie(self, tie: FrameTie) -> int:
+        """Tie the body by strands to a frame; see `TissueLink.tie`."""
+        return self._added(MessageKind.TIE, pack_tie(tie))
+
+    def _added(self, kind: MessageKind, request: bytes) -> int:
+        """Ask for a frame, and return its number."""
         before = self.loads()
-        reply = self._ask(MessageKind.ATTACH, pack_hold(hold), LOAD_BYTES, _one_load)
+        reply = self._ask(kind, request, LOAD_BYTES, _one_load)
         self._loads = [*before, reply]
         self._n_led += 1
         return len(before)

@@ -13,6 +13,7 @@ import selectors
 import signal
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 from bridge.link import InProcessLink, LinkError
@@ -27,6 +28,7 @@ from bridge.tcp.messages.led_frames import (
     pack_loads,
     unpack_hold,
     unpack_number,
+    unpack_tie,
 )
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
@@ -266,7 +268,9 @@ class TissueServer:
             result = link.step(*unpack_step(frame.payload, link.n_led, link.n_geoms))
             return pack_result(result, link.loads(), link.geom_loads())
         if frame.kind == MessageKind.ATTACH:
-            return self._attached(frame.payload)
+            return self._added(partial(self._link.attach, unpack_hold(frame.payload)))
+        if frame.kind == MessageKind.TIE:
+            return self._added(partial(self._link.tie, unpack_tie(frame.payload)))
         if frame.kind == MessageKind.COLLIDE:
             return self._touched(frame.payload)
         if frame.kind == MessageKind.RELEASE:
@@ -291,16 +295,16 @@ class TissueServer:
             return pack_cut_report(self._link.cut_report())
         raise MessageError(f"there is no request of kind {frame.kind}")
 
-    def _attached(self, payload: bytes) -> bytes:
-        """Attach a frame, and return the load on it.
+    def _added(self, add: Callable[[], int]) -> bytes:
+        """Let a frame hold tissue, and return the load on it.
 
         Raises:
-            MessageError: it cannot be attached so, or there are too many.
+            MessageError: it cannot hold it so, or there are too many.
         """
         if len(self._link.loads()) == MAX_FRAMES:
             raise MessageError(f"there are {MAX_FRAMES} frames, and there may be no more")
         try:
-            number = self._link.attach(unpack_hold(payload))
+            number = add()
         except ValueError as error:
             raise MessageError(str(error)) from error
         return pack_loads(self._link.loads()[number:])

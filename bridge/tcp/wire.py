@@ -19,7 +19,8 @@ from typing import NamedTuple
 MAGIC = b"SCUT"
 PROTOCOL_VERSION = 7
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
-contacts and energies of a step; 6 added frames that are led; 7 added geoms that are led."""
+contacts and energies of a step; 6 added frames that are led; 7 added geoms
+that are led, and ties."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be held before it can be checked. A step request
@@ -55,6 +56,7 @@ class MessageKind(enum.IntEnum):
     RELEASE = 11
     FRAMES = 12
     COLLIDE = 13
+    TIE = 14
 
 
 class Frame(NamedTuple):

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from bridge import Bridge, FrameHold, FramePose, InProcessLink, VirtualCoupling
 from bridge.led_frames import mean_wrench, plain_region
 from tests.bridge.bits import bits
-from tissue import BladeSegment, Material, Tissue, Wrench, block, fixed_nodes
+from tissue import BladeSegment, BladeSweep, Material, Tissue, Wrench, block, fixed_nodes
 
 DT = 1e-3
 CUBE = block((2, 2, 2), (0.02, 0.02, 0.02))
@@ -87,6 +87,46 @@ def test_a_bridge_s_grip_has_the_face_of_an_attachment():
     assert grip.n_points == 0 and not grip.wrench.force.any()
     with pytest.raises(ValueError, match="not one of this bridge"):
         bridge.release(Bridge(cube()).attach("top", stiffness=1.0))
+
+
+STRANDS = {"stiffness": 200.0, "area": 2e-6, "toughness": 200.0, "damping": 1.0}
+
+
+def across(y):
+    """An edge along x, above the cube, that faces along y."""
+    return BladeSegment(np.array([-0.02, y, 0.035]), np.array([0.04, y, 0.035]), np.eye(3)[1])
+
+
+def test_a_bridge_s_tie_is_a_ligament_that_the_blade_cuts():
+    tissue, beside = cube(), cube()
+    bridge = Bridge(tissue)
+    above, where = (0.01, 0.01, 0.05), "sphere:0.01,0.01,0.02,0.011"
+    grip = bridge.tie(where, above, **STRANDS)
+    ligament = beside.tie(where, above, **STRANDS)
+    assert grip.n_points == ligament.n_points == 6
+    before = across(-0.01)
+    for y in np.arange(-0.01, 0.05, 5e-4):
+        bridge.step(across(y), DT)
+        beside.step(BladeSweep(before, before := across(y)), DT)
+        assert bits(tuple(grip.wrench)) == bits(tuple(ligament.wrench))
+    assert grip.n_points == ligament.n_points < 6
+    bridge.release(grip)
+    assert grip.n_points == 0
+
+
+def test_strands_that_end_at_places_of_their_own_are_led_by_their_frame():
+    """Two that hang down from a frame, which goes up: both pull up once they are taut."""
+    bridge = Bridge(cube())
+    corners = [[0.0, 0.0, 0.02], [0.02, 0.02, 0.02]]
+    ends = np.add(corners, [0.0, 0.0, 0.03])
+    grip = bridge.tie(corners, ends, rest_length=0.031, **STRANDS)
+    for i in range(60):
+        if i == 20:
+            assert not grip.wrench.force.any()
+        if i > 20:
+            grip.move(grip.pose.origin + np.array([0.0, 0.0, 1e-4]))
+        bridge.step(FAR, DT)
+    assert grip.n_points == 2 and grip.wrench.force[2] < -0.1
 
 
 @pytest.mark.parametrize("changes", [{"tissue_every": 4}, {"coupling": VirtualCoupling()}])

@@ -3,11 +3,12 @@
 import math
 import struct
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import msgspec
 
-from bridge.led_frames import FrameHold, FrameLoad
+from bridge.led_frames import FrameHold, FrameLoad, FrameTie
+from bridge.tcp.messages.poses import LARGEST_COORDINATE
 from bridge.tcp.wire import LARGEST_REPLY, MessageError
 from tissue import Wrench
 
@@ -20,39 +21,67 @@ LOAD_BYTES = _LOAD.size
 
 _NUMBER = struct.Struct("<q")
 
+_Request = TypeVar("_Request")
+
+_Where = str | list[int] | list[list[float]]
 _Node = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_REPLY)]
-_Place = tuple[float, float, float]
+_Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST_COORDINATE, le=LARGEST_COORDINATE)]
+_Place = tuple[_Coordinate, _Coordinate, _Coordinate]
+_Places = Annotated[list[_Place], msgspec.Meta(min_length=1)]
 
 
-class _FrameHold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    """A request to attach a frame; one of region, nodes and points says what it holds."""
+class _Held(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """What a frame holds; one of region, nodes and points says it."""
 
     stiffness: float
     damping: float = 0.0
     breaks_at: float | None = None
-    origin: _Place | None = None
-    region: str | None = None
+    region: Annotated[str, msgspec.Meta(min_length=1)] | None = None
     nodes: Annotated[list[_Node], msgspec.Meta(min_length=1)] | None = None
-    points: Annotated[list[_Place], msgspec.Meta(min_length=1)] | None = None
+    points: _Places | None = None
+
+    @property
+    def where(self) -> _Where:
+        """Return what `FrameHold.where` takes.
+
+        Raises:
+            MessageError: none of them says it, or several.
+        """
+        given = [each for each in (self.region, self.nodes, self.points) if each is not None]
+        if len(given) != 1:
+            raise MessageError(
+                "a frame holds either a region, or nodes, or points; give one of them"
+            )
+        return self.region or self.nodes or [list(point) for point in self.points or ()]
+
+    @property
+    def limit(self) -> float:
+        """The force at which it lets go [N]."""
+        return math.inf if self.breaks_at is None else self.breaks_at
 
 
-_decoder = msgspec.json.Decoder(_FrameHold)
+class _FrameHold(_Held, forbid_unknown_fields=True, kw_only=True):
+    """A request to attach a frame."""
+
+    origin: _Place | None = None
+
+
+class _FrameTie(_Held, forbid_unknown_fields=True, kw_only=True):
+    """A request to tie a frame by strands."""
+
+    to: _Places
+    area: float
+    toughness: float
+    rest_length: float | None = None
+
+
+_hold_decoder = msgspec.json.Decoder(_FrameHold)
+_tie_decoder = msgspec.json.Decoder(_FrameTie)
 
 
 def pack_hold(hold: FrameHold) -> bytes:
     """Return the request to attach a frame, JSON."""
-    found: dict[str, object] = {
-        "stiffness": hold.stiffness,
-        "damping": hold.damping,
-        "breaks_at": hold.breaks_at if math.isfinite(hold.breaks_at) else None,
-        "origin": hold.origin,
-    }
-    where = hold.where
-    if isinstance(where, str):
-        kind = "region"
-    else:
-        kind = "points" if where and isinstance(where[0], list) else "nodes"
-    return msgspec.json.encode(found | {kind: where})
+    return _packed(hold.where, hold.breaks_at, hold)
 
 
 def unpack_hold(payload: bytes) -> FrameHold:
@@ -61,17 +90,56 @@ def unpack_hold(payload: bytes) -> FrameHold:
     Raises:
         MessageError: it cannot be read, or says in no way or several what is held.
     """
+    found = _decoded(_hold_decoder, payload, "attach")
+    return FrameHold(found.where, found.stiffness, found.damping, found.limit, found.origin)
+
+
+def pack_tie(tie: FrameTie) -> bytes:
+    """Return the request to tie a frame by strands, JSON."""
+    return _packed(tie.where, tie.breaks_at, tie)
+
+
+def unpack_tie(payload: bytes) -> FrameTie:
+    """Return what a request to tie a frame asks for.
+
+    Raises:
+        MessageError: see `unpack_hold`.
+    """
+    found = _decoded(_tie_decoder, payload, "tie")
+    return FrameTie(
+        found.where,
+        [list(place) for place in found.to],
+        found.stiffness,
+        found.area,
+        found.toughness,
+        found.damping,
+        found.rest_length,
+        found.limit,
+    )
+
+
+def _packed(where: _Where, breaks_at: float, asked: FrameHold | FrameTie) -> bytes:
+    """Return a request, with what is held under the name of its kind."""
+    found: dict[str, object] = asked._asdict()
+    del found["where"]
+    found["breaks_at"] = breaks_at if math.isfinite(breaks_at) else None
+    if isinstance(where, str):
+        kind = "region"
+    else:
+        kind = "points" if where and isinstance(where[0], list) else "nodes"
+    return msgspec.json.encode(found | {kind: where})
+
+
+def _decoded(decoder: msgspec.json.Decoder[_Request], payload: bytes, what: str) -> _Request:
+    """Return a request.
+
+    Raises:
+        MessageError: it cannot be read.
+    """
     try:
-        found = _decoder.decode(payload)
+        return decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise MessageError(f"the request to attach a frame cannot be read: {error}") from error
-    given = [each for each in (found.region, found.nodes, found.points) if each is not None]
-    if len(given) != 1:
-        raise MessageError("a frame holds either a region, or nodes, or points; give one of them")
-    points = [list(point) for point in found.points or ()]
-    where = found.region or found.nodes or points
-    breaks_at = math.inf if found.breaks_at is None else found.breaks_at
-    return FrameHold(where, found.stiffness, found.damping, breaks_at, found.origin)
+        raise MessageError(f"the request to {what} a frame cannot be read: {error}") from error
 
 
 def pack_loads(loads: Sequence[FrameLoad]) -> bytes:

@@ -2,13 +2,15 @@
 
 import contextlib
 import struct
+import threading
 
 import mujoco
 import numpy as np
 import pytest
 
-from bridge import Bridge, FrameHold, InProcessLink, LinkError, TcpLink
+from bridge import Bridge, FrameHold, FrameTie, InProcessLink, LinkError, TcpLink
 from bridge.tcp.messages.step import pack_step
+from bridge.tcp.server import TissueServer
 from bridge.tcp.wire import FrameReader, MessageKind, pack_frame
 from scalpel_sim import Grip
 from tests.bridge.bits import bits
@@ -63,6 +65,35 @@ def test_frames_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
     assert [n for _, n in of_here[-1]] == [0, 0]
 
 
+def tied_and_cut(link, upright):
+    """Two strands above the top, of which the blade that cuts the block cuts one."""
+    bridge, found = Bridge(link), []
+    ends = [[0.004, 0.01, 0.05], [0.03, 0.03, 0.03]]
+    grip = bridge.tie(
+        [[0.004, 0.01, 0.02], [0.016, 0.01, 0.02]],
+        ends,
+        stiffness=100.0,
+        area=1e-6,
+        toughness=100.0,
+        damping=0.1,
+        breaks_at=2.0,
+    )
+    for i in range(200):
+        bridge.step(upright(0.02, -0.002 + 0.2 * DT * i), DT)
+        found.append([(tuple(load.wrench), load.n_points) for load in bridge.frame_loads])
+        if i == 170:
+            bridge.release(grip)
+    return found
+
+
+def test_ties_over_tcp_are_the_same_as_in_process_bit_for_bit(link, upright):
+    here = InProcessLink(block_tissue())
+    of_here, of_there = tied_and_cut(here, upright), tied_and_cut(link, upright)
+    assert bits(tuple(map(tuple, of_here))) == bits(tuple(map(tuple, of_there)))
+    assert bits(here.snapshot()) == bits(link.snapshot())
+    assert [of_here[i][0][1] for i in (0, 160, 180)] == [2, 1, 0]
+
+
 def jaw_held(link):
     """A jaw of MuJoCo that lifts what it holds; its way."""
     model = mujoco.MjModel.from_xml_string(JAW)
@@ -110,6 +141,40 @@ def test_what_cannot_be_held_is_refused_and_the_link_stays(link, hold, expected)
     with pytest.raises(LinkError, match=expected):
         link.attach(hold)
     assert link.step(None, DT).n_tetrahedra == 72 and len(link.loads()) == 0
+
+
+STRANDS = FrameTie("top", [[0.01, 0.01, 0.05]], 100.0, 1e-6, 50.0)
+
+
+@pytest.mark.parametrize(
+    ("tie", "expected"),
+    [
+        (STRANDS._replace(where="tpo"), "Did you mean 'top'"),
+        (STRANDS._replace(where=""), r"length >= 1 - at `\$\.region`"),
+        (STRANDS._replace(area=0.0), "area is 0.0 m2; it must be positive"),
+        (STRANDS._replace(toughness=-1.0), "toughness is -1.0"),
+        (STRANDS._replace(stiffness=np.inf), "Expected `float`, got `null`"),
+        (STRANDS._replace(rest_length=-1.0), "rest_length is -1.0"),
+        (STRANDS._replace(to=[]), r"length >= 1 - at `\$\.to`"),
+        (STRANDS._replace(to=[[0.0, 0.0]]), "length 3"),
+        (STRANDS._replace(to=[[0.0, 0.0, 2e3]]), "<= 1000"),
+        (STRANDS._replace(to=[[0.0, 0.0, 0.1]] * 2), "one place in m, or one for each of the"),
+    ],
+)
+def test_what_cannot_be_tied_is_refused_and_the_link_stays(link, tie, expected):
+    with pytest.raises(LinkError, match=expected):
+        link.tie(tie)
+    assert link.step(None, DT).n_tetrahedra == 72 and len(link.loads()) == 0
+
+
+def test_more_frames_than_there_may_be_are_refused(monkeypatch):
+    server = TissueServer(block_tissue, port=0)
+    monkeypatch.setattr("bridge.tcp.server.MAX_FRAMES", 1)
+    threading.Thread(target=server.run, daemon=True).start()
+    with contextlib.closing(TcpLink(server.address)) as other:
+        other.tie(STRANDS)
+        with pytest.raises(LinkError, match="there are 1 frames, and there may be no more"):
+            other.attach(FrameHold("top", 100.0))
 
 
 def test_a_frame_that_is_not_there_is_not_released(link):

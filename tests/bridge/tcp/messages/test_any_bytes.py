@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bridge import FrameHold, FrameLoad, FramePose, GeomLoads, GeomPoses
+from bridge import FrameHold, FrameLoad, FramePose, FrameTie, GeomLoads, GeomPoses
 from bridge.link import TissueDescription
 from bridge.tcp.messages.body import (
     pack_pieces,
@@ -22,9 +22,11 @@ from bridge.tcp.messages.led_frames import (
     pack_hold,
     pack_loads,
     pack_number,
+    pack_tie,
     unpack_hold,
     unpack_loads,
     unpack_number,
+    unpack_tie,
 )
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.messages.step import pack_step, unpack_step
@@ -62,6 +64,10 @@ def real_messages():
         "hold": (
             pack_hold(FrameHold([[0.0, 0.01, 0.02]], 100.0, 1.0, 2.0, (0, 0, 0.1))),
             unpack_hold,
+        ),
+        "tie": (
+            pack_tie(FrameTie([3, 4], [[0.0, 0.1, 0.2]], 100.0, 1e-6, 50.0, 1.0, 0.03, 2.0)),
+            unpack_tie,
         ),
         "loads": (pack_loads(LOADS), lambda payload: unpack_loads(payload, 2)),
         "number": (pack_number(1), lambda payload: unpack_number(payload, 2)),
@@ -140,6 +146,9 @@ def is_valid(what, value):
         return all(np.isfinite(each).all() for each in numbers)
     if what == "hold":
         return np.isfinite([value.stiffness, value.damping]).all() and bool(value.where)
+    if what == "tie":
+        numbers = (value.stiffness, value.area, value.toughness, value.damping)
+        return np.isfinite(numbers).all() and np.abs(value.to).max() <= 1e3 and bool(value.where)
     if what == "loads":
         return all(load.n_points >= 0 for load in value)
     if what == "chunks":
