@@ -27,6 +27,7 @@ from .led_geoms import GeomLoads as GeomLoads
 from .led_geoms import GeomPoses as GeomPoses
 from .link import InProcessLink as InProcessLink
 from .link import LinkError as LinkError
+from .link import SceneView as SceneView
 from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
 from .tcp.address import DEFAULT_HOST as DEFAULT_HOST
@@ -64,6 +65,7 @@ __all__ = [
     "MAX_PLAUSIBLE_TORQUE",
     "PassivityCounters",
     "SIZES_PER_SHAPE",
+    "SceneView",
     "TcpLink",
     "TissueDescription",
     "TissueFrame",

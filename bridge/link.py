@@ -32,6 +32,21 @@ class LinkError(ConnectionError):
     """The tissue cannot be reached, does not answer, or its answer cannot be read."""
 
 
+class SceneView(NamedTuple):
+    """A camera of a scene, which stands still in the frame of the tissue."""
+
+    name: str
+    """What it is called."""
+    eye: tuple[float, float, float]
+    """Where it is [m]."""
+    target: tuple[float, float, float]
+    """The point in the middle of its picture [m]."""
+    up: tuple[float, float, float]
+    """Direction that points to the upper side of the picture."""
+    fov_degrees: float
+    """Angle from the lower to the upper side of the picture."""
+
+
 class TissueDescription(NamedTuple):
     """What the arm side must know of a body that it does not hold."""
 
@@ -49,6 +64,8 @@ class TissueDescription(NamedTuple):
     """Shape of the blade that cuts the body; None for the paper's blade, a line."""
     floor: float | None = None
     """Height of the floor that pieces land on [m]; None for no floor."""
+    views: tuple[SceneView, ...] = ()
+    """Where the scene is to be looked at from, the first of them at the start."""
 
 
 class TissueLink(Protocol):
@@ -149,11 +166,13 @@ class InProcessLink:
     Args:
         tissue: The tissue.
         scene: Its name, as the command line gives it; for reports only.
+        views: Where its scene is to be looked at from.
     """
 
-    def __init__(self, tissue: Tissue, scene: str = "") -> None:
+    def __init__(self, tissue: Tissue, scene: str = "", views: Sequence[SceneView] = ()) -> None:
         self._tissue = tissue
         self._scene = scene
+        self._views = tuple(views)
         self._frames: list[Attachment] = list(tissue.attachments)
         self._n_own = len(self._frames)
         self._geoms: TouchedGeoms | None = None
@@ -174,6 +193,7 @@ class InProcessLink:
             self._tissue.n_nodes,
             self._tissue.blade,
             self._tissue.floor,
+            self._views,
         )
 
     def step(

@@ -16,6 +16,7 @@ from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.pictures import add_to, into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import pieces_of
@@ -52,6 +53,7 @@ def perform(
     *,
     settings: dict[str, Any],
     scene: Scene | None = None,
+    views: Sequence[ViewTable] = (),
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
     exports: Sequence[Path] = (),
@@ -66,6 +68,7 @@ def perform(
         outputs: The folder of the files.
         settings: Settings to keep in the summary.
         scene: What `scene.toml` is to hold, if its body is in a table; None: no such file.
+        views: Cameras that the replay offers; it begins with the first.
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
         exports: Files for the body's surface after the run; see `output.export`.
@@ -87,7 +90,7 @@ def perform(
         simulation.arm.model,
         title=title,
         frame=simulation.frame,
-        views=() if scene is None else scene.views,
+        views=views,
     )
     simulation.pictures.append(into_replay(replay))
     _warn_if_slow(simulation)

@@ -8,6 +8,7 @@ from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.reading import SHIPPED_SCENES, read_scene_file, shipped_scene
 from scalpel_sim.scene_parts.scene import Scene
+from scalpel_sim.tables.view import received_views
 from tissue import TetrahedralMesh
 
 SCENES: dict[str, Scene] = {name: scene_in(shipped_scene(name)) for name in SHIPPED_SCENES}
@@ -47,16 +48,28 @@ def read_scene(path: str | Path) -> Scene:
         raise UsageError(f"{path}: {error}") from error
 
 
-def scene_of(link: TissueLink) -> Scene:
+def scene_of(link: TissueLink, scene: Scene | None = None) -> Scene:
     """Return a scene around a body that already exists.
+
+    Args:
+        link: To the body.
+        scene: What is done with it; None: what the scene of its name does, if that comes with the
+            project, seen as the server says.
 
     Raises:
         LinkError: the body is in another process, and cannot be reached.
+        UsageError: the body is that of another scene.
     """
     body = link.describe()
+    if scene is not None:
+        if scene.name != body.scene:
+            raise UsageError(f"the body there is that of '{body.scene}', not of '{scene.name}'")
+        return replace(scene, material=body.material)
+    views = received_views(body.views)
     known = SCENES.get(body.scene)
     if known is not None:
-        return replace(known, material=body.material)
+        return replace(known, material=body.material, views=views)
     rest = link.snapshot()
     mesh = TetrahedralMesh(rest.rest_positions, rest.tetrahedra)
-    return Scene(body.scene, f"the body '{body.scene}'", lambda: mesh, material=body.material)
+    about = f"the body '{body.scene}'"
+    return Scene(body.scene, about, lambda: mesh, material=body.material, views=views)

@@ -12,11 +12,11 @@ import logging
 import selectors
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from bridge.link import InProcessLink, LinkError
+from bridge.link import InProcessLink, LinkError, SceneView
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT, bound_socket, format_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
@@ -32,7 +32,7 @@ from bridge.tcp.messages.led_frames import (
 )
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
-from bridge.tcp.messages.text import pack_description, pack_error
+from bridge.tcp.messages.text import MAX_VIEWS, pack_description, pack_error
 from bridge.tcp.peer import Peer
 from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, MessageKind, pack_frame
 
@@ -49,6 +49,7 @@ def serve(
     make_tissue: Callable[[], Tissue],
     *,
     scene: str = "",
+    views: Sequence[SceneView] = (),
     host: str = DEFAULT_HOST,
     port: int = DEFAULT_PORT,
     key: bytes | None = None,
@@ -59,6 +60,7 @@ def serve(
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
         scene: Name of what it makes, as the command line gives it.
+        views: Where that is to be looked at from.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
         key: Key that a client must have too (`keys.read_key`); None to serve any client on this
@@ -66,10 +68,13 @@ def serve(
         on_listening: Called with the address "HOST:PORT" once clients can connect.
 
     Raises:
-        ValueError: the host is not on loopback and there is no key, or the port is out of range.
+        ValueError: the host is not on loopback and there is no key, the port is out of range, or
+            there are more than `MAX_VIEWS`.
         LinkError: the port is in use or not allowed.
     """
-    with TissueServer(make_tissue, scene=scene, host=host, port=port, key=key) as server:
+    with TissueServer(
+        make_tissue, scene=scene, views=views, host=host, port=port, key=key
+    ) as server:
         _logger.info("serving %s at %s", scene or "a tissue", server.address)
         with _terminate_as_interrupt(), contextlib.suppress(KeyboardInterrupt):
             if on_listening is not None:
@@ -84,12 +89,14 @@ class TissueServer:
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
         scene: Name of what it makes, as the command line gives it.
+        views: Where that is to be looked at from.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
         key: Key that a client must have too; None to serve any client on this machine.
 
     Raises:
-        ValueError: the host is not on loopback and there is no key, or the port is out of range.
+        ValueError: the host is not on loopback and there is no key, the port is out of range, or
+            there are more than `MAX_VIEWS`.
         LinkError: the port is in use or not allowed.
     """
 
@@ -98,12 +105,17 @@ class TissueServer:
         make_tissue: Callable[[], Tissue],
         *,
         scene: str = "",
+        views: Sequence[SceneView] = (),
         host: str = DEFAULT_HOST,
         port: int = DEFAULT_PORT,
         key: bytes | None = None,
     ) -> None:
+        if len(views) > MAX_VIEWS:
+            raise ValueError(
+                f"the scene has {len(views)} views; a client takes {MAX_VIEWS} at most"
+            )
         self._make_tissue = make_tissue
-        self._scene = scene
+        self._scene, self._views = scene, tuple(views)
         self._key = key
         try:
             self._listener = bound_socket(host, port, has_key=key is not None)
@@ -157,7 +169,7 @@ class TissueServer:
 
     def _new_link(self) -> InProcessLink:
         """Return a link to a new tissue."""
-        return InProcessLink(self._make_tissue(), self._scene)
+        return InProcessLink(self._make_tissue(), self._scene, self._views)
 
     def _seconds_to_deadline(self) -> float | None:
         """Return the time to the next deadline of a peer [s]; None if there is none."""

@@ -180,6 +180,7 @@ def _serve(
     from scalpel_sim.cli.run_setup import load_kernels, springs_as_asked
     from scalpel_sim.cli.scene_options import chosen_scene
     from scalpel_sim.scene_body import check_scene, make_tissue
+    from scalpel_sim.tables.view import sent_views
 
     with log_to_stderr(printing):
         secret = chosen_key(key)
@@ -192,6 +193,7 @@ def _serve(
         serve_tissue(
             lambda: make_tissue(served),
             scene=served.name,
+            views=sent_views(served.views),
             host=host,
             port=port,
             key=secret,
@@ -321,6 +323,7 @@ def _perform(
             Outputs(prepared.folder, plotter, prepared.simulation.recording.columns),
             # A server does not say how its tissue is held, nor how it is solved.
             scene=prepared.scene if options.client.connect is None else None,
+            views=prepared.scene.views,
             settings=prepared.settings,
             seconds=seconds,
             every_frame=_paced(advance) if at_most_real_time else advance,

@@ -18,7 +18,7 @@ from scalpel_sim.cli.options import (
     PrintOptions,
     TissueOptions,
 )
-from scalpel_sim.cli.scene_options import chosen_scene
+from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
 from scalpel_sim.errors import UsageError
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
@@ -27,6 +27,7 @@ from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scene_parts.scene import Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.tables.toml import is_toml_file
 from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
 
 _log = logging.getLogger("scalpel_sim")
@@ -137,10 +138,11 @@ def _tissue_elsewhere(
                     f"--{field.name.replace('_', '-')} belongs to the tissue, and that is at "
                     f"{address}; give it to `scalpel-sim serve`"
                 )
+    given = scene_in_file(name) if name is not None and is_toml_file(name) else None
     link = TcpLink(address, key=chosen_key(options.client.key))
     try:
-        scene = changed(scene_of(link), **_changes_of_scene(options.arm))
-        if name not in (None, scene.name):
+        scene = changed(scene_of(link, given), **_changes_of_scene(options.arm))
+        if given is None and name not in (None, scene.name):
             raise UsageError(f"{address} holds '{scene.name}', not '{name}'")
         check_folder(_folder(options.output, scene))
     except BaseException:

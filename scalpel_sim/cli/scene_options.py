@@ -103,6 +103,19 @@ def chosen_scene(
     return scene
 
 
+def scene_in_file(path: str) -> Scene:
+    """Return the scene in a FILE.toml, as the environment has it.
+
+    Raises:
+        UsageError: the file cannot be read, or a key or a value is wrong.
+    """
+    file = with_environment(read_scene_file(Path(path)), os.environ)
+    try:
+        return scene_in(file)
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
+
+
 def _scene_or_mesh(name: str | None, mesh: Path | None, scale: float | None) -> SceneFile:
     """Return the scene of that name, or one around a mesh."""
     if mesh is None:

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, ValidationError, convert
 
+from bridge import LinkError, SceneView
 from scalpel_sim.errors import UsageError
 from scalpel_sim.tables.values import ThreeNumbers, TomlTable, check_own_name
 
@@ -53,6 +54,27 @@ def check_views(views: Sequence[ViewTable]) -> None:
         where = f"[[view]] number {i + 1}"
         _check(view, where)
         check_own_name(view.name, [other.name for other in views[:i]], where)
+
+
+def sent_views(views: Sequence[ViewTable]) -> tuple[SceneView, ...]:
+    """Return the views of a scene as a server of its tissue sends them."""
+    return tuple(
+        SceneView(view.name, view.eye, view.target, view.up, view.fov_degrees) for view in views
+    )
+
+
+def received_views(views: Sequence[SceneView]) -> tuple[ViewTable, ...]:
+    """Return the views that a server has sent.
+
+    Raises:
+        LinkError: one of them shows nothing, or has no name that a page can show.
+    """
+    try:
+        tables = tuple(convert(view._asdict(), ViewTable) for view in views)
+        check_views(tables)
+    except (ValidationError, UsageError) as error:
+        raise LinkError(f"the server sends a view that cannot be used: {error}") from error
+    return tables
 
 
 def _check(view: ViewTable, where: str) -> None:

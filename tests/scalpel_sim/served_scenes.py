@@ -9,17 +9,24 @@ from bridge import TcpLink
 from bridge.tcp.server import TissueServer
 from scalpel_sim.output.recording import COLUMNS
 from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.tables.view import sent_views
 
 N_TIMES = 6
 """Columns of wall times, the last of `COLUMNS`."""
 
 
+def address_of_server(scene):
+    """Serve the tissue of a scene in a thread of this process; return the address."""
+    views = sent_views(scene.views)
+    server = TissueServer(lambda: make_tissue(scene), scene=scene.name, views=views, port=0)
+    threading.Thread(target=server.run, daemon=True).start()
+    return server.address
+
+
 @contextmanager
 def served(scene):
     """Yield a link to the tissue of a scene, which a thread of this process serves."""
-    server = TissueServer(lambda: make_tissue(scene), scene=scene.name, port=0)
-    threading.Thread(target=server.run, daemon=True).start()
-    with closing(TcpLink(server.address)) as link:
+    with closing(TcpLink(address_of_server(scene))) as link:
         yield link
 
 

@@ -11,7 +11,6 @@ from scalpel_sim import prepare
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.layers import with_settings
 from scalpel_sim.scene_file.reading import shipped_scene
-from scalpel_sim.scenes import scene_of
 from scalpel_sim.tables.grasper import WaypointTable
 from tests.bridge.bits import bits
 from tests.scalpel_sim.served_scenes import served, untimed
@@ -73,11 +72,6 @@ def test_the_contacts_of_each_pad_add_up_to_the_force_on_its_jaw():
             pressed = coupling.wrench(name).force
             assert np.linalg.norm(pressed) > 0.1
             assert found.force[mine].sum(axis=0) == pytest.approx(pressed, abs=1e-9)
-
-
-def test_a_client_that_knows_the_scene_by_name_has_its_graspers():
-    with served(COARSE) as link:
-        assert scene_of(link).graspers == COARSE.graspers
 
 
 def test_a_server_that_is_lost_while_a_grasper_holds_ends_the_run():

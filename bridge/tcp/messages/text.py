@@ -1,19 +1,32 @@
 """The messages of text: the description of the tissue (JSON) and an error (plain UTF-8)."""
 
 import math
+from typing import Annotated
 
 import msgspec
 import numpy as np
 
-from bridge.link import TissueDescription
+from bridge.link import SceneView, TissueDescription
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import BladeShape, Material
 
 LARGEST_ERROR = 1 << 16
 """Largest error [byte]: text for a person to read."""
-LARGEST_DESCRIPTION = 1 << 16
-"""Largest description [byte]: a name and a dozen numbers."""
+LARGEST_DESCRIPTION = 1 << 18
+"""Largest description [byte]: a name, a dozen numbers, and the views, of some 300 bytes each."""
+MAX_VIEWS = 256
+"""Largest number of views of a scene: more than anyone looks for in a list."""
+
+_Place = tuple[float, float, float]
+
+
+class _View(msgspec.Struct, forbid_unknown_fields=True):
+    name: Annotated[str, msgspec.Meta(max_length=100)]
+    eye: _Place
+    target: _Place
+    up: _Place
+    fov_degrees: Annotated[float, msgspec.Meta(gt=0.0, lt=180.0)]
 
 
 class _Description(msgspec.Struct, forbid_unknown_fields=True):
@@ -24,6 +37,7 @@ class _Description(msgspec.Struct, forbid_unknown_fields=True):
     n_nodes: int
     blade: BladeShape | None
     floor: float | None
+    views: Annotated[list[_View], msgspec.Meta(max_length=MAX_VIEWS)]
 
 
 _description_decoder = msgspec.json.Decoder(_Description)
@@ -41,6 +55,7 @@ def pack_description(description: TissueDescription) -> bytes:
             description.n_nodes,
             description.blade,
             description.floor,
+            [_View(*view) for view in description.views],
         )
     )
 
@@ -63,6 +78,8 @@ def unpack_description(payload: bytes) -> TissueDescription:
     check_counts(found.n_nodes, found.n_tetrahedra)
     if found.floor is not None and not math.isfinite(found.floor):
         raise MessageError(f"the floor is at {found.floor} m; wanted a finite height")
+    if not all(view.name.isprintable() for view in found.views):
+        raise MessageError("a view of the scene has a control character in its name")
     return TissueDescription(
         found.scene,
         found.material,
@@ -71,6 +88,7 @@ def unpack_description(payload: bytes) -> TissueDescription:
         found.n_nodes,
         found.blade,
         found.floor,
+        tuple(SceneView(*msgspec.structs.astuple(view)) for view in found.views),
     )
 
 

@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from bridge import Bridge, InProcessLink, LinkError, TcpLink
+from bridge import Bridge, InProcessLink, LinkError, SceneView, TcpLink
 from bridge.tcp.address import parse_address
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
@@ -364,6 +364,12 @@ def test_a_host_that_others_can_reach_is_refused(host):
         ValueError, match=r"is open to other machines, and that takes a key: .*scalpel-sim key"
     ):
         TissueServer(make_block, host=host, port=0)
+
+
+def test_more_views_than_a_client_takes_are_refused():
+    view = SceneView("", (0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 38.0)
+    with pytest.raises(ValueError, match="has 257 views; a client takes 256"):
+        TissueServer(make_block, port=0, views=[view] * 257)
 
 
 @pytest.mark.parametrize("port", [-1, 65536])

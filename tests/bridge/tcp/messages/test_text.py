@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
 
-from bridge.link import TissueDescription
+from bridge.link import SceneView, TissueDescription
 from bridge.tcp.messages.text import (
+    LARGEST_DESCRIPTION,
     LARGEST_ERROR,
+    MAX_VIEWS,
     pack_description,
     pack_error,
     unpack_description,
@@ -12,6 +14,8 @@ from bridge.tcp.messages.text import (
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
 from tissue import BladeShape, Material
+
+VIEW = SceneView("from above", (0.0, 0.0, 1.0), (0.1, 0.2, 0.3), (0.0, 1.0, 0.0), 38.0)
 
 
 def test_a_description_arrives_with_every_property_of_material_and_blade():
@@ -40,6 +44,7 @@ def test_a_description_arrives_with_every_property_of_material_and_blade():
         175,
         BladeShape(thickness=3e-4),
         -0.01,
+        (VIEW, VIEW._replace(name="µ", eye=(-0.0, 1.0 / 3.0, 1e-300))),
     )
     received = unpack_description(pack_description(sent))
     assert bits(received.bounds) == bits(sent.bounds)
@@ -69,6 +74,35 @@ def test_a_description_of_an_impossible_prony_series_is_refused(series):
     assert unpack_description(packed).material == material
     with pytest.raises(MessageError, match=r"prony|\$\.material"):
         unpack_description(packed.replace(b'"prony":[[0.3,0.1]]', b'"prony":' + series))
+
+
+def described(*views):
+    bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
+    return pack_description(TissueDescription("", Material(), bounds, 1, 4, views=views))
+
+
+def test_as_many_views_as_there_may_be_fit():
+    longest = SceneView("\U0001f52a" * 40, *[(-1.0 / 3.0e-100,) * 3] * 3, 100.0 / 3.0)
+    packed = described(*[longest] * MAX_VIEWS)
+    assert len(packed) <= LARGEST_DESCRIPTION
+    assert unpack_description(packed).views == (longest,) * MAX_VIEWS
+
+
+@pytest.mark.parametrize(
+    ("views", "why"),
+    [
+        ([VIEW] * (MAX_VIEWS + 1), f"length <= {MAX_VIEWS}"),
+        ([VIEW._replace(name="a\x1b[2J")], "a control character in its name"),
+        ([VIEW._replace(name="a" * 101)], "length <= 100"),
+        ([VIEW._replace(eye=(0.0, 0.0, np.nan))], "got `null`"),
+        ([VIEW._replace(up=(0.0, 0.0))], "length 3"),
+        ([VIEW._replace(fov_degrees=180.0)], "< 180"),
+        ([VIEW._replace(fov_degrees=0.0)], "> 0"),
+    ],
+)
+def test_a_description_with_an_impossible_view_is_refused(views, why):
+    with pytest.raises(MessageError, match=why):
+        unpack_description(described(*views))
 
 
 def test_an_error_arrives_without_its_control_characters():
