@@ -35,6 +35,10 @@ def no_geom_loads(n: int) -> GeomLoads:
     return GeomLoads(np.zeros((n, 3)), np.zeros((n, 3)))
 
 
+NO_GEOM_LOADS = no_geom_loads(0)
+"""What a tissue does to no geoms."""
+
+
 def expect_pose_of_each(poses: GeomPoses, n: int) -> None:
     """Refuse poses of another number than that of the geoms.
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
-from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
+from bridge.led_geoms import NO_GEOM_LOADS, NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each
 from tissue import (
     BladeShape,
     BladeSweep,
@@ -269,7 +269,7 @@ class InProcessLink:
 
     def geom_loads(self) -> GeomLoads:
         """Return what the body did to each of these geoms in the last step."""
-        return no_geom_loads(0) if self._geoms is None else self._geoms.loads
+        return NO_GEOM_LOADS if self._geoms is None else self._geoms.loads
 
     @property
     def n_geoms(self) -> int:

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from bridge.led_geoms import GeomLoads, GeomPoses, no_geom_loads
+from bridge.led_geoms import NO_GEOM_LOADS, GeomLoads, GeomPoses
 from bridge.tcp.messages.poses import LARGEST_COORDINATE, checked_poses
 from bridge.tcp.wire import MessageError
 from tissue import FloatArray, Geom
@@ -79,7 +79,7 @@ def unpack_geoms(payload: bytes) -> tuple[list[Geom], GeomPoses]:
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(f"the request to touch geoms cannot be read: {error}") from error
     rows = np.array([[*geom.origin, *geom.rotation] for geom in found]).reshape(-1, 12)
-    return [_geom(geom) for geom in found], GeomPoses(*checked_poses(rows, "geom"))
+    return [_geom(geom) for geom in found], GeomPoses(*checked_poses(rows, 0))
 
 
 def pack_geom_loads(loads: GeomLoads) -> bytes:
@@ -95,7 +95,7 @@ def unpack_geom_loads(payload: bytes, at: int, n: int) -> GeomLoads:
     Physical quantities are passed on unchanged, NaN included.
     """
     if n == 0:
-        return no_geom_loads(0)
+        return NO_GEOM_LOADS
     rows = np.frombuffer(payload, "<f8", 6 * n, at).astype(np.float64).reshape(n, 6)
     return GeomLoads(rows[:, :3].copy(), rows[:, 3:].copy())
 

@@ -29,12 +29,12 @@ def pack_poses(origins: FloatArray, rotations: FloatArray) -> bytes:
     return rows.tobytes()
 
 
-def checked_poses(rows: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
+def checked_poses(rows: FloatArray, n_frames: int) -> tuple[FloatArray, FloatArray]:
     """Return origins [m], shape (n, 3), and rotations, shape (n, 3, 3), of poses. Copies.
 
     Args:
         rows: The numbers of each, shape (n, 12).
-        what: Of what they are, for the message.
+        n_frames: How many of them, the first ones, are of frames; the others are of geoms.
 
     Raises:
         MessageError: an origin is out of range, or a rotation is none.
@@ -44,10 +44,17 @@ def checked_poses(rows: FloatArray, what: str) -> tuple[FloatArray, FloatArray]:
     if not is_near.all():
         i = int(np.argmin(is_near))
         raise MessageError(
-            f"{what} {i} is not within {LARGEST_COORDINATE:g} m: {origins[i].tolist()}"
+            f"{_owner(i, n_frames)} is not within {LARGEST_COORDINATE:g} m: {origins[i].tolist()}"
         )
     are_axes = are_rotations(rotations, _ROTATION_TOLERANCE)
     if not are_axes.all():
         i = int(np.argmin(are_axes))
-        raise MessageError(f"the axes of {what} {i} are no rotation: {rotations[i].tolist()}")
+        raise MessageError(
+            f"the axes of {_owner(i, n_frames)} are no rotation: {rotations[i].tolist()}"
+        )
     return origins, rotations
+
+
+def _owner(i: int, n_frames: int) -> str:
+    """Return what the pose in row `i` is of."""
+    return f"frame {i}" if i < n_frames else f"geom {i - n_frames}"

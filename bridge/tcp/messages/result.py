@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridge.led_frames import FrameLoad
-from bridge.led_geoms import GeomLoads, no_geom_loads
+from bridge.led_geoms import NO_GEOM_LOADS, GeomLoads
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.messages.geoms import (
     GEOM_LOAD_BYTES,
@@ -47,7 +47,7 @@ LARGEST_RESULT = (
 def pack_result(
     result: StepResult,
     loads: Sequence[FrameLoad] = (),
-    geom_loads: GeomLoads = no_geom_loads(0),
+    geom_loads: GeomLoads = NO_GEOM_LOADS,
 ) -> bytes:
     """Return a reply: the integers of a result, its single floats, its arrays.
 
@@ -139,7 +139,7 @@ def unpack_result(
         wrench=Wrench(floats[0:3], floats[3:6], floats[6:9]),
         wrench_t1=Wrench(floats[9:12], floats[12:15], floats[15:18]),
         stiffness=floats[18:54].reshape(6, 6),
-        contacts=_contacts(floats[_N_FIXED : _N_FIXED + _N_PER_CONTACT * n], n),
+        contacts=_contacts(floats[_N_FIXED : _N_FIXED + _N_PER_CONTACT * n], n, n_geoms),
         force_on_tissue=floats[54:57],
         bounds=floats[57:63].reshape(2, 3),
         n_tetrahedra=n_tetrahedra,
@@ -159,17 +159,17 @@ def unpack_result(
     return result, loads, geom_loads
 
 
-def _contacts(floats: FloatArray, n: int) -> RigidContacts:
+def _contacts(floats: FloatArray, n: int, n_geoms: int) -> RigidContacts:
     """Return the contacts whose floats follow one another by quantity.
 
     Raises:
         MessageError: the number of a geom is none.
     """
     geom = floats[11 * n :]
-    if not ((geom >= -1) & (geom < MAX_CONTACTS) & (geom == np.floor(geom))).all():
+    end = n_geoms or MAX_CONTACTS  # of geoms that the client does not lead it knows nothing
+    if not ((geom >= -1) & (geom < end) & (geom == np.floor(geom))).all():
         raise MessageError(
-            f"the geoms of contacts are {geom.tolist()}; wanted whole numbers from -1 to "
-            f"{MAX_CONTACTS - 1}"
+            f"the geoms of contacts are {geom.tolist()}; wanted whole numbers from -1 to {end - 1}"
         )
     return RigidContacts(
         point=floats[: 3 * n].reshape(n, 3),

@@ -71,10 +71,11 @@ def unpack_step(
     frames: list[FramePose] = []
     geoms = NO_GEOMS
     if of_poses:
-        found = np.frombuffer(payload, "<f8", offset=at).astype(np.float64).reshape(-1, 12)
-        poses = zip(*checked_poses(found[:n_led], "frame"), strict=True)
-        frames = [FramePose(*pose) for pose in poses]
-        geoms = GeomPoses(*checked_poses(found[n_led:], "geom"))
+        rows = np.frombuffer(payload, "<f8", offset=at).astype(np.float64).reshape(-1, 12)
+        origins, rotations = checked_poses(rows, n_led)
+        of_frames = zip(origins[:n_led], rotations[:n_led], strict=True)
+        frames = [FramePose(*pose) for pose in of_frames]
+        geoms = GeomPoses(origins[n_led:], rotations[n_led:])
     return sweep, _checked_step(dt), frames, geoms
 
 

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridge import GeomLoads
+from bridge.led_geoms import no_geom_loads
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.wire import MessageError
 from tests.bridge.bits import bits
@@ -125,6 +126,16 @@ def test_a_contact_with_an_impossible_number_of_a_geom_is_refused(geom):
     result = block_tissue().step(None, 1e-3)._replace(contacts=contacts)
     with pytest.raises(MessageError, match="geoms of contacts are"):
         unpack_result(pack_result(result))
+
+
+def test_a_contact_with_a_geom_that_the_client_does_not_lead_is_refused():
+    one = (np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1), np.zeros((1, 3)), np.zeros(1))
+    contacts = RigidContacts(*one, np.array([2]))
+    result = block_tissue().step(None, 1e-3)._replace(contacts=contacts)
+    three, two = (pack_result(result, (), no_geom_loads(n)) for n in (3, 2))
+    assert unpack_result(three, 3)[0].contacts.geom.tolist() == [2]
+    with pytest.raises(MessageError, match=r"geoms of contacts are \[2.0\]; .* from -1 to 1"):
+        unpack_result(two, 2)
 
 
 def test_a_result_without_its_last_number_is_refused():
