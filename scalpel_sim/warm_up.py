@@ -69,9 +69,9 @@ class KernelSet(NamedTuple):
     relaxes: bool = False
     """Whether the stress of the material relaxes."""
     is_held: bool = False
-    """Whether attachments hold the body."""
+    """Whether attachments hold the body, or graspers do in the same way."""
     has_table: bool = True
-    """Whether the body lies on a table."""
+    """Whether the body touches rigid geoms: a table, or a second hand."""
 
     @classmethod
     def of(cls, scene: Scene) -> "KernelSet":
@@ -79,8 +79,11 @@ class KernelSet(NamedTuple):
         has_sides = scene.blade is not None
         law, scheme, relaxation = scene.material.law, scene.scheme, scene.relaxation
         how = (scene.audit, has_sides, scene.precision, scene.contact)
-        relaxes, is_held = bool(scene.material.prony), bool(scene.attachments)
-        has_table = scene.table is not None
+        relaxes = bool(scene.material.prony)
+        is_held = bool(scene.attachments) or any(
+            grasper.holds == "attachment" for grasper in scene.graspers
+        )
+        has_table = scene.table is not None or bool(scene.graspers)
         return cls(law, scheme, relaxation, *how, relaxes, is_held, has_table)
 
     @property

@@ -113,7 +113,7 @@ class TcpLink:
         expect_each(poses, self._n_led)
         expect_pose_of_each(geoms, n_geoms)
         request = pack_step(sweep, dt, poses, geoms)
-        unpack = functools.partial(unpack_result, n_geoms=n_geoms)
+        unpack = functools.partial(_checked_result, self._loads, n_geoms)
         answer = self._ask(MessageKind.STEP, request, LARGEST_RESULT, unpack)
         result, self._loads, self._geom_loads = answer
         self._n_nodes, self._n_tetrahedra = result.n_nodes, result.n_tetrahedra
@@ -268,6 +268,21 @@ class TcpLink:
                 parts.append(frame.payload)
                 if not frame.kind & MORE:
                     return frame._replace(payload=b"".join(parts))
+
+
+def _checked_result(
+    before: Sequence[FrameLoad] | None, n_geoms: int, payload: bytes
+) -> tuple[StepResult, list[FrameLoad], GeomLoads]:
+    """Return the content of the reply to a step.
+
+    Raises:
+        MessageError: see `unpack_result`; or there are other frames than before.
+    """
+    found = unpack_result(payload, n_geoms)
+    n = len(found[1])
+    if before is not None and n != len(before):
+        raise MessageError(f"a step reply with the loads on {n} frames; there are {len(before)}")
+    return found
 
 
 def _nothing(payload: bytes) -> None:

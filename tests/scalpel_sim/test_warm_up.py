@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 import scalpel_sim
 from scalpel_sim import warm_up
@@ -45,6 +46,20 @@ def test_a_material_whose_stress_relaxes_needs_more_kernels():
     assert KernelSet.of(relaxing) == KernelSet.of(scene)._replace(relaxes=True)
     assert KernelSet.of(relaxing).body(block((2, 2, 2))).material.prony
     assert not KernelSet.of(scene).body(block((2, 2, 2))).material.prony
+
+
+def test_graspers_need_the_kernels_of_what_they_touch_and_of_what_they_tie():
+    """A tissue that is served would else compile them in the step in which the jaws close."""
+    scene = replace(SCENES["retract"], table=None)
+    (left,) = scene.graspers
+    rubbing = replace(scene, graspers=(structs.replace(left, holds="friction", closed=None),))
+    alone = replace(scene, graspers=())
+    found = [KernelSet.of(each) for each in (scene, rubbing, alone)]
+    assert [(each.is_held, each.has_table) for each in found] == [
+        (True, True),
+        (False, True),
+        (False, False),
+    ]
 
 
 @pytest.fixture
