@@ -121,10 +121,19 @@ def test_a_failure_of_the_tissue_is_reported_with_its_message(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
+        (HELLO[:4] + b"\x06\x00" + HELLO[6:], "uses version 6 of the protocol and this one 7"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],
-    ids=["http", "zeros", "no hello", "other version", "bad checksum", "oversize"],
+    ids=[
+        "http",
+        "zeros",
+        "no hello",
+        "other version",
+        "version before",
+        "bad checksum",
+        "oversize",
+    ],
 )
 def test_garbage_is_answered_with_the_reason_and_ends_the_connection(server, garbage, answer):
     with connected(server.address) as peer:

@@ -10,12 +10,15 @@ import pytest
 
 from bridge.tcp.address import parse_address
 from bridge.tcp.authentication import Authenticator, direction_keys
+from bridge.tcp.messages.geoms import MAX_GEOMS
 from bridge.tcp.messages.result import pack_result
+from bridge.tcp.messages.text import MAX_VIEWS
 from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
 from bridge.tcp.server import MAX_CONNECTIONS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.tcp.serve_block import block_tissue
 from tissue import Energies, RigidContacts
+from tissue.contact.geoms.geom_contact import MOST_INCREMENTS
 
 DOCS = Path(__file__).parents[3] / "docs"
 WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
@@ -67,6 +70,8 @@ def test_the_limits_are_those_of_the_server():
     assert f"complete after {FRAME_SECONDS:g} s, and a reply read after {SEND_SECONDS:g} s" in WIRE
     assert f"HELLO must be done {HANDSHAKE_SECONDS:g} s" in WIRE
     assert f"At most {MAX_CONNECTIONS} connections" in WIRE
+    assert f"at most {MAX_GEOMS}." in WIRE and f"more than {MOST_INCREMENTS:,}, is refused" in WIRE
+    assert f"a list of at most {MAX_VIEWS}\ncameras" in WIRE
 
 
 def test_the_numbers_of_a_result_are_where_the_table_says():

@@ -1,13 +1,18 @@
 """Geoms of MuJoCo and tissue: jaws that lift by friction, bodies that feel what they touch."""
 
+import contextlib
+import threading
+
 import mujoco
 import numpy as np
 import pytest
 
-from bridge import TissueFrame
+from bridge import Bridge, TcpLink, TissueFrame
+from bridge.tcp.server import TissueServer
 from scalpel_sim import GeomCoupling
 from scalpel_sim.arm.geom_coupling import GeomCouplingError
-from tissue import Material, SolverSettings, Tissue, block
+from tests.bridge.bits import bits
+from tissue import BladeSegment, Material, SolverSettings, Tissue, block
 
 EDGE = 0.0368
 """Of a cube of 50 g [m]."""
@@ -121,15 +126,55 @@ def test_the_frame_of_the_tissue_changes_nothing():
     assert pushed[0] == pytest.approx(pushed[1], abs=1e-3)
 
 
-def test_convex_meshes_and_ellipsoids_of_a_model_push_too():
-    model = mujoco.MjModel.from_xml_string("""
+WEDGE_AND_EGG = """
 <mujoco>
   <asset><mesh name="wedge" vertex="0 0 0  .02 0 0  0 .02 0  .02 .02 0  .01 .01 -.02"/></asset>
   <worldbody>
     <body name="wedge" mocap="true" pos="-.01 -.01 .06"><geom type="mesh" mesh="wedge"/></body>
     <body name="egg" pos="0 0 -.0051"><geom type="ellipsoid" size=".02 .015 .005"/></body>
   </worldbody>
-</mujoco>""")
+</mujoco>"""
+LYING = TissueFrame(np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]), np.array([0.3, -0.2, 0.1]))
+FAR = BladeSegment(np.array([1.0, 0, 0]), np.array([1.0, 0, 0.03]), np.array([0.0, 1.0, 0.0]))
+
+
+def pressed(tissue):
+    """A wedge that goes down into the cube, which lies on an egg; what the two feel in each frame.
+
+    Args:
+        tissue: The cube, or a bridge to it.
+    """
+    model = mujoco.MjModel.from_xml_string(WEDGE_AND_EGG)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    touch, felt = GeomCoupling(data, tissue, ["wedge", "egg"], frame=LYING), []
+    for k in range(60):
+        data.mocap_pos[0, 2] = 0.06 - 1e-4 * k
+        mujoco.mj_kinematics(model, data)
+        touch.follow()
+        if isinstance(tissue, Bridge):
+            tissue.step(FAR, 1e-3)
+        else:
+            tissue.step(None, 1e-3)
+        touch.apply()
+        felt.append((touch.wrench("wedge"), touch.wrench("egg"), data.xfrc_applied.copy()))
+    assert len(touch.forces().geom) > 1
+    return felt
+
+
+def test_it_is_the_same_on_the_tissue_itself_over_a_bridge_and_over_tcp():
+    server = TissueServer(lambda: cube(frame=LYING), port=0)
+    threading.Thread(target=server.run, daemon=True).start()
+    with contextlib.closing(TcpLink(server.address)) as link:
+        here, bridged, there = (
+            bits(tuple(pressed(tissue)))
+            for tissue in (cube(frame=LYING), Bridge(cube(frame=LYING), LYING), Bridge(link, LYING))
+        )
+    assert here == bridged == there
+
+
+def test_convex_meshes_and_ellipsoids_of_a_model_push_too():
+    model = mujoco.MjModel.from_xml_string(WEDGE_AND_EGG)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     tissue = cube()
