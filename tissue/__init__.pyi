@@ -16,6 +16,7 @@ from .core.jit import kernel as kernel
 from .core.three_vectors import BladeSegment as BladeSegment
 from .core.three_vectors import BladeSweep as BladeSweep
 from .core.three_vectors import Wrench as Wrench
+from .core.memento_reading import StateError as StateError
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
@@ -48,6 +49,7 @@ from .shapes.cylinder import cylinder as cylinder
 from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
+from .state.tissue_state import TissueState as TissueState
 from .tissue import Tissue as Tissue
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
@@ -100,11 +102,13 @@ __all__ = [
     "SourcedValue",
     "SpringError",
     "StageTimes",
+    "StateError",
     "StepResult",
     "Surface",
     "TetrahedralMesh",
     "Tissue",
     "TissueError",
+    "TissueState",
     "ToughnessLaw",
     "Wrench",
     "block",

@@ -43,7 +43,6 @@ from tissue.integrators.integrator import integrator_of
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import Numerics, assembled
 from tissue.loads.attachment_list import AttachmentList
-from tissue.loads.driven_body import DrivenBody
 from tissue.loads.load import Loads
 from tissue.material import Material
 from tissue.mesh.body import Body, build_body
@@ -54,6 +53,7 @@ from tissue.mesh.star import Visits
 from tissue.mesh.validation import expect_sound
 from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
+from tissue.state.saved_body import SavedBody
 from tissue.types import (
     SchemeStatistics,
     StageTimes,
@@ -65,7 +65,7 @@ NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 
 """The edge of no blade."""
 
 
-class Tissue(DrivenBody):
+class Tissue(SavedBody):
     """A soft body of tetrahedra: masses at nodes, a material between them, a blade that cuts it.
 
     Args:
@@ -143,6 +143,7 @@ class Tissue(DrivenBody):
         self._touched = np.zeros(len(body.rest), dtype=np.int64)
         self._make_room()
         self._audit.begin(self._system, NOWHERE)
+        self._begin_state()
 
     def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
         """Advance the body by `dt` [s] while the blade does `sweep`.

@@ -50,6 +50,8 @@ class Attachment:
         if not breaks_at > 0.0:
             raise ValueError(f"breaks_at is {breaks_at} N; it must be positive")
         self.points = points
+        self.number = -1
+        """Its number among all attachments of its tissue; -1 where it never held."""
         self.stiffness, self.damping = float(stiffness), checked_amount("damping", damping)
         self.breaks_at = float(breaks_at)
         self.lengths: FloatArray = np.full(len(points), checked_amount("rest_length", rest_length))

@@ -32,6 +32,7 @@ class AttachmentList:
     def __init__(self) -> None:
         self._attachments: list[Attachment] = []
         self._let_go: list[Attachment] = []
+        self._n_added = 0
         self.arrays: Attachments = no_attachments()
         """What kernels work on; another one where attachments come or go."""
         self.added_frequency_squared = 0.0
@@ -64,6 +65,8 @@ class AttachmentList:
     def add(self, attachment: Attachment, body: Body) -> None:
         """Let an attachment hold from now on."""
         row = len(self.arrays.nodes)
+        attachment.number = self._n_added
+        self._n_added += 1
         self._attachments.append(attachment)
         self._renew(body, list(range(row)))
         arrays = self.arrays

@@ -22,6 +22,8 @@ class Load:
     def __init__(self, points: MaterialPoints, force: npt.ArrayLike) -> None:
         self.points = points
         self.force = force
+        self.number = -1
+        """Its number among all loads of its tissue; -1 where it never acted."""
 
     @property
     def force(self) -> FloatArray:
@@ -54,6 +56,7 @@ class Loads:
 
     def __init__(self) -> None:
         self._loads: list[Load] = []
+        self._n_added = 0
 
     @property
     def act(self) -> bool:
@@ -62,6 +65,8 @@ class Loads:
 
     def add(self, load: Load) -> None:
         """Let a load act."""
+        load.number = self._n_added
+        self._n_added += 1
         self._loads.append(load)
 
     def remove(self, load: Load, nodal_forces: FloatArray) -> None:

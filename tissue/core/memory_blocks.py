@@ -1,0 +1,213 @@
+"""Memory of many arrays copied into one vector, and back.
+
+Arrays have room to grow. Of each the part in use is copied; what follows still holds what it was
+made with, one value. In that part blocks that hold one value are not copied either.
+"""
+
+import ctypes
+from typing import Any, Final, NamedTuple, cast
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import lower_builtin, type_callable
+from numba.np import arrayobj
+
+from tissue.core.array_types import BoolArray, IntArray
+from tissue.core.jit import kernel
+
+WORD: Final = 8
+"""Bytes of a word."""
+
+BLOCK: Final = 256
+"""Words of a block: half a page. Larger: more of one value is copied; smaller: more to look up."""
+
+ADDRESS, LENGTH, COUNTER, UNIT, PER_UNIT, LEAD, HAS_REST = range(7)
+"""Columns of a table of spans, each a number of words but for:
+
+ADDRESS, where it begins; COUNTER, address of the number of things in use, or 0 where all is;
+UNIT, how many things share PER_UNIT words, behind LEAD words in use in any case; and HAS_REST, 1
+where what is not in use holds one value, 0 where it means nothing."""
+
+_WORDS = types.Array(types.int64, 1, "C")
+
+
+def words_at(address: int, n: int) -> IntArray:
+    """Return `n` words of memory from an address on, a multiple of `WORD`; nothing keeps it."""
+    if n == 0:
+        return np.zeros(0, np.int64)
+    words: IntArray = np.ctypeslib.as_array((ctypes.c_int64 * int(n)).from_address(int(address)))
+    return words
+
+
+@type_callable(words_at)
+def _type_of_words(_: Any) -> Any:
+    def typer(address: types.Type, n: types.Type) -> types.Type | None:
+        are_whole = isinstance(address, types.Integer) and isinstance(n, types.Integer)
+        return _WORDS if are_whole else None
+
+    return typer
+
+
+def _lower_words(context: Any, builder: Any, _: Any, values: Any) -> Any:
+    address, n = values
+    array = context.make_array(_WORDS)(context, builder)
+    cast(Any, arrayobj).populate_array(
+        array,
+        data=builder.inttoptr(address, array.data.type),
+        shape=[n],
+        strides=[ir.Constant(ir.IntType(64), WORD)],
+        itemsize=ir.Constant(ir.IntType(64), WORD),
+        meminfo=None,
+    )
+    return array._getvalue()
+
+
+cast(Any, lower_builtin)(words_at, types.Integer, types.Integer)(_lower_words)
+
+
+class PackedMemory(NamedTuple):
+    """What the spans of a table held at one time."""
+
+    in_use: IntArray
+    """Words in use of each span, shape (n_spans,)."""
+    rest: IntArray
+    """The word that each span held behind them, shape (n_spans,)."""
+    is_filled: BoolArray
+    """Whether all words of a block in use are the same, shape (n_blocks,)."""
+    value: IntArray
+    """That word, shape (n_blocks,)."""
+    words: IntArray
+    """The words of all other blocks, one after the other."""
+
+
+def packed(spans: IntArray, room: IntArray) -> PackedMemory:
+    """Return what is in spans of memory.
+
+    Args:
+        spans: See `ADDRESS`, shape (n_spans, 7).
+        room: Taken for the words, if there is enough; else more is made.
+    """
+    n = len(spans)
+    in_use, rest = np.empty(n, np.int64), np.empty(n, np.int64)
+    n_blocks = measure_memory(spans, in_use, rest)
+    is_filled, value = np.empty(n_blocks, np.bool_), np.empty(n_blocks, np.int64)
+    most = int(in_use.sum())
+    words = room if len(room) >= most else np.empty(most + most // 8, np.int64)
+    n_words = pack_memory(spans, in_use, is_filled, value, words)
+    return PackedMemory(in_use, rest, is_filled, value, words[:n_words])
+
+
+def unpacked(spans: IntArray, memory: PackedMemory, *, is_new: bool = False) -> None:
+    """Put back what `packed` found.
+
+    Args:
+        spans: As long as those that were packed.
+        memory: What is put back.
+        is_new: Whether the spans are new and hold 0, not what was in use since it was packed.
+    """
+    live, rest = np.empty((2, len(spans)), np.int64)
+    measure_memory(spans, live, rest)
+    unpack_memory(spans, spans[:, LENGTH] if is_new else live, *memory)
+
+
+@kernel
+def measure_memory(spans: IntArray, in_use: IntArray, rest: IntArray) -> int:
+    """Write how many words of each span are in use, and the one behind; return how many blocks."""
+    n_blocks = 0
+    for i in range(len(spans)):
+        n = spans[i, LENGTH]
+        if spans[i, COUNTER] != 0:
+            units = -(-words_at(spans[i, COUNTER], 1)[0] // spans[i, UNIT])
+            n = min(n, spans[i, LEAD] + units * spans[i, PER_UNIT])
+        in_use[i] = n
+        has_more = n < spans[i, LENGTH]
+        rest[i] = words_at(spans[i, ADDRESS] + WORD * n, 1)[0] if has_more else 0
+        n_blocks += -(-n // BLOCK)
+    return n_blocks
+
+
+@kernel
+def pack_memory(
+    spans: IntArray, in_use: IntArray, is_filled: BoolArray, value: IntArray, words: IntArray
+) -> int:
+    """Write what is in spans of memory; return the number of words.
+
+    Args:
+        spans: See `packed`.
+        in_use: Number of words of each span.
+        is_filled: Written, as the rest; see `PackedMemory`.
+        value: The word that fills a block.
+        words: The words of others.
+    """
+    block = at = 0
+    for i in range(len(spans)):
+        n = in_use[i]
+        memory = words_at(spans[i, ADDRESS], n)
+        for begin in range(0, n, BLOCK):
+            end = min(begin + BLOCK, n)
+            is_filled[block] = _holds_one_value(memory, begin, end)
+            value[block] = memory[begin]
+            if not is_filled[block]:
+                for k in range(end - begin):
+                    words[at + k] = memory[begin + k]
+                at += end - begin
+            block += 1
+    return at
+
+
+@kernel
+def unpack_memory(
+    spans: IntArray,
+    live: IntArray,
+    in_use: IntArray,
+    rest: IntArray,
+    is_filled: BoolArray,
+    value: IntArray,
+    words: IntArray,
+) -> None:
+    """Do `unpacked`.
+
+    Args:
+        spans: Where it is put.
+        live: Number of words of each span that have been in use.
+        in_use: See `PackedMemory`, as the rest.
+        rest: The word behind those in use.
+        is_filled: Whether a block holds one value.
+        value: That value.
+        words: The words of others.
+    """
+    block = at = 0
+    for i in range(len(spans)):
+        n = in_use[i]
+        memory = words_at(spans[i, ADDRESS], spans[i, LENGTH])
+        for begin in range(0, n, BLOCK):
+            end = min(begin + BLOCK, n)
+            if is_filled[block]:
+                _fill(memory, begin, end, value[block])
+            else:
+                for k in range(end - begin):
+                    memory[begin + k] = words[at + k]
+                at += end - begin
+            block += 1
+        if spans[i, HAS_REST] == 1:
+            _fill(memory, n, live[i], rest[i])
+
+
+@kernel
+def _fill(memory: IntArray, begin: int, end: int, value: int) -> None:
+    """Write one value to memory; where it is there already, do not touch the page."""
+    if begin < end and not (memory[begin] == value and _holds_one_value(memory, begin, end)):
+        for k in range(begin, end):
+            memory[k] = value
+
+
+@kernel
+def _holds_one_value(memory: IntArray, begin: int, end: int) -> bool:
+    """Return whether all words from `begin` to `end` are the same."""
+    first, differs = memory[begin], 0
+    if memory[end - 1] != first or memory[(begin + end) // 2] != first:
+        return False
+    for k in range(begin, end):
+        differs |= memory[k] ^ first
+    return bool(differs == 0)

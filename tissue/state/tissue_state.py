@@ -1,0 +1,118 @@
+"""`TissueState`: a tissue at one time, in memory or as bytes."""
+
+import io
+import json
+import zipfile
+from typing import Any, Self
+
+import numpy as np
+
+from tissue.contact.geoms.geom import Geom
+from tissue.core.memento import Memento, Spares, StateRules
+from tissue.core.memento_reading import StateError, put_to
+from tissue.core.memento_writing import written
+from tissue.loads.attachment import Attachment
+from tissue.loads.frame_path import FramePath
+from tissue.loads.ligament import Ligament
+from tissue.loads.load import Load
+from tissue.loads.material_points import MaterialPoints
+from tissue.state.identity import Identity
+from tissue.state.memory_in_use import STRUCTS
+
+_TREE = "tree"
+"""Name of the JSON in the bytes of a state."""
+
+
+def _none() -> None:
+    return None
+
+
+RULES = StateRules(
+    packages=frozenset({"tissue"}),
+    kept=frozenset(
+        {"Material", "BladeShape", "SolverSettings", "CutSettings", "Identity", "Spares"}
+        | {"Hierarchical", "SameTypes"}
+    ),
+    derived={
+        "BladeInteraction._context": _none,
+        "BladeInteraction._views": dict,
+        "System._context": _none,
+        "GlobalStepper._relaxation": _none,
+        "StellarScheme._cut": _none,
+        "BodyQueries._chunks": _none,
+    },
+    own=frozenset({"GlobalStepper._threads", "SavedBody._spares"}),
+    structs=STRUCTS,
+    made={
+        kind.__name__: kind
+        for kind in (Attachment, FramePath, Geom, Ligament, Load, MaterialPoints)
+    },
+)
+"""What of a tissue is its state."""
+
+
+class TissueState:
+    """A tissue at one time: mesh, motion, cuts and all that the next step depends on.
+
+    It is made by `Tissue.save_state`, or from bytes, and does not change.
+    """
+
+    def __init__(
+        self, identity: Identity, memento: Memento | None, content: dict[str, np.ndarray] | None
+    ) -> None:
+        self._identity = identity
+        self._memento = memento
+        self._content = content
+
+    @classmethod
+    def of(cls, tissue: Any, identity: Identity, spares: Spares) -> Self:
+        """Return the state of a tissue now."""
+        return cls(identity, Memento(tissue, RULES, spares), None)
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """Return the state that `to_bytes` wrote.
+
+        Raises:
+            StateError: the bytes are no state, or not all of one.
+        """
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as file:
+                content = {name: file[name] for name in file.files}
+            tree = json.loads(content[_TREE].tobytes())
+            identity = Identity(*(tree["identity"][name] for name in Identity._fields))
+        except (ValueError, KeyError, OSError, EOFError, zipfile.BadZipFile) as error:
+            raise StateError(
+                f"these {len(data)} bytes are no state of a tissue, or a part of one is missing or "
+                f"damaged ({error}): take another one"
+            ) from error
+        return cls(identity, None, content)
+
+    def to_bytes(self) -> bytes:
+        """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and one of JSON."""
+        file = io.BytesIO()
+        np.savez(file, allow_pickle=False, **self._written())
+        return file.getvalue()
+
+    def load_into(self, tissue: Any, identity: Identity) -> None:
+        """Put a tissue to this state.
+
+        Raises:
+            StateError: it is not of that tissue; the tissue is as it was.
+        """
+        if self._memento is not None and self._memento.root is tissue:
+            self._memento.restore()
+            return
+        identity.expect(self._identity)
+        content = self._written()
+        put_to(tissue, json.loads(content[_TREE].tobytes()), content, RULES)
+
+    def _written(self) -> dict[str, np.ndarray]:
+        """Return the state as arrays by their names."""
+        if self._content is not None:
+            return self._content
+        assert self._memento is not None
+        tree, arrays = written(self._memento)
+        tree["identity"] = self._identity._asdict()
+        text = json.dumps(tree, allow_nan=False).encode()
+        return arrays | {_TREE: np.frombuffer(text, np.uint8)}
