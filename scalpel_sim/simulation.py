@@ -15,6 +15,7 @@ from scalpel_sim.arm.led_grasper import LedGrasper
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.output.recording import Recording, columns_of_hand, held_columns
+from scalpel_sim.state.simulation_state import SimulationState
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, StageTimes, StepResult, Wrench
 
@@ -168,6 +169,25 @@ class Simulation:
         self._record(now, segment, drawn - done, done - start)
         self.wall_seconds += time.perf_counter() - start
         return self.wrench
+
+    def save_state(self) -> SimulationState:
+        """Return the state of arm, coupling and tissue after the last frame.
+
+        Raises:
+            StateError: the tissue is in another process.
+        """
+        return SimulationState.of(self)
+
+    def load_state(self, state: SimulationState) -> None:
+        """Put it back to a state of its own, as often as wanted; frames after that are forgotten.
+
+        The frames that follow are those that followed then, to the bit. Wall times, pictures and
+        files that were written stay.
+
+        Raises:
+            StateError: the state is of another simulation.
+        """
+        state.load_into(self)
 
     def _record(self, now: float, segment: BladeSegment, *wall_seconds: float) -> None:
         """Add a frame to the recording, and to its row how long that took.

@@ -16,6 +16,8 @@ from .core.jit import kernel as kernel
 from .core.three_vectors import BladeSegment as BladeSegment
 from .core.three_vectors import BladeSweep as BladeSweep
 from .core.three_vectors import Wrench as Wrench
+from .core.memento import Memento as Memento
+from .core.memento import StateRules as StateRules
 from .core.memento_reading import StateError as StateError
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
@@ -90,6 +92,7 @@ __all__ = [
     "MATERIALS",
     "Material",
     "MaterialPoints",
+    "Memento",
     "MeshError",
     "MeshMeasures",
     "Piece",
@@ -103,6 +106,7 @@ __all__ = [
     "SpringError",
     "StageTimes",
     "StateError",
+    "StateRules",
     "StepResult",
     "Surface",
     "TetrahedralMesh",

@@ -115,6 +115,10 @@ class Recording:
         self._row.pack_into(self._memory, self._n * self._row.size, *row)
         self._n += 1
 
+    def cut_back(self, n_frames: int) -> None:
+        """Forget all frames but the first `n_frames`, of which there are as many."""
+        self._n = n_frames
+
     def column(self, name: str) -> FloatArray:
         """Return one column, shape (n_frames,). A view."""
         return self.rows[:, self.columns.index(name)]

@@ -27,11 +27,11 @@ class StateRules(NamedTuple):
     """Packages whose classes are walked. Objects of others are kept as they are."""
     kept: frozenset[str]
     """Names of classes whose objects never change, or are no state."""
-    derived: Mapping[str, Callable[[], Any]]
+    derived: Mapping[str, Callable[[], Any]] = MappingProxyType({})
     """Attributes that are made again from others, and what they are until then."""
-    own: frozenset[str]
+    own: frozenset[str] = frozenset()
     """Attributes that are no state: an object keeps its own."""
-    structs: StructRules
+    structs: StructRules = StructRules()
     """What of the memory of structs is state."""
     made: Mapping[str, type] = MappingProxyType({})
     """Classes of objects that are made where a state from elsewhere has more of them, by name."""

@@ -172,10 +172,7 @@ class _Reader:
             else:
                 fields[name] = self.value(written, now)
                 same = same and (fields[name] is now or fields[name] == now)
-        if same:
-            struct = live
-        else:
-            struct = kind(**(fields | _new_arrays(node["fields"])))
+        struct = live if same else kind(**(fields | _new_arrays(node["fields"])))
         self._taken.add(id(struct))
         self._made[number] = self._structs[node["index"]] = struct
 

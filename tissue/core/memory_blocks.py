@@ -22,7 +22,7 @@ WORD: Final = 8
 BLOCK: Final = 256
 """Words of a block: half a page. Larger: more of one value is copied; smaller: more to look up."""
 
-ADDRESS, LENGTH, COUNTER, UNIT, PER_UNIT, LEAD, HAS_REST = range(7)
+ADDRESS, SPAN_LENGTH, COUNTER, UNIT, PER_UNIT, LEAD, HAS_REST = range(7)
 """Columns of a table of spans, each a number of words but for:
 
 ADDRESS, where it begins; COUNTER, address of the number of things in use, or 0 where all is;
@@ -92,10 +92,10 @@ def packed(spans: IntArray, room: IntArray) -> PackedMemory:
     in_use, rest = np.empty(n, np.int64), np.empty(n, np.int64)
     n_blocks = measure_memory(spans, in_use, rest)
     is_filled, value = np.empty(n_blocks, np.bool_), np.empty(n_blocks, np.int64)
-    most = int(in_use.sum())
-    words = room if len(room) >= most else np.empty(most + most // 8, np.int64)
-    n_words = pack_memory(spans, in_use, is_filled, value, words)
-    return PackedMemory(in_use, rest, is_filled, value, words[:n_words])
+    n_words = find_filled_blocks(spans, in_use, is_filled, value)
+    words = room[:n_words] if len(room) >= n_words else np.empty(n_words, np.int64)
+    pack_memory(spans, in_use, is_filled, words)
+    return PackedMemory(in_use, rest, is_filled, value, words)
 
 
 def unpacked(spans: IntArray, memory: PackedMemory, *, is_new: bool = False) -> None:
@@ -108,7 +108,7 @@ def unpacked(spans: IntArray, memory: PackedMemory, *, is_new: bool = False) -> 
     """
     live, rest = np.empty((2, len(spans)), np.int64)
     measure_memory(spans, live, rest)
-    unpack_memory(spans, spans[:, LENGTH] if is_new else live, *memory)
+    unpack_memory(spans, spans[:, SPAN_LENGTH] if is_new else live, *memory)
 
 
 @kernel
@@ -116,31 +116,23 @@ def measure_memory(spans: IntArray, in_use: IntArray, rest: IntArray) -> int:
     """Write how many words of each span are in use, and the one behind; return how many blocks."""
     n_blocks = 0
     for i in range(len(spans)):
-        n = spans[i, LENGTH]
+        n = spans[i, SPAN_LENGTH]
         if spans[i, COUNTER] != 0:
             units = -(-words_at(spans[i, COUNTER], 1)[0] // spans[i, UNIT])
             n = min(n, spans[i, LEAD] + units * spans[i, PER_UNIT])
         in_use[i] = n
-        has_more = n < spans[i, LENGTH]
+        has_more = n < spans[i, SPAN_LENGTH]
         rest[i] = words_at(spans[i, ADDRESS] + WORD * n, 1)[0] if has_more else 0
         n_blocks += -(-n // BLOCK)
     return n_blocks
 
 
 @kernel
-def pack_memory(
-    spans: IntArray, in_use: IntArray, is_filled: BoolArray, value: IntArray, words: IntArray
+def find_filled_blocks(
+    spans: IntArray, in_use: IntArray, is_filled: BoolArray, value: IntArray
 ) -> int:
-    """Write what is in spans of memory; return the number of words.
-
-    Args:
-        spans: See `packed`.
-        in_use: Number of words of each span.
-        is_filled: Written, as the rest; see `PackedMemory`.
-        value: The word that fills a block.
-        words: The words of others.
-    """
-    block = at = 0
+    """Find the blocks that hold one value, and that; return how many words the others have."""
+    block = n_words = 0
     for i in range(len(spans)):
         n = in_use[i]
         memory = words_at(spans[i, ADDRESS], n)
@@ -148,12 +140,25 @@ def pack_memory(
             end = min(begin + BLOCK, n)
             is_filled[block] = _holds_one_value(memory, begin, end)
             value[block] = memory[begin]
+            n_words += 0 if is_filled[block] else end - begin
+            block += 1
+    return n_words
+
+
+@kernel
+def pack_memory(spans: IntArray, in_use: IntArray, is_filled: BoolArray, words: IntArray) -> None:
+    """Write the blocks in use that hold more than one value."""
+    block = at = 0
+    for i in range(len(spans)):
+        n = in_use[i]
+        memory = words_at(spans[i, ADDRESS], n)
+        for begin in range(0, n, BLOCK):
+            end = min(begin + BLOCK, n)
             if not is_filled[block]:
                 for k in range(end - begin):
                     words[at + k] = memory[begin + k]
                 at += end - begin
             block += 1
-    return at
 
 
 @kernel
@@ -180,7 +185,7 @@ def unpack_memory(
     block = at = 0
     for i in range(len(spans)):
         n = in_use[i]
-        memory = words_at(spans[i, ADDRESS], spans[i, LENGTH])
+        memory = words_at(spans[i, ADDRESS], spans[i, SPAN_LENGTH])
         for begin in range(0, n, BLOCK):
             end = min(begin + BLOCK, n)
             if is_filled[block]:

@@ -30,9 +30,9 @@ class RowsInUse(NamedTuple):
 class StructRules(NamedTuple):
     """Which memory of structs is state."""
 
-    scratch: frozenset[str]
+    scratch: frozenset[str] = frozenset()
     """Names of classes, and of arrays as `Class.field`, that hold nothing from step to step."""
-    in_use: Callable[[Sequence[Arrays]], Iterable[RowsInUse]]
+    in_use: Callable[[Sequence[Arrays]], Iterable[RowsInUse]] = lambda _: ()
     """Returns what is in use in some of these structs; of others all is."""
 
 

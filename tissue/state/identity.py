@@ -13,7 +13,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body
 from tissue.solver_settings import SolverSettings
 
-FORMAT = 1
+STATE_FORMAT = 1
 """Number of the form of a state in bytes. It rises where the form changes."""
 
 _FREE = ("solver.threads",)
@@ -26,7 +26,7 @@ def version_now() -> str:
         version = importlib.metadata.version("scalpel-sim")
     except importlib.metadata.PackageNotFoundError:
         version = "source"
-    return f"{version} (form {FORMAT})"
+    return f"{version} (form {STATE_FORMAT})"
 
 
 class Identity(NamedTuple):

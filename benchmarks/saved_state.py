@@ -1,0 +1,64 @@
+"""Times saving and loading the state of a scene: at rest, in the middle of its cut, and after it.
+
+Usage: PYTHONPATH=. python benchmarks/saved_state.py [SCENE], on an idle machine
+
+"kept" is a state whose memory is new, as each of a hundred that are kept for undo; "again" one that
+takes the memory of an earlier one, as a state that is saved in each frame to go back by a frame.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from statistics import median
+
+from bridge import InProcessLink
+from scalpel_sim import SCENES, Simulation, prepare
+from tissue import TissueState
+
+N_TIMES = 50
+MILLISECONDS = 1e3
+
+
+def main() -> None:
+    """Print the times."""
+    name = sys.argv[1] if len(sys.argv) > 1 else "organ"
+    simulation = prepare(SCENES[name])
+    print(f"{name}, medians of {N_TIMES} [ms]; the last two columns: arm and coupling with it")
+    columns = ("tetrahedra", "kept", "again", "load", "to bytes", "MB", "again", "load")
+    print(" " * 10 + "".join(f"{column:>11s}" for column in columns))
+    for when, share in (("at rest", 0.0), ("in mid-cut", 0.5), ("after", 1.0)):
+        simulation.run(share * simulation.duration + simulation.dt)
+        print(f"{when:10s}" + "".join(f"{number:11.4g}" for number in figures(simulation)))
+
+
+def figures(simulation: Simulation) -> tuple[float, ...]:
+    """Return the numbers of a row."""
+    link = simulation.link
+    assert isinstance(link, InProcessLink)
+    tissue = link.tissue
+    state, whole = tissue.save_state(), simulation.save_state()
+    states: list[TissueState] = []
+    return (
+        tissue.n_tetrahedra,
+        milliseconds(lambda: states.append(tissue.save_state())),
+        milliseconds(tissue.save_state),
+        milliseconds(lambda: tissue.load_state(state)),
+        milliseconds(state.to_bytes),
+        1e-6 * len(state.to_bytes()),
+        milliseconds(simulation.save_state),
+        milliseconds(lambda: simulation.load_state(whole)),
+    )
+
+
+def milliseconds(do: Callable[[], object]) -> float:
+    """Return how long a call takes, the median of several [ms]."""
+    times = []
+    for _ in range(N_TIMES):
+        start = time.perf_counter()
+        do()
+        times.append(time.perf_counter() - start)
+    return MILLISECONDS * median(times)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The state of a simulation, to which it can be put back."""
