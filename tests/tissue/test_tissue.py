@@ -157,7 +157,7 @@ def test_the_engine_copies_its_arguments(tissue):
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickle.dumps])
 def test_a_tissue_refuses_to_be_copied_and_says_what_to_do(tissue, copied):
-    with pytest.raises(TypeError, match=r"neither pickled nor copied; take Tissue.snapshot"):
+    with pytest.raises(TypeError, match=r"neither pickled nor copied; take Tissue.save_state"):
         copied(tissue)
 
 

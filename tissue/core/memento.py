@@ -25,7 +25,7 @@ class StateRules(NamedTuple):
 
     packages: frozenset[str]
     """Packages whose classes are walked. Objects of others are kept as they are."""
-    kept: frozenset[str]
+    kept: frozenset[str] = frozenset()
     """Names of classes whose objects never change, or are no state."""
     derived: Mapping[str, Callable[[], Any]] = MappingProxyType({})
     """Attributes that are made again from others, and what they are until then."""

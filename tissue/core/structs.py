@@ -175,8 +175,8 @@ class Arrays:
         """
         raise TypeError(
             f"{type(self).__name__} holds addresses of memory, so that a Tissue can be neither "
-            "pickled nor copied; take Tissue.snapshot(), or make another Tissue and do the same "
-            "steps, which gives the same bits"
+            "pickled nor copied; take Tissue.save_state(), which a Tissue made alike can load from "
+            "bytes"
         )
 
 
