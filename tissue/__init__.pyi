@@ -13,12 +13,12 @@ from .core.cache_directory import n_compiled_kernels as n_compiled_kernels
 from .core.jit import SameTypes as SameTypes
 from .core.jit import is_compiling as is_compiling
 from .core.jit import kernel as kernel
-from .core.three_vectors import BladeSegment as BladeSegment
-from .core.three_vectors import BladeSweep as BladeSweep
-from .core.three_vectors import Wrench as Wrench
 from .core.memento import Memento as Memento
 from .core.memento import StateRules as StateRules
 from .core.memento_reading import StateError as StateError
+from .core.three_vectors import BladeSegment as BladeSegment
+from .core.three_vectors import BladeSweep as BladeSweep
+from .core.three_vectors import Wrench as Wrench
 from .cut_settings import CutReport as CutReport
 from .cut_settings import CutSettings as CutSettings
 from .cut_settings import MeshMeasures as MeshMeasures
