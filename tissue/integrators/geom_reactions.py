@@ -11,7 +11,13 @@ Source: Baraff (1994), Fast contact force computation for nonpenetrating rigid b
 in terms of accelerations.
 """
 
-from tissue.contact.geoms.contact_impulses import SWEEPS, mobility_at, push, weighted
+from tissue.contact.geoms.contact_impulses import (
+    SWEEPS,
+    add_to_nodes,
+    mobility_at,
+    push,
+    weighted,
+)
 from tissue.contact.geoms.geom_arrays import GeomContacts
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
@@ -53,7 +59,7 @@ def add_geom_reactions(
 def _note_accelerations(
     context: StepContext, positions: FloatArray, velocities: FloatArray
 ) -> None:
-    """Note how the nodes of contacts accelerate under the forces of the last substep."""
+    """Note how the nodes that touch accelerate, with contact as it was in the last substep."""
     contacts, body, accelerations = context.geoms, context.body, context.geoms.acceleration
     rows = range(contacts.first, contacts.first + contacts.n_contacts)
     for c in rows:
@@ -77,11 +83,7 @@ def _note_accelerations(
 def _change_reaction(contacts: GeomContacts, body: Body, c: int, change: Vec3) -> None:
     """Add to the reaction of contact `c` [N], and to the accelerations of its nodes."""
     store(contacts.reaction, c, add(vec3(contacts.reaction, c), change))
-    for q in range(3):
-        node, weight = contacts.node[c, q], contacts.weight[c, q]
-        if weight != 0.0 and not body.fixed[node]:
-            more = axpy(weight / body.masses[node], change, vec3(contacts.acceleration, node))
-            store(contacts.acceleration, node, more)
+    add_to_nodes(contacts, body, c, change, contacts.acceleration)
 
 
 @kernel

@@ -38,6 +38,26 @@ def mobility_at(contacts: GeomContacts, body: Body, c: int) -> float:
 
 
 @kernel
+def add_to_nodes(
+    contacts: GeomContacts, body: Body, c: int, change: Vec3, values: FloatArray
+) -> None:
+    """Add what a change at the point of contact `c` does to its nodes, by weight and by mass.
+
+    Args:
+        contacts: Nodes and weights.
+        body: Masses; fixed nodes stay as they are.
+        c: The contact.
+        change: An impulse [N s], where `values` are velocities; a force [N], where they are
+            accelerations.
+        values: Written, shape (n_nodes, 3).
+    """
+    for q in range(3):
+        node, weight = contacts.node[c, q], contacts.weight[c, q]
+        if weight != 0.0 and not body.fixed[node]:
+            store(values, node, axpy(weight / body.masses[node], change, vec3(values, node)))
+
+
+@kernel
 def note_velocities(contacts: GeomContacts, body: Body, c: int) -> None:
     """Note the velocities of the nodes of contact `c`."""
     for q in range(3):

@@ -17,6 +17,7 @@ from typing import Final
 
 from tissue.contact.geoms.contact_impulses import (
     SWEEPS,
+    add_to_nodes,
     mobility_at,
     note_velocities,
     push,
@@ -163,11 +164,7 @@ def _correct_impulse(contacts: GeomContacts, body: Body, c: int, seconds: float,
     store(contacts.force, c, now)
     change = scale(seconds, sub(now, before))
     push(contacts, c, change, x, axpy(0.5 * mobility, change, v), dt)
-    for q in range(3):
-        node, weight = contacts.node[c, q], contacts.weight[c, q]
-        if weight != 0.0 and not body.fixed[node]:
-            moved = axpy(weight / body.masses[node], change, vec3(body.velocities, node))
-            store(body.velocities, node, moved)
+    add_to_nodes(contacts, body, c, change, body.velocities)
 
 
 @kernel
