@@ -58,12 +58,12 @@ class SimulationState:
         """
         if self._memento.root is not simulation:
             raise StateError(
-                "the state is of another simulation: of that, Tissue.load_state takes the tissue"
+                "the state is of another simulation: load it into the one that saved it"
             )
         if len(simulation.recording) < self.n_frames:
             raise StateError(
                 f"the state is of frame {self.n_frames}, and the recording has "
-                f"{len(simulation.recording)} frames: put the one of then in its place"
+                f"{len(simulation.recording)} frames: put back the recording of then first"
             )
         link, (model, data) = simulation.link, _mujoco_of(simulation)
         assert isinstance(link, InProcessLink)
