@@ -19,6 +19,7 @@ from scalpel_sim.arm.standing import Standing
 from scalpel_sim.arm.standing_fixture import StandingFixture
 from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
+from scalpel_sim.hands.workspace import resting_stroke, tour_of, workspace_in
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
@@ -32,12 +33,19 @@ from tissue import TetrahedralMesh
 
 _log = logging.getLogger("scalpel_sim")
 
+_SAME_LENGTH = 1e-9
+"""Share by which two lengths of one blade may differ, by rounding."""
+
 _ON_TABLE = 1e-9
 """How far below a table an edge may be that ends on it [m]: that is rounding, and no warning."""
 
 
 def prepare(
-    scene: Scene, link: TissueLink | None = None, fixtures: Iterable[Fixture] = ()
+    scene: Scene,
+    link: TissueLink | None = None,
+    fixtures: Iterable[Fixture] = (),
+    *,
+    is_led: bool = False,
 ) -> Simulation:
     """Return the simulation of a scene, at its start.
 
@@ -49,6 +57,8 @@ def prepare(
         link: A body that is already there; None makes that of the scene in this process.
         fixtures: Rigid bodies around it, in the tissue frame: where that lies in the world is
             chosen here, so that the arm reaches.
+        is_led: Whether a hand will lead the blade: then it rests where the strokes of the scene
+            start, and the arm stands where it reaches all around the body.
 
     Raises:
         ValueError: parts of the scene do not fit together; the message says which.
@@ -61,24 +71,32 @@ def prepare(
     table = tabletop_of(scene, bounds)
     stops = [height for height in (scene.table, scene.floor) if height is not None]
     stroke = stroke_through(mesh, scene.strokes, tissue.material, max(stops, default=-math.inf))
-    check_meets(stroke, mesh)
-    needed = _needed(stroke, mesh, scene)
-    _warn_of_table(stroke, table)
+    if not stroke.is_led:
+        check_meets(stroke, mesh)
+    if is_led:
+        stroke = resting_stroke(stroke.pose(0.0))
+    reached = stroke
+    if stroke.is_led:
+        reached = tour_of(workspace_in(scene, stroke.start, bounds), stroke.start)
+    needed = _needed(reached, mesh, scene)
+    _warn_of_table(reached, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
     motions = motions_of(scene.graspers)
     floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
     around = [*fixtures, *floor]
     others: list[Standing] = []
     if scene.own_arm is None:
-        placement = place(stroke, boxes, scene.arm, force=needed.force)
+        placement = place(reached, boxes, scene.arm, force=needed.force)
         frame = TissueFrame(origin=placement.tissue_origin)
-        others += arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, stroke))
+        # Where a hand will lead it is not known: at the start the arms are clear of each other.
+        known = resting_stroke(stroke.start) if stroke.is_led else stroke
+        others += arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, known))
         others += _in_world(table, around, frame)
         arm: LedArm = placement.arm(others=others)
     else:
         arm, frame = _own(scene.own_arm)
-        stroke = lengthened(stroke, arm.blade.length)
-        move_to_start(arm, stroke, frame)
+        stroke = _as_long(stroke, arm.blade.length)
+        move_to_start(arm, resting_stroke(stroke.start) if stroke.is_led else stroke, frame)
         others += arms_with_graspers(scene.graspers, motions, boxes, frame, None)
         others += _in_world(table, around, frame)
         if others:
@@ -106,10 +124,24 @@ def prepare(
     return simulation
 
 
+def _as_long(stroke: Stroke, length: float) -> Stroke:
+    """Return the stroke of a blade of that length [m].
+
+    A hand has led this very blade where the lengths agree, and what was recorded keeps its bits.
+    """
+    is_same = math.isclose(stroke.blade_length, length, rel_tol=_SAME_LENGTH)
+    if is_same and stroke.is_led:
+        return stroke
+    long = lengthened(stroke, length)
+    return resting_stroke(long.start) if stroke.is_led else long
+
+
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:
     """Return what the cut will take; nothing for a press, which is not to cut."""
     if stroke.name == "press":
         return ExpectedForce(0.0, 0.0)
+    if stroke.is_led:  # its whole edge may be in the tissue
+        return ExpectedForce(highest_toughness(scene) * stroke.blade_length, stroke.blade_length)
     return expected_force(stroke, mesh, highest_toughness(scene))
 
 

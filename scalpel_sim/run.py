@@ -3,19 +3,29 @@
 import logging
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
+from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.export import export_surface
-from scalpel_sim.output.run_folder import FINAL, INITIAL, SCENE, Outputs
+from scalpel_sim.output.run_folder import (
+    FINAL,
+    FRAMES_PER_FLUSH,
+    INITIAL,
+    SCENE,
+    STROKE,
+    Outputs,
+)
 from scalpel_sim.output.summary import COMPLETE, RunFacts, Summary, summarise
 from scalpel_sim.scene_file.writing import scene_text
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.tables.stroke import StrokeTable
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.pictures import add_to, into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
@@ -57,6 +67,7 @@ def perform(
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
     exports: Sequence[Path] = (),
+    hand: LiveHand | None = None,
 ) -> Summary:
     """Do the run, and write its files.
 
@@ -72,6 +83,8 @@ def perform(
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
         exports: Files for the body's surface after the run; see `output.export`.
+        hand: Who leads the blade; what is done is written as `stroke.csv`, and the run ends with a
+            rest after the hand has ended.
 
     Raises:
         Interrupted: the user or the system ended the run.
@@ -80,6 +93,9 @@ def perform(
     seconds = run_time(simulation, seconds)
     body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
     at_first = simulation.link.snapshot()
+    simulation.leader = hand or simulation.leader
+    if scene is not None and hand is not None:
+        scene = _led_scene(scene, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
@@ -94,12 +110,16 @@ def perform(
     )
     simulation.pictures.append(into_replay(replay))
     _warn_if_slow(simulation)
-    stopped, failure = _run_frames(simulation, outputs, seconds, every_frame)
+    stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, hand)
     status = stopped or (COMPLETE if failure is None else f"failed: {one_line(failure)}")
 
     unwritten = _Attempts()
     with unwritten:
         outputs.write_forces(simulation.recording, all_rows=True)
+    if hand is not None:
+        hand.finish(simulation.time)
+        with unwritten:
+            outputs.write_stroke(hand.take_rows())
     summary = summarise(
         simulation.recording,
         _facts(simulation, body, status, settings, outputs, unwritten, asked),
@@ -133,15 +153,18 @@ def _run_frames(
     outputs: Outputs,
     seconds: float,
     every_frame: Callable[[Simulation], None] | None,
+    hand: LiveHand | None,
 ) -> tuple[str | None, Exception | None]:
     """Do the frames, and return the signal that ended them early, and the error that did."""
     with StopSignals() as stop:
 
         def after_frame(now: Simulation) -> bool:
             outputs.write_forces(now.recording)
+            if hand is not None and len(now.recording) % FRAMES_PER_FLUSH == 0:
+                outputs.write_stroke(hand.take_rows())
             if every_frame is not None:
                 every_frame(now)
-            return stop.reason is not None
+            return stop.reason is not None or (hand is not None and _has_rested(now, hand))
 
         failure = None
         try:
@@ -149,6 +172,21 @@ def _run_frames(
         except Exception as error:
             failure = error
     return stop.reason, failure
+
+
+def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
+    """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
+    if hand.ended_at is None:
+        return False
+    # The very number of frames of a run that repeats the stroke.
+    n_frames = round((hand.ended_at + REST_AFTER_STROKE) / simulation.dt)
+    return len(simulation.recording) >= n_frames
+
+
+def _led_scene(scene: Scene, outputs: Outputs) -> Scene:
+    """Return the scene that repeats what the hand will have done."""
+    recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
+    return replace(scene, strokes=(recorded,), seconds=None)
 
 
 def _facts(

@@ -41,6 +41,13 @@ class Partner(Protocol):
         """Apply to the model what the tissue did in its step."""
 
 
+class Leader(Protocol):
+    """What leads the hand: a `StrokeFollower`, or a person by a `LiveHand`."""
+
+    def lead(self, t: float) -> None:
+        """Lead the blade to its pose at time `t` [s], a step after the last one."""
+
+
 class Simulation:
     """An arm that leads a blade along a stroke, and the tissue that the blade cuts.
 
@@ -105,7 +112,8 @@ class Simulation:
     @stroke.setter
     def stroke(self, stroke: Stroke) -> None:
         self._stroke = stroke
-        self._follower = StrokeFollower(self.arm.hand, stroke, self.frame)
+        self.leader: Leader = StrokeFollower(self.arm.hand, stroke, self.frame)
+        """What leads the blade in each frame."""
 
     def add_grasper(self, grasper: LedGrasper) -> None:
         """Have a grasper of the arm's model take part, before the first frame."""
@@ -123,7 +131,8 @@ class Simulation:
     @property
     def title(self) -> str:
         """Name of the scene and of the stroke, for a heading."""
-        return f"{self.link.describe().scene}: {self.stroke.name} stroke"
+        stroke = "led by hand" if self.stroke.is_led else f"{self.stroke.name} stroke"
+        return f"{self.link.describe().scene}: {stroke}"
 
     @property
     def time(self) -> float:
@@ -148,7 +157,7 @@ class Simulation:
         """
         start = time.perf_counter()
         arm, blade, now = self.arm, self.arm.blade, self.time
-        self._follower.lead(now)
+        self.leader.lead(now)
         for grasper in self.graspers:
             grasper.lead(now)
         arm.step1()

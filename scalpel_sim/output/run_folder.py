@@ -4,7 +4,7 @@ import json
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import IO, TypeVar
 
 import msgspec
 import numpy as np
@@ -13,6 +13,7 @@ from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS, Recording
 from scalpel_sim.output.summary import Summary
+from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import FloatArray, Snapshot, write_vtu
 
@@ -26,8 +27,10 @@ INITIAL = "initial.vtu"
 FINAL = "final.vtu"
 REPLAY = "replay.html"
 SCENE = "scene.toml"
+STROKE = "stroke.csv"
+"""What a hand did. A scripted run leaves it: it may be the very stroke that is done again."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
-"""Names of all files that a run can write."""
+"""Names of all files that a run can write, beside `STROKE`."""
 
 FRAMES_PER_FLUSH = 25
 """Number of rows of `forces.csv` that are written together, which takes 0.1 ms: a kill loses a
@@ -58,6 +61,7 @@ class Outputs:
         self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
         self._append((",".join(columns) + "\n").encode("ascii"))
         self._n_written = 0
+        self._stroke: IO[bytes] | None = None
 
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
@@ -82,6 +86,18 @@ class Outputs:
         self._append(_csv(recording.rows[self._n_written :]))
         self._n_written = len(recording)
 
+    def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
+        """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew.
+
+        Numbers are written so that reading them gives the same bits.
+        """
+        text = _csv(np.array(rows)) if rows else b""
+        if self._stroke is None:
+            self._stroke = _naming_path(self.path(STROKE), lambda p: p.open("wb", buffering=0))
+            text = (",".join(LED_COLUMNS) + "\n").encode("ascii") + text
+        stroke = self._stroke
+        _naming_path(self.path(STROKE), lambda _: stroke.write(text))
+
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
         self._plotter.start(self.path(FORCES), title, self.path(PLOT), self.path(ENERGY_PLOT))
@@ -100,8 +116,10 @@ class Outputs:
         _naming_path(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
 
     def close(self) -> None:
-        """Close `forces.csv`. May be called twice."""
+        """Close `forces.csv` and `stroke.csv`. May be called twice."""
         self._forces.close()
+        if self._stroke is not None:
+            self._stroke.close()
 
     def _append(self, text: bytes) -> None:
         _naming_path(self.path(FORCES), lambda _: self._forces.write(text))

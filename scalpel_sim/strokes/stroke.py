@@ -21,6 +21,10 @@ millimetres do."""
 
 _COLUMNS = ("t", "tip_x", "tip_y", "tip_z", "heel_x", "heel_y", "heel_z")
 FORWARD_COLUMNS = ("forward_x", "forward_y", "forward_z")
+_ENGAGED_COLUMN = "engaged"
+
+LED_COLUMNS = (*_COLUMNS, *FORWARD_COLUMNS, _ENGAGED_COLUMN)
+"""Columns of a stroke that was led by hand."""
 
 
 class StrokeError(UsageError):
@@ -39,6 +43,7 @@ class Stroke:
         segments: The n poses, n >= 2. `forward` is made orthogonal to the edge.
         name: For messages and reports.
         asked: Intervals in which the edge passes what it is to cut [s]; None where it is not known.
+        is_led: Whether a person leads it, or has led it.
 
     Raises:
         StrokeError: fewer than two poses; a number that is not finite; times that do not increase;
@@ -53,8 +58,12 @@ class Stroke:
         name: str = "",
         *,
         asked: Sequence[tuple[float, float]] | None = None,
+        is_led: bool = False,
     ) -> None:
         self.name = name
+        self.is_led = is_led
+        """Whether a person leads it, or has led it: the arm then stands where it reaches all
+        around the body, wherever that stroke goes."""
         self.asked = asked
         """Intervals in which the edge passes what it is to cut [s]; None where it is not known."""
         given = np.array(times, np.float64)
@@ -63,18 +72,17 @@ class Stroke:
                 f"a stroke has {len(given)} times and {len(segments)} poses; it needs as many of "
                 "one as of the other, and at least two"
             )
+        self.start = segments[0]
+        """The first pose, as it was given."""
         tips, heels, forwards = (np.array(part, np.float64) for part in zip(*segments, strict=True))
         if not tips.shape == heels.shape == forwards.shape == (len(segments), 3):
             raise StrokeError("tip, heel and forward of every pose are three numbers each")
         _check(given, tips, heels, forwards)
         self.times = given - given[0]
         """Times of the poses [s], from 0; shape (n,)."""
-        edges = tips - heels
-        lengths = np.linalg.norm(edges, axis=1)
+        middles, rotations, lengths = poses_of_edges(tips, heels, forwards)
         self.blade_length = float(lengths[0])
         """From heel to tip [m]."""
-        middles = (tips + heels) / 2.0
-        rotations = _quaternions(edges / lengths[:, None], forwards)
         self.path = np.column_stack(
             [
                 self.times[:-1],
@@ -107,12 +115,28 @@ class Stroke:
         return [self.pose(t) for t in np.linspace(0.0, self.duration, count)]
 
 
+def poses_of_edges(
+    tips: FloatArray, heels: FloatArray, forwards: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the middles of edges [m], their rotations (w, x, y, z), and their lengths [m].
+
+    Args:
+        tips: Shape (n, 3), as the others.
+        heels: The other ends [m].
+        forwards: Directions in which they cut; only the part across the edge counts.
+    """
+    edges = tips - heels
+    lengths = np.linalg.norm(edges, axis=1)
+    return (tips + heels) / 2.0, _quaternions(edges / lengths[:, None], forwards), lengths
+
+
 def from_csv(path: str | Path) -> Stroke:
     """Read a stroke from a CSV file: one pose per line, in metres and seconds, tissue frame.
 
     The first line names the columns: `t, tip_x, tip_y, tip_z, heel_x, heel_y, heel_z` and, if
     wanted, `forward_x, forward_y, forward_z`, in any order. Without the latter the blade cuts
     in the direction in which it moves. Empty lines, and lines that start with #, are skipped.
+    A stroke that was led by hand has a last column, `engaged`: whether the hand led the blade.
 
     Raises:
         StrokeError: no such file, or one that is no such table; the message names file and line.
@@ -135,13 +159,13 @@ def from_csv(path: str | Path) -> Stroke:
     if len(table) < 2:
         raise StrokeError(f"{path} has {len(table)} poses; a stroke needs at least two")
     times, tips, heels = table[:, 0], table[:, 1:4], table[:, 4:7]
-    if len(columns) > len(_COLUMNS):
+    if len(columns) >= len(_COLUMNS) + len(FORWARD_COLUMNS):
         forwards = table[:, 7:10]
     else:
         forwards = _forwards_of_motion(path, tips, heels)
     try:
         segments = [BladeSegment(*pose) for pose in zip(tips, heels, forwards, strict=True)]
-        return Stroke(times, segments, path.stem)
+        return Stroke(times, segments, path.stem, is_led=len(columns) == len(LED_COLUMNS))
     except _PoseError as error:
         raise StrokeError(f"{path}, line {numbered[1 + error.pose][0]}: {error.problem}") from error
 
@@ -211,8 +235,9 @@ def _quaternions(edges: FloatArray, forwards: FloatArray) -> FloatArray:
 
 def _turn(before: FloatArray, after: FloatArray) -> FloatArray:
     """Return the rotation vector, in the frame of `before`, that leads to `after`."""
-    turn = np.empty(3)
-    mujoco.mju_subQuat(turn, after, before)
+    turn = np.zeros(3)
+    if not np.array_equal(before, after):  # a blade at rest is not turned by rounding
+        mujoco.mju_subQuat(turn, after, before)
     return turn
 
 
@@ -220,6 +245,8 @@ def _columns(path: Path, number: int, header: list[str]) -> list[int]:
     """Return where each of the columns is, in the order in which they are used."""
     names = [name.lower() for name in header]
     wanted = _COLUMNS + (FORWARD_COLUMNS if set(FORWARD_COLUMNS) & set(names) else ())
+    if _ENGAGED_COLUMN in names:
+        wanted = LED_COLUMNS
     if sorted(names) != sorted(wanted):
         raise StrokeError(
             f"{path}, line {number}: the columns are '{','.join(header)[:200]}'; wanted "

@@ -1,0 +1,87 @@
+"""What a page may ask of the hand: small messages as JSON, checked where they come in."""
+
+import math
+from typing import Annotated
+
+import msgspec
+
+LONGEST_MESSAGE = 256
+"""Longest message [bytes]. The longest that makes sense has some 120."""
+
+FARTHEST_MOVE = 0.1
+"""Largest displacement of one message [m]: more than the width of a body is no hand's."""
+
+FARTHEST_TURN = math.pi / 2.0
+"""Largest turn of one message [rad]."""
+
+LATEST_STAMP = 1e12
+"""Largest stamp [ms]: some thirty years."""
+
+LONGEST_SILENCE = 0.5
+"""Wall time without a message after which an engaged hand lets go [s]: the page says ten times a
+second that it is there."""
+
+_ThreeNumbers = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
+_Stamp = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST_STAMP)]
+
+
+class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A message; `type` says which."""
+
+
+class Engage(_Message, frozen=True, tag="engage"):
+    """The hand takes hold: from now on moves and turns lead the blade."""
+
+
+class Release(_Message, frozen=True, tag="release"):
+    """The hand lets go: the blade stays where it is."""
+
+
+class Move(_Message, frozen=True, tag="move"):
+    """Move the blade."""
+
+    by: _ThreeNumbers
+    """Displacement [m], world frame."""
+    stamp: _Stamp
+    """Time of the input by the page's clock [ms], to measure how late the picture is."""
+
+
+class Turn(_Message, frozen=True, tag="turn"):
+    """Turn the blade about the middle of its edge."""
+
+    by: _ThreeNumbers
+    """Rotation vector [rad], world frame."""
+    stamp: _Stamp
+    """See `Move`."""
+
+
+class StillThere(_Message, frozen=True, tag="still there"):
+    """The page is still there, and its hand has nothing new to say."""
+
+
+class Lead(_Message, frozen=True, tag="lead"):
+    """The page asks to be the one that leads."""
+
+
+class End(_Message, frozen=True, tag="end"):
+    """The run is to end."""
+
+
+Command = Engage | Release | Move | Turn | StillThere | Lead | End
+
+_decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
+
+
+def command_of(message: str | bytes) -> Command | None:
+    """Return the command of a message; None where it is none, or asks for too much."""
+    if len(message) > LONGEST_MESSAGE:
+        return None
+    try:
+        command = _decoder.decode(message)
+    except (msgspec.MsgspecError, UnicodeError, RecursionError):
+        return None
+    if isinstance(command, Move | Turn):
+        most = FARTHEST_MOVE if isinstance(command, Move) else FARTHEST_TURN
+        size = math.hypot(*command.by)
+        return command if size <= most else None  # NaN is not
+    return command

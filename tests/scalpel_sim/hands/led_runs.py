@@ -1,0 +1,65 @@
+"""Runs of a scene that a script leads as a person would: by commands."""
+
+import math
+
+import numpy as np
+
+from scalpel_sim import SCENES, Simulation, prepare
+from scalpel_sim.hands.commands import Engage, Move, Turn
+from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.workspace import workspace_in
+
+GRID2 = SCENES["grid2"]
+
+PERIOD = 16
+"""Frames between two moves of a page that draws sixty pictures a second."""
+
+
+class Clock:
+    """Wall time [s] that passes where a test says so."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def led(scene=GRID2, clock=None, seconds=math.inf) -> tuple[Simulation, LiveHand]:
+    """Return a simulation at its start, and the hand that leads it."""
+    simulation = prepare(scene, is_led=True)
+    bounds = simulation.link.describe().bounds
+    hand = LiveHand(
+        simulation.arm.hand,
+        simulation.stroke,
+        simulation.frame,
+        workspace_in(scene, simulation.stroke.start, bounds),
+        dt=simulation.dt,
+        seconds=seconds,
+        clock=clock or Clock(),
+    )
+    simulation.leader = hand
+    return simulation, hand
+
+
+def move(x=0.0, y=0.0, z=0.0, stamp=0.0) -> Move:
+    return Move([x, y, z], stamp)
+
+
+def turn(x=0.0, y=0.0, z=0.0, stamp=0.0) -> Turn:
+    return Turn([x, y, z], stamp)
+
+
+def through_the_body(hand: LiveHand):
+    """Return a callback that draws the blade through the body, in a bend and with a pause."""
+    rng = np.random.default_rng(0)
+    hand.commands.append(Engage())
+
+    def command(simulation: Simulation) -> None:
+        n = len(simulation.recording)
+        if n % PERIOD == 0 and not 300 <= n < 350:
+            x, z = rng.normal(0.0, 2e-4, 2)
+            hand.commands.append(move(x, 1.6e-3, z, stamp=float(n)))
+            hand.commands.append(turn(z=2e-3))
+
+    return command

@@ -1,0 +1,198 @@
+import numpy as np
+import pytest
+
+from scalpel_sim import prepare
+from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
+from scalpel_sim.hands.live_hand import (
+    ARRIVED,
+    FARTHEST_AHEAD,
+    MOST_SPEED,
+    MOST_TURN_RATE,
+    LiveHand,
+)
+from scalpel_sim.hands.workspace import ROOM
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.recording import COLUMNS
+from scalpel_sim.output.run_folder import FINAL, STROKE, Outputs
+from scalpel_sim.run import REST_AFTER_STROKE, perform
+from scalpel_sim.scene_parts.scene import changed
+from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
+from tests.scalpel_sim.hands.led_runs import GRID2, Clock, led, move, through_the_body, turn
+
+UNTIMED = COLUMNS.index("cd_s")
+"""Columns from here on are wall times."""
+
+DT = 1e-3
+"""Length of a frame [s]."""
+
+ROUNDING = 1e-12
+"""By which a limit may be passed, in its unit."""
+
+
+@pytest.fixture(scope="module")
+def at_start():
+    return led()
+
+
+@pytest.fixture
+def hand(at_start):
+    """A hand at the start of the scene, that leads the arm of `at_start`."""
+    simulation, first = at_start
+    return LiveHand(
+        simulation.arm.hand,
+        simulation.stroke,
+        simulation.frame,
+        first._workspace,
+        dt=DT,
+        clock=Clock(),
+    )
+
+
+def poses(hand, n, first=0):
+    """Return tip, heel and forward of the hand in `n` frames, shape (n, 9)."""
+    found = []
+    for k in range(first, first + n):
+        hand.lead(k * DT)
+        found.append(hand._numbers)
+    return np.array(found)
+
+
+def middles(found):
+    return 0.5 * (found[:, :3] + found[:, 3:6])
+
+
+def test_the_blade_rests_until_the_hand_is_engaged(hand):
+    hand.commands.append(move(y=0.01))
+    found = poses(hand, 100)
+    assert (found == found[0]).all()
+
+
+def test_an_engaged_hand_arrives_where_it_was_moved_to(hand):
+    hand.commands += [Engage(), move(x=0.002, y=0.01), turn(z=0.1)]
+    found = poses(hand, 400)
+    way = middles(found)[-1] - middles(found)[0]
+    assert way == pytest.approx([0.002, 0.01, 0.0], abs=1e-6)
+    forward, turned = found[0, 6:], found[-1, 6:]
+    assert np.arccos(forward @ turned) == pytest.approx(0.1, abs=1e-5)
+    assert (found[-1] == found[-50]).all(), "it rests there"
+
+
+def test_no_move_is_faster_than_the_limits(hand):
+    hand.commands.append(Engage())
+    found = []
+    for k in range(300):
+        hand.commands += [move(y=0.001), turn(z=0.05)]
+        found.append(poses(hand, 1, k)[0])
+    found = np.array(found)
+    speeds = np.linalg.norm(np.diff(middles(found), axis=0), axis=1) / DT
+    turns = np.linalg.norm(np.diff(found[:, 6:], axis=0), axis=1) / DT
+    assert speeds.max() == pytest.approx(MOST_SPEED)
+    assert turns.max() == pytest.approx(MOST_TURN_RATE, rel=1e-3)
+    assert MOST_SPEED < FASTEST / 5.0
+
+
+def test_the_blade_stops_soon_after_the_person_does_however_far_was_asked(hand):
+    poses(hand, 1)
+    hand.commands.append(Engage())
+    hand.commands += [move(y=0.05)] * 10
+    way = np.ptp(middles(poses(hand, 2000, 1)), axis=0)
+    assert way[1] <= FARTHEST_AHEAD + ROUNDING
+
+
+def test_nothing_jumps_when_a_released_hand_is_engaged_again(hand):
+    hand.commands += [Engage(), move(y=0.02)]
+    before = poses(hand, 30)
+    hand.commands.append(Release())
+    released = poses(hand, 50, 30)
+    hand.commands += [move(y=0.02), Engage()]
+    engaged = poses(hand, 50, 80)
+    assert 0.0 < before[-1, 1] - before[0, 1] < 0.01, "it was on its way"
+    assert (released == before[-1]).all() and (engaged == before[-1]).all()
+
+
+def test_a_hand_that_hears_nothing_stops_where_it_is(hand):
+    hand.commands += [Engage(), move(y=0.03)]
+    before = poses(hand, 20)
+    hand._clock.now = LONGEST_SILENCE + 0.01
+    after = poses(hand, 50, 20)
+    assert (after == before[-1]).all()
+    assert not hand.is_engaged
+
+
+def test_a_page_that_says_that_it_is_there_keeps_the_hand_engaged(hand):
+    hand.commands.append(Engage())
+    for k in range(20):
+        hand._clock.now += 0.9 * LONGEST_SILENCE
+        hand.commands.append(StillThere())
+        poses(hand, 1, k)
+    assert hand.is_engaged
+
+
+def test_the_tip_stays_in_the_room_around_the_body(hand, at_start):
+    high = at_start[0].link.describe().bounds[1]
+    hand.commands.append(Engage())
+    for k in range(1000):
+        hand.commands += [StillThere()] if k % 100 else [move(0.05, 0.05, 0.05)]
+        tip = poses(hand, 1, k)[0, :3]
+    assert tip == pytest.approx(high + ROOM, abs=2.0 * ARRIVED)
+
+
+def test_the_stamp_is_that_of_the_newest_command(hand):
+    assert hand.stamp is None
+    hand.commands += [Engage(), move(stamp=5.0), move(stamp=7.5)]
+    poses(hand, 1)
+    assert hand.stamp == 7.5
+
+
+def test_poses_at_rest_take_no_rows(hand):
+    poses(hand, 1000)
+    hand.commands += [Engage(), move(y=1e-3)]
+    poses(hand, 1000, 1000)
+    assert 10 < len(hand.take_rows()) < 400
+
+
+def done(simulation, folder, **others):
+    """Do a run that writes its files to a folder."""
+    with Plotter() as plotter:
+        perform(simulation, Outputs(folder, plotter), settings={}, **others)
+
+
+def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
+    scene = changed(GRID2, relaxation="verlet")
+    simulation, hand = led(scene)
+    command = through_the_body(hand)
+
+    def every_frame(now):
+        command(now)
+        if len(now.recording) == 700:
+            hand.commands.append(End())
+
+    done(simulation, tmp_path / "led", seconds=10.0, every_frame=every_frame, hand=hand)
+    assert simulation.result.cut_area > 1e-3
+    assert simulation.time == pytest.approx(0.7 + REST_AFTER_STROKE, abs=2e-3)
+
+    repeated = prepare(changed(scene, stroke=str(tmp_path / "led" / STROKE)))
+    done(repeated, tmp_path / "again")
+    same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
+    assert np.array_equal(*same_rows, equal_nan=True)
+    assert (tmp_path / "led" / FINAL).read_bytes() == (tmp_path / "again" / FINAL).read_bytes()
+
+
+def test_what_was_recorded_says_when_the_hand_was_engaged(tmp_path, hand):
+    poses(hand, 10)
+    hand.commands += [Engage(), move(y=1e-3)]
+    poses(hand, 200, 10)
+    hand.commands.append(Release())
+    poses(hand, 10, 210)
+    hand.finish(0.22)
+    rows = np.array(hand.take_rows())
+    engaged = rows[:, LED_COLUMNS.index("engaged")]
+    assert rows[engaged == 1.0, 0].min() == pytest.approx(0.010)
+    assert rows[engaged == 1.0, 0].max() == pytest.approx(0.209)
+    assert rows[-1, 0] == 0.22
+
+
+def test_a_hand_ends_after_the_time_that_was_asked_for():
+    simulation, hand = led(seconds=0.05)
+    simulation.run(0.1)
+    assert hand.ended_at == pytest.approx(0.05)
