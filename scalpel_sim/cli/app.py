@@ -2,22 +2,20 @@
 
 import gc
 import sys
-import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import App, CycloptsError, Parameter
 
 from bridge import DEFAULT_HOST, DEFAULT_PORT
 from scalpel_sim.bench.commands import bench
-from scalpel_sim.cli.console import log_to_stderr, print_report, progress, say, say_error
+from scalpel_sim.cli.console import log_to_stderr, print_report, say, say_error
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
     CONNECTION,
     OUTPUT,
-    PAGE,
     ArmOptions,
     ClientOptions,
     Flag,
@@ -26,6 +24,7 @@ from scalpel_sim.cli.options import (
     SceneName,
     TissueOptions,
 )
+from scalpel_sim.cli.view_command import view
 from scalpel_sim.cli.warm_up_command import warm_up
 from scalpel_sim.errors import (
     EXIT_OK,
@@ -37,20 +36,10 @@ from scalpel_sim.errors import (
 )
 from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
 
-if TYPE_CHECKING:  # imported where they are used: `--help` should not wait for a compiler
-    from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
-    from scalpel_sim.output.summary import Summary
-    from scalpel_sim.simulation import Simulation
-
 PROGRAM = "scalpel-sim"
-SHORTEST_PAUSE = 5e-3
-"""Shortest pause that slows a run to real time [s]: a shorter one costs more than it gains."""
-SECONDS_PER_CHECK = 0.2
-"""How often a finished `view` checks whether its page is still wanted [s]."""
 
 app = App(
     name=PROGRAM,
@@ -85,66 +74,15 @@ def _run(
     """
     with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
+        from scalpel_sim.cli.scripted_run import perform_script
 
         options = RunOptions(tissue, arm, client, output, printing)
         with prepared_run(scene, options, audits=True) as prepared:
-            summary = _perform(prepared, options, plotter)
+            summary = perform_script(prepared, options, plotter)
             print_report(summary, prepared.folder, output.export, printing)
 
 
-@app.command(name="view")
-def _view(
-    scene: SceneName = None,
-    /,
-    *,
-    wireframe: Annotated[Flag, Parameter(group=PAGE)] = False,
-    port: Annotated[int | None, Parameter(group=PAGE)] = None,
-    tissue: TissueOptions = TissueOptions(),
-    arm: ArmOptions = ArmOptions(),
-    client: ClientOptions = ClientOptions(),
-    output: OutputOptions = OutputOptions(),
-    printing: PrintOptions = PrintOptions(),
-) -> None:
-    """Run at real-time speed, and show the cut live in a browser.
-
-    On a terminal it waits for Enter, so that you can open the page first. Afterwards the page stays
-    until Ctrl-C. The motion is advanced by --relaxation verlet, unless you choose another
-    or the tissue stiffens.
-
-    For example:
-
-    ```console
-    scalpel-sim view
-    scalpel-sim view slab --wireframe --port 8080
-    ```
-
-    Args:
-        wireframe: Show the edges of the mesh.
-        port: Port of the page, on this machine only [default: any free port].
-    """
-    with log_to_stderr(printing), Plotter() as plotter:
-        from scalpel_sim.cli.run_setup import RunOptions, prepared_run
-        from scalpel_sim.viewer.pictures import into_viewer, show_in
-        from scalpel_sim.viewer.viewer import Viewer
-
-        options = RunOptions(tissue, arm, client, output, printing)
-        with prepared_run(scene, options, relaxation="verlet") as prepared:
-            simulation = prepared.simulation
-            with Viewer(
-                simulation.arm.model,
-                title=simulation.title,
-                frame=simulation.frame,
-                wireframe=wireframe,
-                port=port,
-                views=prepared.scene.views,
-            ) as viewer:
-                show_in(viewer, simulation)
-                simulation.pictures.append(into_viewer(viewer))
-                _wait_for_start(viewer.url)
-                summary = _perform(prepared, options, plotter, at_most_real_time=True)
-                show_in(viewer, simulation)
-                print_report(summary, prepared.folder, output.export, printing)
-                _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
+app.command(view)
 
 
 @app.command(name="serve")
@@ -303,59 +241,3 @@ def command_line(arguments: Sequence[str]) -> int:
         say_error(one_line(error))
         return exit_code(error)
     return EXIT_OK
-
-
-def _perform(
-    prepared: "PreparedRun",
-    options: "RunOptions",
-    plotter: Plotter,
-    *,
-    at_most_real_time: bool = False,
-) -> "Summary":
-    """Do the run, with a progress bar on a terminal."""
-    from scalpel_sim.output.run_folder import Outputs
-    from scalpel_sim.run import perform, run_time
-
-    seconds = run_time(prepared.simulation, prepared.scene.seconds)
-    with progress(seconds, options.printing) as advance:
-        return perform(
-            prepared.simulation,
-            Outputs(prepared.folder, plotter, prepared.simulation.recording.columns),
-            # A server does not say how its tissue is held, nor how it is solved.
-            scene=prepared.scene if options.client.connect is None else None,
-            views=prepared.scene.views,
-            settings=prepared.settings,
-            seconds=seconds,
-            every_frame=_paced(advance) if at_most_real_time else advance,
-            exports=options.output.export,
-        )
-
-
-def _paced(after_frame: Callable[["Simulation"], None]) -> Callable[["Simulation"], None]:
-    """Return `after_frame` followed by a pause where simulated time is ahead of the wall clock."""
-    start = time.monotonic()
-
-    def pause(simulation: "Simulation") -> None:
-        after_frame(simulation)
-        ahead = simulation.time - (time.monotonic() - start)
-        if ahead > SHORTEST_PAUSE:
-            time.sleep(ahead)
-
-    return pause
-
-
-def _wait_for_start(url: str) -> None:
-    """Print where the page is; at a terminal, wait until it has been opened."""
-    if sys.stdin is not None and sys.stdin.isatty():
-        say(f"open {url}, then press Enter to begin")
-        sys.stdin.readline()
-    else:
-        say(f"live at {url}")
-
-
-def _stay_while(condition: Callable[[], bool], message: str) -> None:
-    """Print a message, and return when the condition fails, or on Ctrl-C."""
-    with StopSignals() as stop:
-        say(message)  # from now on Ctrl-C ends it without a traceback
-        while condition() and stop.reason is None:
-            time.sleep(SECONDS_PER_CHECK)

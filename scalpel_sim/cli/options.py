@@ -34,7 +34,7 @@ _BLADE = Group("Blade", sort_key=3)
 _SOLVER = Group("Solver", sort_key=4)
 _ARM = Group("Arm", sort_key=5)
 CONNECTION = Group("Connection", sort_key=6)
-PAGE = Group("Page", sort_key=7)
+_PAGE = Group("Page", sort_key=7)
 OUTPUT = Group("Output", sort_key=8)
 
 
@@ -197,6 +197,20 @@ class ClientOptions:
     "HOST:PORT of a `scalpel-sim serve`, which holds the tissue [default: it is in this process]."
     key: Path | None = None
     "File with the key of that server [default: the key in SCALPEL_SIM_KEY, if that is set]."
+
+
+@Parameter(name="*", group=_PAGE)
+@dataclass(frozen=True)
+class PageOptions:
+    """The page of a live run."""
+
+    hand: Literal["script", "live"] = "script"
+    """Who leads the blade: script, the strokes of the scene; or live, you in the page, until you
+    end it there or --seconds have passed. What you did is written as stroke.csv."""
+    wireframe: Flag = False
+    "Show the edges of the mesh."
+    port: int | None = None
+    "Port of the page, on this machine only [default: any free port]."
 
 
 @Parameter(name="*", group=OUTPUT)

@@ -76,7 +76,12 @@ class PreparedRun(NamedTuple):
 
 @contextmanager
 def prepared_run(
-    name: str | None, options: RunOptions, *, audits: bool = False, relaxation: str | None = None
+    name: str | None,
+    options: RunOptions,
+    *,
+    audits: bool = False,
+    relaxation: str | None = None,
+    is_led: bool = False,
 ) -> Iterator[PreparedRun]:
     """Yield the run that the command line asks for, and close the link to the tissue afterwards.
 
@@ -86,6 +91,7 @@ def prepared_run(
         audits: Whether an account of the energy is kept where nothing is said of it.
         relaxation: How the motion is advanced where nothing is said of it, and the tissue does not
             stiffen; None: as the scene has it.
+        is_led: Whether a hand will lead the blade.
 
     Raises:
         UsageError: options that make no sense, or not together.
@@ -100,7 +106,7 @@ def prepared_run(
     else:
         link, scene, settings = _tissue_elsewhere(name, options, client.connect)
     try:
-        simulation = prepare(scene, link)
+        simulation = prepare(scene, link, is_led=is_led)
         settings |= {"arm": simulation.arm.name}
         yield PreparedRun(simulation, scene, _folder(options.output, scene), settings)
     finally:

@@ -8,7 +8,7 @@ import msgspec
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import Readings
+from scalpel_sim.viewer.scene3d import HandState, Readings
 from tissue import FloatArray, Surface
 
 UPDATES_PER_SECOND = 25.0
@@ -30,6 +30,8 @@ class ViewerSettings(NamedTuple):
     """Port of the page; None for the first free port."""
     views: Sequence[ViewTable] = ()
     """Cameras that the page offers."""
+    is_led: bool = False
+    """Whether the page leads the blade."""
 
 
 class SceneState(NamedTuple):
@@ -41,6 +43,8 @@ class SceneState(NamedTuple):
     """Poses of all bodies of the MuJoCo model, see `model_shapes.body_poses`."""
     readings: Readings | None
     """Numbers to show beside the picture."""
+    hand: HandState | None = None
+    """How the hand is, if the page leads one."""
 
 
 class StartReply(msgspec.Struct):

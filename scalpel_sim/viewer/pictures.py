@@ -1,10 +1,13 @@
 """Callbacks that hand a running simulation to the live viewer and to the replay."""
 
+from collections.abc import Callable
+
+from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
-from scalpel_sim.viewer.scene3d import Readings
+from scalpel_sim.viewer.scene3d import HandState, Readings
 from scalpel_sim.viewer.viewer import Viewer
 
 
@@ -49,16 +52,35 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
     )
 
 
-def into_viewer(viewer: Viewer) -> DrawFrame:
-    """Return a callback that shows a simulation in a live viewer after each frame."""
+def into_viewer(
+    viewer: Viewer, hand_state: Callable[[], HandState | None] = lambda: None
+) -> DrawFrame:
+    """Return a callback that shows a simulation in a live viewer after each frame.
+
+    Args:
+        viewer: The viewer.
+        hand_state: Returns how the hand is that the page leads.
+    """
 
     def draw(simulation: Simulation) -> None:
         if viewer.is_due():
-            show_in(viewer, simulation)
+            show_in(viewer, simulation, hand_state())
 
     return draw
 
 
-def show_in(viewer: Viewer, simulation: Simulation) -> None:
+def show_in(viewer: Viewer, simulation: Simulation, hand: HandState | None = None) -> None:
     """Show the present state of a simulation in a live viewer, also before the first frame."""
-    viewer.show(simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation))
+    viewer.show(
+        simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation), hand
+    )
+
+
+def state_of_hand(hand: LiveHand, factor: float) -> HandState:
+    """Return how a hand is, for the page that leads it.
+
+    Args:
+        hand: The hand.
+        factor: How fast the simulation runs, over real time.
+    """
+    return HandState(hand.tip, hand.is_engaged, hand.ended_at is not None, hand.stamp, factor)

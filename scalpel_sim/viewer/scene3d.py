@@ -77,6 +77,21 @@ class Readings(NamedTuple):
     """Energy balance: where the work of the blade went. None without an audit."""
 
 
+class HandState(NamedTuple):
+    """How the hand is that the page leads."""
+
+    tip: FloatArray
+    """Where the tip is led [m], world frame, shape (3,)."""
+    is_engaged: bool
+    """Whether it leads the blade."""
+    has_ended: bool
+    """Whether the run will not follow it any more."""
+    stamp: float | None
+    """Stamp of the newest command that the picture shows; None: there was none yet."""
+    real_time: float
+    """How fast the simulation runs, over real time."""
+
+
 class Camera(NamedTuple):
     """Where the scene is looked at from, world frame."""
 
@@ -193,6 +208,17 @@ class Scene3D:
             ),
             parts=[] if readings.parts is None else [math.hypot(*part) for part in readings.parts],
             energies=_energy_terms(readings.energies),
+        )
+
+    def set_hand(self, hand: HandState) -> None:
+        """Show how the hand is that the page leads."""
+        self._add(
+            "set_hand",
+            tip=hand.tip.tolist(),
+            engaged=hand.is_engaged,
+            ended=hand.has_ended,
+            stamp=hand.stamp,
+            real_time=hand.real_time,
         )
 
     def take(self) -> bytes:

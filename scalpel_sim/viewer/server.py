@@ -2,15 +2,19 @@
 
 `viewer.Viewer` starts it and sends pickles to its standard input: first a `ViewerSettings`, then
 any number of `SceneState`s. The process replies with one line on its standard output, a
-`StartReply` as JSON, and ends when its input ends. The pickles never leave the two processes.
+`StartReply` as JSON, and ends when its input ends. Where the page leads the blade, a line follows
+for each of its commands. The pickles never leave the two processes.
 """
 
 import asyncio
+import contextlib
 import errno
 import logging
 import pickle
+import secrets
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import msgspec
@@ -18,6 +22,8 @@ import tornado.web
 import tornado.websocket
 
 from scalpel_sim.errors import RunError
+from scalpel_sim.hands.commands import Command
+from scalpel_sim.viewer.leading import Leading
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
     SceneState,
@@ -38,14 +44,22 @@ FIRST_PORT = 7000
 LAST_PORT = 7099
 """Last port that is tried."""
 
+DRAWN = "drawn"
+"""Message of a page that has drawn a packet."""
+
 LAST_STATE_TIMEOUT = 1.0
 """Time for the pages to draw the last state before the process ends [s]."""
 
 _CAPTION = (
     "Bright red: faces of the cut. Arrow: force on the blade. Blue lines: contact forces, "
-    "magnified thirty times. Drag to turn the view, scroll to zoom."
+    "magnified thirty times. "
 )
+_HOW_TO_LOOK = "Drag to turn the view, scroll to zoom."
+_HOW_TO_LEAD = "Drag with the right button to turn the view."
 """Text below the heading of the live page."""
+
+N_BYTES_OF_TOKEN = 32
+"""Random bytes in the token of a page that leads: nobody guesses it."""
 
 
 class NewestState:
@@ -54,14 +68,18 @@ class NewestState:
     def __init__(self) -> None:
         self.state: SceneState | None = None
         self.has_ended = threading.Event()
+        self.on_change: Callable[[], object] = lambda: None
+        """Called by the thread that reads, after each state and at the end."""
 
     def read(self, pipe: Any) -> None:
         """Read scene states from the pipe until it ends."""
         try:
             while True:
                 self.state = pickle.load(pipe)
+                self.on_change()
         except (EOFError, pickle.UnpicklingError):  # closed, or cut off inside a pickle
             self.has_ended.set()
+            self.on_change()
 
 
 class OpenPages:
@@ -86,7 +104,7 @@ class OpenPages:
             self._opening = self._packets.opening(state.surface, state.body_poses)
             for page in self._pages:
                 page.send(self._opening)
-        self._newest = self._packets.frame(state.surface, state.body_poses, state.readings)
+        self._newest = self._packets.frame(*state)
         self._shown = state
         for page in list(self._pages):
             self.send_newest(page)
@@ -119,24 +137,40 @@ class OpenPages:
 class PageSocket(tornado.websocket.WebSocketHandler):
     """The connection to one open page."""
 
-    def initialize(self, open_pages: OpenPages) -> None:
-        """Set the pages that this page is one of; called by tornado."""
+    def initialize(self, open_pages: OpenPages, leading: Leading | None) -> None:
+        """Set the pages that this page is one of, and who of them leads; called by tornado."""
         self._open_pages = open_pages
+        self._leading = leading
         self.n_undrawn = 0
         self.last: bytes | None = None
 
     def open(self, *_: str, **__: str) -> None:
-        """Handle a page that was opened."""
+        """Handle a page that was opened. A page of another origin was refused by tornado."""
         self._open_pages.add(self)
+        host, origin = self.request.host, self.request.headers.get("Origin")
+        if self._leading and self._leading.may_lead(host, origin, self.get_argument("token", "")):
+            self.set_nodelay(True)
+            self._leading.add(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """Handle a page's message that it has drawn a packet."""
+        """Handle a page's message: that it has drawn a packet, or a command."""
+        if message != DRAWN:
+            if self._leading is not None:
+                self._leading.receive(self, message)
+            return
         self.n_undrawn = max(0, self.n_undrawn - 1)
         self._open_pages.send_newest(self)
 
     def on_close(self) -> None:
         """Handle a page that was closed."""
         self._open_pages.remove(self)
+        if self._leading is not None:
+            self._leading.remove(self)
+
+    def say(self, text: str) -> None:
+        """Send a text, which is not drawn."""
+        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
+            self.write_message(text).add_done_callback(lambda sent: sent.exception())
 
     def send(self, packet: bytes) -> None:
         """Send a packet, and count it until the page has drawn it."""
@@ -157,6 +191,8 @@ class PageRequest(tornado.web.RequestHandler):
     def get(self) -> None:
         """Send the page."""
         self.set_header("Cache-Control", "no-store")
+        # Another page must not show this one in a frame, and have its visitor click there.
+        self.set_header("Content-Security-Policy", "frame-ancestors 'none'")
         self.write(self._document)
 
 
@@ -166,21 +202,35 @@ async def serve(settings: ViewerSettings, newest: NewestState) -> None:
         settings.shapes, settings.frame, wireframe=settings.wireframe, views=settings.views
     )
     open_pages = OpenPages(packets)
+    has_changed, loop = asyncio.Event(), asyncio.get_running_loop()
+    newest.on_change = lambda: loop.call_soon_threadsafe(has_changed.set)
+    has_changed.set()  # what came before it was set
     reply = _start(settings, open_pages)
-    print(msgspec.json.encode(reply).decode(), flush=True)
+    _print_line(reply)
     if reply.error:
         return
     while not newest.has_ended.is_set():
+        await has_changed.wait()
+        has_changed.clear()
         open_pages.show(newest.state)
-        await asyncio.sleep(1.0 / UPDATES_PER_SECOND)
     open_pages.show(newest.state)
     await open_pages.wait_until_drawn()
 
 
+def _print_line(message: StartReply | Command) -> None:
+    """Send a message to the run."""
+    print(msgspec.json.encode(message).decode(), flush=True)
+
+
 def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
     """Start to serve the page, and return its address, or why it cannot be served."""
+    leading, token = None, None
+    if settings.is_led:
+        token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
+        leading = Leading(token, _print_line)
     try:
-        document = live_page(settings.title, _CAPTION)
+        how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
+        document = live_page(settings.title, _CAPTION + how, token)
     except RunError as error:
         return StartReply(error=str(error))
     application = tornado.web.Application()
@@ -188,7 +238,7 @@ def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
         OWN_NAMES,
         [
             (r"/", PageRequest, {"document": document}),
-            (r"/frames", PageSocket, {"open_pages": open_pages}),
+            (r"/frames", PageSocket, {"open_pages": open_pages, "leading": leading}),
         ],
     )
     return _listen(application, settings.port)

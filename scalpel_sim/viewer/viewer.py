@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Sequence
 from types import TracebackType
 from typing import IO, cast
@@ -16,10 +17,16 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.hands.commands import Command, Release, command_of
 from scalpel_sim.tables.view import ViewTable
-from scalpel_sim.viewer.messages import UPDATES_PER_SECOND, SceneState, StartReply, ViewerSettings
+from scalpel_sim.viewer.messages import (
+    UPDATES_PER_SECOND,
+    SceneState,
+    StartReply,
+    ViewerSettings,
+)
 from scalpel_sim.viewer.model_shapes import shapes_of
-from scalpel_sim.viewer.scene3d import Readings
+from scalpel_sim.viewer.scene3d import HandState, Readings
 from tissue import FloatArray, Surface
 
 START_TIMEOUT = 30.0
@@ -55,6 +62,7 @@ class Viewer:
         wireframe: bool = False,
         port: int | None = None,
         views: Sequence[ViewTable] = (),
+        commands: deque[Command] | None = None,
     ) -> None:
         """Start the viewer's process and learn its address.
 
@@ -65,6 +73,8 @@ class Viewer:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
+            commands: What receives the commands of the page that leads the blade; None: the page
+                shows, and leads nothing.
 
         Raises:
             UsageError: the port does not exist.
@@ -74,15 +84,29 @@ class Viewer:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
         self._process = _start_process()  # it starts while the shapes are made here
         shapes = list(shapes_of(model))
-        settings = ViewerSettings(title, shapes, frame or TissueFrame(), wireframe, port, views)
+        settings = ViewerSettings(
+            title,
+            shapes,
+            frame or TissueFrame(),
+            wireframe,
+            port,
+            views,
+            is_led=commands is not None,
+        )
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
         self._waiting: ViewerSettings | SceneState | None = settings
         self._is_closed = False
+        self._listener: threading.Thread | None = None
         self._last_shown = -float("inf")
         self._sender = threading.Thread(target=self._send_states, name="viewer", daemon=True)
         self._sender.start()
         self.url = self._start_reply().url
+        if commands is not None:
+            self._listener = threading.Thread(
+                target=self._listen, args=(commands,), name="commands", daemon=True
+            )
+            self._listener.start()
 
     def __enter__(self) -> "Viewer":
         return self
@@ -109,7 +133,11 @@ class Viewer:
         return passed >= 1.0 / UPDATES_PER_SECOND and self.is_running
 
     def show(
-        self, surface: Surface, body_poses: FloatArray, readings: Readings | None = None
+        self,
+        surface: Surface,
+        body_poses: FloatArray,
+        readings: Readings | None = None,
+        hand: HandState | None = None,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
@@ -117,10 +145,11 @@ class Viewer:
             surface: Surface of the body, tissue frame. Kept, not copied.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
+            hand: How the hand is, if the page leads one.
         """
         self._last_shown = time.monotonic()
         with self._changed:
-            self._waiting = SceneState(surface, body_poses, readings)
+            self._waiting = SceneState(surface, body_poses, readings, hand)
             self._changed.notify()
 
     def close(self) -> None:
@@ -136,6 +165,8 @@ class Viewer:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        if self._listener is not None:
+            self._listener.join()  # the process has ended, and with it what is listened to
         cast(IO[bytes], self._process.stdout).close()
 
     def _send_states(self) -> None:
@@ -154,6 +185,14 @@ class Viewer:
         finally:
             with contextlib.suppress(OSError):
                 self._pipe.close()
+
+    def _listen(self, commands: deque[Command]) -> None:
+        """Receive commands until the process ends, and then let go."""
+        for line in cast(IO[bytes], self._process.stdout):
+            command = command_of(line)
+            if command is not None:
+                commands.append(command)
+        commands.append(Release())
 
     def _start_reply(self) -> StartReply:
         """Wait for the first line of the process: the address of its page, or an error."""

@@ -15,13 +15,27 @@ _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
 
-def live_page(title: str, caption: str) -> str:
+def live_page(title: str, caption: str, token: str | None = None) -> str:
     """Return a page that follows a run over a web socket.
+
+    Args:
+        title: Heading of the page.
+        caption: Text below the heading.
+        token: What the page shows the server so as to lead the blade; None: it leads nothing.
 
     Raises:
         RunError: meshcat's viewer was not found.
     """
-    return _page(title, caption, ("scene_view.js", "controls.js", "live.js"))
+    if token is None:
+        return _page(title, caption, ("scene_view.js", "controls.js", "live.js"))
+    return _page(
+        title,
+        caption,
+        ("scene_view.js", "controls.js", "hand_input.js", "gamepad.js", "hand.js", "live.js"),
+        controls=(_HERE / "hand.html").read_text("utf-8"),
+        data=f'<script>const TOKEN = "{token}";</script>',
+        style=(_HERE / "hand.css").read_text("utf-8"),
+    )
 
 
 def replay_page(title: str, caption: str, packets: str) -> str:
@@ -40,13 +54,27 @@ def replay_page(title: str, caption: str, packets: str) -> str:
 
 
 def _page(
-    title: str, caption: str, scripts: tuple[str, ...], controls: str = "", data: str = ""
+    title: str,
+    caption: str,
+    scripts: tuple[str, ...],
+    controls: str = "",
+    data: str = "",
+    style: str = "",
 ) -> str:
-    """Return one self-contained HTML document."""
+    """Return one self-contained HTML document.
+
+    Args:
+        title: Heading of the page.
+        caption: Text below the heading.
+        scripts: Files of its scripts, in order.
+        controls: Elements of its bar.
+        data: Script elements that come before these.
+        style: Rules beside those of all pages.
+    """
     return Template((_HERE / "page.html").read_text("utf-8")).substitute(
         title=html.escape(title),
         caption=html.escape(caption),
-        style=(_HERE / "page.css").read_text("utf-8"),
+        style=(_HERE / "page.css").read_text("utf-8") + style,
         controls=controls,
         meshcat=_meshcat_bundle().read_text("utf-8"),
         data=data,

@@ -2,17 +2,41 @@
 "use strict";
 
 const RETRY_AFTER = 2000; // time between attempts to reach the next run [ms]
+const LONGEST_DRAWING = 500; // [ms]: a tab that is hidden draws nothing
+
+// Call back once what was changed is on the screen: asked for another picture before, a page that draws
+// slowly would decode many that it never shows.
+function afterDrawing(callback) {
+    let isDone = false;
+    const once = () => {
+        if (!isDone) callback();
+        isDone = true;
+    };
+    requestAnimationFrame(() => setTimeout(once));
+    setTimeout(once, LONGEST_DRAWING);
+}
+
+// Where the page leads the blade: see hand.js.
+const hand = typeof Hand === "undefined" ? null : new Hand(sceneView);
 
 function follow() {
-    const socket = new WebSocket(`ws://${location.host}/frames`);
+    const socket = new WebSocket(`ws://${location.host}/frames${hand ? hand.query : ""}`);
     socket.binaryType = "arraybuffer";
-    socket.onopen = () => { element("status").textContent = "live"; };
+    socket.onopen = () => {
+        element("status").textContent = "live";
+        if (hand) hand.connect(socket);
+    };
     socket.onmessage = (message) => {
+        if (typeof message.data === "string") {
+            hand.onLeading(JSON.parse(message.data));
+            return;
+        }
         viewer.handle_command_bytearray(new Uint8Array(message.data));
         element("wireframe").checked = sceneView.wireframe;
-        socket.send("drawn");
+        afterDrawing(() => { if (socket.readyState === WebSocket.OPEN) socket.send("drawn"); });
     };
     socket.onclose = () => {
+        if (hand) hand.disconnect();
         element("status").textContent = "the run has ended; waiting for the next run";
         setTimeout(waitForNextRun, RETRY_AFTER);
     };

@@ -23,6 +23,7 @@ class SceneView {
         this.viewer = new MeshCat.Viewer(pane);
         this.onReadings = onReadings;
         this.onCameras = onCameras;
+        this.onHand = () => {};
         this.cameras = [];
         this.chosen = 0;
         this.appearances = new Map();
@@ -38,6 +39,7 @@ class SceneView {
             set_cameras: (command) => this.setCameras(command),
             set_wireframe: (command) => this.setWireframe(command.on),
             set_readings: (command) => this.setReadings(command),
+            set_hand: (command) => this.onHand(command),
         };
         this.viewer.handle_command = (command) => {
             (own[command.type] || meshcatHandles)(command);

@@ -1,0 +1,76 @@
+"""Does a run whose blade a visitor leads in the live page, as the command `view` asks for it."""
+
+import time
+
+from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
+from scalpel_sim.errors import RunError
+from scalpel_sim.hands.commands import End, Engage
+from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.pace import Pace
+from scalpel_sim.hands.workspace import workspace_in
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.run_folder import Outputs
+from scalpel_sim.output.summary import Summary
+from scalpel_sim.run import REST_AFTER_STROKE, perform
+from scalpel_sim.scene_parts.scene import LONGEST_RUN
+from scalpel_sim.viewer.pictures import into_viewer, show_in, state_of_hand
+from scalpel_sim.viewer.viewer import Viewer
+
+SECONDS_PER_LOOK = 0.02
+"""How often it is looked whether somebody has taken hold of the blade [s]."""
+
+
+def live_hand(prepared: PreparedRun) -> LiveHand:
+    """Return the hand that leads a run."""
+    simulation, scene = prepared.simulation, prepared.scene
+    return LiveHand(
+        simulation.arm.hand,
+        simulation.stroke,
+        simulation.frame,
+        workspace_in(scene, simulation.stroke.start, simulation.link.describe().bounds),
+        dt=simulation.dt,
+        seconds=LONGEST_RUN if scene.seconds is None else scene.seconds,
+    )
+
+
+def perform_led(
+    prepared: PreparedRun, options: RunOptions, plotter: Plotter, viewer: Viewer, hand: LiveHand
+) -> Summary:
+    """Do the run from when somebody takes hold of the blade until they end it.
+
+    Args:
+        prepared: The run.
+        options: What the command line asks for.
+        plotter: Draws the plots.
+        viewer: Its page has shown the start.
+        hand: Obeys the commands of that page.
+
+    Raises:
+        RunError: the viewer has ended, and nobody can lead.
+    """
+    simulation = prepared.simulation
+    _wait_for_hand(viewer, hand)
+    pace = Pace()
+    simulation.pictures.append(
+        into_viewer(viewer, lambda: state_of_hand(hand, pace.factor)),
+    )
+    summary = perform(
+        simulation,
+        Outputs(prepared.folder, plotter, simulation.recording.columns),
+        scene=prepared.scene if options.client.connect is None else None,
+        settings=prepared.settings | {"stroke": simulation.stroke.name},
+        seconds=LONGEST_RUN + REST_AFTER_STROKE,
+        every_frame=lambda now: pace.wait(now.dt),
+        exports=options.output.export,
+        hand=hand,
+    )
+    show_in(viewer, simulation, state_of_hand(hand, pace.factor))
+    return summary
+
+
+def _wait_for_hand(viewer: Viewer, hand: LiveHand) -> None:
+    """Wait until a page engages the hand, or ends the run before it has begun."""
+    while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
+        if not viewer.is_running:
+            raise RunError("the viewer has ended before anybody took hold of the blade")
+        time.sleep(SECONDS_PER_LOOK)

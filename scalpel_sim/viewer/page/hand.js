@@ -1,0 +1,205 @@
+// The hand of the page: it says to the run how the blade is to move, and shows how late that is.
+"use strict";
+
+const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
+const SILENT_AFTER = 400; // silence after which the run may have let go [ms]
+const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
+const LONGEST_STEP = 5000; // and at most, where no picture shows it
+const N_LAGS_SHOWN = 30; // of which the median is shown
+const MOST_LAGS = 2000; // that are kept
+const SLOWER = 0.95; // factor of real time below which the page says so
+
+class Hand {
+    constructor(view) {
+        this.view = view;
+        this.viewer = view.viewer;
+        this.query = `?token=${encodeURIComponent(TOKEN)}`;
+        this.socket = null;
+        this.leads = false;
+        this.isClutchOpen = false;
+        this.isEngaged = false;
+        this.hasMoved = false;
+        this.hasEnded = false;
+        this.holders = new Map(); // what holds the blade, and since when it only finishes a step [ms]
+        this.tip = null; // in the last picture [m], world frame
+        this.isAtRest = true; // whether it was there in the picture before
+        this.sentAt = 0;
+        this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
+        this.lags = [];
+        view.onHand = (state) => this.show(state);
+        setInterval(() => this.sayAlive(), ALIVE_EVERY);
+        window.addEventListener("blur", () => this.letGoOfAll());
+        document.addEventListener("visibilitychange", () => document.hidden && this.letGoOfAll());
+        element("clutch").addEventListener("click", () => this.toggleClutch());
+        element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
+        element("end").addEventListener("click", () => this.say({ type: "end" }));
+        document.body.append(element("hint"));
+        const pane = element("meshcat-pane");
+        pane.tabIndex = 0;
+        pane.setAttribute("role", "application");
+        pane.setAttribute("aria-label", "The tissue and the blade");
+        pane.setAttribute("aria-describedby", "hint");
+        this.viewer.controls.mouseButtons.RIGHT = THREE.MOUSE.ROTATE;
+        listenToPointer(pane, this.viewer.renderer.domElement, this);
+        listenToKeys(this);
+        listenToGamepads(this);
+        this.showControls();
+    }
+
+    // Whether the input of this page leads the blade.
+    get isClosed() {
+        return this.leads && !this.isClutchOpen && !this.hasEnded;
+    }
+
+    connect(socket) {
+        this.socket = socket;
+    }
+
+    disconnect() {
+        this.letGoOfAll();
+        this.socket = null;
+        this.leads = false;
+        this.showControls();
+    }
+
+    say(message) {
+        if (this.socket === null || this.socket.readyState !== WebSocket.OPEN) return;
+        this.socket.send(JSON.stringify(message));
+        this.sentAt = performance.now();
+    }
+
+    // After a silence the run has let go, or will: then the page engages anew.
+    sayAlive() {
+        this.letGoOfSteps();
+        if (!this.isEngaged) return;
+        const wasSilent = performance.now() - this.sentAt > SILENT_AFTER;
+        this.say({ type: wasSilent ? "engage" : "still there" });
+    }
+
+    // Hold the blade until `letGo`; or, for a step, until a picture shows that it is done.
+    hold(holder, isStep = false) {
+        if (!this.isClosed) return;
+        this.holders.set(holder, isStep ? performance.now() : Infinity);
+        if (!this.isEngaged) this.say({ type: "engage" });
+        this.isEngaged = true;
+    }
+
+    letGo(holder) {
+        this.holders.delete(holder);
+        if (!this.isEngaged || this.holders.size > 0) return;
+        this.say({ type: "release" });
+        this.isEngaged = false;
+    }
+
+    letGoOfSteps() {
+        for (const [holder, since] of [...this.holders]) {
+            const passed = performance.now() - since;
+            const isDone = this.unshown.length === 0 && this.isAtRest && passed > SHORTEST_STEP;
+            if (isDone || passed > LONGEST_STEP) this.letGo(holder);
+        }
+    }
+
+    letGoOfAll() {
+        for (const holder of [...this.holders.keys()]) this.letGo(holder);
+    }
+
+    toggleClutch() {
+        this.letGoOfAll();
+        this.isClutchOpen = !this.isClutchOpen;
+        this.showControls();
+    }
+
+    // Move by [right, up, away] in metres. `stamp` is when the person did it [ms].
+    move(by, stamp) {
+        this.lead({ type: "move", by: this.inWorld(by), stamp });
+    }
+
+    // Turn by a rotation vector about the axes [right, up, away] of the view [rad].
+    turn(by, stamp) {
+        this.lead({ type: "turn", by: this.inWorld(by), stamp });
+    }
+
+    lead(message) {
+        if (!this.isEngaged || !this.isClosed) return;
+        if (performance.now() - this.sentAt > SILENT_AFTER) this.sayAlive();
+        this.say(message);
+        this.unshown.push(message.stamp);
+        if (!this.hasMoved) {
+            this.hasMoved = true;
+            this.showControls();
+        }
+    }
+
+    // Up is z in the scene and y in three.js: see SceneView.setCamera.
+    inWorld([right, up, away]) {
+        const { camera } = this.viewer;
+        camera.updateMatrixWorld();
+        const vector = new THREE.Vector3(right, up, -away).transformDirection(camera.matrixWorld);
+        vector.multiplyScalar(Math.hypot(right, up, away));
+        return [vector.x, -vector.z, vector.y];
+    }
+
+    // Length of a pixel in the plane of the screen through the tip.
+    metresPerPixel() {
+        const { camera, renderer } = this.viewer;
+        camera.updateMatrixWorld();
+        const [x, y, z] = this.tip;
+        const depth = -new THREE.Vector3(x, z, -y).applyMatrix4(camera.matrixWorldInverse).z;
+        const height = 2 * depth * Math.tan(camera.fov * Math.PI / 360) / camera.zoom;
+        return height / renderer.domElement.clientHeight;
+    }
+
+    // The server says who leads, each time that changes.
+    onLeading({ leads, held }) {
+        this.leads = leads;
+        if (!leads) this.letGoOfAll();
+        element("take-over").disabled = held;
+        this.showControls();
+    }
+
+    // A picture says how the hand is in it.
+    show({ tip, engaged, ended, stamp, real_time: realTime }) {
+        this.isAtRest = this.tip !== null && tip.every((x, axis) => x === this.tip[axis]);
+        this.tip = tip;
+        if (ended && !this.hasEnded) this.letGoOfAll();
+        this.hasEnded = ended;
+        document.body.classList.toggle("engaged", engaged);
+        if (stamp !== null) this.noteLags(stamp);
+        const pace = realTime < SLOWER ? `${realTime.toFixed(1)} of real time` : "real time";
+        element("pace").textContent = pace;
+        this.showControls();
+    }
+
+    // Each input up to the stamp is in the picture that is drawn next.
+    noteLags(stamp) {
+        const shown = this.unshown.filter((each) => each <= stamp);
+        if (shown.length === 0 || !this.unshown.includes(stamp)) return; // of another page
+        this.unshown = this.unshown.filter((each) => each > stamp);
+        afterDrawing(() => {
+            this.lags.push(...shown.map((each) => performance.now() - each));
+            this.lags.splice(0, this.lags.length - MOST_LAGS);
+            const last = this.lags.slice(-N_LAGS_SHOWN).sort((a, b) => a - b);
+            element("lag").textContent = `${last[last.length >> 1].toFixed(0)} ms from hand to picture`;
+        });
+    }
+
+    showControls() {
+        const { controls } = this.viewer;
+        // With Ctrl the controls exchange the two.
+        controls.mouseButtons.LEFT = this.isClosed ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
+        element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
+        for (const id of ["clutch", "end"]) element(id).disabled = !this.leads || this.hasEnded;
+        element("take-over").hidden = this.leads || this.socket === null || this.hasEnded;
+        element("hint").textContent = this.hint();
+        element("hint").hidden = element("hint").textContent === "";
+    }
+
+    hint() {
+        if (this.hasEnded) return "The run has ended.";
+        if (this.socket === null || this.tip === null) return "";
+        if (!this.leads) return "Another tab leads the blade.";
+        if (this.isClutchOpen) return "Drags turn the view. Space: lead the blade again.";
+        if (this.hasMoved) return "";
+        return "Press on the picture and drag: the blade follows";
+    }
+}

@@ -1,0 +1,76 @@
+// Mouse, touch, wheel and keys that lead the blade. Each tells the hand how far to move or to turn, in
+// the axes of the view: to the right, up, and away from the eye.
+"use strict";
+
+const TURN_PER_PIXEL = 0.0044; // [rad]: a quarter of a degree
+const DEPTH_PER_WHEEL_PIXEL = 1e-5; // [m]: a notch of the wheel, 100 pixels, is a millimetre
+const PIXELS_PER_LINE = 33; // of a wheel that counts lines
+const FINE_STEP = 5e-4; // [m], of a key
+const FINE_TURN = 0.02; // [rad]
+
+const STEPS = {
+    ArrowRight: [1, 0, 0], ArrowLeft: [-1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0],
+    PageUp: [0, 0, 1], PageDown: [0, 0, -1],
+};
+
+// A drag in the plane of the screen through the tip. With Shift it turns.
+function listenToPointer(pane, canvas, hand) {
+    let last = null;
+    pane.addEventListener("pointerdown", (event) => {
+        if (event.button !== 0 || event.ctrlKey || event.target !== canvas || !hand.isClosed) return;
+        event.stopPropagation(); // it does not turn the view
+        if (last !== null) return;
+        last = event;
+        pane.setPointerCapture(event.pointerId);
+        hand.hold("pointer");
+    }, { capture: true });
+    pane.addEventListener("pointermove", (event) => {
+        if (last === null || event.pointerId !== last.pointerId) return;
+        event.stopPropagation();
+        const right = event.clientX - last.clientX, up = last.clientY - event.clientY;
+        last = event;
+        if (event.shiftKey) {
+            hand.turn([-up * TURN_PER_PIXEL, right * TURN_PER_PIXEL, 0], event.timeStamp);
+        } else {
+            const metres = hand.metresPerPixel();
+            hand.move([right * metres, up * metres, 0], event.timeStamp);
+        }
+    }, { capture: true });
+    for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
+        pane.addEventListener(end, (event) => {
+            if (last === null || event.pointerId !== last.pointerId) return;
+            last = null;
+            hand.letGo("pointer");
+        }, { capture: true });
+    }
+    pane.addEventListener("wheel", (event) => {
+        if (event.ctrlKey || event.target !== canvas || !hand.isClosed) return;
+        event.stopPropagation();
+        event.preventDefault();
+        const pixels = event.deltaY * (event.deltaMode === 0 ? 1 : PIXELS_PER_LINE);
+        hand.hold("wheel", true);
+        hand.move([0, 0, -pixels * DEPTH_PER_WHEEL_PIXEL], event.timeStamp);
+    }, { capture: true, passive: false });
+}
+
+function listenToKeys(hand) {
+    window.addEventListener("keydown", (event) => {
+        const { target, key } = event;
+        if (event.ctrlKey || event.altKey || event.metaKey) return;
+        if (target instanceof Element && target.matches("select, input")) return; // they are its own
+        if (key === " " && !(target instanceof Element && target.matches("button"))) {
+            event.preventDefault();
+            hand.toggleClutch();
+        }
+        if (key in STEPS && hand.isClosed) {
+            event.preventDefault();
+            const [right, up, away] = STEPS[key];
+            hand.hold("keys", true);
+            if (event.shiftKey) {
+                hand.turn([-up, right, away].map((part) => part * FINE_TURN), event.timeStamp);
+            } else {
+                hand.move([right, up, away].map((part) => part * FINE_STEP), event.timeStamp);
+            }
+        }
+    });
+}

@@ -1,0 +1,91 @@
+import json
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scalpel_sim.hands.commands import (
+    FARTHEST_MOVE,
+    FARTHEST_TURN,
+    LONGEST_MESSAGE,
+    Command,
+    End,
+    Engage,
+    Lead,
+    Move,
+    Release,
+    StillThere,
+    Turn,
+    command_of,
+)
+
+ALL = [
+    Engage(),
+    Release(),
+    Move([1e-3, -2e-3, 0.0], 12.5),
+    Turn([0.0, 0.1, 0.0], 1e9),
+    StillThere(),
+    Lead(),
+    End(),
+]
+
+ANY_JSON = st.recursive(
+    st.none() | st.booleans() | st.floats() | st.integers() | st.text(),
+    lambda children: st.lists(children) | st.dictionaries(st.text(), children),
+    max_leaves=10,
+)
+
+ALMOST_A_MOVE = st.fixed_dictionaries(
+    {
+        "type": st.sampled_from(["move", "turn"]),
+        "by": st.lists(st.floats(), max_size=4) | ANY_JSON,
+        "stamp": st.floats() | ANY_JSON,
+    }
+)
+
+
+@pytest.mark.parametrize("command", ALL, ids=lambda command: type(command).__name__)
+def test_a_command_is_read_as_it_was_written(command):
+    assert command_of(msgspec.json.encode(command)) == command
+
+
+def is_small(command: Command) -> bool:
+    """Whether a command asks for no more than a hand may."""
+    if isinstance(command, Move | Turn):
+        most = FARTHEST_MOVE if isinstance(command, Move) else FARTHEST_TURN
+        return math.hypot(*command.by) <= most and math.isfinite(command.stamp)
+    return True
+
+
+@given(st.text() | st.binary() | ANY_JSON.map(json.dumps) | ALMOST_A_MOVE.map(json.dumps))
+def test_garbage_is_no_command_and_no_exception(message):
+    command = command_of(message)
+    assert command is None or is_small(command)
+
+
+@given(st.lists(st.floats(allow_nan=False, width=32), min_size=3, max_size=3))
+def test_a_move_is_obeyed_just_if_it_is_finite_and_small(by):
+    command = command_of(json.dumps({"type": "move", "by": by, "stamp": 0.0}))
+    assert (command is not None) == (math.hypot(*by) <= FARTHEST_MOVE)
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        '{"type":"move","by":[NaN,0,0],"stamp":0}',
+        '{"type":"move","by":[1e999,0,0],"stamp":0}',
+        '{"type":"move","by":[0,0],"stamp":0}',
+        '{"type":"move","by":[0,0,0],"stamp":-1}',
+        '{"type":"move","by":[0,0,0]}',
+        '{"type":"move","by":[0,0,0],"stamp":0,"to":"the moon"}',
+        '{"type":"jump"}',
+        "[" * 200,
+        '{"type":"end"}' + " " * LONGEST_MESSAGE,
+        b"\xff\xfe",
+        "",
+    ],
+)
+def test_what_is_no_command_is_dropped(message):
+    assert command_of(message) is None

@@ -1,0 +1,193 @@
+"""A visitor leads the blade in the live page, and a run repeats what was done."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.recording import COLUMNS, read_forces
+from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
+from tests.browser import new_tab
+
+pytestmark = pytest.mark.browser
+
+UNTIMED = COLUMNS.index("cd_s")
+"""Columns from here on are wall times."""
+
+STEPS_OF_DRAG = 30
+"""Moves of the mouse in a drag."""
+
+PAUSE = 0.03
+"""Between two of them [s]."""
+
+PIXELS_TO = """(way) => {
+    // The drag that moves the blade by that much along x and y of the world.
+    const right = hand.inWorld([1, 0, 0]), up = hand.inWorld([0, 1, 0]);
+    const size = right[0] * up[1] - right[1] * up[0];
+    const across = (way[0] * up[1] - way[1] * up[0]) / size;
+    const upwards = (way[1] * right[0] - way[0] * right[1]) / size;
+    return [across, -upwards].map((metres) => metres / hand.metresPerPixel());
+}"""
+
+HOLD_STICK = """([x, y, isPressed]) => {
+    const buttons = Array.from({ length: 17 }, (_, i) => ({ pressed: i === 0 && isPressed }));
+    const pad = { connected: true, axes: [x, y, 0, 0], buttons };
+    navigator.getGamepads = () => [pad, null, null, null];
+}"""
+
+LAID_BARE = """() => {
+    const { x, y, width, height } = viewer.renderer.domElement.getBoundingClientRect();
+    return [x + 0.5 * width, y + 0.45 * height];
+}"""
+
+
+class LedView:
+    """A `scalpel-sim view --hand live` in another process."""
+
+    def __init__(self, scene, folder):
+        self.folder = folder
+        command = [sys.executable, "-m", "scalpel_sim", "view", scene, "--hand", "live"]
+        self.process = subprocess.Popen(
+            [*command, "--out", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("open http")).group()
+
+    def line_with(self, text):
+        """Wait for a line of the log, and return it."""
+        for line in self.process.stderr:
+            if text in line:
+                return line
+        raise AssertionError(f"it ended without saying '{text}'")
+
+    def wait_for_files(self):
+        self.line_with("stays until Ctrl-C")
+
+
+@pytest.fixture
+def view(tmp_path, request):
+    led = LedView(request.param, tmp_path / "led")
+    yield led
+    led.process.kill()
+    led.process.communicate()
+
+
+def opened(browser, view):
+    """Return a tab that shows the start."""
+    tab = new_tab(browser)
+    tab.goto(view.url)
+    tab.wait_for_function("hand.tip !== null")
+    return tab
+
+
+def drag(tab, right, down):
+    """Drag by so many pixels with the left button, without haste."""
+    x, y = tab.evaluate(LAID_BARE)
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    for i in range(1, STEPS_OF_DRAG + 1):
+        tab.mouse.move(x + right * i / STEPS_OF_DRAG, y + down * i / STEPS_OF_DRAG)
+        time.sleep(PAUSE)
+    tab.mouse.up()
+
+
+def tip(tab):
+    """Return where the tip is led in the picture [m], world frame."""
+    return np.array(tab.evaluate("hand.tip"))
+
+
+def until_it_rests(tab):
+    """Wait until the picture shows all that was done, and the blade in it no longer moves."""
+    tab.wait_for_function("hand.unshown.length === 0 && !hand.isEngaged")
+    before = None
+    while before is None or not np.array_equal(before, tip(tab)):
+        before = tip(tab)
+        time.sleep(0.5)
+
+
+def end(tab, view):
+    """End the run in the page, and wait for its files."""
+    tab.click("#end")
+    tab.wait_for_function("hand.hasEnded")
+    view.wait_for_files()
+    assert tab.failures == []
+
+
+def assert_a_run_repeats(view, folder):
+    """Do what was recorded once more, and compare the bits."""
+    assert command_line(["run", str(view.folder / SCENE), "-q", "--out", str(folder)]) == 0
+    assert (folder / FINAL).read_bytes() == (view.folder / FINAL).read_bytes()
+    led, again = (read_forces(each / FORCES).rows[:, :UNTIMED] for each in (view.folder, folder))
+    assert np.array_equal(led, again, equal_nan=True)
+
+
+def pieces(view):
+    return json.loads((view.folder / SUMMARY).read_text())["pieces"]
+
+
+@pytest.mark.parametrize("view", ["slab"], indirect=True)
+def test_a_mouse_cuts_the_slab_in_two_and_a_run_of_the_record_has_the_same_bits(
+    view, browser, tmp_path
+):
+    tab = opened(browser, view)
+    assert tab.inner_text("#hint") == "Press on the picture and drag: the blade follows"
+    for way in ([0.0, 0.04], [0.0, 0.04], [0.0, 0.02]):
+        drag(tab, *tab.evaluate(PIXELS_TO, way))
+    assert tab.is_hidden("#hint")
+    until_it_rests(tab)
+    assert "from hand to picture" in tab.inner_text("#lag")
+    end(tab, view)
+    assert pieces(view) == 2
+    assert_a_run_repeats(view, tmp_path / "again")
+    assert (view.folder / STROKE).exists()
+
+
+@pytest.mark.parametrize("view", ["grid2"], indirect=True)
+def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, browser):
+    tab, other = opened(browser, view), opened(browser, view)
+    at_first = tip(tab)
+
+    def moves(action, least):
+        before = tip(tab)
+        action()
+        until_it_rests(tab)
+        return np.linalg.norm(tip(tab) - before) > least
+
+    def press(key, n):
+        for _ in range(n):
+            tab.keyboard.press(key)
+
+    def tilt_stick(is_pressed):
+        tab.evaluate(HOLD_STICK, [0.0, -1.0, is_pressed])
+        time.sleep(1.0)
+        tab.evaluate(HOLD_STICK, [0.0, 0.0, False])
+
+    tab.mouse.move(*tab.evaluate(LAID_BARE))
+    assert moves(lambda: press("ArrowUp", 4), 1e-3)
+    assert moves(lambda: tab.mouse.wheel(0, -200), 1e-3)
+    assert moves(lambda: tilt_stick(False), 1e-3)
+    assert not moves(lambda: tilt_stick(True), 0.0)
+    press(" ", 1)
+    assert tab.get_attribute("#clutch", "aria-pressed") == "false"
+    assert not moves(lambda: press("ArrowUp", 4), 0.0)
+    press(" ", 1)
+
+    assert not other.evaluate("hand.leads")
+    assert other.inner_text("#hint") == "Another tab leads the blade."
+    tab.close()
+    other.click("#take-over")
+    other.wait_for_function("hand.leads")
+    tab = other
+    assert moves(lambda: press("ArrowUp", 4), 1e-3)
+    assert np.linalg.norm(tip(tab) - at_first) > 3e-3
+    end(tab, view)
