@@ -13,7 +13,7 @@ from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.geom_coupling import GeomCoupling
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.own_arm import move_to_start, own_arm
-from scalpel_sim.arm.placement import place
+from scalpel_sim.arm.placement import Placement, PlacementError, place
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.arm.standing_fixture import StandingFixture
@@ -29,7 +29,7 @@ from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import TetrahedralMesh
+from tissue import FloatArray, TetrahedralMesh
 
 _log = logging.getLogger("scalpel_sim")
 
@@ -86,7 +86,7 @@ def prepare(
     around = [*fixtures, *floor]
     others: list[Standing] = []
     if scene.own_arm is None:
-        placement = place(reached, boxes, scene.arm, force=needed.force)
+        placement = _placed(reached, boxes, scene, needed)
         frame = TissueFrame(origin=placement.tissue_origin)
         # Where a hand will lead it is not known: at the start the arms are clear of each other.
         known = resting_stroke(stroke.start) if stroke.is_led else stroke
@@ -122,6 +122,20 @@ def prepare(
         for grasper in led_graspers(scene.graspers, motions, arm, bridge):
             simulation.add_grasper(grasper)
     return simulation
+
+
+def _placed(reached: Stroke, boxes: FloatArray, scene: Scene, needed: ExpectedForce) -> Placement:
+    """Return where an arm of the project stands; see `placement.place`."""
+    try:
+        return place(reached, boxes, scene.arm, force=needed.force)
+    except PlacementError as error:
+        if not reached.is_led:
+            raise
+        raise PlacementError(
+            "no hand can lead the blade here: the arm does not reach all around the body with the "
+            "blade as it is at the start. Choose another scene, or a first stroke that begins with "
+            f"the blade upright ({error})"
+        ) from error
 
 
 def _as_long(stroke: Stroke, length: float) -> Stroke:

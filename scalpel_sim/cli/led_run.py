@@ -3,7 +3,7 @@
 import time
 
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
-from scalpel_sim.errors import RunError
+from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import End, Engage
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.pace import Pace
@@ -13,6 +13,7 @@ from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import LONGEST_RUN
+from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.viewer.pictures import into_viewer, show_in, state_of_hand
 from scalpel_sim.viewer.viewer import Viewer
 
@@ -46,7 +47,8 @@ def perform_led(
         hand: Obeys the commands of that page.
 
     Raises:
-        RunError: the viewer has ended, and nobody can lead.
+        Interrupted: the user or the system ended the run.
+        RunError: the viewer has ended, and nobody can lead; or the run failed.
     """
     simulation = prepared.simulation
     _wait_for_hand(viewer, hand)
@@ -70,7 +72,10 @@ def perform_led(
 
 def _wait_for_hand(viewer: Viewer, hand: LiveHand) -> None:
     """Wait until a page engages the hand, or ends the run before it has begun."""
-    while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
-        if not viewer.is_running:
-            raise RunError("the viewer has ended before anybody took hold of the blade")
-        time.sleep(SECONDS_PER_LOOK)
+    with StopSignals() as stop:
+        while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
+            if stop.reason is not None:
+                raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
+            if not viewer.is_running:
+                raise RunError("the viewer has ended before anybody took hold of the blade")
+            time.sleep(SECONDS_PER_LOOK)

@@ -251,7 +251,7 @@ def _columns(path: Path, number: int, header: list[str]) -> list[int]:
         raise StrokeError(
             f"{path}, line {number}: the columns are '{','.join(header)[:200]}'; wanted "
             f"{','.join(_COLUMNS)} and, if the blade does not cut in the direction of motion, "
-            f"{','.join(FORWARD_COLUMNS)}"
+            f"{','.join(FORWARD_COLUMNS)}, and {_ENGAGED_COLUMN} too if a hand has led it"
         )
     return [names.index(name) for name in wanted]
 

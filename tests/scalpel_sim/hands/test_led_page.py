@@ -1,10 +1,6 @@
 """A visitor leads the blade in the live page, and a run repeats what was done."""
 
 import json
-import os
-import re
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -14,8 +10,7 @@ from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import COLUMNS, read_forces
 from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
 from tests.browser import new_tab
-
-pytestmark = pytest.mark.browser
+from tests.scalpel_sim.hands.led_view import LedView
 
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
@@ -47,39 +42,10 @@ LAID_BARE = """() => {
 }"""
 
 
-class LedView:
-    """A `scalpel-sim view --hand live` in another process."""
-
-    def __init__(self, scene, folder):
-        self.folder = folder
-        command = [sys.executable, "-m", "scalpel_sim", "view", scene, "--hand", "live"]
-        self.process = subprocess.Popen(
-            [*command, "--out", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-        )
-        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("open http")).group()
-
-    def line_with(self, text):
-        """Wait for a line of the log, and return it."""
-        for line in self.process.stderr:
-            if text in line:
-                return line
-        raise AssertionError(f"it ended without saying '{text}'")
-
-    def wait_for_files(self):
-        self.line_with("stays until Ctrl-C")
-
-
 @pytest.fixture
 def view(tmp_path, request):
-    led = LedView(request.param, tmp_path / "led")
-    yield led
-    led.process.kill()
-    led.process.communicate()
+    with LedView(request.param, tmp_path / "led") as led:
+        yield led
 
 
 def opened(browser, view):
@@ -135,6 +101,7 @@ def pieces(view):
     return json.loads((view.folder / SUMMARY).read_text())["pieces"]
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("view", ["slab"], indirect=True)
 def test_a_mouse_cuts_the_slab_in_two_and_a_run_of_the_record_has_the_same_bits(
     view, browser, tmp_path
@@ -152,6 +119,7 @@ def test_a_mouse_cuts_the_slab_in_two_and_a_run_of_the_record_has_the_same_bits(
     assert (view.folder / STROKE).exists()
 
 
+@pytest.mark.browser
 @pytest.mark.parametrize("view", ["grid2"], indirect=True)
 def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, browser):
     tab, other = opened(browser, view), opened(browser, view)

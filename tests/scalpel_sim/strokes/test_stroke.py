@@ -142,3 +142,22 @@ def test_a_file_that_cannot_be_read_is_refused_by_name(tmp_path):
     (tmp_path / "image.csv").write_bytes(bytes(range(128, 256)))
     with pytest.raises(StrokeError, match="not a text file"):
         from_csv(tmp_path / "image.csv")
+
+
+def test_a_file_with_the_column_engaged_is_a_stroke_that_was_led(tmp_path):
+    rows = ["0,0,0,0,0,0,0.05,0,1,0", "1,0,0.01,0,0,0.01,0.05,0,1,0"]
+    plain = write(tmp_path, HEADER + FORWARD, *rows)
+    assert not from_csv(plain).is_led
+    led = write(tmp_path, HEADER + FORWARD + ",engaged", *(row + ",1" for row in rows))
+    assert from_csv(led).is_led
+    with pytest.raises(StrokeError, match="engaged"):
+        from_csv(write(tmp_path, HEADER + ",engaged", "0,0,0,0,0,0,0.05,1"))
+
+
+def test_a_blade_at_rest_is_not_turned_by_rounding():
+    leaning = BladeSegment(
+        np.array([0.01, 0.02, 0.0]), np.array([0.013, 0.031, 0.05]), np.array([0.3, 1.0, 0.1])
+    )
+    stroke = Stroke([0.0, 0.3, 1.0], [leaning] * 3)
+    first = stroke.pose(0.0).numbers
+    assert all(stroke.pose(t).numbers == first for t in np.linspace(0.0, 1.2, 50))

@@ -1,18 +1,17 @@
 import asyncio
 import json
-import re
 import time
 import urllib.request
 from collections import deque
 
 import pytest
-from tornado.httpclient import HTTPClientError, HTTPRequest
-from tornado.websocket import websocket_connect
+from tornado.httpclient import HTTPClientError
 
 from scalpel_sim import Viewer
 from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Move, Release
 from scalpel_sim.viewer.leading import MESSAGES_PER_SECOND, MOST_AT_ONCE, Leading
 from tests.scalpel_sim.hands.led_runs import Clock
+from tests.scalpel_sim.hands.led_view import page_of, token_in
 from tests.scalpel_sim.little_arm import FRAME, little_arm
 
 TOKEN = "a-token-that-nobody-guesses"
@@ -151,25 +150,11 @@ def led_viewer():
         yield viewer
 
 
-def token_of(viewer) -> str:
-    """Return the token in the document of the page."""
-    with urllib.request.urlopen(viewer.url) as answer:
-        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
-        return re.search(r'const TOKEN = "([\w-]{40,})"', answer.read().decode()).group(1)
-
-
-async def opened(viewer, origin, token):
-    """Return an open socket of a page of that origin."""
-    url = viewer.url.replace("http", "ws", 1) + f"frames?token={token}"
-    headers = {} if origin is None else {"Origin": origin}
-    return await websocket_connect(HTTPRequest(url, headers=headers))
-
-
 def heard(viewer, origin, token) -> list:
     """Return what the run hears of a page that engages the hand and is closed."""
 
     async def engage():
-        page = await opened(viewer, origin, token)
+        page = await page_of(viewer.url, origin, token)
         await page.write_message(ENGAGE)
         page.close()
         while await page.read_message() is not None:
@@ -187,7 +172,7 @@ def own_origin(viewer) -> str:
 
 
 def test_a_page_with_the_token_leads_until_it_is_closed(led_viewer):
-    found = heard(led_viewer, own_origin(led_viewer), token_of(led_viewer))
+    found = heard(led_viewer, own_origin(led_viewer), token_in(led_viewer.url))
     assert found == [Engage(), Release()]
 
 
@@ -197,12 +182,12 @@ def test_a_page_without_the_token_is_not_heard(led_viewer):
 
 
 def test_a_program_that_says_no_origin_is_not_heard(led_viewer):
-    assert heard(led_viewer, None, token_of(led_viewer)) == []
+    assert heard(led_viewer, None, token_in(led_viewer.url)) == []
 
 
 def test_a_page_of_another_origin_opens_no_socket(led_viewer):
     with pytest.raises(HTTPClientError) as refused:
-        heard(led_viewer, "http://evil.example", token_of(led_viewer))
+        heard(led_viewer, "http://evil.example", token_in(led_viewer.url))
     assert refused.value.code == 403
 
 
@@ -213,6 +198,11 @@ def test_the_hand_lets_go_when_the_viewer_is_killed(led_viewer):
         assert time.monotonic() < end
         time.sleep(0.02)
     assert list(led_viewer.commands) == [Release()]
+
+
+def test_no_other_page_shows_this_one_in_a_frame(led_viewer):
+    with urllib.request.urlopen(led_viewer.url) as answer:
+        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
 
 
 def test_a_page_that_only_shows_has_no_token():

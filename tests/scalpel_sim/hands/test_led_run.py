@@ -1,0 +1,61 @@
+"""`scalpel-sim view --hand live`, led by a page without a browser."""
+
+import asyncio
+import json
+import signal
+
+import numpy as np
+import pytest
+
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.recording import COLUMNS, read_forces
+from scalpel_sim.output.run_folder import FINAL, FORCES, STROKE, SUMMARY
+from scalpel_sim.run import REST_AFTER_STROKE
+from tests.scalpel_sim.hands.led_view import LedView, page_of, token_in
+
+SECONDS = 0.4
+"""How long the hand leads [s]."""
+
+N_FORCES = COLUMNS.index("cut_area_m2")
+"""Columns of time, tip and forces, which come first."""
+
+
+async def lead(view):
+    """Engage the hand, and move it forwards until the run has ended."""
+    page = await page_of(view.url, view.url.rstrip("/"), token_in(view.url))
+    await page.write_message('{"type":"engage"}')
+    files = asyncio.create_task(asyncio.to_thread(view.wait_for_files))
+    while not files.done():
+        await page.write_message('{"type":"move","by":[0,0.002,0],"stamp":1}')
+        await asyncio.sleep(0.03)
+    await files
+
+
+def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(tmp_path):
+    led, again = tmp_path / "led", tmp_path / "again"
+    with LedView("grid2", led, "--seconds", str(SECONDS)) as view:
+        asyncio.run(lead(view))
+    summary = json.loads((led / SUMMARY).read_text())
+    assert summary["status"] == "complete"
+    assert summary["simulated_seconds"] == pytest.approx(SECONDS + REST_AFTER_STROKE)
+    stroke = ["--relaxation", "verlet", "--stroke", str(led / STROKE)]
+    assert command_line(["run", "grid2", *stroke, "-q", "--out", str(again)]) == 0
+    assert (led / FINAL).read_bytes() == (again / FINAL).read_bytes()
+    rows = [read_forces(folder / FORCES).rows[:, :N_FORCES] for folder in (led, again)]
+    assert np.ptp(rows[0][:, COLUMNS.index("tip_y_m")]) > 0.005
+    assert np.array_equal(*rows)
+
+
+def test_a_scripted_run_keeps_the_stroke_that_it_repeats(tmp_path):
+    with LedView("grid2", tmp_path, "--seconds", "0.2") as view:
+        asyncio.run(lead(view))
+    stroke = (tmp_path / STROKE).read_bytes()
+    assert command_line(["run", str(tmp_path / "scene.toml"), "-q", "--out", str(tmp_path)]) == 0
+    assert (tmp_path / STROKE).read_bytes() == stroke
+
+
+def test_an_interrupted_run_that_waits_for_a_hand_ends(tmp_path):
+    with LedView("grid2", tmp_path) as view:
+        view.process.send_signal(signal.SIGINT)
+        view.line_with("interrupted")
+        assert view.process.wait(timeout=30) == 1
