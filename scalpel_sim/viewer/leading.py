@@ -100,9 +100,7 @@ class Leading:
         else:
             self._heard_at = self._clock()
             if isinstance(command, Engage | Release):
-                was_engaged, self._is_engaged = self._is_engaged, isinstance(command, Engage)
-                if was_engaged != self._is_engaged:
-                    self._tell()
+                self._is_engaged = isinstance(command, Engage)
             self._pass_on(command)
 
     @property
@@ -112,10 +110,9 @@ class Leading:
         return self._leader is None or not self._is_engaged or is_silent
 
     def _tell(self) -> None:
-        """Tell all pages whether they lead, and whether another one holds the blade."""
+        """Tell all pages whether they lead."""
         for page in list(self._pages):
-            state = {"leads": page is self._leader, "held": self._is_engaged}
-            page.say(msgspec.json.encode(state).decode())
+            page.say(msgspec.json.encode({"leads": page is self._leader}).decode())
 
 
 class _Allowance:

@@ -48,7 +48,7 @@ class Hand {
 
     // Whether the input of this page leads the blade.
     get isClosed() {
-        return this.leads && !this.isClutchOpen && !this.hasEnded;
+        return this.leads && this.tip !== null && !this.isClutchOpen && !this.hasEnded;
     }
 
     connect(socket) {
@@ -150,10 +150,9 @@ class Hand {
     }
 
     // The server says who leads, each time that changes.
-    onLeading({ leads, held }) {
+    onLeading({ leads }) {
         this.leads = leads;
         if (!leads) this.letGoOfAll();
-        element("take-over").disabled = held;
         this.showControls();
     }
 
@@ -164,6 +163,7 @@ class Hand {
         if (ended && !this.hasEnded) this.letGoOfAll();
         this.hasEnded = ended;
         document.body.classList.toggle("engaged", engaged);
+        element("take-over").disabled = engaged;
         if (stamp !== null) this.noteLags(stamp);
         const pace = realTime < SLOWER ? `${realTime.toFixed(1)} of real time` : "real time";
         element("pace").textContent = pace;

@@ -56,15 +56,19 @@ def opened(browser, view):
     return tab
 
 
-def drag(tab, right, down):
-    """Drag by so many pixels with the left button, without haste."""
+def drag(tab, right, down, button="left", key=None):
+    """Drag by so many pixels, without haste, while a key is pressed."""
     x, y = tab.evaluate(LAID_BARE)
     tab.mouse.move(x, y)
-    tab.mouse.down()
+    if key is not None:
+        tab.keyboard.down(key)
+    tab.mouse.down(button=button)
     for i in range(1, STEPS_OF_DRAG + 1):
         tab.mouse.move(x + right * i / STEPS_OF_DRAG, y + down * i / STEPS_OF_DRAG)
         time.sleep(PAUSE)
-    tab.mouse.up()
+    tab.mouse.up(button=button)
+    if key is not None:
+        tab.keyboard.up(key)
 
 
 def tip(tab):
@@ -121,6 +125,24 @@ def test_a_mouse_cuts_the_slab_in_two_and_a_run_of_the_record_has_the_same_bits(
 
 @pytest.mark.browser
 @pytest.mark.parametrize("view", ["grid2"], indirect=True)
+def test_the_view_is_turned_by_the_right_button_by_ctrl_and_with_the_clutch_open(view, browser):
+    tab = opened(browser, view)
+
+    def turns(action):
+        before = tab.evaluate("viewer.camera.position.toArray()")
+        action()
+        return not np.allclose(before, tab.evaluate("viewer.camera.position.toArray()"))
+
+    assert turns(lambda: drag(tab, 60, 0, button="right"))
+    assert turns(lambda: drag(tab, 60, 0, key="Control"))
+    assert not turns(lambda: drag(tab, 5, 0))
+    tab.click("#clutch")
+    assert turns(lambda: drag(tab, 60, 0))
+    assert tab.failures == []
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("view", ["grid2"], indirect=True)
 def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, browser):
     tab, other = opened(browser, view), opened(browser, view)
     at_first = tip(tab)
@@ -145,6 +167,8 @@ def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, b
     assert moves(lambda: tab.mouse.wheel(0, -200), 1e-3)
     assert moves(lambda: tilt_stick(False), 1e-3)
     assert not moves(lambda: tilt_stick(True), 0.0)
+    assert moves(lambda: drag(tab, 60, 0, key="Shift"), 1e-3)
+    assert not moves(lambda: drag(tab, 60, 0, button="right"), 0.0)
     press(" ", 1)
     assert tab.get_attribute("#clutch", "aria-pressed") == "false"
     assert not moves(lambda: press("ArrowUp", 4), 0.0)
