@@ -106,8 +106,8 @@ def pieces(view):
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("view", ["slab"], indirect=True)
-def test_a_mouse_cuts_the_slab_in_two_and_a_run_of_the_record_has_the_same_bits(
+@pytest.mark.parametrize("view", ["organ"], indirect=True)
+def test_a_mouse_cuts_the_organ_in_two_and_a_run_of_the_record_has_the_same_bits(
     view, browser, tmp_path
 ):
     tab = opened(browser, view)

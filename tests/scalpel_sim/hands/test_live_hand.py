@@ -1,7 +1,11 @@
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from scalpel_sim import prepare
+from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
+from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
 from scalpel_sim.hands.live_hand import (
     ARRIVED,
@@ -18,6 +22,9 @@ from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
 from tests.scalpel_sim.hands.led_runs import GRID2, Clock, led, move, through_the_body, turn
+
+ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml")
+"""A scene with an arm of its own."""
 
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
@@ -176,6 +183,30 @@ def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
     same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
     assert np.array_equal(*same_rows, equal_nan=True)
     assert (tmp_path / "led" / FINAL).read_bytes() == (tmp_path / "again" / FINAL).read_bytes()
+
+
+@pytest.mark.parametrize("scene", [SCENES["incision"], ROBOT], ids=lambda scene: scene.name)
+def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_path, scene):
+    simulation, hand = led(scene)
+    hand.commands += [Engage(), move(y=2e-3, z=-1e-3), turn(x=0.01)]
+    simulation.run(0.05)
+    hand.finish(simulation.time)
+    with Plotter() as plotter:
+        outputs = Outputs(tmp_path, plotter)
+        outputs.write_stroke(hand.take_rows())
+        outputs.close()
+
+    recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))
+    repeated = prepare(replace(scene, strokes=(recorded,)))
+    repeated.run(0.05)
+    same_rows = [each.recording.rows[:, :UNTIMED] for each in (simulation, repeated)]
+    assert np.ptp(simulation.recording.vector("tip")[:, 1]) > 1e-3
+    assert np.array_equal(*same_rows, equal_nan=True)
+
+
+def test_a_scene_whose_arm_does_not_reach_around_the_body_is_refused():
+    with pytest.raises(PlacementError, match=r"no hand can lead the blade here.*Choose another"):
+        prepare(SCENES["retract"], is_led=True)
 
 
 def test_what_was_recorded_says_when_the_hand_was_engaged(tmp_path, hand):
