@@ -116,9 +116,9 @@ def prepare(
         passivity=scene.passivity,
     )
     if scene.graspers:
-        known = [arm.model.body(arm.blade.body_id).name, *(each.body for each in standing)]
+        ours = [arm.model.body(arm.blade.body_id).name, *(each.body for each in standing)]
         bridge = simulation.bridge
-        simulation.partners.append(GeomCoupling(arm.data, bridge, without=known))
+        simulation.partners.append(GeomCoupling(arm.data, bridge, without=ours))
         for grasper in led_graspers(scene.graspers, motions, arm, bridge):
             simulation.add_grasper(grasper)
     return simulation

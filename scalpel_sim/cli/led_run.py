@@ -60,6 +60,7 @@ def perform_led(
         simulation,
         Outputs(prepared.folder, plotter, simulation.recording.columns),
         scene=prepared.scene if options.client.connect is None else None,
+        views=prepared.scene.views,
         settings=prepared.settings | {"stroke": simulation.stroke.name},
         seconds=LONGEST_RUN + REST_AFTER_STROKE,
         every_frame=lambda now: pace.wait(now.dt),

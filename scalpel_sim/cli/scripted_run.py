@@ -37,6 +37,7 @@ def perform_script(
             Outputs(prepared.folder, plotter, prepared.simulation.recording.columns),
             # A server does not say how its tissue is held, nor how it is solved.
             scene=prepared.scene if options.client.connect is None else None,
+            views=prepared.scene.views,
             settings=prepared.settings,
             seconds=seconds,
             every_frame=every_frame,
