@@ -4,7 +4,6 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from bridge import LinkError, TissueDescription
@@ -66,7 +65,6 @@ def perform(
     views: Sequence[ViewTable] = (),
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
-    exports: Sequence[Path] = (),
     hand: LiveHand | None = None,
 ) -> Summary:
     """Do the run, and write its files.
@@ -82,7 +80,6 @@ def perform(
         views: Cameras that the replay offers; it begins with the first.
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
-        exports: Files for the body's surface after the run; see `output.export`.
         hand: Who leads the blade; what is done is written as `stroke.csv`, and the run ends with a
             rest after the hand has ended.
 
@@ -131,7 +128,7 @@ def perform(
         add_to(replay, simulation)
     with unwritten:
         outputs.write_replay(replay)
-    for path in exports:
+    for path in outputs.exports:
         with unwritten:
             export_surface(simulation.link.surface(), path)
     with unwritten:

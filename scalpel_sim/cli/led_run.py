@@ -58,13 +58,12 @@ def perform_led(
     )
     summary = perform(
         simulation,
-        Outputs(prepared.folder, plotter, simulation.recording.columns),
+        Outputs(prepared.folder, plotter, simulation.recording.columns, options.output.export),
         scene=prepared.scene if options.client.connect is None else None,
         views=prepared.scene.views,
         settings=prepared.settings | {"stroke": simulation.stroke.name},
         seconds=LONGEST_RUN + REST_AFTER_STROKE,
         every_frame=lambda now: pace.wait(now.dt),
-        exports=options.output.export,
         hand=hand,
     )
     show_in(viewer, simulation, state_of_hand(hand, pace.factor))

@@ -34,12 +34,16 @@ def perform_script(
 
         return perform(
             prepared.simulation,
-            Outputs(prepared.folder, plotter, prepared.simulation.recording.columns),
+            Outputs(
+                prepared.folder,
+                plotter,
+                prepared.simulation.recording.columns,
+                options.output.export,
+            ),
             # A server does not say how its tissue is held, nor how it is solved.
             scene=prepared.scene if options.client.connect is None else None,
             views=prepared.scene.views,
             settings=prepared.settings,
             seconds=seconds,
             every_frame=every_frame,
-            exports=options.output.export,
         )

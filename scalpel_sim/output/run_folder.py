@@ -46,14 +46,21 @@ class Outputs:
         folder: The folder; it is made if there is none.
         plotter: Draws the plots. The caller closes it.
         columns: Columns of `forces.csv`.
+        exports: Files beside the folder for the body's surface after the run; see `export`.
 
     Raises:
         UsageError: the path is a file, or lies below one.
         RunError: the folder cannot be made or written.
     """
 
-    def __init__(self, folder: Path, plotter: Plotter, columns: Sequence[str] = COLUMNS) -> None:
-        self.folder = folder
+    def __init__(
+        self,
+        folder: Path,
+        plotter: Plotter,
+        columns: Sequence[str] = COLUMNS,
+        exports: Sequence[Path] = (),
+    ) -> None:
+        self.folder, self.exports = folder, tuple(exports)
         self._plotter = plotter
         check_folder(folder)
         for name in RUN_FILES:

@@ -31,7 +31,7 @@ class LeadingPage(Protocol):
         """Send a text to the page."""
 
 
-class Leading:
+class Leadership:
     """Passes on what the page that leads says, and drops all else.
 
     The first page that comes leads. Another may take over once that one has let go of the blade or

@@ -23,7 +23,7 @@ import tornado.websocket
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.hands.commands import Command
-from scalpel_sim.viewer.leading import Leading
+from scalpel_sim.viewer.leading import Leadership
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
     SceneState,
@@ -137,7 +137,7 @@ class OpenPages:
 class PageSocket(tornado.websocket.WebSocketHandler):
     """The connection to one open page."""
 
-    def initialize(self, open_pages: OpenPages, leading: Leading | None) -> None:
+    def initialize(self, open_pages: OpenPages, leading: Leadership | None) -> None:
         """Set the pages that this page is one of, and who of them leads; called by tornado."""
         self._open_pages = open_pages
         self._leading = leading
@@ -227,7 +227,7 @@ def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
     leading, token = None, None
     if settings.is_led:
         token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
-        leading = Leading(token, _print_line)
+        leading = Leadership(token, _print_line)
     try:
         how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
         document = live_page(settings.title, _CAPTION + how, token)

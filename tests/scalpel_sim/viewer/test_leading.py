@@ -9,7 +9,7 @@ from tornado.httpclient import HTTPClientError
 
 from scalpel_sim import Viewer
 from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Move, Release
-from scalpel_sim.viewer.leading import MESSAGES_PER_SECOND, MOST_AT_ONCE, Leading
+from scalpel_sim.viewer.leading import MESSAGES_PER_SECOND, MOST_AT_ONCE, Leadership
 from tests.scalpel_sim.hands.led_runs import Clock
 from tests.scalpel_sim.hands.led_view import page_of, token_in
 from tests.scalpel_sim.little_arm import FRAME, little_arm
@@ -53,7 +53,7 @@ def obeyed():
 
 @pytest.fixture
 def leading(clock, obeyed):
-    return Leading(TOKEN, obeyed.append, clock)
+    return Leadership(TOKEN, obeyed.append, clock)
 
 
 @pytest.fixture
