@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import mujoco
@@ -11,24 +11,35 @@ import numpy as np
 from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.geom_coupling import GeomCoupling
+from scalpel_sim.arm.grasper import HALF_PAD
+from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.own_arm import move_to_start, own_arm
-from scalpel_sim.arm.placement import Placement, PlacementError, place
+from scalpel_sim.arm.own_arm import move_to_start, move_within, own_arm
+from scalpel_sim.arm.placement import (
+    Placement,
+    PlacementError,
+    place,
+    place_if_reached,
+    stays_in_reach,
+)
+from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.arm.standing_fixture import StandingFixture
 from scalpel_sim.arm.tabletop import Tabletop
 from scalpel_sim.errors import UsageError
-from scalpel_sim.hands.workspace import resting_stroke, tour_of, workspace_in
+from scalpel_sim.hands.workspace import ROOM_OF_GRASPER, resting_stroke, workspace_in
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
 from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
+from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
 from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
+from scalpel_sim.tables.grasper import GrasperTable
 from tissue import FloatArray, TetrahedralMesh
 
 _log = logging.getLogger("scalpel_sim")
@@ -57,8 +68,8 @@ def prepare(
         link: A body that is already there; None makes that of the scene in this process.
         fixtures: Rigid bodies around it, in the tissue frame: where that lies in the world is
             chosen here, so that the arm reaches.
-        is_led: Whether a hand will lead the blade: then it rests where the strokes of the scene
-            start, and the arm stands where it reaches all around the body.
+        is_led: Whether a hand will lead the blade and the graspers: then they rest where their
+            scripts start, and the arms stand where they reach around the body, as far as they do.
 
     Raises:
         ValueError: parts of the scene do not fit together; the message says which.
@@ -73,31 +84,33 @@ def prepare(
     stroke = stroke_through(mesh, scene.strokes, tissue.material, max(stops, default=-math.inf))
     if not stroke.is_led:
         check_meets(stroke, mesh)
-    if is_led:
-        stroke = resting_stroke(stroke.pose(0.0))
-    reached = stroke
-    if stroke.is_led:
-        reached = tour_of(workspace_in(scene, stroke.start, bounds), stroke.start)
-    needed = _needed(reached, mesh, scene)
-    _warn_of_table(reached, table)
-    boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
     motions = motions_of(scene.graspers)
+    if is_led:
+        stroke, motions = resting_stroke(stroke.pose(0.0)), [each.at_rest() for each in motions]
+    needed = _needed(stroke, mesh, scene)
+    if not stroke.is_led:
+        _warn_of_table(stroke, table)
+    boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
+    rooms = [_room_of_grasper(motion, scene, bounds) for motion in motions]
     floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
     around = [*fixtures, *floor]
     others: list[Standing] = []
     if scene.own_arm is None:
-        placement = _placed(reached, boxes, scene, needed)
+        placement, held, room = _placed(
+            stroke,
+            boxes,
+            scene,
+            needed,
+            lambda place: _beside(place, stroke, scene.graspers, motions, boxes, rooms),
+        )
         frame = TissueFrame(origin=placement.tissue_origin)
-        # Where a hand will lead it is not known: at the start the arms are clear of each other.
-        known = resting_stroke(stroke.start) if stroke.is_led else stroke
-        others += arms_with_graspers(scene.graspers, motions, boxes, frame, (placement, known))
-        others += _in_world(table, around, frame)
+        others += [*held, *_in_world(table, around, frame)]
         arm: LedArm = placement.arm(others=others)
     else:
         arm, frame = _own(scene.own_arm)
         stroke = _as_long(stroke, arm.blade.length)
-        move_to_start(arm, resting_stroke(stroke.start) if stroke.is_led else stroke, frame)
-        others += arms_with_graspers(scene.graspers, motions, boxes, frame, None)
+        room = _moved(arm, stroke, frame, workspace_in(scene, stroke.start, bounds))
+        others += arms_with_graspers(scene.graspers, motions, boxes, frame, None, rooms)
         others += _in_world(table, around, frame)
         if others:
             start = np.array(arm.data.qpos)
@@ -115,27 +128,107 @@ def prepare(
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
+    simulation.workspace = room
     if scene.graspers:
-        ours = [arm.model.body(arm.blade.body_id).name, *(each.body for each in standing)]
-        bridge = simulation.bridge
-        simulation.partners.append(GeomCoupling(arm.data, bridge, without=ours))
-        for grasper in led_graspers(scene.graspers, motions, arm, bridge):
-            simulation.add_grasper(grasper)
+        _add_graspers(simulation, scene.graspers, motions, [each.body for each in standing])
     return simulation
 
 
-def _placed(reached: Stroke, boxes: FloatArray, scene: Scene, needed: ExpectedForce) -> Placement:
-    """Return where an arm of the project stands; see `placement.place`."""
+def _add_graspers(
+    simulation: Simulation,
+    graspers: Sequence[GrasperTable],
+    motions: Sequence[GraspMotion],
+    fixtures: Sequence[str],
+) -> None:
+    """Have graspers take part, and all bodies of the arms but the blade touch the tissue.
+
+    Args:
+        simulation: Before its first frame.
+        graspers: What the scene says of them.
+        motions: Where they go.
+        fixtures: Names of bodies that the tissue knows already.
+    """
+    arm, bridge = simulation.arm, simulation.bridge
+    ours = [arm.model.body(arm.blade.body_id).name, *fixtures]
+    simulation.partners.append(GeomCoupling(arm.data, bridge, without=ours))
+    for grasper in led_graspers(graspers, motions, arm, bridge):
+        simulation.add_grasper(grasper)
+
+
+def _beside(
+    placement: Placement,
+    stroke: Stroke,
+    graspers: Sequence[GrasperTable],
+    motions: Sequence[GraspMotion],
+    boxes: FloatArray,
+    rooms: Sequence[FloatArray | None],
+) -> list[HeldArm]:
+    """Return the arms with graspers beside an arm of the project; see `arms_with_graspers`."""
+    frame = TissueFrame(origin=placement.tissue_origin)
+    # Where a hand will lead it is not known: at the start the arms are clear of each other.
+    known = resting_stroke(stroke.start) if stroke.is_led else stroke
+    return arms_with_graspers(graspers, motions, boxes, frame, (placement, known), rooms)
+
+
+def _placed(
+    stroke: Stroke,
+    boxes: FloatArray,
+    scene: Scene,
+    needed: ExpectedForce,
+    beside: Callable[[Placement], list[HeldArm]],
+) -> tuple[Placement, list[HeldArm], FloatArray | None]:
+    """Return where an arm of the project stands, arms beside it, and where a hand may lead it.
+
+    Args:
+        stroke: What it is to reach; of a hand, where it starts.
+        boxes: See `placement.place`.
+        scene: The scene.
+        needed: What the cut will take.
+        beside: Places the arms beside it.
+    """
+    if not stroke.is_led:
+        placement = place(stroke, boxes, scene.arm, force=needed.force)
+        return placement, beside(placement), None
+    start = stroke.start
+    workspace, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
+
+    def place_for(box: FloatArray) -> tuple[Placement, list[HeldArm]]:
+        tour = tour_of(box, middle, start)
+        found = place_if_reached(tour, boxes, scene.arm, force=needed.force)
+        if found is None:
+            raise PlacementError(f"arm {scene.arm}")
+        return found, beside(found)
+
+    def reaches(box: FloatArray) -> bool:
+        return stays_in_reach(placement, tour_of(box, middle, start), boxes)
+
     try:
-        return place(reached, boxes, scene.arm, force=needed.force)
+        (placement, held), box = placed_within(workspace, middle, place_for)
     except PlacementError as error:
-        if not reached.is_led:
-            raise
         raise PlacementError(
-            "no hand can lead the blade here: the arm does not reach all around the body with the "
-            "blade as it is at the start. Choose another scene, or a first stroke that begins with "
-            f"the blade upright ({error})"
+            "no hand can lead the blade here: the arm does not reach around where the blade "
+            "starts, in the direction that it has there. Choose another scene, or a first stroke "
+            f"that begins with the blade upright ({error})"
         ) from error
+    return placement, held, grown_within(box, workspace, reaches)
+
+
+def _moved(
+    arm: LedArm, stroke: Stroke, frame: TissueFrame, workspace: FloatArray
+) -> FloatArray | None:
+    """Move an arm of the user's own to the start, and return where a hand may lead it."""
+    if stroke.is_led:
+        return move_within(arm, workspace, stroke.start, frame)
+    move_to_start(arm, stroke, frame)
+    return None
+
+
+def _room_of_grasper(motion: GraspMotion, scene: Scene, bounds: FloatArray) -> FloatArray | None:
+    """Return where a hand is to lead a grasper; None where a script leads it."""
+    if not motion.is_led:
+        return None
+    start = motion.stroke(HALF_PAD, HALF_PAD).start
+    return workspace_in(scene, start, bounds, ROOM_OF_GRASPER)
 
 
 def _as_long(stroke: Stroke, length: float) -> Stroke:

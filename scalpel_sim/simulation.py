@@ -17,7 +17,7 @@ from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.output.recording import Recording, columns_of_hand, held_columns
 from scalpel_sim.state.simulation_state import SimulationState
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import BladeSegment, StageTimes, StepResult, Wrench
+from tissue import BladeSegment, FloatArray, StageTimes, StepResult, Wrench
 
 NO_WRENCH = Wrench(np.zeros(3), np.zeros(3), np.zeros(3))
 
@@ -98,6 +98,9 @@ class Simulation:
         """Graspers of other arms: see `add_grasper`."""
         self.partners: list[Partner] = []
         """What else acts on the tissue, graspers among it."""
+        self.workspace: FloatArray | None = None
+        """Where a hand may lead the middle of the edge [m], tissue frame: the lowest and the
+        highest place, shape (2, 3); None: the blade follows a script."""
         self.pictures: list[DrawFrame] = []
         """Called after each frame; most frames they skip."""
         self.wall_seconds = 0.0

@@ -24,6 +24,9 @@ SHAFT_LENGTH = 0.0715
 PAD_LENGTH = 0.015
 """Length of a pad, along the shaft [m]."""
 
+HALF_PAD = 0.5 * PAD_LENGTH
+"""From the middle between the pads to either end of them [m]."""
+
 FORWARD = (0.0, 0.0, -1.0)
 """What a blade calls forward, in the frame of the shaft: across the shaft and across the way of the
 jaws. A grasper is led as a blade is."""

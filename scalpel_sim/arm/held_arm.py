@@ -23,6 +23,9 @@ class HeldArm(NamedTuple):
     """Where the origin of its model is in the world [m], shape (3,)."""
     quaternion: FloatArray
     """How it is turned there (w, x, y, z)."""
+    workspace: FloatArray | None = None
+    """Lowest and highest place where a hand may lead the middle of the pads [m], tissue frame,
+    shape (2, 3); None: it follows a script."""
 
     @property
     def prefix(self) -> str:

@@ -2,13 +2,13 @@
 
 import logging
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import mujoco
 import numpy as np
 
 from bridge import Bridge, TissueFrame
-from scalpel_sim.arm.grasper import PAD_LENGTH, GuidedGrasper, Pads
+from scalpel_sim.arm.grasper import HALF_PAD, GuidedGrasper, Pads
 from scalpel_sim.arm.grip import Grip
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.arm.tissue_frames import frame_of
@@ -46,6 +46,32 @@ class Hold(NamedTuple):
     """Distance between the pads below which they hold what is between them [m]."""
 
 
+class GrasperLeader(Protocol):
+    """What leads a grasper: a `MotionFollower`, or a person by a `LiveGrasper`."""
+
+    def lead(self, t: float) -> None:
+        """Lead it to its pose and opening at time `t` [s], a step after the last one."""
+
+
+class MotionFollower:
+    """Leads a grasper along a motion.
+
+    Args:
+        grasper: The grasper.
+        motion: Where it goes, tissue frame.
+        frame: Where the tissue lies in the world.
+    """
+
+    def __init__(self, grasper: GuidedGrasper, motion: GraspMotion, frame: TissueFrame) -> None:
+        self._grasper, self._motion = grasper, motion
+        self._follower = StrokeFollower(grasper.hand, motion.stroke(HALF_PAD, HALF_PAD), frame)
+
+    def lead(self, t: float) -> None:
+        """Lead it to its pose and opening at time `t` [s], a step after the last one."""
+        self._follower.lead(t)
+        self._grasper.open_to(self._motion.opening(t))
+
+
 class LedGrasper:
     """A grasper that is led along a motion, and the tissue that it holds.
 
@@ -58,6 +84,7 @@ class LedGrasper:
         tissue: What it may hold: a tissue in this process, or a bridge to one anywhere.
         frame: Where the tissue lies in the world; of a bridge it is that of the bridge.
         hold: How it is tied to what it closes on; None: it is not, and friction alone holds.
+        workspace: Where a person may lead it: see `HeldArm.workspace`.
     """
 
     def __init__(
@@ -68,6 +95,7 @@ class LedGrasper:
         tissue: Tissue | Bridge,
         frame: TissueFrame = TissueFrame(),
         hold: Hold | None = Hold(),
+        workspace: FloatArray | None = None,
     ) -> None:
         self.name = motion.name
         self.grasper = grasper
@@ -79,8 +107,10 @@ class LedGrasper:
         self._was_closed = False
         self._had_met = False
         self._holds_some = False
-        half = 0.5 * PAD_LENGTH
-        self._follower = StrokeFollower(grasper.hand, motion.stroke(half, half), frame)
+        self.workspace = workspace
+        """Where a person may lead the middle of the pads [m], shape (2, 3); None: nowhere."""
+        self.leader: GrasperLeader = MotionFollower(grasper, motion, frame)
+        """What leads it in each frame."""
 
     @property
     def n_points(self) -> int:
@@ -101,8 +131,7 @@ class LedGrasper:
 
     def lead(self, t: float) -> None:
         """Lead it to its pose and opening at time `t` [s], a step after the last one."""
-        self._follower.lead(t)
-        self.grasper.open_to(self.motion.opening(t))
+        self.leader.lead(t)
 
     def follow(self) -> None:
         """Take what the jaws have closed on, or let go where they have opened; lead what is held.

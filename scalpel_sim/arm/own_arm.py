@@ -18,6 +18,7 @@ from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.hand import EDGE, Impedance
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
+from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.stroke import Stroke
@@ -160,29 +161,56 @@ def move_to_start(arm: LedArm, stroke: Stroke, frame: TissueFrame) -> None:
     Raises:
         PlacementError: it does not; the message says where, and by how much.
     """
-    times = np.linspace(0.0, stroke.duration, _SAMPLES)
-    poses = [frame.segment_to_world(stroke.pose(t)) for t in times]
+    times, poses = _watched(stroke, frame)
     solver = _InverseKinematics(arm)
     nearest = (np.inf, 0.0, 0)
     for start in solver.starts():
-        qpos, first = start, None
-        for i, pose in enumerate(poses):
-            qpos, miss = solver.solve(qpos, pose)
-            if first is None:
-                first = qpos
-            if miss > 1.0:
-                nearest = min(nearest, (miss, float(times[i]), i), key=lambda each: -each[2])
-                break
-        else:
-            assert first is not None
+        first, miss, i = solver.follow(start, poses)
+        if miss <= 1.0:
             arm.reset(first)
             return
+        nearest = min(nearest, (miss, float(times[i]), i), key=lambda each: -each[2])
     miss, when, _ = nearest
     raise PlacementError(
         f"the arm '{arm.name}' does not reach the stroke: at {when:.2f} s of it the edge stays "
         f"{miss * 1e3 * _NEAR:.3g} mm away, a turn of {_NEAR_TURN / _NEAR * 1e-3:.2g} rad counted "
         "as a millimetre. Move it or the tissue (pos, quat of the scene), or choose a smaller one"
     )
+
+
+def move_within(
+    arm: LedArm, workspace: FloatArray, start: BladeSegment, frame: TissueFrame
+) -> FloatArray:
+    """Move an arm to a pose, and return how much of the workspace around it it reaches.
+
+    Args:
+        arm: See `move_to_start`.
+        workspace: Lowest and highest place where the middle of the edge is wanted, tissue frame
+            [m], shape (2, 3).
+        start: The pose, tissue frame.
+        frame: Where the tissue lies in the world.
+
+    Raises:
+        PlacementError: it does not reach even a small part of it.
+    """
+    middle = 0.5 * (start.tip + start.heel)
+
+    def move_for(box: FloatArray) -> None:
+        move_to_start(arm, tour_of(box, middle, start), frame)
+
+    def reaches(box: FloatArray) -> bool:
+        poses = _watched(tour_of(box, middle, start), frame)[1]
+        solver = _InverseKinematics(arm)
+        return solver.follow(solver.starts()[0], poses)[1] <= 1.0
+
+    _, box = placed_within(workspace, middle, move_for)
+    return grown_within(box, workspace, reaches)
+
+
+def _watched(stroke: Stroke, frame: TissueFrame) -> tuple[FloatArray, list[BladeSegment]]:
+    """Return the instants at which an arm must reach a stroke [s], and the poses, world frame."""
+    times = np.linspace(0.0, stroke.duration, _SAMPLES)
+    return times, [frame.segment_to_world(stroke.pose(t)) for t in times]
 
 
 class _InverseKinematics:
@@ -201,6 +229,22 @@ class _InverseKinematics:
         high = np.where(np.isfinite(self._high), self._high, np.pi)
         rng = np.random.default_rng(0)
         return [self._at_first, *rng.uniform(low, high, (_STARTS - 1, len(low)))]
+
+    def follow(
+        self, qpos: FloatArray, poses: Sequence[BladeSegment]
+    ) -> tuple[FloatArray, float, int]:
+        """Follow poses from a configuration, up to the first that is not reached.
+
+        Returns:
+            The configuration at the first pose, the miss at the last one that was tried, as
+            `solve` counts it, and the number of that pose.
+        """
+        qpos, miss = self.solve(qpos, poses[0])
+        first, n = qpos, 1
+        while miss <= 1.0 and n < len(poses):
+            qpos, miss = self.solve(qpos, poses[n])
+            n += 1
+        return first, miss, n - 1
 
     def solve(self, qpos: FloatArray, pose: BladeSegment) -> tuple[FloatArray, float]:
         """Return a configuration near `qpos` that has the edge at a pose, and by how much not.

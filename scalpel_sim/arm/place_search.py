@@ -8,7 +8,7 @@ import numpy as np
 
 from scalpel_sim.arm.inverse_kinematics import Geometry, reach
 from scalpel_sim.strokes.stroke import Stroke
-from tissue import FloatArray
+from tissue import BoolArray, FloatArray
 
 YAWS = np.arange(24) * (2.0 * math.pi / 24)
 """Directions from the base to the stroke that the search tries [rad]."""
@@ -113,13 +113,20 @@ def blade_path(
     return InstrumentPath(heels - edge_height * backs, axes, lowest, boxes)
 
 
-def search_place(measures: Geometry, path: InstrumentPath, others: Sequence[Spheres] = ()) -> Found:
+def search_place(
+    measures: Geometry,
+    path: InstrumentPath,
+    others: Sequence[Spheres] = (),
+    *,
+    at_start: bool = False,
+) -> Found:
     """Return the best of all places that is clear of other arms; the best of all if none is.
 
     Args:
         measures: Of the arm.
         path: What it is to reach, at the instants at which the others are known.
         others: What covers them.
+        at_start: Whether the arms are to be clear of each other at the first instant alone.
     """
     length = measures.upper + measures.forearm + measures.neck
     heights = HEIGHTS * length + measures.shoulder
@@ -128,6 +135,9 @@ def search_place(measures: Geometry, path: InstrumentPath, others: Sequence[Sphe
     grid = np.meshgrid(YAWS, DISTANCES * length, heights, indexing="ij")
     places = Places(*(values.ravel() for values in grid))
     scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
+    if at_start:
+        clear = [_are_clear_at_start(measures, path, places, a, others) for a in MOUNT_ANGLES]
+        scores, others = np.where(clear, scores, -np.inf), ()
     order = np.argsort(-scores, axis=None, kind="stable")
     order = order[: MOST_TRIED if others else 1]
     for mount, best in zip(*np.unravel_index(order, scores.shape), strict=True):
@@ -153,22 +163,74 @@ def spheres_along(
         yaw: Angle by which it is turned about +z [rad].
         mount_angle: Between stylus and instrument [rad].
     """
-    turn = _turns(np.array([yaw]))[0]
-    axes = turn.T @ path.axes
-    angles = reach(measures, (path.positions - base) @ turn, axes, mount_angle).angles
+    turn, n = turn_about_z(yaw), len(path.positions)
+    reached = reach(measures, (path.positions - base) @ turn, turn.T @ path.axes, mount_angle)
+    bases, turns = np.broadcast_to(base, (n, 3)), np.broadcast_to(turn, (n, 3, 3))
+    return _spheres(measures, path, reached.angles, bases, turns, mount_angle)
+
+
+def _spheres(
+    measures: Geometry,
+    path: InstrumentPath,
+    angles: FloatArray,
+    bases: FloatArray,
+    turns: FloatArray,
+    mount_angle: float,
+) -> Spheres:
+    """Return spheres that cover an arm at n poses, or at one pose from n bases.
+
+    Args:
+        measures: Of the arm.
+        path: The poses, or the one.
+        angles: Of the joints [rad], shape (n, 6).
+        bases: Where the arm stands, tissue frame [m], shape (n, 3).
+        turns: Axes of the base as columns, shape (n, 3, 3).
+        mount_angle: Between stylus and instrument [rad].
+    """
     c, s = math.cos(mount_angle), math.sin(mount_angle)
     stylus = path.axes @ np.array([0.0, c, -s])
     gimbal = path.positions - measures.neck * stylus
+    along = np.stack([gimbal - d * stylus for d in (0.0, 0.03, 0.06)], axis=1)
     column = np.multiply.outer(np.linspace(0.0, measures.shoulder, 4), [0.0, 0.0, 1.0])
+    links = _links(measures, angles) @ np.swapaxes(turns, 1, 2)
     parts = [
-        (np.broadcast_to(base + column, (len(gimbal), 4, 3)), BASE_RADIUS),
-        (base + _links(measures, angles) @ turn.T, LINK_RADIUS),
-        (np.stack([gimbal - d * stylus for d in (0.0, 0.03, 0.06)], axis=1), LINK_RADIUS),
+        (bases[:, None] + column, BASE_RADIUS),
+        (bases[:, None] + links, LINK_RADIUS),
+        (np.broadcast_to(along, (len(bases), *along.shape[1:])), LINK_RADIUS),
     ]
     return Spheres(
         np.concatenate([centres for centres, _ in parts], axis=1),
         np.concatenate([np.full(centres.shape[1], radius) for centres, radius in parts]),
     )
+
+
+def _are_clear_at_start(
+    measures: Geometry,
+    path: InstrumentPath,
+    places: Places,
+    mount_angle: float,
+    others: Sequence[Spheres],
+) -> BoolArray:
+    """Return from which places an arm is clear of others at the first instant, shape (n_places,).
+
+    Args:
+        measures: Of the arm.
+        path: Where its instrument is.
+        places: The places.
+        mount_angle: Between stylus and instrument [rad].
+        others: What covers the others.
+    """
+    positions, axes = in_base(path, places)
+    angles = reach(measures, positions[:, 0], axes[:, 0], mount_angle).angles
+    first = path._replace(positions=path.positions[:1], axes=path.axes[:1])
+    bases, turns = base_of(path, places), _turns(places.yaws)
+    own = _spheres(measures, first, angles, bases, turns, mount_angle)
+    clear = np.ones(len(bases), bool)
+    for other in others:
+        for centre, radius in zip(other.centres[0], other.radii, strict=True):
+            apart = np.linalg.norm(own.centres - centre, axis=2)
+            clear &= (apart >= own.radii + radius + LINK_CLEARANCE).all(axis=1)
+    return clear
 
 
 def _is_clear(measures: Geometry, path: InstrumentPath, found: Found, other: Spheres) -> bool:
@@ -216,6 +278,11 @@ def in_base(path: InstrumentPath, places: Places) -> tuple[FloatArray, FloatArra
 def _middle(path: InstrumentPath) -> FloatArray:
     """Return the middle of the box around the positions along the path [m], shape (3,)."""
     return np.asarray((path.positions.min(axis=0) + path.positions.max(axis=0)) / 2.0)
+
+
+def turn_about_z(yaw: float) -> FloatArray:
+    """Return the axes of a base that is turned about +z [rad], as columns, shape (3, 3)."""
+    return np.asarray(_turns(np.array([yaw]))[0])
 
 
 def _turns(yaws: FloatArray) -> FloatArray:

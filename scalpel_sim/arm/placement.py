@@ -21,6 +21,7 @@ from scalpel_sim.arm.place_search import (
     in_base,
     search_place,
     spheres_along,
+    turn_about_z,
 )
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError, unknown
@@ -116,6 +117,27 @@ def place(
         UsageError: no arm has this name.
         PlacementError: no arm reaches; the message says at which scale one would.
     """
+    found = place_if_reached(stroke, boxes, preset, force=force)
+    if found is None:
+        largest = list(ARMS)[-1] if preset == AUTO else preset
+        raise PlacementError(_advice(stroke, boxes, largest))
+    return found
+
+
+def place_if_reached(
+    stroke: Stroke, boxes: FloatArray, preset: str, *, force: float
+) -> Placement | None:
+    """Do what `place` does, but return None where no arm reaches: what would help takes long.
+
+    Args:
+        stroke: See `place`, as the rest.
+        boxes: What lies there [m].
+        preset: The arm.
+        force: Expected force on the blade [N].
+
+    Raises:
+        UsageError: no arm has this name.
+    """
     if preset != AUTO and preset not in ARMS:
         raise unknown("arm", preset, [*ARMS, AUTO])
     found = None
@@ -125,8 +147,6 @@ def place(
             found = placement
             if ARMS[name].force >= force:
                 break
-    if found is None:  # `name` is the largest arm that was asked for
-        raise PlacementError(_advice(stroke, boxes, name))
     return found
 
 
@@ -154,6 +174,26 @@ def covered(
     return spheres_along(measures, path, base, placement.base_yaw, placement.mount_angle)
 
 
+def stays_in_reach(
+    placement: Placement, stroke: Stroke, boxes: FloatArray, *, edge_height: float | None = None
+) -> bool:
+    """Return whether an arm that stands somewhere reaches a stroke, with enough room in its joints.
+
+    Args:
+        placement: Where it stands.
+        stroke: Tissue frame.
+        boxes: See `place`.
+        edge_height: See `covered`.
+    """
+    measures, of_scalpel = _measured(placement.preset)
+    height = of_scalpel if edge_height is None else edge_height
+    path = blade_path(stroke, boxes, height, np.linspace(0.0, stroke.duration, DENSE_SAMPLES))
+    turn = turn_about_z(placement.base_yaw)
+    positions = (path.positions - (placement.base_position - placement.tissue_origin)) @ turn
+    reached = reach(measures, positions, turn.T @ path.axes, placement.mount_angle)
+    return bool(reached.margin.min() >= NEEDED_MARGIN)
+
+
 def place_beside(
     stroke: Stroke,
     boxes: FloatArray,
@@ -162,6 +202,7 @@ def place_beside(
     *,
     table: float | None,
     others: Sequence[Spheres],
+    at_start: bool = False,
 ) -> Placement:
     """Return the place from which an arm that holds a grasper reaches, clear of other arms.
 
@@ -173,6 +214,7 @@ def place_beside(
         times: Instants at which it must reach, and be clear of the others [s].
         table: Height of the table on which it stands, tissue frame [m]; None: of its own.
         others: What covers the arms that stand there, at these instants.
+        at_start: Whether they are to be clear of each other at the first instant alone.
 
     Raises:
         UsageError: no arm has this name.
@@ -183,7 +225,7 @@ def place_beside(
     for name in ARMS if preset == AUTO else (preset,):
         measures, _ = _measured(name)
         path = blade_path(stroke, boxes, 0.0, times)._replace(table=table)
-        found = search_place(measures, path, others)
+        found = search_place(measures, path, others, at_start=at_start)
         placement = _placed(found, measures, name, path)
         if placement.margin >= NEEDED_MARGIN and math.isfinite(found.score):
             return placement

@@ -14,6 +14,7 @@ from scalpel_sim.arm.placement import AUTO, Placement, covered
 from scalpel_sim.arm.second_arm import (
     model_with_grasper,
     place_of_grasper,
+    place_of_led_grasper,
     preset_with_grasper,
 )
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
@@ -52,6 +53,7 @@ def arms_with_graspers(
     boxes: FloatArray,
     frame: TissueFrame,
     first: tuple[Placement, Stroke] | None,
+    workspaces: Sequence[FloatArray | None],
 ) -> list[HeldArm]:
     """Return the arms that hold the graspers of a scene, each clear of those before.
 
@@ -63,32 +65,47 @@ def arms_with_graspers(
         frame: Where the tissue lies in the world.
         first: Where an arm of the project stands that does a stroke, and that stroke; its table is
             that of all. None: there is none, and each arm has its own table.
+        workspaces: Where a hand is to lead each: see `HeldArm.workspace`; None: it follows its
+            script.
 
     Raises:
         UsageError: a model cannot be read, or has no place for a grasper.
         PlacementError: an arm does not reach its motion.
     """
-    last = max([motion.duration for motion in motions], default=0.0)
+    last = max([motion.duration for motion in motions if not motion.is_led], default=0.0)
     if first is not None:
         last = max(last, first[1].duration)
     times = np.linspace(0.0, last, WATCHED_INSTANTS)
     table = None if first is None else -float(first[0].tissue_origin[2])
     taken = [] if first is None else [covered(*first, boxes, times)]
     found = []
-    for grasper, motion in zip(graspers, motions, strict=True):
+    for grasper, motion, workspace in zip(graspers, motions, workspaces, strict=True):
         if grasper.model is None:
-            preset = grasper.preset or AUTO
-            place, spheres = place_of_grasper(
-                motion, boxes, preset, times, table=table, others=taken
-            )
+            preset, reached = grasper.preset or AUTO, None
+            if workspace is None:
+                place, spheres = place_of_grasper(
+                    motion, boxes, preset, times, table=table, others=taken
+                )
+            else:
+                place, spheres, reached = place_of_led_grasper(
+                    motion, workspace, boxes, preset, times, table=table, others=taken
+                )
             taken.append(spheres)
-            found.append(preset_with_grasper(motion, place, frame, force=grasper.force))
+            arm = preset_with_grasper(motion, place, frame, force=grasper.force, workspace=reached)
         else:
             assert grasper.at is not None
             base = TissueFrame(_rotation(grasper), np.array(grasper.pos or (0.0, 0.0, 0.0)))
             model = Path(grasper.model)
-            arm = model_with_grasper(motion, model, grasper.at, base, frame, force=grasper.force)
-            found.append(arm)
+            arm = model_with_grasper(
+                motion,
+                model,
+                grasper.at,
+                base,
+                frame,
+                force=grasper.force,
+                workspace=workspace,
+            )
+        found.append(arm)
     return found
 
 
@@ -114,8 +131,10 @@ def led_graspers(
         bridge: To the tissue that they may hold.
     """
     return [
-        LedGrasper(grasper, arm.data, motion, bridge, hold=_hold(table))
-        for table, motion, grasper in zip(graspers, motions, arm.graspers, strict=True)
+        LedGrasper(grasper, arm.data, motion, bridge, hold=_hold(table), workspace=held.workspace)
+        for table, motion, grasper, held in zip(
+            graspers, motions, arm.graspers, arm.others, strict=True
+        )
     ]
 
 

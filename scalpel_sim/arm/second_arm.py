@@ -15,7 +15,7 @@ from scalpel_sim.arm.grasper import (
     GRASPER,
     GRASPER_HEEL,
     GRASPER_TIP,
-    PAD_LENGTH,
+    HALF_PAD,
     SHAFT_LENGTH,
     add_grasper,
     grasper_spec,
@@ -23,9 +23,22 @@ from scalpel_sim.arm.grasper import (
 from scalpel_sim.arm.hand import Impedance, add_hand
 from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.own_arm import expect_angles, firm_impedance, move_to_start, own_spec
+from scalpel_sim.arm.own_arm import (
+    expect_angles,
+    firm_impedance,
+    move_to_start,
+    move_within,
+    own_spec,
+)
 from scalpel_sim.arm.place_search import Spheres
-from scalpel_sim.arm.placement import Placement, covered, place_beside
+from scalpel_sim.arm.placement import (
+    SAMPLES,
+    Placement,
+    covered,
+    place_beside,
+    stays_in_reach,
+)
+from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.stroke import Stroke
@@ -38,6 +51,7 @@ def preset_with_grasper(
     frame: TissueFrame,
     *,
     force: float | None = None,
+    workspace: FloatArray | None = None,
 ) -> HeldArm:
     """Return an arm of the project that holds a grasper, at the start of a motion.
 
@@ -46,6 +60,7 @@ def preset_with_grasper(
         placement: Where the arm stands.
         frame: Where the tissue lies in the world.
         force: Largest force of the jaws [N]; None: the usual.
+        workspace: See `HeldArm.workspace`.
     """
     spec = preset_spec(placement.preset)
     put_base(spec, placement.base_position, placement.base_yaw)
@@ -57,7 +72,7 @@ def preset_with_grasper(
     add_hand(spec, Impedance(), GRASPER_HEEL, GRASPER_TIP, FORWARD)
     qpos = np.append(placement.qpos, 2 * [0.5 * motion.opening(0.0)])
     origin = frame.points_to_world(-placement.tissue_origin)
-    return HeldArm(motion.name, spec, qpos, origin, _quaternion(frame.rotation))
+    return HeldArm(motion.name, spec, qpos, origin, _quaternion(frame.rotation), workspace)
 
 
 def place_of_grasper(
@@ -84,9 +99,54 @@ def place_of_grasper(
     return place, covered(place, path, boxes, times, edge_height=0.0)
 
 
+def place_of_led_grasper(
+    motion: GraspMotion,
+    workspace: FloatArray,
+    boxes: FloatArray,
+    preset: str,
+    times: FloatArray,
+    *,
+    table: float | None,
+    others: Sequence[Spheres],
+) -> tuple[Placement, Spheres, FloatArray]:
+    """Return where an arm stands whose grasper a hand leads, what covers it, and where it reaches.
+
+    It is clear of other arms at the start; where hands lead them is not known.
+
+    Args:
+        motion: Where the grasper is at the start.
+        workspace: Where it is wanted, see `HeldArm.workspace`.
+        boxes: See `place_of_grasper`, as the rest.
+        preset: The arm.
+        times: Instants at which what covers it is wanted [s].
+        table: Height of the table.
+        others: What covers other arms.
+
+    Raises:
+        PlacementError: it does not reach even a small part of the workspace.
+    """
+    path, middle = path_of_grasper(motion), np.array(motion.start.at)
+
+    def tour(box: FloatArray) -> Stroke:
+        return tour_of(box, middle, path.start)
+
+    def place_for(box: FloatArray) -> Placement:
+        instants = np.linspace(0.0, tour(box).duration, SAMPLES)
+        return place_beside(
+            tour(box), boxes, preset, instants, table=table, others=others, at_start=True
+        )
+
+    def reaches(box: FloatArray) -> bool:
+        return stays_in_reach(place, tour(box), boxes, edge_height=0.0)
+
+    place, box = placed_within(workspace, middle, place_for)
+    spheres = covered(place, path, boxes, times, edge_height=0.0)
+    return place, spheres, grown_within(box, workspace, reaches)
+
+
 def path_of_grasper(motion: GraspMotion) -> Stroke:
     """Return a motion as that of an edge from where an arm holds it to the end of its pads."""
-    return motion.stroke(SHAFT_LENGTH, 0.5 * PAD_LENGTH)
+    return motion.stroke(SHAFT_LENGTH, HALF_PAD)
 
 
 def model_with_grasper(
@@ -97,6 +157,7 @@ def model_with_grasper(
     frame: TissueFrame,
     *,
     force: float | None = None,
+    workspace: FloatArray | None = None,
 ) -> HeldArm:
     """Return the arm of an MJCF file that holds a grasper, at the start of a motion.
 
@@ -107,6 +168,7 @@ def model_with_grasper(
         base: Where the origin of the model lies in the frame of the tissue.
         frame: Where the tissue lies in the world.
         force: Largest force of the jaws [N]; None: the usual.
+        workspace: Where a hand is to lead the middle of the pads [m]; None: a script leads it.
 
     Raises:
         UsageError: the file cannot be read, is no model, or has no such site or body.
@@ -124,9 +186,12 @@ def model_with_grasper(
         expect_angles(alone.model)
     except ValueError as error:
         raise UsageError(f"[[grasper]] '{motion.name}' model {path}: {error}") from error
-    half = 0.5 * PAD_LENGTH
     tissue_in_model = TissueFrame(base.rotation.T, base.points_to_tissue(np.zeros(3)))
-    move_to_start(alone, motion.stroke(half, half), tissue_in_model)
+    if workspace is None:
+        move_to_start(alone, motion.stroke(HALF_PAD, HALF_PAD), tissue_in_model)
+    else:
+        start = motion.stroke(HALF_PAD, HALF_PAD).start
+        workspace = move_within(alone, workspace, start, tissue_in_model)
     spec = spec_with_grasper()
     add_hand(spec, firm_impedance(alone), GRASPER_HEEL, GRASPER_TIP, FORWARD)
     qpos = np.array(alone.data.qpos)
@@ -134,7 +199,8 @@ def model_with_grasper(
         joint = alone.model.joint(f"{GRASPER}jaw_{side}")
         qpos[int(joint.qposadr[0])] = 0.5 * motion.opening(0.0)
     turned = frame.rotation @ base.rotation
-    return HeldArm(motion.name, spec, qpos, frame.points_to_world(base.origin), _quaternion(turned))
+    origin = frame.points_to_world(base.origin)
+    return HeldArm(motion.name, spec, qpos, origin, _quaternion(turned), workspace)
 
 
 def _quaternion(rotation: FloatArray) -> FloatArray:

@@ -7,7 +7,6 @@ from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import End, Engage
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.pace import Pace
-from scalpel_sim.hands.workspace import workspace_in
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
@@ -24,11 +23,12 @@ SECONDS_PER_LOOK = 0.02
 def live_hand(prepared: PreparedRun) -> LiveHand:
     """Return the hand that leads a run."""
     simulation, scene = prepared.simulation, prepared.scene
+    assert simulation.workspace is not None
     return LiveHand(
         simulation.arm.hand,
         simulation.stroke,
         simulation.frame,
-        workspace_in(scene, simulation.stroke.start, simulation.link.describe().bounds),
+        simulation.workspace,
         dt=simulation.dt,
         seconds=LONGEST_RUN if scene.seconds is None else scene.seconds,
     )

@@ -35,18 +35,22 @@ class GraspMotion:
     """The motion of a grasper from waypoint to waypoint, at rest at each.
 
     In between position, turn and opening follow the polynomial of least jerk (Flash and Hogan 1985,
-    J. Neuroscience 5:1688), as the hands of people do.
+    J. Neuroscience 5:1688), as the hands of people do. Where a person leads it, or has led it, each
+    frame of a motion has a waypoint, and in between it is even.
 
     Args:
         waypoints: At least one, in the order of time. Before the first it is there.
         name: For messages.
+        is_led: Whether a person leads it, or has led it.
 
     Raises:
         StrokeError: times do not increase, a direction is zero or along another, or a part of the
             grasper would be too fast.
     """
 
-    def __init__(self, waypoints: Sequence[Waypoint], name: str = "grasper") -> None:
+    def __init__(
+        self, waypoints: Sequence[Waypoint], name: str = "grasper", *, is_led: bool = False
+    ) -> None:
         if not waypoints:
             raise StrokeError(f"the motion of '{name}' has no waypoint")
         first, last = waypoints[0], waypoints[-1]
@@ -61,6 +65,11 @@ class GraspMotion:
                     f"waypoint {i + 2}; times must increase"
                 )
         self.name = name
+        self.is_led = is_led
+        """Whether a person leads it, or has led it: its arm then stands where it reaches around the
+        body, wherever that motion goes."""
+        self.start = waypoints[0]
+        """Where it is at first."""
         self._waypoints = waypoints
         self._times = [waypoint.time for waypoint in waypoints]
         self._poses = [_pose(waypoint, name) for waypoint in waypoints]
@@ -76,7 +85,8 @@ class GraspMotion:
         if i == 0 or i == len(self._times):
             return self._waypoints[min(i, len(self._times) - 1)].opening
         before, after = self._waypoints[i - 1], self._waypoints[i]
-        share = least_jerk((t - before.time) / (after.time - before.time))
+        share = (t - before.time) / (after.time - before.time)
+        share = share if self.is_led else least_jerk(share)
         return before.opening + share * (after.opening - before.opening)
 
     def stroke(self, behind: float, ahead: float) -> Stroke:
@@ -89,6 +99,10 @@ class GraspMotion:
         Raises:
             StrokeError: an end of the edge would be too fast.
         """
+        name = f"motion of '{self.name}'"
+        if self.is_led:  # what was recorded keeps its bits
+            edges = [_edge(pose, behind, ahead) for pose in self._poses]
+            return Stroke(self._times, edges, name, is_led=True)
         times, poses = [self._times[0]], [_edge(self._poses[0], behind, ahead)]
         for (begin, end), legs in zip(pairwise(self._times), pairwise(self._poses), strict=True):
             is_still = all(np.array_equal(a, b) for a, b in zip(*legs, strict=True))
@@ -96,7 +110,25 @@ class GraspMotion:
             for k in range(1, n + 1):
                 times.append(begin + (end - begin) * k / n)
                 poses.append(_edge(_between(*legs, least_jerk(k / n)), behind, ahead))
-        return Stroke(times, poses, f"motion of '{self.name}'")
+        return Stroke(times, poses, name)
+
+    def at_rest(self) -> "GraspMotion":
+        """Return the motion of a grasper that rests at the start of this one, until it is led."""
+        return GraspMotion([self.start], self.name, is_led=True)
+
+    def pads(self) -> tuple[float, float]:
+        """Return the smallest and the largest distance of the pads in it [m]."""
+        openings = [waypoint.opening for waypoint in self._waypoints]
+        return min(openings), max(openings)
+
+
+def edge_of_grasper(waypoint: Waypoint, behind: float, ahead: float, name: str) -> BladeSegment:
+    """Return the edge along the shaft at a waypoint: see `GraspMotion.stroke`.
+
+    Raises:
+        StrokeError: its directions are along one line, or one is zero.
+    """
+    return _edge(_pose(waypoint, name), behind, ahead)
 
 
 def least_jerk(s: float) -> float:

@@ -7,7 +7,6 @@ import numpy as np
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.live_hand import LiveHand
-from scalpel_sim.hands.workspace import workspace_in
 
 GRID2 = SCENES["grid2"]
 
@@ -28,12 +27,11 @@ class Clock:
 def led(scene=GRID2, clock=None, seconds=math.inf) -> tuple[Simulation, LiveHand]:
     """Return a simulation at its start, and the hand that leads it."""
     simulation = prepare(scene, is_led=True)
-    bounds = simulation.link.describe().bounds
     hand = LiveHand(
         simulation.arm.hand,
         simulation.stroke,
         simulation.frame,
-        workspace_in(scene, simulation.stroke.start, bounds),
+        simulation.workspace,
         dt=simulation.dt,
         seconds=seconds,
         clock=clock or Clock(),

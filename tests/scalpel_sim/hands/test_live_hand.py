@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
-from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
 from scalpel_sim.hands.limited_pose import (
     ARRIVED,
@@ -28,6 +27,9 @@ ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml
 
 UNTIMED = COLUMNS.index("cd_s")
 """Columns from here on are wall times."""
+
+LEAST_ROOM = 0.01
+"""Room in each direction in which a hand can do something in a body of some 30 mm [m]."""
 
 DT = 1e-3
 """Length of a frame [s]."""
@@ -204,9 +206,16 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
     assert np.array_equal(*same_rows, equal_nan=True)
 
 
-def test_a_scene_whose_arm_does_not_reach_around_the_body_is_refused():
-    with pytest.raises(PlacementError, match=r"no hand can lead the blade here.*Choose another"):
-        prepare(SCENES["retract"], is_led=True)
+@pytest.mark.parametrize("name", ["retract", "excise", "taut_incision"])
+def test_scenes_of_two_hands_have_room_for_both_from_their_start_on(name):
+    simulation = prepare(SCENES[name], is_led=True)
+    start, (grasper,) = simulation.stroke.start, simulation.graspers
+    for middle, workspace in (
+        (0.5 * (start.tip + start.heel), simulation.workspace),
+        (np.array(grasper.motion.start.at), grasper.workspace),
+    ):
+        assert (workspace[0] <= middle).all() and (middle <= workspace[1]).all()
+        assert (np.ptp(workspace, axis=0) > LEAST_ROOM).all()
 
 
 def test_what_was_recorded_says_when_the_hand_was_engaged(tmp_path, hand):

@@ -1,0 +1,101 @@
+"""How much of a workspace an arm reaches: a box around where it starts."""
+
+from collections.abc import Callable
+from typing import TypeVar
+
+import numpy as np
+
+from scalpel_sim.arm.placement import PlacementError
+from scalpel_sim.strokes.stroke import Stroke
+from tissue import BladeSegment, FloatArray
+
+PlaceT = TypeVar("PlaceT")
+
+SMALLEST_SHARE = 1.0 / 16.0
+"""Share of a workspace below which an arm that does not reach it is refused: of the body and 20 mm
+around it that is a few millimetres each way, in which nobody can cut."""
+
+NEAR_ENOUGH = 1e-3
+"""How near the side of a box comes to where the reach of the arm ends [m]."""
+
+_CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 1), (0, 0, 1))
+"""Corners of a box in an order in which each is beside the next: 0 is low, 1 is high."""
+
+
+def tour_of(workspace: FloatArray, middle: FloatArray, start: BladeSegment) -> Stroke:
+    """Return a stroke from the start to all corners of a workspace, one a second.
+
+    Args:
+        workspace: Lowest and highest place of the middle of an instrument [m], shape (2, 3).
+        middle: Where that is at the start [m].
+        start: An edge along the instrument at the start; it keeps its direction.
+    """
+    shifts = [workspace[np.array(corner), np.arange(3)] - middle for corner in _CORNERS]
+    poses = [
+        start._replace(tip=start.tip + shift, heel=start.heel + shift)
+        for shift in (np.zeros(3), *shifts)
+    ]
+    return Stroke(np.arange(float(len(poses))), poses, "live hand", is_led=True)
+
+
+def placed_within(
+    workspace: FloatArray, middle: FloatArray, place: Callable[[FloatArray], PlaceT]
+) -> tuple[PlaceT, FloatArray]:
+    """Return what places an arm for a workspace, or for a smaller one that it reaches.
+
+    The workspace is halved about the start until there is a place.
+
+    Args:
+        workspace: See `tour_of`.
+        middle: Where the middle of the instrument is at the start [m].
+        place: Places the arm so that it reaches a box.
+
+    Returns:
+        What `place` returns, and the box that the arm reaches.
+
+    Raises:
+        PlacementError: there is no place even for the smallest share of it.
+    """
+
+    def placed(share: float) -> tuple[PlaceT, FloatArray]:
+        box = middle + share * (workspace - middle)
+        return place(box), box
+
+    try:
+        return placed(1.0)
+    except PlacementError:
+        smallest, share = placed(SMALLEST_SHARE), 0.5
+    while share > SMALLEST_SHARE:
+        try:
+            return placed(share)
+        except PlacementError:
+            share /= 2.0
+    return smallest
+
+
+def grown_within(
+    box: FloatArray, workspace: FloatArray, reaches: Callable[[FloatArray], bool]
+) -> FloatArray:
+    """Return a box, each side of which is moved out as far as the arm reaches, in turn.
+
+    Args:
+        box: What it reaches [m], shape (2, 3).
+        workspace: What is wanted, around it.
+        reaches: Whether an arm that has been placed reaches a box.
+    """
+    if np.array_equal(box, workspace):
+        return box
+    box = box.copy()
+    for side, axis in np.ndindex(2, 3):
+        inner, outer = float(box[side, axis]), float(workspace[side, axis])
+        box[side, axis] = outer
+        if reaches(box):
+            continue
+        while abs(outer - inner) > NEAR_ENOUGH:
+            box[side, axis] = 0.5 * (inner + outer)
+            if reaches(box):
+                inner = float(box[side, axis])
+            else:
+                outer = float(box[side, axis])
+        box[side, axis] = inner
+    return box
