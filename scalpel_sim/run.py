@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from msgspec import structs
+
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.live_hand import LiveHand
@@ -17,6 +19,7 @@ from scalpel_sim.output.run_folder import (
     SCENE,
     STROKE,
     Outputs,
+    grasp_file,
 )
 from scalpel_sim.output.summary import COMPLETE, RunFacts, Summary, summarise
 from scalpel_sim.scene_file.writing import scene_text
@@ -80,8 +83,8 @@ def perform(
         views: Cameras that the replay offers; it begins with the first.
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
-        hand: Who leads the blade; what is done is written as `stroke.csv`, and the run ends with a
-            rest after the hand has ended.
+        hand: Who leads blade and graspers; what is done is written, as `stroke.csv` and a file for
+            each grasper, and the run ends with a rest after the hand has ended.
 
     Raises:
         Interrupted: the user or the system ended the run.
@@ -90,7 +93,8 @@ def perform(
     seconds = run_time(simulation, seconds)
     body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
     at_first = simulation.link.snapshot()
-    simulation.leader = hand or simulation.leader
+    if hand is not None:
+        hand.take_over(simulation)
     if scene is not None and hand is not None:
         scene = _led_scene(scene, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
@@ -116,7 +120,7 @@ def perform(
     if hand is not None:
         hand.finish(simulation.time)
         with unwritten:
-            outputs.write_stroke(hand.take_rows())
+            _write_led(outputs, hand)
     summary = summarise(
         simulation.recording,
         _facts(simulation, body, status, settings, outputs, unwritten, asked),
@@ -158,7 +162,7 @@ def _run_frames(
         def after_frame(now: Simulation) -> bool:
             outputs.write_forces(now.recording)
             if hand is not None and len(now.recording) % FRAMES_PER_FLUSH == 0:
-                outputs.write_stroke(hand.take_rows())
+                _write_led(outputs, hand)
             if every_frame is not None:
                 every_frame(now)
             return stop.reason is not None or (hand is not None and _has_rested(now, hand))
@@ -183,7 +187,18 @@ def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
 def _led_scene(scene: Scene, outputs: Outputs) -> Scene:
     """Return the scene that repeats what the hand will have done."""
     recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
-    return replace(scene, strokes=(recorded,), seconds=None)
+    graspers = [
+        structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))
+        for each in scene.graspers
+    ]
+    return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
+
+
+def _write_led(outputs: Outputs, hand: LiveHand) -> None:
+    """Write what the hand has done since the last call."""
+    outputs.write_stroke(hand.blade.take_rows())
+    for grasper in hand.graspers:
+        outputs.write_grasp(grasper.name, grasper.take_rows())
 
 
 def _facts(

@@ -18,6 +18,7 @@ from scalpel_sim.arm.second_arm import (
     preset_with_grasper,
 )
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint
+from scalpel_sim.strokes.recorded_grasp import grasp_from_csv
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.grasper import DEFAULT_ACROSS, DEFAULT_APPROACH, GrasperTable
 from tissue import FloatArray
@@ -31,9 +32,14 @@ def motions_of(graspers: Sequence[GrasperTable]) -> list[GraspMotion]:
     """Return the motions of graspers; what a row leaves out is as in the row before.
 
     Raises:
-        StrokeError: no grasper can follow one.
+        StrokeError: no grasper can follow one, or a file that holds one is wrong.
     """
-    return [GraspMotion(_waypoints(grasper), grasper.name) for grasper in graspers]
+    return [
+        GraspMotion(_waypoints(grasper), grasper.name)
+        if grasper.recorded is None
+        else grasp_from_csv(grasper.recorded, grasper.name)
+        for grasper in graspers
+    ]
 
 
 def _waypoints(grasper: GrasperTable) -> list[Waypoint]:

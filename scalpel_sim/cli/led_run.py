@@ -4,7 +4,7 @@ import time
 
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
-from scalpel_sim.hands.commands import End, Engage
+from scalpel_sim.hands.commands import Choose, End, Engage, Jaws
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.pace import Pace
 from scalpel_sim.output.plot_process import Plotter
@@ -19,19 +19,14 @@ from scalpel_sim.viewer.viewer import Viewer
 SECONDS_PER_LOOK = 0.02
 """How often it is looked whether somebody has taken hold of the blade [s]."""
 
+_BEGIN = Engage | Choose | Jaws | End
+"""Commands with which a run begins."""
+
 
 def live_hand(prepared: PreparedRun) -> LiveHand:
     """Return the hand that leads a run."""
-    simulation, scene = prepared.simulation, prepared.scene
-    assert simulation.workspace is not None
-    return LiveHand(
-        simulation.arm.hand,
-        simulation.stroke,
-        simulation.frame,
-        simulation.workspace,
-        dt=simulation.dt,
-        seconds=LONGEST_RUN if scene.seconds is None else scene.seconds,
-    )
+    seconds = prepared.scene.seconds
+    return LiveHand.of(prepared.simulation, seconds=LONGEST_RUN if seconds is None else seconds)
 
 
 def perform_led(
@@ -71,9 +66,9 @@ def perform_led(
 
 
 def _wait_for_hand(viewer: Viewer, hand: LiveHand) -> None:
-    """Wait until a page engages the hand, or ends the run before it has begun."""
+    """Wait until a page chooses or takes hold, or ends the run before it has begun."""
     with StopSignals() as stop:
-        while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
+        while not any(isinstance(command, _BEGIN) for command in list(hand.commands)):
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:

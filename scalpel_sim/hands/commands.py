@@ -30,15 +30,15 @@ class _Message(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Engage(_Message, frozen=True, tag="engage"):
-    """The hand takes hold: from now on moves and turns lead the blade."""
+    """The hand takes hold: from now on moves and turns lead the chosen instrument."""
 
 
 class Release(_Message, frozen=True, tag="release"):
-    """The hand lets go: the blade stays where it is."""
+    """The hand lets go: the instrument stays where it is."""
 
 
 class Move(_Message, frozen=True, tag="move"):
-    """Move the blade."""
+    """Move the chosen instrument."""
 
     by: _ThreeNumbers
     """Displacement [m], world frame."""
@@ -47,7 +47,7 @@ class Move(_Message, frozen=True, tag="move"):
 
 
 class Turn(_Message, frozen=True, tag="turn"):
-    """Turn the blade about the middle of its edge."""
+    """Turn it about the middle of its edge or of its pads."""
 
     by: _ThreeNumbers
     """Rotation vector [rad], world frame."""
@@ -63,11 +63,25 @@ class Lead(_Message, frozen=True, tag="lead"):
     """The page asks to be the one that leads."""
 
 
+class Choose(_Message, frozen=True, tag="choose"):
+    """Lead another instrument from now on; the hand lets go of the one before."""
+
+    instrument: Annotated[int, msgspec.Meta(ge=0)]
+    """Its number: 0 is the blade, the graspers follow in the order of the scene."""
+
+
+class Jaws(_Message, frozen=True, tag="jaws"):
+    """Close or open the jaws of the chosen instrument, if it has any."""
+
+    closed: bool
+    """Whether they are to close."""
+
+
 class End(_Message, frozen=True, tag="end"):
     """The run is to end."""
 
 
-Command = Engage | Release | Move | Turn | StillThere | Lead | End
+Command = Engage | Release | Move | Turn | StillThere | Choose | Jaws | Lead | End
 
 _decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 

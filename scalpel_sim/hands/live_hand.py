@@ -1,43 +1,44 @@
-"""A hand that a person leads: it moves towards where they want it, and what it did is recorded."""
+"""A person who leads the instruments: their commands go to the one that they have chosen."""
 
 import math
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-import mujoco
 import numpy as np
 
 from bridge import TissueFrame
-from scalpel_sim.arm.hand import Hand
-from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.hands.commands import (
     LONGEST_SILENCE,
+    Choose,
     Command,
     End,
     Engage,
+    Jaws,
     Move,
     Release,
     Turn,
 )
-from scalpel_sim.hands.limited_pose import LimitedPose
-from scalpel_sim.strokes.stroke import Stroke, poses_of_edges
+from scalpel_sim.hands.instrument import Instrument
+from scalpel_sim.hands.live_blade import LiveBlade
+from scalpel_sim.hands.live_grasper import LiveGrasper
+from scalpel_sim.simulation import Simulation
 from tissue import FloatArray
 
 
 class LiveHand:
-    """Leads a hand as commands say, in place of a `StrokeFollower`.
+    """Leads blade and graspers as commands say, in place of their scripts.
 
-    It starts at the start of a stroke, and is released. Commands say how to move from where it
-    wants to be, never where to be, so that nothing jumps when it is engaged again.
+    They start at rest, the blade is chosen, and nothing is held. Commands say how to move from
+    where the chosen one wants to be, never where to be, so that nothing jumps when it is engaged
+    again.
 
-    A `Stroke` read from its rows leads a hand to the same bits.
+    A `Stroke` and `GraspMotion`s read from their rows lead to the same bits.
 
     Args:
-        hand: Holds a blade already, at the start of the stroke.
-        stroke: Where the blade rests at first, tissue frame.
+        blade: The blade at its start.
+        graspers: Graspers at theirs.
         frame: Where the tissue lies in the world.
-        workspace: Where the middle of the edge may be: see `workspace.workspace`.
         dt: Length of a frame [s].
         seconds: How long it leads at most [s]; then it has ended.
         clock: Wall time [s], by which silence is measured.
@@ -45,10 +46,9 @@ class LiveHand:
 
     def __init__(
         self,
-        hand: Hand,
-        stroke: Stroke,
+        blade: LiveBlade,
+        graspers: Sequence[LiveGrasper],
         frame: TissueFrame,
-        workspace: FloatArray,
         *,
         dt: float,
         seconds: float = math.inf,
@@ -59,71 +59,100 @@ class LiveHand:
         self.stamp: float | None = None
         """Stamp of the newest command that it has obeyed; None: there was none yet."""
         self.is_engaged = False
-        """Whether it leads the blade."""
+        """Whether it leads the chosen instrument."""
         self.ended_at: float | None = None
-        """Simulated time at which the stroke has ended [s]; from then on it rests."""
+        """Simulated time at which it has ended [s]; from then on all rest."""
+        self.blade = blade
+        self.graspers = tuple(graspers)
+        self.instruments: tuple[Instrument, ...] = (blade, *graspers)
+        """What it may choose."""
+        self.chosen = 0
+        """Which of them it leads."""
         self._frame, self._clock = frame, clock
         self._dt, self._seconds = dt, seconds
         self._heard_at = -math.inf
-        start = stroke.start
-        self._resting = Stroke([0.0, 1.0], [start, start])
-        """Its path has one row, the pose that leads now, which is written over."""
-        self._follower = StrokeFollower(hand, self._resting, frame)
-        path = self._resting.path[0]
-        self._half = float(path[2])
-        self._pose = LimitedPose(path[10:13], path[3:7], workspace, dt)
-        self._numbers = [float(number) for part in start for number in part]
-        self._rows: list[list[float]] = []
-        self._last: tuple[float, list[float]] | None = None
-        self._is_kept = False
+
+    @classmethod
+    def of(
+        cls,
+        simulation: Simulation,
+        *,
+        seconds: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> "LiveHand":
+        """Return a hand for a simulation that was prepared to be led.
+
+        Args:
+            simulation: At its start.
+            seconds: See `LiveHand`, as the rest.
+            clock: Wall time [s].
+        """
+        frame, dt = simulation.frame, simulation.dt
+        assert simulation.workspace is not None
+        start, hand = simulation.stroke.start, simulation.arm.hand
+        blade = LiveBlade(hand, start, frame, simulation.workspace, dt)
+        graspers = []
+        for each in simulation.graspers:
+            assert each.workspace is not None
+            graspers.append(LiveGrasper(each.grasper, each.motion, frame, each.workspace, dt))
+        return cls(blade, graspers, frame, dt=dt, seconds=seconds, clock=clock)
+
+    def take_over(self, simulation: Simulation) -> None:
+        """Lead the instruments of the simulation that it was made for, from its next frame on."""
+        simulation.leader = self
+        for grasper, live in zip(simulation.graspers, self.graspers, strict=True):
+            grasper.leader = live
 
     @property
     def tip(self) -> FloatArray:
-        """Where the tip is led [m], world frame, shape (3,)."""
-        return self._frame.points_to_world(np.array(self._numbers[:3]))
+        """Where the chosen instrument is led [m], world frame, shape (3,)."""
+        return self.instruments[self.chosen].tip
 
     def lead(self, t: float) -> None:
-        """Lead the blade to its pose at time `t` [s], a step after the last one."""
+        """Lead the blade to its pose at time `t` [s], a step after the last one.
+
+        The graspers then know where they are to be led in this frame.
+        """
         if self.ended_at is None:
             has_ended = self._obey() or t >= self._seconds
-            # The record begins at the start.
-            if self._last is not None and not has_ended and self._pose.step():
-                self._take_pose()
-            self._record(t)
+            for i, instrument in enumerate(self.instruments):
+                is_engaged = self.is_engaged and i == self.chosen
+                instrument.advance(t, is_engaged=is_engaged, moves=not has_ended)
             if has_ended:
                 self.finish(max(t, self._dt))
-        self._follower.lead(t)
+        self.blade.lead(t)
 
     def finish(self, t: float) -> None:
-        """End the stroke at time `t` [s], after its last frame, unless it has ended before."""
+        """End at time `t` [s], after the last frame, unless it has ended before."""
         if self.ended_at is None:
             self.ended_at = t
             self._let_go()
-            if self._last is not None and (t > self._last[0] or not self._is_kept):
-                self._rows.append([t, *self._last[1]])
-
-    def take_rows(self) -> list[list[float]]:
-        """Return the rows of `LED_COLUMNS` that were recorded since the last call."""
-        rows, self._rows = self._rows, []
-        return rows
+            for instrument in self.instruments:
+                instrument.finish(t)
 
     def _obey(self) -> bool:
-        """Do what the commands say; return whether one of them ends the stroke."""
+        """Do what the commands say; return whether one of them ends the run."""
         has_ended = False
         while self.commands:
             command = self.commands.popleft()
             self._heard_at = self._clock()
+            chosen = self.instruments[self.chosen]
             if isinstance(command, Move | Turn):
                 self.stamp = command.stamp
                 by = self._frame.vectors_to_tissue(np.array(command.by))
                 if self.is_engaged and isinstance(command, Move):
-                    self._pose.move(by)
+                    chosen.pose.move(by)
                 elif self.is_engaged:
-                    self._pose.turn(by)
+                    chosen.pose.turn(by)
             elif isinstance(command, Engage):
                 self.is_engaged = True
             elif isinstance(command, Release):
                 self._let_go()
+            elif isinstance(command, Choose) and command.instrument < len(self.instruments):
+                self._let_go()
+                self.chosen = command.instrument
+            elif isinstance(command, Jaws):
+                chosen.close_jaws(command.closed)
             elif isinstance(command, End):
                 has_ended = True
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
@@ -131,31 +160,6 @@ class LiveHand:
         return has_ended
 
     def _let_go(self) -> None:
-        """Rest where it is."""
+        """Have the chosen instrument rest where it is."""
         self.is_engaged = False
-        self._pose.rest()
-
-    def _take_pose(self) -> None:
-        """Lead by the pose as a `Stroke` reads it from the record: that rounds it once more."""
-        axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, self._pose.rotation)
-        _, along, back = axes.reshape(3, 3).T
-        middle, to_tip = self._pose.middle, self._half * along
-        tip, heel = middle + to_tip, middle - to_tip
-        self._numbers = [*tip.tolist(), *heel.tolist(), *(-back).tolist()]
-        middles, rotations, _ = poses_of_edges(tip[None], heel[None], -back[None])
-        path = self._resting.path[0]
-        path[3:7], path[10:13] = rotations[0], middles[0]
-
-    def _record(self, t: float) -> None:
-        """Record the pose at time `t` [s], and the one before where that had been left out.
-
-        Of poses in turn that are the same, the first and the last are enough.
-        """
-        row = [*self._numbers, float(self.is_engaged)]
-        is_new = self._last is None or self._last[1] != row
-        if is_new:
-            if self._last is not None and not self._is_kept:
-                self._rows.append([self._last[0], *self._last[1]])
-            self._rows.append([t, *row])
-        self._last, self._is_kept = (t, row), is_new
+        self.instruments[self.chosen].pose.rest()

@@ -13,6 +13,7 @@ from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS, Recording
 from scalpel_sim.output.summary import Summary
+from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import FloatArray, Snapshot, write_vtu
@@ -28,13 +29,19 @@ FINAL = "final.vtu"
 REPLAY = "replay.html"
 SCENE = "scene.toml"
 STROKE = "stroke.csv"
-"""What a hand did. A scripted run leaves it: it may be the very stroke that is done again."""
+"""What a hand did with the blade. A scripted run leaves it, and the files of graspers: they may be
+the very ones that are done again."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write, beside `STROKE`."""
 
 FRAMES_PER_FLUSH = 25
 """Number of rows of `forces.csv` that are written together, which takes 0.1 ms: a kill loses a
 fortieth of a second."""
+
+
+def grasp_file(name: str) -> str:
+    """Return the name of the file of what a hand did with a grasper."""
+    return f"grasper_{name}.csv"
 
 
 class Outputs:
@@ -68,7 +75,7 @@ class Outputs:
         self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
         self._append((",".join(columns) + "\n").encode("ascii"))
         self._n_written = 0
-        self._stroke: IO[bytes] | None = None
+        self._led: dict[str, IO[bytes]] = {}
 
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
@@ -94,16 +101,26 @@ class Outputs:
         self._n_written = len(recording)
 
     def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
-        """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew.
+        """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew."""
+        self._write_led(STROKE, LED_COLUMNS, rows)
+
+    def write_grasp(self, name: str, rows: Sequence[Sequence[float]]) -> None:
+        """Add rows of `GRASP_COLUMNS` to the file of a grasper; the first call begins it anew."""
+        self._write_led(grasp_file(name), GRASP_COLUMNS, rows)
+
+    def _write_led(
+        self, name: str, columns: Sequence[str], rows: Sequence[Sequence[float]]
+    ) -> None:
+        """Add rows to a file of what a hand did; the first call begins it anew.
 
         Numbers are written so that reading them gives the same bits.
         """
         text = _csv(np.array(rows)) if rows else b""
-        if self._stroke is None:
-            self._stroke = _naming_path(self.path(STROKE), lambda p: p.open("wb", buffering=0))
-            text = (",".join(LED_COLUMNS) + "\n").encode("ascii") + text
-        stroke = self._stroke
-        _naming_path(self.path(STROKE), lambda _: stroke.write(text))
+        if name not in self._led:
+            self._led[name] = _naming_path(self.path(name), lambda p: p.open("wb", buffering=0))
+            text = (",".join(columns) + "\n").encode("ascii") + text
+        led = self._led[name]
+        _naming_path(self.path(name), lambda _: led.write(text))
 
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
@@ -123,10 +140,10 @@ class Outputs:
         _naming_path(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
 
     def close(self) -> None:
-        """Close `forces.csv` and `stroke.csv`. May be called twice."""
+        """Close `forces.csv` and what a hand did. May be called twice."""
         self._forces.close()
-        if self._stroke is not None:
-            self._stroke.close()
+        for led in self._led.values():
+            led.close()
 
     def _append(self, text: bytes) -> None:
         _naming_path(self.path(FORCES), lambda _: self._forces.write(text))

@@ -68,7 +68,7 @@ def scene_in(file: SceneFile) -> Scene:
         blade=naming_table("[blade]", lambda: _blade(tables.blade)),
         attachments=tuple(tables.attachment),
         strokes=tuple(_located(stroke, file.folder) for stroke in tables.stroke),
-        graspers=tuple(_with_model(grasper, file.folder) for grasper in tables.grasper),
+        graspers=tuple(_with_files(grasper, file.folder) for grasper in tables.grasper),
         views=tuple(tables.view),
         **{key: value for key, value in given.items() if value is not None},
     )
@@ -120,8 +120,8 @@ def _located(stroke: StrokeTable, folder: Path) -> StrokeTable:
     return msgspec.structs.replace(stroke, file=str(folder / stroke.file))
 
 
-def _with_model(grasper: GrasperTable, folder: Path) -> GrasperTable:
-    """Return a grasper the model of whose arm is found from anywhere."""
-    if grasper.model is None:
-        return grasper
-    return msgspec.structs.replace(grasper, model=str(folder / grasper.model))
+def _with_files(grasper: GrasperTable, folder: Path) -> GrasperTable:
+    """Return a grasper whose files are found from anywhere."""
+    given = {"model": grasper.model, "recorded": grasper.recorded}
+    found = {key: str(folder / file) for key, file in given.items() if file is not None}
+    return msgspec.structs.replace(grasper, **found)

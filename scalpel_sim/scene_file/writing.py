@@ -10,6 +10,7 @@ import tomlkit
 
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.tables.body import BodySource, BodyTable
+from scalpel_sim.tables.grasper import GrasperTable
 from scalpel_sim.tables.material import given_in
 from tissue import BladeShape
 
@@ -43,10 +44,7 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         if "file" in stroke:
             stroke["file"] = _relative(Path(stroke["file"]), folder)
     attachments = [given_in(attachment) for attachment in scene.attachments]
-    graspers = [given_in(grasper) for grasper in scene.graspers]
-    for grasper in graspers:
-        if "model" in grasper:
-            grasper["model"] = _relative(Path(grasper["model"]), folder)
+    graspers = [_grasper(grasper, folder) for grasper in scene.graspers]
     run = {} if scene.seconds is None else {"seconds": scene.seconds}
     return {
         "name": scene.name,
@@ -97,6 +95,17 @@ def content_of(scene: Scene, folder: Path) -> dict[str, Any]:
         "stroke": strokes,
         **_views(scene),
     }
+
+
+def _grasper(grasper: GrasperTable, folder: Path) -> dict[str, Any]:
+    """Return a row of `[[grasper]]`."""
+    given = given_in(grasper)
+    if grasper.recorded is not None:
+        del given["motion"]  # it is empty
+    for key in ("model", "recorded"):
+        if key in given:
+            given[key] = _relative(Path(given[key]), folder)
+    return given
 
 
 def _views(scene: Scene) -> dict[str, Any]:

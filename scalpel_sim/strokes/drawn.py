@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from scalpel_sim.strokes.stroke import Stroke, StrokeError, from_csv
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke, from_csv
 from scalpel_sim.strokes.timing import SAMPLE, SPEED_UP_TIME, timed
 from scalpel_sim.tables.stroke import StrokeTable
 from tissue import BladeSegment, FloatArray

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import SAMPLE
 from tissue import BladeSegment, FloatArray
 
@@ -70,6 +71,10 @@ class GraspMotion:
         body, wherever that motion goes."""
         self.start = waypoints[0]
         """Where it is at first."""
+        openings = [waypoint.opening for waypoint in waypoints]
+        self.pads = min(openings), max(openings)
+        """Smallest and largest distance of the pads in it [m]; of one that rests until it is led,
+        those of its script."""
         self._waypoints = waypoints
         self._times = [waypoint.time for waypoint in waypoints]
         self._poses = [_pose(waypoint, name) for waypoint in waypoints]
@@ -114,12 +119,9 @@ class GraspMotion:
 
     def at_rest(self) -> "GraspMotion":
         """Return the motion of a grasper that rests at the start of this one, until it is led."""
-        return GraspMotion([self.start], self.name, is_led=True)
-
-    def pads(self) -> tuple[float, float]:
-        """Return the smallest and the largest distance of the pads in it [m]."""
-        openings = [waypoint.opening for waypoint in self._waypoints]
-        return min(openings), max(openings)
+        rest = GraspMotion([self.start], self.name, is_led=True)
+        rest.pads = self.pads
+        return rest
 
 
 def edge_of_grasper(waypoint: Waypoint, behind: float, ahead: float, name: str) -> BladeSegment:

@@ -11,7 +11,8 @@ import math
 
 import numpy as np
 
-from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh, boundary_faces
 

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.strokes.timing import timed
 from tissue import BladeSegment, FloatArray, TetrahedralMesh
 

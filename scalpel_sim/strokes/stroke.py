@@ -1,7 +1,5 @@
 """A stroke: the path of a blade over time, in the tissue frame."""
 
-import csv
-import math
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -9,7 +7,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from scalpel_sim.errors import UsageError
+from scalpel_sim.strokes.csv_lines import StrokeError, numbered_lines, numbers_of
 from tissue import BladeSegment, FloatArray
 
 _SAME_LENGTH = 0.01
@@ -25,10 +23,6 @@ _ENGAGED_COLUMN = "engaged"
 
 LED_COLUMNS = (*_COLUMNS, *FORWARD_COLUMNS, _ENGAGED_COLUMN)
 """Columns of a stroke that was led by hand."""
-
-
-class StrokeError(UsageError):
-    """A path that no blade can follow, or that does not lead through the body."""
 
 
 class Stroke:
@@ -142,20 +136,9 @@ def from_csv(path: str | Path) -> Stroke:
         StrokeError: no such file, or one that is no such table; the message names file and line.
     """
     path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
-        raise StrokeError(f"cannot read the stroke {path}: {reason}") from error
-    numbered = [
-        (number, [cell.strip() for cell in next(csv.reader([line]))])
-        for number, line in enumerate(lines, start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not numbered:
-        raise StrokeError(f"{path} is empty; its first line is {','.join(_COLUMNS)}")
+    numbered = numbered_lines(path, "stroke", _COLUMNS)
     columns = _columns(path, *numbered[0])
-    table = np.array([_row(path, number, cells, columns) for number, cells in numbered[1:]])
+    table = np.array([numbers_of(path, *line, columns) for line in numbered[1:]])
     if len(table) < 2:
         raise StrokeError(f"{path} has {len(table)} poses; a stroke needs at least two")
     times, tips, heels = table[:, 0], table[:, 1:4], table[:, 4:7]
@@ -254,22 +237,6 @@ def _columns(path: Path, number: int, header: list[str]) -> list[int]:
             f"{','.join(FORWARD_COLUMNS)}, and {_ENGAGED_COLUMN} too if a hand has led it"
         )
     return [names.index(name) for name in wanted]
-
-
-def _row(path: Path, number: int, cells: list[str], columns: list[int]) -> list[float]:
-    """Return the numbers of one line."""
-    if len(cells) != len(columns):
-        raise StrokeError(f"{path}, line {number}: {len(cells)} values, wanted {len(columns)}")
-    values = []
-    for column in columns:
-        try:
-            value = float(cells[column])
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise StrokeError(f"{path}, line {number}: '{cells[column]}' is not a finite number")
-        values.append(value)
-    return values
 
 
 def _forwards_of_motion(path: Path, tips: FloatArray, heels: FloatArray) -> FloatArray:

@@ -48,7 +48,7 @@ class WaypointTable(TomlTable, kw_only=True, frozen=True):
 
 
 class GrasperTable(TomlTable, kw_only=True, frozen=True):
-    """`[[grasper]]`: an arm that holds a grasper, which is led along a motion."""
+    """`[[grasper]]`: an arm that holds a grasper, led along a motion, or as a hand has led it."""
 
     name: Name = "left"
     preset: Text | None = None
@@ -76,6 +76,8 @@ class GrasperTable(TomlTable, kw_only=True, frozen=True):
     force: Positive | None = None
     """Largest force of the jaws [N]."""
     motion: Annotated[list[WaypointTable], Meta(min_length=1)] = field(default_factory=list)
+    recorded: Text | None = None
+    """CSV file of what a hand did with it, in place of a motion."""
 
 
 _OF_MODEL = ("at", "pos", "quat")
@@ -94,13 +96,19 @@ def check_graspers(graspers: Sequence[GrasperTable]) -> None:
         check_own_name(grasper.name, [other.name for other in graspers[:i]], where)
 
 
-def _check(grasper: GrasperTable, where: str) -> None:
-    if not grasper.motion:
+def _check_motion(motion: Sequence[WaypointTable], where: str) -> None:
+    if not motion:
         raise UsageError(f"{where} has no motion: rows such as {{time = 0.0, at = [0, 0, 0.1]}}")
-    first = grasper.motion[0]
     for key in ("at", "opening"):
-        if getattr(first, key) is None:
+        if getattr(motion[0], key) is None:
             raise UsageError(f"the first row of motion of {where} has no {key}")
+
+
+def _check(grasper: GrasperTable, where: str) -> None:
+    if grasper.recorded is not None and grasper.motion:
+        raise UsageError(f"{where} has a motion and a recorded one; choose one")
+    if grasper.recorded is None:
+        _check_motion(grasper.motion, where)
     if grasper.model is not None:
         if grasper.preset is not None:
             raise UsageError(f"{where} has a preset and a model; choose one")

@@ -83,4 +83,13 @@ def state_of_hand(hand: LiveHand, factor: float) -> HandState:
         hand: The hand.
         factor: How fast the simulation runs, over real time.
     """
-    return HandState(hand.tip, hand.is_engaged, hand.ended_at is not None, hand.stamp, factor)
+    return HandState(
+        hand.tip,
+        hand.is_engaged,
+        hand.ended_at is not None,
+        hand.stamp,
+        factor,
+        [each.name for each in hand.instruments],
+        hand.chosen,
+        hand.instruments[hand.chosen].is_closed,
+    )

@@ -81,15 +81,21 @@ class HandState(NamedTuple):
     """How the hand is that the page leads."""
 
     tip: FloatArray
-    """Where the tip is led [m], world frame, shape (3,)."""
+    """Where the tip of the chosen instrument is led [m], world frame, shape (3,)."""
     is_engaged: bool
-    """Whether it leads the blade."""
+    """Whether it leads that."""
     has_ended: bool
     """Whether the run will not follow it any more."""
     stamp: float | None
     """Stamp of the newest command that the picture shows; None: there was none yet."""
     real_time: float
     """How fast the simulation runs, over real time."""
+    instruments: Sequence[str] = ()
+    """Names of the instruments that it may choose."""
+    chosen: int = 0
+    """Which of them it leads."""
+    is_closed: bool | None = None
+    """Whether the jaws of the chosen one are closed, or on their way there; None: it has none."""
 
 
 class Camera(NamedTuple):
@@ -219,6 +225,9 @@ class Scene3D:
             ended=hand.has_ended,
             stamp=hand.stamp,
             real_time=hand.real_time,
+            instruments=list(hand.instruments),
+            chosen=hand.chosen,
+            closed=hand.is_closed,
         )
 
     def take(self) -> bytes:

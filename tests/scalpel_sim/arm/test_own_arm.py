@@ -15,7 +15,8 @@ from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.errors import UsageError
 from scalpel_sim.scene_file.writing import scene_text
 from scalpel_sim.scene_parts.scene import changed
-from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, pieces_of
 
 EXAMPLES = Path(__file__).parents[3] / "docs" / "examples"

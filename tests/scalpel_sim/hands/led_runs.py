@@ -27,16 +27,8 @@ class Clock:
 def led(scene=GRID2, clock=None, seconds=math.inf) -> tuple[Simulation, LiveHand]:
     """Return a simulation at its start, and the hand that leads it."""
     simulation = prepare(scene, is_led=True)
-    hand = LiveHand(
-        simulation.arm.hand,
-        simulation.stroke,
-        simulation.frame,
-        simulation.workspace,
-        dt=simulation.dt,
-        seconds=seconds,
-        clock=clock or Clock(),
-    )
-    simulation.leader = hand
+    hand = LiveHand.of(simulation, seconds=seconds, clock=clock or Clock())
+    hand.take_over(simulation)
     return simulation, hand
 
 

@@ -46,15 +46,7 @@ def at_start():
 @pytest.fixture
 def hand(at_start):
     """A hand at the start of the scene, that leads the arm of `at_start`."""
-    simulation, first = at_start
-    return LiveHand(
-        simulation.arm.hand,
-        simulation.stroke,
-        simulation.frame,
-        first._pose._workspace,
-        dt=DT,
-        clock=Clock(),
-    )
+    return LiveHand.of(at_start[0], clock=Clock())
 
 
 def poses(hand, n, first=0):
@@ -62,7 +54,7 @@ def poses(hand, n, first=0):
     found = []
     for k in range(first, first + n):
         hand.lead(k * DT)
-        found.append(hand._numbers)
+        found.append(hand.blade._numbers)
     return np.array(found)
 
 
@@ -157,7 +149,7 @@ def test_poses_at_rest_take_no_rows(hand):
     poses(hand, 1000)
     hand.commands += [Engage(), move(y=1e-3)]
     poses(hand, 1000, 1000)
-    assert 10 < len(hand.take_rows()) < 400
+    assert 10 < len(hand.blade.take_rows()) < 400
 
 
 def done(simulation, folder, **others):
@@ -195,7 +187,7 @@ def test_the_arm_of_what_was_recorded_stands_where_that_of_the_hand_stood(tmp_pa
     hand.finish(simulation.time)
     with Plotter() as plotter:
         outputs = Outputs(tmp_path, plotter)
-        outputs.write_stroke(hand.take_rows())
+        outputs.write_stroke(hand.blade.take_rows())
         outputs.close()
 
     recorded = StrokeTable(kind="recorded", file=str(tmp_path / STROKE))
@@ -225,7 +217,7 @@ def test_what_was_recorded_says_when_the_hand_was_engaged(tmp_path, hand):
     hand.commands.append(Release())
     poses(hand, 10, 210)
     hand.finish(0.22)
-    rows = np.array(hand.take_rows())
+    rows = np.array(hand.blade.take_rows())
     engaged = rows[:, LED_COLUMNS.index("engaged")]
     assert rows[engaged == 1.0, 0].min() == pytest.approx(0.010)
     assert rows[engaged == 1.0, 0].max() == pytest.approx(0.209)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.drawn import drawn_stroke
 from scalpel_sim.strokes.sequence import in_turn
-from scalpel_sim.strokes.stroke import Stroke, StrokeError
+from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.stroke import StrokeTable
 from tissue import BladeSegment, block
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.grasp_motion import GraspMotion, Waypoint, least_jerk
-from scalpel_sim.strokes.stroke import StrokeError
 
 DOWN, X, Y = (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 START = Waypoint(0.5, (0.0, 0.0, 0.1), DOWN, X, 0.02)

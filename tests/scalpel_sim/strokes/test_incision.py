@@ -10,6 +10,7 @@ from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.asked_area import asked_area
+from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.incision import (
     DEPTH,
     INSERTED_AT,
@@ -19,7 +20,6 @@ from scalpel_sim.strokes.incision import (
     plan_incision,
 )
 from scalpel_sim.strokes.planning import plan_stroke
-from scalpel_sim.strokes.stroke import StrokeError
 from tissue import MATERIALS, BladeSweep, TetrahedralMesh, block, pieces_of
 
 SPEED = 0.06

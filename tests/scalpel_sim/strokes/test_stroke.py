@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from scalpel_sim.strokes.stroke import Stroke, StrokeError, from_csv
+from scalpel_sim.strokes.csv_lines import StrokeError
+from scalpel_sim.strokes.stroke import Stroke, from_csv
 from tissue import BladeSegment
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z"

@@ -1,0 +1,66 @@
+"""Lines of a CSV file that holds the motion of an instrument."""
+
+import csv
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from scalpel_sim.errors import UsageError
+
+
+class StrokeError(UsageError):
+    """A path that no blade can follow, or that does not lead through the body."""
+
+
+def numbered_lines(path: Path, what: str, columns: Sequence[str]) -> list[tuple[int, list[str]]]:
+    """Return the number and the cells of each line; the first names the columns.
+
+    Empty lines, and lines that start with #, are left out.
+
+    Args:
+        path: The file.
+        what: What it holds, for messages.
+        columns: Columns that it must have, for messages.
+
+    Raises:
+        StrokeError: no such file, no text, or nothing in it.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not a text file"
+        raise StrokeError(f"cannot read the {what} {path}: {reason}") from error
+    numbered = [
+        (number, [cell.strip() for cell in next(csv.reader([line]))])
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise StrokeError(f"{path} is empty; its first line is {','.join(columns)}")
+    return numbered
+
+
+def numbers_of(path: Path, number: int, cells: list[str], columns: list[int]) -> list[float]:
+    """Return the numbers of one line, in the order of the columns.
+
+    Args:
+        path: The file, for messages.
+        number: Number of the line.
+        cells: Its cells.
+        columns: Which of them are wanted: all, in some order.
+
+    Raises:
+        StrokeError: another number of cells, or one that is no finite number.
+    """
+    if len(cells) != len(columns):
+        raise StrokeError(f"{path}, line {number}: {len(cells)} values, wanted {len(columns)}")
+    values = []
+    for column in columns:
+        try:
+            value = float(cells[column])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise StrokeError(f"{path}, line {number}: '{cells[column]}' is not a finite number")
+        values.append(value)
+    return values
