@@ -31,7 +31,15 @@ def live_page(title: str, caption: str, token: str | None = None) -> str:
     return _page(
         title,
         caption,
-        ("scene_view.js", "controls.js", "hand_input.js", "gamepad.js", "hand.js", "live.js"),
+        (
+            "scene_view.js",
+            "controls.js",
+            "hand_input.js",
+            "gamepad.js",
+            "instruments.js",
+            "hand.js",
+            "live.js",
+        ),
         controls=(_HERE / "hand.html").read_text("utf-8"),
         data=f'<script>const TOKEN = "{token}";</script>',
         style=(_HERE / "hand.css").read_text("utf-8"),

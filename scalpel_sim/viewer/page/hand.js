@@ -1,4 +1,4 @@
-// The hand of the page: it says to the run how the blade is to move, and shows how late that is.
+// The hand of the page: it says to the run how the chosen instrument is to move, and shows how late that is.
 "use strict";
 
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
@@ -21,7 +21,8 @@ class Hand {
         this.hasMoved = false;
         this.hasEnded = false;
         this.holders = new Map(); // what holds the blade, and since when it only finishes a step [ms]
-        this.tip = null; // in the last picture [m], world frame
+        this.instruments = new Instruments(this);
+        this.tip = null; // of the chosen instrument in the last picture [m], world frame
         this.isAtRest = true; // whether it was there in the picture before
         this.sentAt = 0;
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
@@ -157,7 +158,8 @@ class Hand {
     }
 
     // A picture says how the hand is in it.
-    show({ tip, engaged, ended, stamp, real_time: realTime }) {
+    show({ tip, engaged, ended, stamp, real_time: realTime, instruments, chosen, closed }) {
+        this.instruments.show(instruments, chosen, closed);
         this.isAtRest = this.tip !== null && tip.every((x, axis) => x === this.tip[axis]);
         this.tip = tip;
         if (ended && !this.hasEnded) this.letGoOfAll();
@@ -188,6 +190,8 @@ class Hand {
         // With Ctrl the controls exchange the two.
         controls.mouseButtons.LEFT = this.isClosed ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
+        element("clutch").textContent = `lead the ${this.instruments.noun}`;
+        this.instruments.enable(this.leads && !this.hasEnded);
         for (const id of ["clutch", "end"]) element(id).disabled = !this.leads || this.hasEnded;
         element("take-over").hidden = this.leads || this.socket === null || this.hasEnded;
         element("hint").textContent = this.hint();
@@ -197,9 +201,10 @@ class Hand {
     hint() {
         if (this.hasEnded) return "The run has ended.";
         if (this.socket === null || this.tip === null) return "";
+        const { noun } = this.instruments;
         if (!this.leads) return "Another tab leads the blade.";
-        if (this.isClutchOpen) return "Drags turn the view. Space: lead the blade again.";
+        if (this.isClutchOpen) return `Drags turn the view. Space: lead the ${noun} again.`;
         if (this.hasMoved) return "";
-        return "Press on the picture and drag: the blade follows";
+        return `Press on the picture and drag: the ${noun} follows`;
     }
 }

@@ -62,6 +62,8 @@ function listenToKeys(hand) {
             event.preventDefault();
             hand.toggleClutch();
         }
+        if (key === "x" && !event.repeat) hand.instruments.chooseNext();
+        if (key === "j" && !event.repeat) hand.instruments.toggleJaws();
         if (key in STEPS && hand.isClosed) {
             event.preventDefault();
             const [right, up, away] = STEPS[key];

@@ -1,0 +1,231 @@
+"""A visitor leads a grasper and the blade in the live page: by gamepad, touch and controls."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scalpel_sim.output.recording import read_forces
+from scalpel_sim.output.run_folder import FORCES
+from tests.browser import TIMEOUT, WINDOW
+from tests.scalpel_sim.hands.led_view import LedView
+from tests.scalpel_sim.hands.test_led_page import (
+    LAID_BARE,
+    assert_a_run_repeats,
+    end,
+    opened,
+    tip,
+    until_it_rests,
+)
+
+SHEET = str(Path(__file__).parent / "sheet.toml")
+
+B, X, RIGHT_TRIGGER = 1, 2, 7
+"""Buttons of a gamepad."""
+
+TIME_TO_CLOSE = 0.4
+"""Simulated time in which jaws close [s]: 9 mm at 30 mm/s take 0.3 s."""
+
+LEAST_STEP = 1e-3
+"""What any control moves the instrument by, at least [m]."""
+
+GAMEPAD = """() => {
+    // A gamepad at rest, which tests replace.
+    window.pad = (axes, pressed = -1) => [{
+        connected: true, index: 0, axes,
+        buttons: Array.from({ length: 17 }, (_, i) => ({ pressed: i === pressed })),
+    }];
+    navigator.getGamepads = () => pad([0, 0, 0, 0]);
+}"""
+
+PRESS = """(button) => new Promise((done) => {
+    let polls = 0;
+    navigator.getGamepads = () => {
+        polls += 1;
+        if (polls < 4) return pad([0, 0, 0, 0], polls === 2 ? button : -1);
+        navigator.getGamepads = () => pad([0, 0, 0, 0]);
+        done();
+        return pad([0, 0, 0, 0]);
+    };
+})"""
+
+STEER = """(way) => new Promise((done) => {
+    // Tilt the sticks until the page has asked for that way in the world [m], less near its end.
+    const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => hand.inWorld(axis));
+    const left = axes.map((axis) => axis[0] * way[0] + axis[1] * way[1] + axis[2] * way[2]);
+    const most = STICK_SPEED * LONGEST_PAUSE;
+    const tilt = (part) => Math.sign(part) * (DEAD_ZONE + (1 - DEAD_ZONE) * Math.abs(part));
+    hand.move = (by, stamp) => {
+        by.forEach((part, axis) => { left[axis] -= part; });
+        Hand.prototype.move.call(hand, by, stamp);
+    };
+    navigator.getGamepads = () => {
+        const size = Math.hypot(...left);
+        if (size > 2e-4) {
+            const [right, up, away] = left.map((part) => tilt(part / Math.max(size, most)));
+            return pad([right, -up, 0, -away]);
+        }
+        delete hand.move;
+        navigator.getGamepads = () => pad([0, 0, 0, 0]);
+        done();
+        return pad([0, 0, 0, 0]);
+    };
+})"""
+
+TILT = """([axis, deflection]) => new Promise((done) => {
+    // Tilt one stick along an axis until some messages have been said.
+    const axes = [0, 0, 0, 0];
+    axes[axis] = deflection;
+    let said = 0;
+    hand.lead = (message) => {
+        said += 1;
+        Hand.prototype.lead.call(hand, message);
+    };
+    navigator.getGamepads = () => {
+        if (said < 6) return pad(axes);
+        delete hand.lead;
+        navigator.getGamepads = () => pad([0, 0, 0, 0]);
+        done();
+        return pad([0, 0, 0, 0]);
+    };
+})"""
+
+
+@pytest.fixture
+def view(tmp_path):
+    with LedView(SHEET, tmp_path / "led") as led:
+        yield led
+
+
+@pytest.fixture
+def tab(browser, view):
+    """A tab that shows the start and leads, with a gamepad at rest."""
+    tab = opened(browser, view)
+    tab.wait_for_function("hand.leads")
+    tab.evaluate(GAMEPAD)
+    return tab
+
+
+def time_in(tab):
+    """Return the simulated time in the picture [s]."""
+    return float(tab.inner_text("#time").removesuffix(" s") or 0.0)
+
+
+def wait_for_jaws(tab):
+    """Wait until jaws that have begun to move are where they are wanted."""
+    tab.wait_for_function(
+        "(until) => parseFloat(element('time').textContent) > until",
+        arg=time_in(tab) + TIME_TO_CLOSE,
+    )
+
+
+def chooses(tab, number):
+    tab.wait_for_function("(number) => hand.instruments.chosen === number", arg=number)
+
+
+@pytest.mark.browser
+def test_a_gamepad_holds_with_the_grasper_and_cuts_with_the_blade_and_the_record_repeats_it(
+    view, tab, tmp_path
+):
+    tab.evaluate(PRESS, X)
+    chooses(tab, 1)
+    tab.evaluate(STEER, [0.0, -0.034, 0.0])
+    until_it_rests(tab)
+    tab.evaluate(PRESS, B)
+    tab.wait_for_function("hand.instruments.isClosed")
+    wait_for_jaws(tab)
+    tab.evaluate(STEER, [0.0, 0.0, 0.01])
+    until_it_rests(tab)
+    tab.evaluate(PRESS, X)
+    chooses(tab, 0)
+    tab.evaluate(STEER, [0.0, -0.035, 0.0])
+    until_it_rests(tab)
+    tab.screenshot(path=str(tmp_path / "cut.png"))
+    end(tab, view)
+    forces = read_forces(view.folder / FORCES)
+    last = dict(zip(forces.columns, forces.rows[-1], strict=True))
+    assert last["left_points"] > 0
+    assert last["left_force_z_n"] < 0.0, "the sheet hangs from the jaws"
+    assert last["cut_area_m2"] > 1e-4
+    assert_a_run_repeats(view, tmp_path / "again")
+
+
+@pytest.mark.browser
+def test_the_controls_of_the_page_choose_an_instrument_and_say_what_the_jaws_will_do(view, tab):
+    names = tab.eval_on_selector_all("#instrument option", "all => all.map((each) => each.text)")
+    assert names == ["scalpel", "left"]
+    assert tab.is_hidden("#jaws")
+    tab.select_option("#instrument", "1")
+    tab.wait_for_function("element('clutch').textContent === 'lead the left grasper'")
+    assert tab.inner_text("#hint") == "Press on the picture and drag: the left grasper follows"
+    assert tab.inner_text("#jaws") == "close the jaws"
+
+    def says(action, label):
+        action()
+        tab.wait_for_function("(label) => element('jaws').textContent === label", arg=label)
+
+    says(lambda: tab.click("#jaws"), "open the jaws")
+    says(lambda: tab.keyboard.press("j"), "close the jaws")
+    says(lambda: tab.evaluate(PRESS, RIGHT_TRIGGER), "open the jaws")
+    says(lambda: tab.evaluate(PRESS, B), "close the jaws")
+    before = tip(tab)
+    tab.keyboard.press("ArrowUp")
+    tab.keyboard.press("ArrowUp")
+    until_it_rests(tab)
+    assert np.linalg.norm(tip(tab) - before) > 0.9 * LEAST_STEP, "the keys lead, not the list"
+    tab.keyboard.press("x")
+    chooses(tab, 0)
+    assert tab.input_value("#instrument") == "0"
+    tab.wait_for_selector("#jaws", state="hidden")
+    end(tab, view)
+
+
+@pytest.mark.browser
+def test_the_right_stick_leads_in_depth_and_turns(view, tab):
+    away = np.array(tab.evaluate("hand.inWorld([0, 0, 1])"))
+    before = tip(tab)
+    tab.evaluate(TILT, [3, -1.0])
+    until_it_rests(tab)
+    way = tip(tab) - before
+    assert way @ away > LEAST_STEP
+    assert way == pytest.approx((way @ away) * away, abs=0.05 * LEAST_STEP)
+
+    before = tip(tab)  # the blade turns about the middle of its edge, which stands upright
+    tab.evaluate(TILT, [2, 1.0])
+    until_it_rests(tab)
+    assert np.linalg.norm(tip(tab) - before) > LEAST_STEP
+    end(tab, view)
+
+
+@pytest.mark.browser
+def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
+    context = browser.new_context(viewport=WINDOW, has_touch=True)
+    tab = context.new_page()
+    tab.set_default_timeout(TIMEOUT)
+    tab.failures = []
+    tab.on("pageerror", lambda error: tab.failures.append(str(error)))
+    tab.goto(view.url)
+    tab.wait_for_function("hand.tip !== null && hand.leads")
+    right, up, away, metres = tab.evaluate(
+        "[hand.inWorld([1, 0, 0]), hand.inWorld([0, 1, 0]), hand.inWorld([0, 0, 1]), "
+        "hand.metresPerPixel()]"
+    )
+    before, (x, y) = tip(tab), tab.evaluate(LAID_BARE)
+    pixels = 0.004 / metres
+    device = context.new_cdp_session(tab)
+
+    def touch(kind, *points):
+        device.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": list(points)})
+
+    touch("touchStart", {"x": x, "y": y})
+    for share in np.linspace(0.0, 1.0, 20):
+        touch("touchMove", {"x": x + share * pixels, "y": y - 0.5 * share * pixels})
+    tab.wait_for_function("hand.isEngaged")
+    touch("touchEnd")
+    until_it_rests(tab)
+    way = tip(tab) - before
+    assert way @ right == pytest.approx(0.004, rel=0.05)
+    assert way @ up == pytest.approx(0.002, rel=0.05)
+    assert way @ away == pytest.approx(0.0, abs=1e-6)
+    end(tab, view)
+    context.close()
