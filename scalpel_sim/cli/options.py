@@ -205,8 +205,8 @@ class PageOptions:
     """The page of a live run."""
 
     hand: Literal["script", "live"] = "script"
-    """Who leads the blade: script, the strokes of the scene; or live, you in the page, until you
-    end it there or --seconds have passed. What you did is written as stroke.csv."""
+    """Who leads blade and graspers: script, the scene; or live, you in the page, until you end it
+    there or --seconds have passed. What you did is written: stroke.csv and grasper_NAME.csv."""
     wireframe: Flag = False
     "Show the edges of the mesh."
     port: int | None = None

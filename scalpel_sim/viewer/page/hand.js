@@ -34,7 +34,10 @@ class Hand {
         element("clutch").addEventListener("click", () => this.toggleClutch());
         element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
         element("end").addEventListener("click", () => this.say({ type: "end" }));
-        document.body.append(element("hint"));
+        new ResizeObserver(([footer]) => { // the readings stand on it, in however many rows
+            const height = footer.target.offsetHeight;
+            document.body.style.setProperty("--footer-height", `${height}px`);
+        }).observe(document.querySelector("footer"));
         const pane = element("meshcat-pane");
         pane.tabIndex = 0;
         pane.setAttribute("role", "application");
