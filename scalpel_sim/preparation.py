@@ -22,7 +22,7 @@ from scalpel_sim.arm.placement import (
     place_if_reached,
     stays_in_reach,
 )
-from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
+from scalpel_sim.arm.reachable_box import arm_for, grown_within, placed_within, shrunk, tour_of
 from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.arm.standing_fixture import StandingFixture
@@ -101,7 +101,7 @@ def prepare(
             boxes,
             scene,
             needed,
-            lambda place: _beside(place, stroke, scene.graspers, motions, boxes, rooms),
+            lambda place: _beside(place, stroke, scene, motions, boxes, rooms),
         )
         frame = TissueFrame(origin=placement.tissue_origin)
         others += [*held, *_in_world(table, around, frame)]
@@ -158,7 +158,7 @@ def _add_graspers(
 def _beside(
     placement: Placement,
     stroke: Stroke,
-    graspers: Sequence[GrasperTable],
+    scene: Scene,
     motions: Sequence[GraspMotion],
     boxes: FloatArray,
     rooms: Sequence[FloatArray | None],
@@ -167,7 +167,8 @@ def _beside(
     frame = TissueFrame(origin=placement.tissue_origin)
     # Where a hand will lead it is not known: at the start the arms are clear of each other.
     known = resting_stroke(stroke.start) if stroke.is_led else stroke
-    return arms_with_graspers(graspers, motions, boxes, frame, (placement, known), rooms)
+    first = placement, known
+    return arms_with_graspers(scene.graspers, motions, boxes, frame, first, rooms)
 
 
 def _placed(
@@ -192,18 +193,20 @@ def _placed(
     start = stroke.start
     workspace, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
 
-    def place_for(box: FloatArray) -> tuple[Placement, list[HeldArm]]:
+    def place_for(shares: FloatArray) -> tuple[Placement, list[HeldArm], FloatArray]:
+        box = shrunk(workspace, middle, shares)
         tour = tour_of(box, middle, start)
-        found = place_if_reached(tour, boxes, scene.arm, force=needed.force)
+        name = arm_for(scene.arm, shares)
+        found = place_if_reached(tour, boxes, name, force=needed.force)
         if found is None:
-            raise PlacementError(f"arm {scene.arm}")
-        return found, beside(found)
+            raise PlacementError(f"arm {name}")
+        return found, beside(found), box
 
     def reaches(box: FloatArray) -> bool:
         return stays_in_reach(placement, tour_of(box, middle, start), boxes)
 
     try:
-        (placement, held), box = placed_within(workspace, middle, place_for)
+        placement, held, box = placed_within(place_for)
     except PlacementError as error:
         raise PlacementError(
             "no hand can lead the blade here: the arm does not reach around where the blade "

@@ -18,7 +18,7 @@ from bridge import DeviceLimits, TissueFrame
 from scalpel_sim.arm.hand import EDGE, Impedance
 from scalpel_sim.arm.led_arm import LedArm
 from scalpel_sim.arm.placement import PlacementError
-from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
+from scalpel_sim.arm.reachable_box import grown_within, placed_within, shrunk, tour_of
 from scalpel_sim.arm.standing import Standing
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.stroke import Stroke
@@ -195,16 +195,17 @@ def move_within(
     """
     middle = 0.5 * (start.tip + start.heel)
 
-    def move_for(box: FloatArray) -> None:
+    def move_for(shares: FloatArray) -> FloatArray:
+        box = shrunk(workspace, middle, shares)
         move_to_start(arm, tour_of(box, middle, start), frame)
+        return box
 
     def reaches(box: FloatArray) -> bool:
         poses = _watched(tour_of(box, middle, start), frame)[1]
         solver = _InverseKinematics(arm)
         return solver.follow(solver.starts()[0], poses)[1] <= 1.0
 
-    _, box = placed_within(workspace, middle, move_for)
-    return grown_within(box, workspace, reaches)
+    return grown_within(placed_within(move_for), workspace, reaches)
 
 
 def _watched(stroke: Stroke, frame: TissueFrame) -> tuple[FloatArray, list[BladeSegment]]:

@@ -134,10 +134,16 @@ def search_place(
         heights = np.append(heights, _middle(path)[2] - path.table)
     grid = np.meshgrid(YAWS, DISTANCES * length, heights, indexing="ij")
     places = Places(*(values.ravel() for values in grid))
-    scores = np.stack([_scores(measures, path, places, angle) for angle in MOUNT_ANGLES])
+    scores = np.full((len(MOUNT_ANGLES), len(places.yaws)), -np.inf)
+    for of_mount, angle in zip(scores, MOUNT_ANGLES, strict=True):
+        if at_start:
+            tried = _are_clear_at_start(measures, path, places, angle, others)
+        else:
+            tried = np.ones(len(places.yaws), bool)
+        chosen = Places(*(values[tried] for values in places))
+        of_mount[tried] = _scores(measures, path, chosen, angle)
     if at_start:
-        clear = [_are_clear_at_start(measures, path, places, a, others) for a in MOUNT_ANGLES]
-        scores, others = np.where(clear, scores, -np.inf), ()
+        others = ()
     order = np.argsort(-scores, axis=None, kind="stable")
     order = order[: MOST_TRIED if others else 1]
     for mount, best in zip(*np.unravel_index(order, scores.shape), strict=True):

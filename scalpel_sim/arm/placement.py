@@ -229,6 +229,11 @@ def place_beside(
         placement = _placed(found, measures, name, path)
         if placement.margin >= NEEDED_MARGIN and math.isfinite(found.score):
             return placement
+    if at_start:
+        raise PlacementError(
+            f"the {name} arm does not reach around the start of its grasper from any place that is "
+            "clear of the other arm; turn its approach"
+        )
     if search_place(measures, path).margin >= NEEDED_MARGIN:
         raise PlacementError(
             f"the {name} arm reaches the {stroke.name}, but not clear of the other arm; turn its "

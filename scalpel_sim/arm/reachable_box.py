@@ -5,7 +5,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from scalpel_sim.arm.placement import PlacementError
+from scalpel_sim.arm.arm import ARMS
+from scalpel_sim.arm.placement import AUTO, PlacementError
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BladeSegment, FloatArray
 
@@ -38,38 +39,49 @@ def tour_of(workspace: FloatArray, middle: FloatArray, start: BladeSegment) -> S
     return Stroke(np.arange(float(len(poses))), poses, "live hand", is_led=True)
 
 
-def placed_within(
-    workspace: FloatArray, middle: FloatArray, place: Callable[[FloatArray], PlaceT]
-) -> tuple[PlaceT, FloatArray]:
-    """Return what places an arm for a workspace, or for a smaller one that it reaches.
-
-    The workspace is halved about the start until there is a place.
+def shrunk(workspace: FloatArray, middle: FloatArray, shares: FloatArray) -> FloatArray:
+    """Return the part of a workspace around the start.
 
     Args:
         workspace: See `tour_of`.
         middle: Where the middle of the instrument is at the start [m].
-        place: Places the arm so that it reaches a box.
+        shares: How much of it along each axis, shape (3,).
+    """
+    return middle + shares * (workspace - middle)
 
-    Returns:
-        What `place` returns, and the box that the arm reaches.
+
+def arm_for(preset: str, shares: FloatArray) -> str:
+    """Return which arm is to reach shares of a workspace: the largest, where not all is reached.
+
+    Args:
+        preset: What was asked for, one of `ARMS` or `auto`.
+        shares: See `shrunk`.
+    """
+    return list(ARMS)[-1] if preset == AUTO and shares.min() < 1.0 else preset
+
+
+def placed_within(place: Callable[[FloatArray], PlaceT]) -> PlaceT:
+    """Return what places an arm for its workspace, or for a smaller one that it reaches.
+
+    The workspace is halved about the start until there is a place: in height first, where these
+    arms reach least and an instrument needs least, then in all directions.
+
+    Args:
+        place: Places the arm so that it reaches certain shares of its workspace: see `shrunk`.
 
     Raises:
-        PlacementError: there is no place even for the smallest share of it.
+        PlacementError: there is no place even for the smallest shares.
     """
-
-    def placed(share: float) -> tuple[PlaceT, FloatArray]:
-        box = middle + share * (workspace - middle)
-        return place(box), box
-
     try:
-        return placed(1.0)
+        return place(np.ones(3))
     except PlacementError:
-        smallest, share = placed(SMALLEST_SHARE), 0.5
-    while share > SMALLEST_SHARE:
+        smallest = place(np.full(3, SMALLEST_SHARE))
+    level, height = 1.0, 0.5
+    while level > SMALLEST_SHARE:
         try:
-            return placed(share)
+            return place(np.array([level, level, height]))
         except PlacementError:
-            share /= 2.0
+            level, height = (height, height) if level > height else (level, 0.5 * height)
     return smallest
 
 

@@ -94,7 +94,13 @@ def arms_with_graspers(
                 )
             else:
                 place, spheres, reached = place_of_led_grasper(
-                    motion, workspace, boxes, preset, times, table=table, others=taken
+                    motion,
+                    workspace,
+                    boxes,
+                    preset,
+                    times,
+                    table=table,
+                    others=taken,
                 )
             taken.append(spheres)
             arm = preset_with_grasper(motion, place, frame, force=grasper.force, workspace=reached)

@@ -38,7 +38,7 @@ from scalpel_sim.arm.placement import (
     place_beside,
     stays_in_reach,
 )
-from scalpel_sim.arm.reachable_box import grown_within, placed_within, tour_of
+from scalpel_sim.arm.reachable_box import arm_for, grown_within, placed_within, shrunk, tour_of
 from scalpel_sim.errors import UsageError
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.stroke import Stroke
@@ -127,19 +127,18 @@ def place_of_led_grasper(
     """
     path, middle = path_of_grasper(motion), np.array(motion.start.at)
 
-    def tour(box: FloatArray) -> Stroke:
-        return tour_of(box, middle, path.start)
+    def place_for(shares: FloatArray) -> tuple[Placement, FloatArray]:
+        box = shrunk(workspace, middle, shares)
+        tour = tour_of(box, middle, path.start)
+        instants = np.linspace(0.0, tour.duration, SAMPLES)
+        name = arm_for(preset, shares)
+        found = place_beside(tour, boxes, name, instants, table=table, others=others, at_start=True)
+        return found, box
 
-    def place_for(box: FloatArray) -> Placement:
-        instants = np.linspace(0.0, tour(box).duration, SAMPLES)
-        return place_beside(
-            tour(box), boxes, preset, instants, table=table, others=others, at_start=True
-        )
+    def reaches(larger: FloatArray) -> bool:
+        return stays_in_reach(place, tour_of(larger, middle, path.start), boxes, edge_height=0.0)
 
-    def reaches(box: FloatArray) -> bool:
-        return stays_in_reach(place, tour(box), boxes, edge_height=0.0)
-
-    place, box = placed_within(workspace, middle, place_for)
+    place, box = placed_within(place_for)
     spheres = covered(place, path, boxes, times, edge_height=0.0)
     return place, spheres, grown_within(box, workspace, reaches)
 
