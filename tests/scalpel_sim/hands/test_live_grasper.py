@@ -208,6 +208,35 @@ def test_the_grasper_stays_in_its_workspace(hand, at_start):
     assert grasper[-1] == pytest.approx(workspace[1], abs=1e-6)
 
 
+def test_a_state_saved_while_a_grasper_holds_brings_both_hands_back_to_the_bit():
+    simulation, hand = led(SHEET)
+    command = doing(LIFT_AND_CUT, hand)
+
+    def go_on(n):
+        for _ in range(n):
+            command(simulation)
+            simulation.step()
+
+    def where():
+        rows = simulation.recording.rows[700:, UNTIMED]
+        return rows.copy(), hand.chosen, [each.pose.wanted.copy() for each in hand.instruments]
+
+    go_on(700)
+    state = simulation.save_state()
+    assert simulation.graspers[0].n_points > 0
+    found = []
+    for _ in range(2):
+        command = doing([(700, Choose(BLADE)), (700, Engage()), *moves(700, 900, y=-0.03)], hand)
+        go_on(300)
+        found.append(where())
+        simulation.load_state(state)
+        assert hand.chosen == GRASPER
+    (rows, chosen, wanted), (rows_again, chosen_again, wanted_again) = found
+    assert np.array_equal(rows, rows_again, equal_nan=True)
+    assert chosen == chosen_again
+    assert np.array_equal(wanted, wanted_again)
+
+
 HEADER = ",".join(GRASP_COLUMNS)
 ROW = "0,0,0.07,0.004,0,-1,0,0,0,1,0.016,0"
 
