@@ -1,6 +1,7 @@
 """Arms that hold a grasper beside the first: presets, robots from MJCF, and those of a package."""
 
 import importlib.util
+import itertools
 import re
 import warnings
 from pathlib import Path
@@ -18,6 +19,7 @@ from scalpel_sim.arm.second_arm import (
     model_with_grasper,
     path_of_grasper,
     place_of_grasper,
+    place_of_led_grasper,
     preset_with_grasper,
 )
 from scalpel_sim.errors import UsageError
@@ -34,6 +36,7 @@ MOTION = GraspMotion(
     ],
     "left",
 )
+FROM_LEFT = GraspMotion([Waypoint(0.0, (-0.01, 0.03, 0.02), (1.0, 0.0, 0.0), UP, 0.01)], "left")
 BODY = block((2, 2, 2), (0.06, 0.06, 0.03))
 BOUNDS = np.array([[0.0, 0.0, 0.0], [0.06, 0.06, 0.03]])
 TIMES = np.linspace(0.0, 0.4, 9)
@@ -49,16 +52,16 @@ def robot(path=ROBOT, at="wrist_3", pos=(0.6, 0.03, -0.1)):
     return model_with_grasper(MOTION, path, at, TissueFrame(origin=np.array(pos)), FRAME)
 
 
-def misses_of(held):
-    """Do the motion beside another arm; how far are the pads from where they are to be [m, rad]?"""
+def misses_of(held, motion=MOTION):
+    """Do a motion beside another arm; how far are the pads from where they are to be [m, rad]?"""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # of MuJoCo, that parts of the model contradict each other
         arm = Arm("touch", base_position=(-1.0, 0.0, 0.0), others=[held])
     (grasper,) = arm.graspers
-    led = LedGrasper(grasper, arm.data, MOTION, Tissue(BODY), FRAME, None)
-    wanted = MOTION.stroke(0.0, 0.01)
+    led = LedGrasper(grasper, arm.data, motion, Tissue(BODY), FRAME, None)
+    wanted = motion.stroke(0.0, 0.01)
     misses = []
-    for _ in range(450):
+    for _ in range(round((motion.duration + 0.05) / arm.model.opt.timestep)):
         now = arm.time
         led.lead(now)
         arm.step1()
@@ -66,7 +69,7 @@ def misses_of(held):
         along = pose.tip - pose.heel
         cosine = grasper.pads.axes[:, 1] @ along / np.linalg.norm(along)
         off = np.linalg.norm(grasper.pads.centre - pose.heel)
-        misses.append((off, np.arccos(min(cosine, 1.0)), grasper.opening - MOTION.opening(now)))
+        misses.append((off, np.arccos(min(cosine, 1.0)), grasper.opening - motion.opening(now)))
         arm.step2()
         arm.check()
     return np.abs(misses)
@@ -110,11 +113,10 @@ def test_a_robot_that_is_turned_in_the_frame_of_the_tissue_stands_so_in_the_worl
 def test_a_second_arm_stands_on_the_table_of_the_first_and_clear_of_it():
     stroke = plan_stroke("straight", BODY, speed=0.06)
     first = place(stroke, BOUNDS)
-    from_left = GraspMotion([Waypoint(0.0, (-0.01, 0.03, 0.02), (1.0, 0.0, 0.0), UP, 0.01)], "left")
     times = np.linspace(0.0, stroke.duration, 9)
     table, there = -float(first.tissue_origin[2]), covered(first, stroke, BOUNDS, times)
     second, spheres = place_of_grasper(
-        from_left, BOUNDS, "auto", times, table=table, others=[there]
+        FROM_LEFT, BOUNDS, "auto", times, table=table, others=[there]
     )
     assert second.base_position[2] >= 0.0
     assert second.tissue_origin == pytest.approx(first.tissue_origin)
@@ -128,6 +130,47 @@ def test_an_arm_that_reaches_only_where_the_other_is_says_so():
     everywhere = there._replace(radii=there.radii + 1.0)
     with pytest.raises(PlacementError, match="not clear of the other arm"):
         place_of_grasper(MOTION, BOUNDS, "touch", TIMES, table=None, others=[everywhere])
+
+
+ROOM = np.array([[-0.06, -0.06, 0.0], [0.3, 0.12, 0.09]])
+"""Where a hand is to lead the grasper [m], farther than any arm reaches."""
+
+
+def led_preset():
+    rest = MOTION.at_rest()
+    place, _, room = place_of_led_grasper(rest, ROOM, BOUNDS, "auto", TIMES, table=-0.05, others=[])
+    return preset_with_grasper(rest, place, FRAME, workspace=room)
+
+
+def led_robot():
+    base = TissueFrame(origin=np.array([0.6, 0.03, -0.1]))
+    return model_with_grasper(MOTION.at_rest(), ROBOT, "wrist_3", base, FRAME, workspace=ROOM)
+
+
+@pytest.mark.parametrize("make", [led_preset, led_robot])
+def test_an_arm_reaches_all_corners_of_the_room_in_which_a_hand_leads_its_grasper(make):
+    held = make()
+    room = held.workspace
+    assert (room[0] >= ROOM[0]).all() and (room[1] <= ROOM[1]).all()
+    assert (room[0] < MOTION.start.at).all() and (room[1] > MOTION.start.at).all()
+    corners = [np.choose(sides, room) for sides in itertools.product((0, 1), repeat=3)]
+    ways = [MOTION.start, *(MOTION.start._replace(at=corner) for corner in corners)]
+    motion = GraspMotion([way._replace(time=0.8 * i) for i, way in enumerate(ways)], "left")
+    at_corners = misses_of(held, motion)[[800 * i for i in range(1, len(ways))]]
+    assert (at_corners < (1e-3, 0.01, 1e-4)).all()
+
+
+def test_an_arm_whose_grasper_a_hand_leads_is_clear_of_the_other_at_the_start():
+    stroke = plan_stroke("straight", BODY, speed=0.06)
+    first = place(stroke, BOUNDS)
+    at_start = np.zeros(1)
+    there = covered(first, stroke, BOUNDS, at_start)
+    table = -float(first.tissue_origin[2])
+    _, spheres, _ = place_of_led_grasper(
+        FROM_LEFT.at_rest(), ROOM, BOUNDS, "auto", at_start, table=table, others=[there]
+    )
+    apart = np.linalg.norm(spheres.centres[:, :, None] - there.centres[:, None], axis=3)
+    assert (apart > spheres.radii[:, None] + there.radii).all()
 
 
 @pytest.mark.parametrize(
