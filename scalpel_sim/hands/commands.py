@@ -17,9 +17,11 @@ FARTHEST_TURN = math.pi / 2.0
 LATEST_STAMP = 1e12
 """Largest stamp [ms]: some thirty years."""
 
-LONGEST_SILENCE = 0.5
-"""Wall time without a message after which an engaged hand lets go [s]: the page says ten times a
-second that it is there."""
+LONGEST_SILENCE = 2.0
+"""Wall time without a message after which an engaged hand lets go [s]. The page says ten times a
+second that it is there, but where drawing takes all of the machine, its thread hangs for a second.
+Until then the blade goes no farther than it was asked to, and a page that is closed lets go at
+once."""
 
 _ThreeNumbers = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 _Stamp = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST_STAMP)]

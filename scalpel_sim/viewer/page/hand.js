@@ -2,7 +2,7 @@
 "use strict";
 
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
-const SILENT_AFTER = 400; // silence after which the run may have let go [ms]
+const SILENT_AFTER = 1600; // silence after which the run may have let go [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
 const LONGEST_STEP = 5000; // and at most, where no picture shows it
 const N_LAGS_SHOWN = 30; // of which the median is shown
