@@ -20,28 +20,9 @@ from scalpel_sim.hands.commands import (
     Release,
     Turn,
 )
+from scalpel_sim.hands.limited_pose import LimitedPose
 from scalpel_sim.strokes.stroke import Stroke, poses_of_edges
 from tissue import FloatArray
-
-MOST_SPEED = 0.2
-"""Highest speed of the middle of the edge [m/s]: three times that of an unhurried incision, and a
-tenth of `FASTEST`. A faster blade would skip elements in a frame."""
-
-MOST_TURN_RATE = 2.0
-"""Highest rate at which the blade turns [rad/s]: the ends of an edge of 80 mm then move at 0.08 m/s
-more."""
-
-FOLLOWING_TIME = 0.02
-"""Time constant with which the hand follows [s]: a page sends a move every 16 ms, and between two
-of them the blade should not stop."""
-
-FARTHEST_AHEAD, MOST_AHEAD_TURN = 0.04, 0.4
-"""How far the wanted pose may be ahead of the hand [m, rad]: what it does in a fifth of a second.
-What is asked beyond is lost, so that the blade stops soon after the person does."""
-
-ARRIVED, ARRIVED_TURN = 1e-7, 1e-6
-"""Distance [m] and angle [rad] from the wanted pose at which the hand is there: a thousandth of a
-frame's motion."""
 
 
 class LiveHand:
@@ -81,7 +62,7 @@ class LiveHand:
         """Whether it leads the blade."""
         self.ended_at: float | None = None
         """Simulated time at which the stroke has ended [s]; from then on it rests."""
-        self._frame, self._workspace, self._clock = frame, workspace, clock
+        self._frame, self._clock = frame, clock
         self._dt, self._seconds = dt, seconds
         self._heard_at = -math.inf
         start = stroke.start
@@ -90,8 +71,7 @@ class LiveHand:
         self._follower = StrokeFollower(hand, self._resting, frame)
         path = self._resting.path[0]
         self._half = float(path[2])
-        self._rotation, self._middle = path[3:7].copy(), path[10:13].copy()
-        self._wanted_rotation, self._wanted = self._rotation.copy(), self._middle.copy()
+        self._pose = LimitedPose(path[10:13], path[3:7], workspace, dt)
         self._numbers = [float(number) for part in start for number in part]
         self._rows: list[list[float]] = []
         self._last: tuple[float, list[float]] | None = None
@@ -106,8 +86,9 @@ class LiveHand:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""
         if self.ended_at is None:
             has_ended = self._obey() or t >= self._seconds
-            if self._last is not None and not has_ended:  # the record begins at the start
-                self._step()
+            # The record begins at the start.
+            if self._last is not None and not has_ended and self._pose.step():
+                self._take_pose()
             self._record(t)
             if has_ended:
                 self.finish(max(t, self._dt))
@@ -134,8 +115,11 @@ class LiveHand:
             self._heard_at = self._clock()
             if isinstance(command, Move | Turn):
                 self.stamp = command.stamp
-                if self.is_engaged:
-                    self._want(command)
+                by = self._frame.vectors_to_tissue(np.array(command.by))
+                if self.is_engaged and isinstance(command, Move):
+                    self._pose.move(by)
+                elif self.is_engaged:
+                    self._pose.turn(by)
             elif isinstance(command, Engage):
                 self.is_engaged = True
             elif isinstance(command, Release):
@@ -149,47 +133,15 @@ class LiveHand:
     def _let_go(self) -> None:
         """Rest where it is."""
         self.is_engaged = False
-        self._wanted[:] = self._middle
-        self._wanted_rotation[:] = self._rotation
-
-    def _want(self, command: Move | Turn) -> None:
-        """Move or turn the wanted pose, as far as it may be ahead."""
-        by = self._frame.vectors_to_tissue(np.array(command.by))
-        if isinstance(command, Move):
-            ahead = np.clip(self._wanted + by, *self._workspace) - self._middle
-            self._wanted = self._middle + _shortened(ahead, FARTHEST_AHEAD)
-        else:
-            turn, turned = np.array([1.0, 0.0, 0.0, 0.0]), np.empty(4)
-            mujoco.mju_quatIntegrate(turn, by, 1.0)
-            mujoco.mju_mulQuat(turned, turn, self._wanted_rotation)
-            ahead = np.empty(3)
-            mujoco.mju_subQuat(ahead, turned, self._rotation)
-            self._wanted_rotation = self._rotation.copy()
-            mujoco.mju_quatIntegrate(self._wanted_rotation, _shortened(ahead, MOST_AHEAD_TURN), 1.0)
-
-    def _step(self) -> None:
-        """Go one frame towards the wanted pose."""
-        way, turn = self._wanted - self._middle, np.empty(3)
-        mujoco.mju_subQuat(turn, self._wanted_rotation, self._rotation)
-        distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
-        if distance <= ARRIVED and angle <= ARRIVED_TURN:
-            return
-        share = 1.0 - math.exp(-self._dt / FOLLOWING_TIME)
-        if distance > ARRIVED:
-            self._middle += way * min(share, MOST_SPEED * self._dt / distance)
-        if angle > ARRIVED_TURN:
-            mujoco.mju_quatIntegrate(
-                self._rotation, turn, min(share, MOST_TURN_RATE * self._dt / angle)
-            )
-            mujoco.mju_normalize4(self._rotation)
-        self._take_pose()
+        self._pose.rest()
 
     def _take_pose(self) -> None:
         """Lead by the pose as a `Stroke` reads it from the record: that rounds it once more."""
         axes = np.empty(9)
-        mujoco.mju_quat2Mat(axes, self._rotation)
+        mujoco.mju_quat2Mat(axes, self._pose.rotation)
         _, along, back = axes.reshape(3, 3).T
-        tip, heel = self._middle + self._half * along, self._middle - self._half * along
+        middle, to_tip = self._pose.middle, self._half * along
+        tip, heel = middle + to_tip, middle - to_tip
         self._numbers = [*tip.tolist(), *heel.tolist(), *(-back).tolist()]
         middles, rotations, _ = poses_of_edges(tip[None], heel[None], -back[None])
         path = self._resting.path[0]
@@ -207,9 +159,3 @@ class LiveHand:
                 self._rows.append([self._last[0], *self._last[1]])
             self._rows.append([t, *row])
         self._last, self._is_kept = (t, row), is_new
-
-
-def _shortened(vector: FloatArray, longest: float) -> FloatArray:
-    """Return a vector of at most that length."""
-    length = math.hypot(*vector.tolist())
-    return vector if length <= longest else vector * (longest / length)

@@ -7,13 +7,13 @@ import pytest
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
-from scalpel_sim.hands.live_hand import (
+from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
     MOST_SPEED,
     MOST_TURN_RATE,
-    LiveHand,
 )
+from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.workspace import ROOM
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS
@@ -49,7 +49,7 @@ def hand(at_start):
         simulation.arm.hand,
         simulation.stroke,
         simulation.frame,
-        first._workspace,
+        first._pose._workspace,
         dt=DT,
         clock=Clock(),
     )
