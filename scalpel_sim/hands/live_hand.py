@@ -13,9 +13,9 @@ from scalpel_sim.arm.hand import Hand
 from scalpel_sim.arm.stroke_follower import StrokeFollower
 from scalpel_sim.hands.commands import (
     LONGEST_SILENCE,
-    Command,
     End,
     Engage,
+    HandCommand,
     Move,
     Release,
     Turn,
@@ -54,8 +54,8 @@ class LiveHand:
         seconds: float = math.inf,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.commands: deque[Command] = deque()
-        """What it is asked to do; any thread may append."""
+        self.commands: deque[HandCommand] = deque()
+        """What it is asked to do."""
         self.stamp: float | None = None
         """Stamp of the newest command that it has obeyed; None: there was none yet."""
         self.is_engaged = False
@@ -69,13 +69,18 @@ class LiveHand:
         self._resting = Stroke([0.0, 1.0], [start, start])
         """Its path has one row, the pose that leads now, which is written over."""
         self._follower = StrokeFollower(hand, self._resting, frame)
-        path = self._resting.path[0]
+        self._path = path = self._resting.path[0]
         self._half = float(path[2])
         self._pose = LimitedPose(path[10:13], path[3:7], workspace, dt)
         self._numbers = [float(number) for part in start for number in part]
         self._rows: list[list[float]] = []
         self._last: tuple[float, list[float]] | None = None
         self._is_kept = False
+
+    @property
+    def pose(self) -> tuple[float, ...]:
+        """Tip, heel and forward of the pose that leads, tissue frame."""
+        return tuple(self._numbers)
 
     @property
     def tip(self) -> FloatArray:
@@ -98,9 +103,14 @@ class LiveHand:
         """End the stroke at time `t` [s], after its last frame, unless it has ended before."""
         if self.ended_at is None:
             self.ended_at = t
-            self._let_go()
+            self.let_go()
             if self._last is not None and (t > self._last[0] or not self._is_kept):
                 self._rows.append([t, *self._last[1]])
+
+    def let_go(self) -> None:
+        """Rest where it is."""
+        self.is_engaged = False
+        self._pose.rest()
 
     def take_rows(self) -> list[list[float]]:
         """Return the rows of `LED_COLUMNS` that were recorded since the last call."""
@@ -123,17 +133,12 @@ class LiveHand:
             elif isinstance(command, Engage):
                 self.is_engaged = True
             elif isinstance(command, Release):
-                self._let_go()
+                self.let_go()
             elif isinstance(command, End):
                 has_ended = True
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
-            self._let_go()
+            self.let_go()
         return has_ended
-
-    def _let_go(self) -> None:
-        """Rest where it is."""
-        self.is_engaged = False
-        self._pose.rest()
 
     def _take_pose(self) -> None:
         """Lead by the pose as a `Stroke` reads it from the record: that rounds it once more."""
@@ -144,8 +149,7 @@ class LiveHand:
         tip, heel = middle + to_tip, middle - to_tip
         self._numbers = [*tip.tolist(), *heel.tolist(), *(-back).tolist()]
         middles, rotations, _ = poses_of_edges(tip[None], heel[None], -back[None])
-        path = self._resting.path[0]
-        path[3:7], path[10:13] = rotations[0], middles[0]
+        self._path[3:7], self._path[10:13] = rotations[0], middles[0]
 
     def _record(self, t: float) -> None:
         """Record the pose at time `t` [s], and the one before where that had been left out.
