@@ -19,6 +19,10 @@ class Instrument(Protocol):
         """Whether its jaws are closed, or on their way there; None: it has none."""
 
     @property
+    def numbers(self) -> list[float]:
+        """Where it is led, tissue frame, and how far its jaws are open."""
+
+    @property
     def tip(self) -> FloatArray:
         """What of it is led, in the world [m], shape (3,)."""
 

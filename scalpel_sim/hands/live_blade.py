@@ -40,13 +40,14 @@ class LiveBlade:
         self._path = RestingPath(hand, start, frame)
         self._half = self._path.half
         self.pose = LimitedPose(self._path.middle, self._path.rotation, workspace, dt)
-        self._numbers = [float(number) for part in start for number in part]
+        self.numbers = [float(number) for part in start for number in part]
+        """Tip, heel and forward of the pose that leads, tissue frame."""
         self._record = PoseRecord()
 
     @property
     def tip(self) -> FloatArray:
         """Where the tip is led [m], world frame, shape (3,)."""
-        return self._frame.points_to_world(np.array(self._numbers[:3]))
+        return self._frame.points_to_world(np.array(self.numbers[:3]))
 
     def close_jaws(self, closed: bool) -> None:
         """It has none."""
@@ -56,7 +57,7 @@ class LiveBlade:
         # The record begins at the start.
         if moves and self._record.has_begun and self.pose.step():
             self._take_pose()
-        self._record.add(t, [*self._numbers, float(is_engaged)])
+        self._record.add(t, [*self.numbers, float(is_engaged)])
 
     def lead(self, t: float) -> None:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""
@@ -77,5 +78,5 @@ class LiveBlade:
         _, along, back = axes.reshape(3, 3).T
         middle, to_tip = self.pose.middle, self._half * along
         pose = BladeSegment(middle + to_tip, middle - to_tip, -back)
-        self._numbers = [number for part in pose for number in part.tolist()]
+        self.numbers = [number for part in pose for number in part.tolist()]
         self._path.take(pose)

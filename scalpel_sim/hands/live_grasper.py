@@ -56,6 +56,11 @@ class LiveGrasper:
         return self._wanted_opening < 0.5 * (self._closed + self._open)
 
     @property
+    def numbers(self) -> list[float]:
+        """Place, approach, across and opening, tissue frame."""
+        return [*(float(number) for part in self._at[1:4] for number in part), self._at.opening]
+
+    @property
     def tip(self) -> FloatArray:
         """Where the middle between the pads is led [m], world frame, shape (3,)."""
         return self._frame.points_to_world(np.array(self._at.at))
@@ -70,8 +75,7 @@ class LiveGrasper:
             if self.pose.step():
                 self._take_pose()
             self._move_jaws()
-        numbers = [float(number) for part in self._at[1:4] for number in part]
-        self._record.add(t, [*numbers, self._at.opening, float(is_engaged)])
+        self._record.add(t, [*self.numbers, float(is_engaged)])
 
     def lead(self, t: float) -> None:
         """Lead it to its pose and opening at time `t` [s], a step after the last one."""

@@ -11,9 +11,9 @@ from bridge import TissueFrame
 from scalpel_sim.hands.commands import (
     LONGEST_SILENCE,
     Choose,
-    Command,
     End,
     Engage,
+    HandCommand,
     Jaws,
     Move,
     Release,
@@ -54,8 +54,8 @@ class LiveHand:
         seconds: float = math.inf,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.commands: deque[Command] = deque()
-        """What it is asked to do; any thread may append."""
+        self.commands: deque[HandCommand] = deque()
+        """What it is asked to do."""
         self.stamp: float | None = None
         """Stamp of the newest command that it has obeyed; None: there was none yet."""
         self.is_engaged = False
@@ -104,6 +104,11 @@ class LiveHand:
             grasper.leader = live
 
     @property
+    def numbers(self) -> tuple[float, ...]:
+        """Where all instruments are led, and how far jaws are open: they tell moments apart."""
+        return tuple(number for each in self.instruments for number in each.numbers)
+
+    @property
     def tip(self) -> FloatArray:
         """Where the chosen instrument is led [m], world frame, shape (3,)."""
         return self.instruments[self.chosen].tip
@@ -126,9 +131,20 @@ class LiveHand:
         """End at time `t` [s], after the last frame, unless it has ended before."""
         if self.ended_at is None:
             self.ended_at = t
-            self._let_go()
+            self.let_go()
             for instrument in self.instruments:
                 instrument.finish(t)
+
+    def choose(self, instrument: int) -> None:
+        """Let go, and lead another instrument from now on, if there is one of that number."""
+        self.let_go()
+        if instrument < len(self.instruments):
+            self.chosen = instrument
+
+    def let_go(self) -> None:
+        """Have the chosen instrument rest where it is."""
+        self.is_engaged = False
+        self.instruments[self.chosen].pose.rest()
 
     def _obey(self) -> bool:
         """Do what the commands say; return whether one of them ends the run."""
@@ -147,19 +163,13 @@ class LiveHand:
             elif isinstance(command, Engage):
                 self.is_engaged = True
             elif isinstance(command, Release):
-                self._let_go()
-            elif isinstance(command, Choose) and command.instrument < len(self.instruments):
-                self._let_go()
-                self.chosen = command.instrument
+                self.let_go()
+            elif isinstance(command, Choose):
+                self.choose(command.instrument)
             elif isinstance(command, Jaws):
                 chosen.close_jaws(command.closed)
             elif isinstance(command, End):
                 has_ended = True
         if self.is_engaged and self._clock() - self._heard_at > LONGEST_SILENCE:
-            self._let_go()
+            self.let_go()
         return has_ended
-
-    def _let_go(self) -> None:
-        """Have the chosen instrument rest where it is."""
-        self.is_engaged = False
-        self.instruments[self.chosen].pose.rest()

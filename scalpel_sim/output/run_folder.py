@@ -3,8 +3,9 @@
 import json
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import IO, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -44,6 +45,25 @@ def grasp_file(name: str) -> str:
     return f"grasper_{name}.csv"
 
 
+class FilesMark(NamedTuple):
+    """How far the files of a run have got that grow with it."""
+
+    n_rows: int
+    """Rows of `forces.csv`."""
+    forces: int
+    """Length of `forces.csv` [bytes]."""
+    led: dict[str, int]
+    """Lengths of the files of what a hand did, by name [bytes]."""
+
+
+class _LedFile(NamedTuple):
+    """A file of what a hand did."""
+
+    file: IO[bytes]
+    head: int
+    """Length of its first line [bytes]."""
+
+
 class Outputs:
     """A folder with the files of one run. Files of an earlier run are removed, and no others.
 
@@ -75,7 +95,7 @@ class Outputs:
         self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
         self._append((",".join(columns) + "\n").encode("ascii"))
         self._n_written = 0
-        self._led: dict[str, IO[bytes]] = {}
+        self._led: dict[str, _LedFile] = {}
 
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
@@ -117,10 +137,29 @@ class Outputs:
         """
         text = _csv(np.array(rows)) if rows else b""
         if name not in self._led:
-            self._led[name] = _naming_path(self.path(name), lambda p: p.open("wb", buffering=0))
-            text = (",".join(columns) + "\n").encode("ascii") + text
-        led = self._led[name]
+            file = _naming_path(self.path(name), lambda p: p.open("wb", buffering=0))
+            head = (",".join(columns) + "\n").encode("ascii")
+            self._led[name] = _LedFile(file, len(head))
+            text = head + text
+        led = self._led[name].file
         _naming_path(self.path(name), lambda _: led.write(text))
+
+    def mark(self) -> FilesMark:
+        """Return how far `forces.csv` and the files of what a hand did have got."""
+        led = {name: file.tell() for name, (file, _) in self._led.items()}
+        return FilesMark(self._n_written, self._forces.tell(), led)
+
+    def cut_back(self, mark: FilesMark) -> None:
+        """Take off what was written to these files after a mark.
+
+        Raises:
+            RunError: the system refuses.
+        """
+        self._n_written = mark.n_rows
+        _naming_path(self.path(FORCES), partial(_cut_off, self._forces, mark.forces))
+        for name, (file, head) in self._led.items():
+            end = mark.led.get(name, head)
+            _naming_path(self.path(name), partial(_cut_off, file, end))
 
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
@@ -142,11 +181,17 @@ class Outputs:
     def close(self) -> None:
         """Close `forces.csv` and what a hand did. May be called twice."""
         self._forces.close()
-        for led in self._led.values():
-            led.close()
+        for file, _ in self._led.values():
+            file.close()
 
     def _append(self, text: bytes) -> None:
         _naming_path(self.path(FORCES), lambda _: self._forces.write(text))
+
+
+def _cut_off(file: IO[bytes], end: int, path: Path) -> None:
+    """Make an open file that long [bytes], and go on writing there; `path` is its name."""
+    file.truncate(end)
+    file.seek(end)
 
 
 def _csv(rows: FloatArray) -> bytes:

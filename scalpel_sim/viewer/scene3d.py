@@ -88,14 +88,35 @@ class HandState(NamedTuple):
     """Whether the run will not follow it any more."""
     stamp: float | None
     """Stamp of the newest command that the picture shows; None: there was none yet."""
-    real_time: float
-    """How fast the simulation runs, over real time."""
-    instruments: Sequence[str] = ()
+    instruments: Sequence[str]
     """Names of the instruments that it may choose."""
-    chosen: int = 0
+    chosen: int
     """Which of them it leads."""
-    is_closed: bool | None = None
+    is_closed: bool | None
     """Whether the jaws of the chosen one are closed, or on their way there; None: it has none."""
+
+
+class RunState(NamedTuple):
+    """How the run is that the page controls."""
+
+    is_paused: bool
+    """Whether its time stands still."""
+    rate: float
+    """Simulated time over wall time, at most: below 1 it is slow motion."""
+    real_time: float
+    """Simulated time over wall time, lately."""
+    can_go_back: bool
+    """Whether it can go back to its start."""
+    n_strokes: int
+    """How many strokes can be undone."""
+
+
+class LiveState(NamedTuple):
+    """What a page shows of the run that it controls."""
+
+    run: RunState
+    hand: HandState | None = None
+    """The hand that it leads; None: a script leads it."""
 
 
 class Camera(NamedTuple):
@@ -216,18 +237,32 @@ class Scene3D:
             energies=_energy_terms(readings.energies),
         )
 
-    def set_hand(self, hand: HandState) -> None:
-        """Show how the hand is that the page leads."""
+    def set_live(self, live: LiveState) -> None:
+        """Show how the run is that the page controls, and its hand."""
+        self._set_run(live.run)
+        if live.hand is not None:
+            self._set_hand(live.hand)
+
+    def _set_hand(self, hand: HandState) -> None:
         self._add(
             "set_hand",
             tip=hand.tip.tolist(),
             engaged=hand.is_engaged,
             ended=hand.has_ended,
             stamp=hand.stamp,
-            real_time=hand.real_time,
             instruments=list(hand.instruments),
             chosen=hand.chosen,
             closed=hand.is_closed,
+        )
+
+    def _set_run(self, run: RunState) -> None:
+        self._add(
+            "set_run",
+            paused=run.is_paused,
+            rate=run.rate,
+            real_time=run.real_time,
+            can_go_back=run.can_go_back,
+            strokes=run.n_strokes,
         )
 
     def take(self) -> bytes:

@@ -9,7 +9,7 @@ from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import Appearance, Camera, HandState, Readings, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Camera, LiveState, Readings, Scene3D
 from scalpel_sim.viewer.texture_mapping import map_texture
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Surface
@@ -132,7 +132,7 @@ class ScenePackets:
         surface: Surface,
         body_poses: FloatArray,
         readings: Readings | None = None,
-        hand: HandState | None = None,
+        live: LiveState | None = None,
     ) -> bytes:
         """Return the packet that shows one instant.
 
@@ -140,7 +140,7 @@ class ScenePackets:
             surface: Surface of the body, tissue frame.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
-            hand: How the hand is that the page leads.
+            live: How the run is that the page controls.
         """
         scene = Scene3D()
         textured = map_texture(surface, self._diagonal / TILES_PER_BODY)
@@ -150,8 +150,8 @@ class ScenePackets:
             scene.set_pose(f"/bodies/{body}", *_position_and_rotation(body_poses[body]))
         if readings is not None:
             scene.set_readings(readings, ARROW_LENGTH * self._diagonal)
-        if hand is not None:
-            scene.set_hand(hand)
+        if live is not None:
+            scene.set_live(live)
         return scene.take()
 
     def _set_shape(

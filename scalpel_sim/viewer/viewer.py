@@ -26,7 +26,7 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
-from scalpel_sim.viewer.scene3d import HandState, Readings
+from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface
 
 START_TIMEOUT = 30.0
@@ -63,6 +63,7 @@ class Viewer:
         port: int | None = None,
         views: Sequence[ViewTable] = (),
         commands: deque[Command] | None = None,
+        is_led: bool = False,
     ) -> None:
         """Start the viewer's process and learn its address.
 
@@ -73,8 +74,9 @@ class Viewer:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
-            commands: What receives the commands of the page that leads the blade; None: the page
-                shows, and leads nothing.
+            commands: What receives the commands of the page that controls the run; None: the page
+                shows, and controls nothing.
+            is_led: Whether that page leads the blade, too.
 
         Raises:
             UsageError: the port does not exist.
@@ -91,7 +93,8 @@ class Viewer:
             wireframe,
             port,
             views,
-            is_led=commands is not None,
+            has_controls=commands is not None,
+            is_led=is_led,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
@@ -137,7 +140,7 @@ class Viewer:
         surface: Surface,
         body_poses: FloatArray,
         readings: Readings | None = None,
-        hand: HandState | None = None,
+        live: LiveState | None = None,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
@@ -145,11 +148,11 @@ class Viewer:
             surface: Surface of the body, tissue frame. Kept, not copied.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
-            hand: How the hand is, if the page leads one.
+            live: How the run is, if the page controls it.
         """
         self._last_shown = time.monotonic()
         with self._changed:
-            self._waiting = SceneState(surface, body_poses, readings, hand)
+            self._waiting = SceneState(surface, body_poses, readings, live)
             self._changed.notify()
 
     def close(self) -> None:

@@ -40,7 +40,7 @@ class Instruments {
     // Let go first: nothing jumps.
     choose(number) {
         this.hand.letGoOfAll();
-        this.hand.say({ type: "choose", instrument: number });
+        this.hand.run.say({ type: "choose", instrument: number });
     }
 
     chooseNext() {
@@ -48,6 +48,6 @@ class Instruments {
     }
 
     toggleJaws() {
-        if (this.isClosed !== null) this.hand.say({ type: "jaws", closed: !this.isClosed });
+        if (this.isClosed !== null) this.hand.run.say({ type: "jaws", closed: !this.isClosed });
     }
 }

@@ -24,6 +24,7 @@ class SceneView {
         this.onReadings = onReadings;
         this.onCameras = onCameras;
         this.onHand = () => {};
+        this.onRun = () => {};
         this.cameras = [];
         this.chosen = 0;
         this.appearances = new Map();
@@ -40,6 +41,7 @@ class SceneView {
             set_wireframe: (command) => this.setWireframe(command.on),
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),
+            set_run: (command) => this.onRun(command),
         };
         this.viewer.handle_command = (command) => {
             (own[command.type] || meshcatHandles)(command);

@@ -101,7 +101,7 @@ def view(tmp_path):
 def tab(browser, view):
     """A tab that shows the start and leads, with a gamepad at rest."""
     tab = opened(browser, view)
-    tab.wait_for_function("hand.leads")
+    tab.wait_for_function("run.leads")
     tab.evaluate(GAMEPAD)
     return tab
 
@@ -205,7 +205,7 @@ def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
     tab.failures = []
     tab.on("pageerror", lambda error: tab.failures.append(str(error)))
     tab.goto(view.url)
-    tab.wait_for_function("hand.tip !== null && hand.leads")
+    tab.wait_for_function("hand.tip !== null && run.leads")
     right, up, away, metres = tab.evaluate(
         "[hand.inWorld([1, 0, 0]), hand.inWorld([0, 1, 0]), hand.inWorld([0, 0, 1]), "
         "hand.metresPerPixel()]"

@@ -8,7 +8,7 @@ import pytest
 from scalpel_sim import prepare, read_scene
 from scalpel_sim.arm.grasper import HALF_PAD
 from scalpel_sim.errors import UsageError
-from scalpel_sim.hands.commands import Choose, End, Engage, Jaws, Release
+from scalpel_sim.hands.commands import Choose, End, Engage, Jaws, Pause, Release, Undo
 from scalpel_sim.hands.limited_pose import MOST_SPEED
 from scalpel_sim.hands.live_grasper import JAW_SPEED
 from scalpel_sim.hands.live_hand import LiveHand
@@ -18,7 +18,7 @@ from scalpel_sim.output.run_folder import FINAL, SCENE, STROKE, Outputs, grasp_f
 from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.strokes.csv_lines import StrokeError
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS, grasp_from_csv
-from tests.scalpel_sim.hands.led_runs import PERIOD, Clock, led, move, turn
+from tests.scalpel_sim.hands.led_runs import PERIOD, Clock, controls_of, led, move, turn
 
 SHEET = read_scene(Path(__file__).parent / "sheet.toml")
 
@@ -32,7 +32,7 @@ DT = 1e-3
 """Length of a frame [s]."""
 
 ROUNDING = 1e-9
-"""By which a limit may be passed, relative."""
+"""By which a place may differ after it was turned into an edge and back [m]."""
 
 
 def moves(first, last, x=0.0, y=0.0, z=0.0):
@@ -87,7 +87,8 @@ def lifted(tmp_path_factory):
     simulation, hand = led(SHEET)
     command = doing(LIFT_AND_CUT, hand)
     command(simulation)
-    performed(simulation, folder, scene=SHEET, seconds=10.0, every_frame=command, hand=hand)
+    controls = controls_of(simulation, hand)
+    performed(simulation, folder, scene=SHEET, seconds=10.0, every_frame=command, controls=controls)
     return simulation, hand, folder
 
 
@@ -235,6 +236,52 @@ def test_a_state_saved_while_a_grasper_holds_brings_both_hands_back_to_the_bit()
     assert np.array_equal(rows, rows_again, equal_nan=True)
     assert chosen == chosen_again
     assert np.array_equal(wanted, wanted_again)
+
+
+def test_an_undo_takes_what_a_grasper_did_off_its_record(tmp_path):
+    simulation, hand = led(SHEET)
+    controls = controls_of(simulation, hand)
+    undone = [(0, Choose(GRASPER)), (50, Engage()), *moves(50, 250, y=-0.034), (400, Undo())]
+    kept = [(60, Choose(BLADE)), (60, Engage()), *moves(60, 300, y=-0.02), (350, End())]
+    command = doing([*undone, *kept], controls)
+    command(simulation)
+    folder, again = tmp_path / "led", tmp_path / "again"
+    performed(simulation, folder, scene=SHEET, seconds=10.0, every_frame=command, controls=controls)
+    at = hand.graspers[0].pose.middle
+    assert at == pytest.approx(SHEET.graspers[0].motion[0].at, abs=ROUNDING)
+    assert len((folder / grasp_file("left")).read_text().splitlines()) < 10, "it rests all the time"
+    repeated = prepare(read_scene(folder / SCENE))
+    performed(repeated, again)
+    assert (folder / FINAL).read_bytes() == (again / FINAL).read_bytes()
+
+
+def test_closed_jaws_are_undone_as_a_stroke_is():
+    simulation, hand = led(SHEET)
+    controls = controls_of(simulation, hand)
+    controls.history.begin()
+
+    def frames(*commands):
+        controls.commands += commands
+        for _ in range(200):
+            controls.obey()
+            simulation.step()
+
+    frames(Choose(GRASPER))
+    frames(Jaws(True))
+    assert hand.graspers[0].is_closed
+    controls.commands.append(Undo())
+    controls.obey()
+    assert not hand.graspers[0].is_closed
+    assert len(simulation.recording) == 200
+    assert hand.chosen == GRASPER
+
+
+def test_a_choice_is_seen_while_time_stands_still():
+    simulation, hand = led(SHEET)
+    controls = controls_of(simulation, hand)
+    controls.commands += [Pause(), Choose(GRASPER)]
+    assert controls.obey()
+    assert hand.chosen == GRASPER
 
 
 HEADER = ",".join(GRASP_COLUMNS)
