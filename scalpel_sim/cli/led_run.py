@@ -4,7 +4,7 @@ import time
 
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
-from scalpel_sim.hands.commands import End, Engage
+from scalpel_sim.hands.commands import Begin, End, Engage
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.workspace import workspace_in
@@ -39,8 +39,10 @@ def perform_led(
     plotter: Plotter,
     viewer: Viewer,
     controls: RunControls,
-) -> Summary:
+) -> Summary | None:
     """Do the run from when somebody takes hold of the blade until they end it.
+
+    Where they ask for another run before, there is none.
 
     Args:
         prepared: The run.
@@ -55,6 +57,8 @@ def perform_led(
     """
     simulation = prepared.simulation
     _wait_for_hand(viewer, controls)
+    if any(isinstance(command, Begin) for command in list(controls.commands)):
+        return None
     controls.pace.go_on()
     return perform(
         simulation,
@@ -71,7 +75,9 @@ def perform_led(
 def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
     """Wait until a page engages the hand, or ends the run before it has begun."""
     with StopSignals() as stop:
-        while not any(isinstance(command, Engage | End) for command in list(controls.commands)):
+        while not any(
+            isinstance(command, Engage | End | Begin) for command in list(controls.commands)
+        ):
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:
