@@ -39,6 +39,9 @@ _log = logging.getLogger(__name__)
 REST_AFTER_STROKE = 0.3
 """How long a run continues after the stroke's end [s]: the tissue swings out, and the cut gapes."""
 
+ENDED_IN_PAGE = "ended in the page"
+"""The status of a run of a script that somebody has ended in the live page."""
+
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
 
@@ -117,7 +120,7 @@ def perform(
         controls.history.begin(outputs, replay)
     _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
-    status = stopped or (COMPLETE if failure is None else f"failed: {one_line(failure)}")
+    status = stopped or _status(failure, controls)
 
     unwritten = _Attempts()
     with unwritten:
@@ -154,6 +157,14 @@ def perform(
     return summary
 
 
+def _status(failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended that no signal ended."""
+    if failure is not None:
+        return f"failed: {one_line(failure)}"
+    was_cut_short = controls is not None and controls.has_ended and controls.hand is None
+    return ENDED_IN_PAGE if was_cut_short else COMPLETE
+
+
 def _run_frames(
     simulation: Simulation,
     outputs: Outputs,
@@ -176,7 +187,9 @@ def _run_frames(
             if every_frame is not None:
                 every_frame(now)
             obey()
-            return stop.reason is not None or (hand is not None and _has_rested(now, hand))
+            if hand is not None:
+                return stop.reason is not None or _has_rested(now, hand)
+            return stop.reason is not None or (controls is not None and controls.has_ended)
 
         failure = None
         try:

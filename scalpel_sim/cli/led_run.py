@@ -4,7 +4,7 @@ import time
 
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
-from scalpel_sim.hands.commands import Choose, End, Engage, Jaws
+from scalpel_sim.hands.commands import Begin, Choose, End, Engage, Jaws
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.plot_process import Plotter
@@ -18,7 +18,7 @@ from scalpel_sim.viewer.viewer import Viewer
 SECONDS_PER_LOOK = 0.02
 """How often it is looked whether somebody has taken hold of the blade [s]."""
 
-_BEGIN = Engage | Choose | Jaws | End
+_BEGIN = Engage | Choose | Jaws | End | Begin
 """Commands with which a run begins."""
 
 
@@ -34,8 +34,10 @@ def perform_led(
     plotter: Plotter,
     viewer: Viewer,
     controls: RunControls,
-) -> Summary:
+) -> Summary | None:
     """Do the run from when somebody takes hold of the blade until they end it.
+
+    Where they ask for another run before, there is none.
 
     Args:
         prepared: The run.
@@ -50,6 +52,8 @@ def perform_led(
     """
     simulation = prepared.simulation
     _wait_for_hand(viewer, controls)
+    if any(isinstance(command, Begin) for command in list(controls.commands)):
+        return None
     controls.pace.go_on()
     return perform(
         simulation,

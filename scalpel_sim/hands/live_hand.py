@@ -13,8 +13,8 @@ from scalpel_sim.hands.commands import (
     Choose,
     End,
     Engage,
-    HandCommand,
     Jaws,
+    LeadingCommand,
     Move,
     Release,
     Turn,
@@ -54,7 +54,7 @@ class LiveHand:
         seconds: float = math.inf,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.commands: deque[HandCommand] = deque()
+        self.commands: deque[LeadingCommand] = deque()
         """What it is asked to do."""
         self.stamp: float | None = None
         """Stamp of the newest command that it has obeyed; None: there was none yet."""

@@ -5,12 +5,13 @@ from collections import deque
 from collections.abc import Callable
 
 from scalpel_sim.hands.commands import (
+    Begin,
     Choose,
     Command,
     End,
     Engage,
-    HandCommand,
     Jaws,
+    LeadingCommand,
     Pause,
     Reset,
     Resume,
@@ -25,7 +26,7 @@ from scalpel_sim.hands.pace import Pace
 FRAMES_PER_STEP = 10
 """Frames of a step: a hundredth of a second, in which a blade that cuts goes half a millimetre."""
 
-SECONDS_PER_LOOK = 0.01
+SECONDS_ASLEEP = 0.01
 """How often a run that stands still looks for commands [s]."""
 
 
@@ -36,6 +37,7 @@ class RunControls:
         pace: How fast time passes.
         history: Where the run can go back to.
         hand: Obeys the commands that lead the blade; None: a script leads it.
+        commands: What the page asks; any thread may append. None: there is no page.
         sleep: Waits for so many seconds.
     """
 
@@ -44,14 +46,21 @@ class RunControls:
         pace: Pace,
         history: History,
         hand: LiveHand | None = None,
+        commands: deque[Command] | None = None,
         *,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.commands: deque[Command] = deque()
-        """What the page asks; any thread may append."""
+        self.commands: deque[Command] = deque() if commands is None else commands
+        """What the page asks."""
         self.pace, self.history, self.hand = pace, history, hand
         self.is_paused = False
         """Whether time stands still."""
+        self.has_ended = False
+        """Whether the page has ended the run."""
+        self.next: Begin | None = None
+        """The run that the page has asked for after this one."""
+        self.notice = ""
+        """What the page is to tell the person."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self._sleep = sleep
@@ -71,23 +80,15 @@ class RunControls:
         if self._is_stepping:
             self._is_stepping = False
             self.on_change()  # pictures skip most frames
-        self._sleep(SECONDS_PER_LOOK)
+        self._sleep(SECONDS_ASLEEP)
         self.pace.go_on()
         return True
 
     def _do(self, command: Command) -> None:
-        if isinstance(command, HandCommand):
+        if isinstance(command, LeadingCommand):
             if isinstance(command, Engage | Jaws):
                 self._begin_stroke()
-            if isinstance(command, End):
-                self.is_paused = False
-            if self.hand is None:
-                return
-            if isinstance(command, Choose) and self.is_paused:  # no frame would show it
-                self.hand.choose(command.instrument)
-                self.on_change()
-            else:
-                self.hand.commands.append(command)
+            self._pass_on(command)
         elif isinstance(command, Pause | Resume):
             self._let_go()
             self.is_paused, self._frames_left = isinstance(command, Pause), 0
@@ -99,6 +100,21 @@ class RunControls:
             self.on_change()
         elif isinstance(command, Undo | Reset):
             self._go_back(isinstance(command, Reset))
+        elif isinstance(command, Begin):
+            self.next = command
+            self._pass_on(End())
+
+    def _pass_on(self, command: LeadingCommand) -> None:
+        """Have the hand obey."""
+        if isinstance(command, End):
+            self.is_paused, self.has_ended = False, True
+        if self.hand is None:
+            return
+        if isinstance(command, Choose) and self.is_paused:  # no frame would show it
+            self.hand.choose(command.instrument)
+            self.on_change()
+        else:
+            self.hand.commands.append(command)
 
     def _begin_stroke(self) -> None:
         """Keep the present, to which an undo goes back; a stroke that led nowhere is none."""

@@ -15,8 +15,27 @@ UPDATES_PER_SECOND = 25.0
 """Rate at which the pages are updated, per second of wall time."""
 
 
+class Choices(NamedTuple):
+    """What a page may ask for in the next run, and what this one has."""
+
+    first: str
+    """Name of the scene of the command line."""
+    scenes: list[str]
+    """Scenes; empty: that of the command line."""
+    scene: str
+    materials: list[str]
+    material: str
+    """Empty: as in the scene."""
+    toughness: float
+    """Fracture toughness [J/m2]."""
+    blade_thickness: float
+    """Thickness of the blade [m]."""
+    is_led: bool
+    """Whether the page leads the blade."""
+
+
 class ViewerSettings(NamedTuple):
-    """The first message to the viewer's process: what stays the same during the run."""
+    """The first message to the viewer's process, and of each run that follows in the same page."""
 
     title: str
     """Heading of the page."""
@@ -27,13 +46,15 @@ class ViewerSettings(NamedTuple):
     wireframe: bool
     """Whether the edges of the tissue's triangles are drawn at the start."""
     port: int | None
-    """Port of the page; None for the first free port."""
+    """Port of the page; None for the first free port. That of the first run stays."""
     views: Sequence[ViewTable] = ()
     """Cameras that the page offers."""
     has_controls: bool = False
     """Whether the page controls the run."""
     is_led: bool = False
     """Whether it leads the blade, too."""
+    choices: Choices | None = None
+    """What it may ask for in the next run; None: there is none."""
 
 
 class SceneState(NamedTuple):

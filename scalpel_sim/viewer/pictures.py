@@ -84,7 +84,13 @@ def live_state(controls: RunControls) -> LiveState:
     """Return how a run is, for the page that controls it."""
     hand, pace, history = controls.hand, controls.pace, controls.history
     run = RunState(
-        controls.is_paused, pace.rate, pace.factor, history.can_go_back, history.n_strokes
+        controls.is_paused,
+        pace.rate,
+        pace.factor,
+        history.can_go_back,
+        history.n_strokes,
+        controls.has_ended,
+        controls.notice,
     )
     return LiveState(run, None if hand is None else _state_of_hand(hand))
 

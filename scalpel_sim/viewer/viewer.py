@@ -21,6 +21,7 @@ from scalpel_sim.hands.commands import Command, Release, command_of
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
+    Choices,
     SceneState,
     StartReply,
     ViewerSettings,
@@ -64,6 +65,7 @@ class Viewer:
         views: Sequence[ViewTable] = (),
         commands: deque[Command] | None = None,
         is_led: bool = False,
+        choices: Choices | None = None,
     ) -> None:
         """Start the viewer's process and learn its address.
 
@@ -77,6 +79,7 @@ class Viewer:
             commands: What receives the commands of the page that controls the run; None: the page
                 shows, and controls nothing.
             is_led: Whether that page leads the blade, too.
+            choices: What it may ask for in the next run.
 
         Raises:
             UsageError: the port does not exist.
@@ -85,20 +88,20 @@ class Viewer:
         if port is not None and not 1 <= port <= HIGHEST_PORT:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
         self._process = _start_process()  # it starts while the shapes are made here
-        shapes = list(shapes_of(model))
-        settings = ViewerSettings(
+        self._settings: ViewerSettings | None = ViewerSettings(
             title,
-            shapes,
+            list(shapes_of(model)),
             frame or TissueFrame(),
             wireframe,
             port,
             views,
             has_controls=commands is not None,
             is_led=is_led,
+            choices=choices,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
-        self._waiting: ViewerSettings | SceneState | None = settings
+        self._waiting: SceneState | None = None
         self._is_closed = False
         self._listener: threading.Thread | None = None
         self._last_shown = -float("inf")
@@ -155,6 +158,33 @@ class Viewer:
             self._waiting = SceneState(surface, body_poses, readings, live)
             self._changed.notify()
 
+    def begin(
+        self,
+        model: mujoco.MjModel,
+        *,
+        title: str,
+        frame: TissueFrame,
+        views: Sequence[ViewTable] = (),
+        is_led: bool = False,
+        choices: Choices | None = None,
+    ) -> None:
+        """Show another run in the same page; the arguments are as at the start."""
+        shapes = list(shapes_of(model))
+        with self._changed:
+            self._settings = ViewerSettings(
+                title,
+                shapes,
+                frame,
+                wireframe=False,
+                port=None,
+                views=views,
+                has_controls=True,
+                is_led=is_led,
+                choices=choices,
+            )
+            self._waiting = None
+            self._changed.notify()
+
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
         with self._changed:
@@ -177,8 +207,14 @@ class Viewer:
         try:
             while True:
                 with self._changed:
-                    self._changed.wait_for(lambda: self._waiting is not None or self._is_closed)
-                    message, self._waiting = self._waiting, None
+                    self._changed.wait_for(
+                        lambda: self._settings or self._waiting or self._is_closed
+                    )
+                    message: ViewerSettings | SceneState | None
+                    if self._settings is not None:
+                        message, self._settings = self._settings, None
+                    else:
+                        message, self._waiting = self._waiting, None
                 if message is None:
                     break
                 self._pipe.write(pickle.dumps(message, protocol=5))

@@ -30,7 +30,6 @@ class Hand {
         window.addEventListener("blur", () => this.letGoOfAll());
         document.addEventListener("visibilitychange", () => document.hidden && this.letGoOfAll());
         element("clutch").addEventListener("click", () => this.toggleClutch());
-        element("end").addEventListener("click", () => run.say({ type: "end" }));
         document.querySelector("footer").before(element("hint"));
         const pane = element("meshcat-pane");
         pane.tabIndex = 0;
@@ -175,7 +174,7 @@ class Hand {
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
         element("clutch").textContent = `lead the ${this.instruments.noun}`;
         this.instruments.enable(this.run.leads && !this.hasEnded);
-        for (const id of ["clutch", "end"]) element(id).disabled = !this.run.leads || this.hasEnded;
+        element("clutch").disabled = !this.run.leads || this.hasEnded;
         element("hint").textContent = this.hint();
         element("hint").hidden = element("hint").textContent === "";
     }

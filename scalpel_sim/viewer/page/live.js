@@ -20,6 +20,11 @@ function afterDrawing(callback) {
 const run = typeof Run === "undefined" ? null : new Run(sceneView);
 const hand = typeof Hand === "undefined" ? null : new Hand(sceneView, run);
 
+if (typeof NextRun !== "undefined") {
+    run.next = new NextRun(run, CHOICES);
+    run.showControls();
+}
+
 function follow() {
     const socket = new WebSocket(`ws://${location.host}/frames${run ? run.query : ""}`);
     socket.binaryType = "arraybuffer";
@@ -29,7 +34,9 @@ function follow() {
     };
     socket.onmessage = (message) => {
         if (typeof message.data === "string") {
-            run.onLeading(JSON.parse(message.data));
+            const said = JSON.parse(message.data);
+            if (said.reload) location.reload();
+            else run.onLeading(said);
             return;
         }
         viewer.handle_command_bytearray(new Uint8Array(message.data));
