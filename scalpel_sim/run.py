@@ -115,13 +115,7 @@ def perform(
         controls.history.begin(outputs, replay)
     _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
-    if failure is not None and stopped is None:
-        status = f"failed: {one_line(failure)}"
-    elif controls is not None and controls.has_ended and hand is None:
-        status = stopped or ENDED_IN_PAGE
-    else:
-        status = stopped or COMPLETE
-
+    status = _status_of(stopped, failure, controls)
     unwritten = _Attempts()
     with unwritten:
         outputs.write_forces(simulation.recording, all_rows=True)
@@ -190,6 +184,16 @@ def _run_frames(
         except Exception as error:
             failure = error
     return stop.reason, failure
+
+
+def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended, for its summary."""
+    if stopped is not None:
+        return stopped
+    if failure is not None:
+        return f"failed: {one_line(failure)}"
+    is_cut_short = controls is not None and controls.hand is None and controls.has_ended
+    return ENDED_IN_PAGE if is_cut_short else COMPLETE
 
 
 def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
