@@ -14,7 +14,7 @@ from bridge.tcp.messages.geoms import MAX_GEOMS
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.text import MAX_VIEWS
 from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
-from bridge.tcp.server import MAX_CONNECTIONS
+from bridge.tcp.single_client import MAX_CONNECTIONS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.tcp.serve_block import block_tissue
 from tissue import Energies, RigidContacts
