@@ -17,7 +17,7 @@ from bridge.link import LinkError
 from bridge.tcp.address import bound_socket, format_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.messages.text import pack_error
-from bridge.tcp.peer import Peer
+from bridge.tcp.peer import SEND_SECONDS, Peer
 from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, MessageKind, pack_frame
 
 _logger = logging.getLogger(__name__)
@@ -39,6 +39,9 @@ class SingleClientServer(abc.ABC):
         ValueError: the host is not on loopback and there is no key, or the port is out of range.
         LinkError: the port is in use or not allowed.
     """
+
+    _send_seconds = SEND_SECONDS
+    """Longest time for a peer to read a reply [s]."""
 
     def __init__(self, served: str, host: str, port: int, key: bytes | None) -> None:
         self._served, self._key = served, key
@@ -196,7 +199,7 @@ class SingleClientServer(abc.ABC):
             if len(reply) > LARGEST_REPLY:
                 raise MessageError(f"the reply has {len(reply)} bytes, over {LARGEST_REPLY}")
         except MessageError as error:
-            _logger.warning("refused a request of %s: %s", peer.name, error)
+            self._note_refusal(peer, error)
             self._send(peer, MessageKind.ERROR, pack_error(str(error)), frame.sequence)
         except Exception as error:  # a failure is reported and does not end the server
             _logger.exception("%s of %s failed", self._served, peer.name)
@@ -205,13 +208,17 @@ class SingleClientServer(abc.ABC):
         else:
             self._send(peer, MessageKind(frame.kind), reply, frame.sequence)
 
+    def _note_refusal(self, peer: Peer, error: MessageError) -> None:
+        """Log that a request of the client is refused."""
+        _logger.warning("refused a request of %s: %s", peer.name, error)
+
     def _send(
         self, peer: Peer, kind: MessageKind, payload: bytes, sequence: int | None = None
     ) -> None:
         if sequence is None:
             sequence = peer.sequence
         try:
-            peer.send(peer.channel.pack(kind, sequence, payload))
+            peer.send(peer.channel.pack(kind, sequence, payload), self._send_seconds)
         except OSError as error:
             self._drop(peer, f"its reply cannot be sent: {error}")
 

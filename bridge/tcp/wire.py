@@ -57,6 +57,9 @@ class MessageKind(enum.IntEnum):
     FRAMES = 12
     COLLIDE = 13
     TIE = 14
+    SERVO = 15
+    MEASURED = 16
+    END = 17
 
 
 class Frame(NamedTuple):

@@ -1,13 +1,12 @@
 """The command `view`: a run that is shown live in a browser, and may be led there."""
 
 import sys
-import time
-from collections.abc import Callable
 
-from scalpel_sim.cli.console import log_to_stderr, print_report, say
+from scalpel_sim.cli.console import log_to_stderr, print_report, say, stay_while
 from scalpel_sim.cli.options import (
     ArmOptions,
     ClientOptions,
+    DeviceOptions,
     OutputOptions,
     PageOptions,
     PrintOptions,
@@ -15,10 +14,6 @@ from scalpel_sim.cli.options import (
     TissueOptions,
 )
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.stop_signals import StopSignals
-
-SECONDS_PER_CHECK = 0.2
-"""How often a finished `view` checks whether its page is still wanted [s]."""
 
 
 def view(
@@ -29,6 +24,7 @@ def view(
     tissue: TissueOptions = TissueOptions(),
     arm: ArmOptions = ArmOptions(),
     client: ClientOptions = ClientOptions(),
+    device: DeviceOptions = DeviceOptions(),
     output: OutputOptions = OutputOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
@@ -44,12 +40,14 @@ def view(
     scalpel-sim view
     scalpel-sim view slab --wireframe --port 8080
     scalpel-sim view --hand live
+    scalpel-sim view --hand device
     ```
 
     Args:
         scene: What to cut.
     """
     with log_to_stderr(printing), Plotter() as plotter:
+        from scalpel_sim.cli.device_run import check_device_options
         from scalpel_sim.cli.led_run import live_hand, perform_led
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.cli.scripted_run import perform_script
@@ -60,6 +58,11 @@ def view(
         from scalpel_sim.viewer.viewer import Viewer
 
         options = RunOptions(tissue, arm, client, output, printing)
+        if page.hand == "device":
+            from scalpel_sim.cli.device_view import view_device
+
+            return view_device(scene, options, page, device, plotter)
+        check_device_options(device, is_led=False)
         is_led = page.hand == "live"
         with prepared_run(scene, options, relaxation="verlet", is_led=is_led) as prepared:
             simulation = prepared.simulation
@@ -97,7 +100,7 @@ def view(
                     )
                 show()
                 print_report(summary, prepared.folder, output.export, printing)
-                _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
+                stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
 
 
 def _wait_for_start(url: str) -> None:
@@ -107,11 +110,3 @@ def _wait_for_start(url: str) -> None:
         sys.stdin.readline()
     else:
         say(f"live at {url}")
-
-
-def _stay_while(condition: Callable[[], bool], message: str) -> None:
-    """Print a message, and return when the condition fails, or on Ctrl-C."""
-    with StopSignals() as stop:
-        say(message)  # from now on Ctrl-C ends it without a traceback
-        while condition() and stop.reason is None:
-            time.sleep(SECONDS_PER_CHECK)
