@@ -1,17 +1,22 @@
 """A device's client and the server in a run, over real sockets."""
 
+import re
 import socket
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from bridge import DeviceClient, LinkError, TcpLink
+from bridge import DeviceClient, LinkError, TcpLink, parse_address
 from bridge.device.messages import ServoRequest, pack_servo
 from bridge.tcp.wire import MessageKind, pack_frame
 from tests.bridge.device.served_blade import ORIGIN, POSE, STATE, UNTURNED, served_blade
 from tests.bridge.tcp.bare_sockets import HELLO, connected, read_one
 
+EXAMPLE = Path(__file__).parents[3] / "docs" / "examples" / "device.py"
 KEY = bytes(range(32))
 PATIENCE = 10.0
 """Longest wait for what must happen [s]."""
@@ -161,6 +166,37 @@ def test_a_tissue_is_not_taken_for_a_run_nor_a_run_for_a_tissue(served, server):
         DeviceClient(server.address)
     with pytest.raises(LinkError, match="description cannot be read"):
         TcpLink(served[1])
+
+
+def test_a_client_of_forty_lines_leads_the_blade_and_prints_its_force(served):
+    blade, address = served
+    done = run_example(address)
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = re.findall(r"([\d.]+) s: tip at y ([+-][\d.]+) mm, ([+-][\d.]+) N", done.stdout)
+    assert len(rows) == 10 and rows[0] == ("1.250", "+200.0", "+2.000")
+    assert re.search(r"frames limited 7, periods missed \d+, messages dropped 0", done.stdout)
+    ys = [asked[2] for asked in blade.asked if asked[0] == "servo_cp"]
+    assert len(ys) == 3000 and ys[0] == pytest.approx(0.2, abs=1e-3)
+    assert ys[-1] == pytest.approx(0.2 + 0.06, abs=1e-3), "3 s at 20 mm/s from where the blade was"
+
+
+def test_the_client_is_forty_lines_and_imports_only_the_standard_library():
+    text = EXAMPLE.read_text()
+    assert text.count("\n") <= 40
+    imported = re.findall(r"^(?:import|from) (\w+)", text, re.MULTILINE)
+    assert set(imported) <= set(sys.stdlib_module_names)
+
+
+def test_the_client_prints_why_the_run_refuses_it():
+    with served_blade(KEY) as (_, address):
+        done = run_example(address)
+    assert done.returncode == 1 and "this server asks for a key" in done.stderr
+
+
+def run_example(address):
+    port = str(parse_address(address)[1])
+    command = [sys.executable, "-I", str(EXAMPLE), port]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60)
 
 
 def test_a_missing_run_is_one_clear_error():
