@@ -11,8 +11,7 @@ from bridge import CartesianPose, DeviceState
 from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN, End
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.simulation import Simulation
-from scalpel_sim.strokes.stroke import poses_of_edges
-from tissue import FloatArray, Wrench
+from tissue import BladeSegment, FloatArray, Wrench
 
 WATCHDOG = 0.04
 """Wall time without a pose after which the hand lets go [s]: forty periods of a haptic device. With
@@ -116,15 +115,13 @@ class DeviceHand(LedHand):
     def state(self) -> DeviceState:
         """Return how the blade is after the last frame."""
         simulation = self._simulation
-        segment = simulation.arm.blade.segment()
-        _, rotations, _ = poses_of_edges(*(part[None] for part in segment))
-        tip = np.array(segment.tip)
+        measured_cp = _pose_of_blade(simulation.arm.blade.segment())
         wrench = simulation.wrench
         return DeviceState(
             simulation.time,
             self._factor(),
-            CartesianPose(tip, rotations[0]),
-            Wrench(wrench.force, wrench.torque, tip),
+            measured_cp,
+            Wrench(wrench.force, wrench.torque, measured_cp.position),
             self.is_engaged,
             self.ended_at is not None,
             self.n_limited,
@@ -157,6 +154,16 @@ class DeviceHand(LedHand):
         way = np.empty(3)
         mujoco.mju_rotVecQuat(way, np.array([0.0, self._half, 0.0]), self._pose.wanted_rotation)
         return way
+
+
+def _pose_of_blade(segment: BladeSegment) -> CartesianPose:
+    """Return the pose of a blade as `DeviceState` has it."""
+    along, back, across = segment.tip - segment.heel, -segment.forward, np.empty(3)
+    mujoco.mju_normalize3(along)
+    mujoco.mju_cross(across, along, back)
+    orientation = np.empty(4)
+    mujoco.mju_mat2Quat(orientation, np.array([across, along, back]).T.ravel())
+    return CartesianPose(np.array(segment.tip), orientation)
 
 
 def _turn_between(before: CartesianPose, after: CartesianPose) -> FloatArray:
