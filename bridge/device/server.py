@@ -64,6 +64,8 @@ class DeviceServer(SingleClientServer):
 
     # A device that does not read its replies must not make a frame wait.
     _send_seconds = 0.0
+    # Nor must one that sends too much: these are some forty poses, which take 3 ms.
+    _read_bytes = 4096
 
     def __init__(
         self,

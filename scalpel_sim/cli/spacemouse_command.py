@@ -38,6 +38,7 @@ def spacemouse(
     with log_to_stderr(printing):
         try:
             import pyspacemouse
+            from easyhid import HIDException
         except ImportError as cause:
             raise RunError(
                 "a SpaceMouse is read by pyspacemouse, which cannot be loaded "
@@ -52,4 +53,7 @@ def spacemouse(
             with DeviceClient(address, period=SPACEMOUSE_PERIOD, key=secret) as client:
                 if not printing.quiet:
                     say(f"{mouse.name} leads the blade in {client.description.scene}")
-                lead_by_spacemouse(client, mouse.read)
+                try:
+                    lead_by_spacemouse(client, mouse.read)
+                except HIDException as cause:
+                    raise RunError(f"the SpaceMouse can no longer be read: {cause}") from cause

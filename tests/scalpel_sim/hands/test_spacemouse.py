@@ -2,12 +2,14 @@
 
 import math
 import struct
+import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bridge import DeviceClient
+from scalpel_sim.cli.app import command_line
 from scalpel_sim.hands.spacemouse import (
     DEAD_ZONE,
     FULL_SPEED,
@@ -91,3 +93,9 @@ def test_the_reports_are_read_here_as_pyspacemouse_reads_them():
         take_report(ours, report)
         assert [getattr(ours, axis) for axis in AXES] == [getattr(theirs, axis) for axis in AXES]
         assert list(theirs.buttons) == list(ours.buttons)
+
+
+def test_without_pyspacemouse_the_command_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pyspacemouse", None)
+    assert command_line(["spacemouse"]) == 1
+    assert "pip install scalpel-sim[spacemouse]" in capsys.readouterr().err
