@@ -57,9 +57,9 @@ class MessageKind(enum.IntEnum):
     FRAMES = 12
     COLLIDE = 13
     TIE = 14
-    SERVO = 15
-    MEASURED = 16
-    END = 17
+    SERVO = 16
+    MEASURED = 17
+    END = 18
 
 
 class Frame(NamedTuple):

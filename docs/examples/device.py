@@ -6,7 +6,7 @@ import sys
 import time
 import zlib
 
-HELLO, ERROR, SERVO, MEASURED, END = 1, 6, 15, 16, 17
+HELLO, ERROR, SERVO, MEASURED, END = 1, 6, 16, 17, 18
 PERIOD, SPEED, SECONDS = 1e-3, 0.02, 3.0  # s, m/s, s
 connection = socket.create_connection(("127.0.0.1", int([*sys.argv, "8767"][1])))
 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
