@@ -8,7 +8,7 @@ from typing import Any
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import (
@@ -196,7 +196,7 @@ def _status_of(stopped: str | None, failure: Exception | None, controls: RunCont
     return ENDED_IN_PAGE if is_cut_short else COMPLETE
 
 
-def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
+def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
     """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
     if hand.ended_at is None:
         return False
