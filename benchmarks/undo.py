@@ -29,7 +29,7 @@ def main() -> None:
     name = sys.argv[1] if len(sys.argv) > 1 else "organ"
     scene = SCENES[name]
     simulation = prepare(scene, is_led=True)
-    hand = LiveHand.of(simulation)
+    hand = LiveHand(simulation)
     hand.take_over(simulation)
     controls = RunControls(Pace(), History(simulation), hand)
     undo, drawn, areas = [], [], []

@@ -10,7 +10,7 @@ from msgspec import structs
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import (
@@ -120,8 +120,7 @@ def perform(
         controls.history.begin(outputs, replay)
     _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
-    status = stopped or _status(failure, controls)
-
+    status = _status_of(stopped, failure, controls)
     unwritten = _Attempts()
     with unwritten:
         outputs.write_forces(simulation.recording, all_rows=True)
@@ -155,14 +154,6 @@ def perform(
     if unwritten.errors:
         raise unwritten.errors[0]
     return summary
-
-
-def _status(failure: Exception | None, controls: RunControls | None) -> str:
-    """Return how a run ended that no signal ended."""
-    if failure is not None:
-        return f"failed: {one_line(failure)}"
-    was_cut_short = controls is not None and controls.has_ended and controls.hand is None
-    return ENDED_IN_PAGE if was_cut_short else COMPLETE
 
 
 def _run_frames(
@@ -200,7 +191,17 @@ def _run_frames(
     return stop.reason, failure
 
 
-def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
+def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended, for its summary."""
+    if stopped is not None:
+        return stopped
+    if failure is not None:
+        return f"failed: {one_line(failure)}"
+    is_cut_short = controls is not None and controls.hand is None and controls.has_ended
+    return ENDED_IN_PAGE if is_cut_short else COMPLETE
+
+
+def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
     """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
     if hand.ended_at is None:
         return False
@@ -219,7 +220,7 @@ def _led_scene(scene: Scene, outputs: Outputs) -> Scene:
     return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
 
 
-def _write_led(outputs: Outputs, hand: LiveHand) -> None:
+def _write_led(outputs: Outputs, hand: LedHand) -> None:
     """Write what the hand has done since the last call."""
     outputs.write_stroke(hand.blade.take_rows())
     for grasper in hand.graspers:

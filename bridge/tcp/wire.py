@@ -57,6 +57,9 @@ class MessageKind(enum.IntEnum):
     FRAMES = 12
     COLLIDE = 13
     TIE = 14
+    SERVO = 16
+    MEASURED = 17
+    END = 18
 
 
 class Frame(NamedTuple):

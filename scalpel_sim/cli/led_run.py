@@ -2,15 +2,14 @@
 
 import time
 
+from scalpel_sim.cli.hand_run import perform_by_hand
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import Begin, Choose, End, Engage, Jaws
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
-from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import LONGEST_RUN
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.viewer.viewer import Viewer
@@ -25,7 +24,7 @@ _BEGIN = Engage | Choose | Jaws | End | Begin
 def live_hand(prepared: PreparedRun) -> LiveHand:
     """Return the hand that leads a run."""
     seconds = prepared.scene.seconds
-    return LiveHand.of(prepared.simulation, seconds=LONGEST_RUN if seconds is None else seconds)
+    return LiveHand(prepared.simulation, seconds=LONGEST_RUN if seconds is None else seconds)
 
 
 def perform_led(
@@ -50,21 +49,10 @@ def perform_led(
         Interrupted: the user or the system ended the run.
         RunError: the viewer has ended, and nobody can lead; or the run failed.
     """
-    simulation = prepared.simulation
     _wait_for_hand(viewer, controls)
     if any(isinstance(command, Begin) for command in list(controls.commands)):
         return None
-    controls.pace.go_on()
-    return perform(
-        simulation,
-        Outputs(prepared.folder, plotter, simulation.recording.columns, options.output.export),
-        scene=prepared.scene if options.client.connect is None else None,
-        views=prepared.scene.views,
-        settings=prepared.settings | {"stroke": simulation.stroke.name},
-        seconds=LONGEST_RUN + REST_AFTER_STROKE,
-        every_frame=lambda now: controls.pace.wait(now.dt),
-        controls=controls,
-    )
+    return perform_by_hand(prepared, options, plotter, controls)
 
 
 def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:

@@ -1,5 +1,6 @@
 """Runs that are shown live in one page, one after the other, as the person there asks."""
 
+import logging
 import sys
 import time
 from collections import deque
@@ -24,13 +25,16 @@ from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.scenes import SCENES
 from scalpel_sim.stop_signals import StopSignals
-from scalpel_sim.viewer.messages import Choices
+from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.pictures import into_viewer, live_state, show_in
 from scalpel_sim.viewer.viewer import Viewer
 from tissue import MATERIALS
 
 SECONDS_PER_CHECK = 0.2
 """How often a finished run checks whether another is asked for, or its page still wanted [s]."""
+
+
+_log = logging.getLogger("scalpel_sim")
 
 
 class _LiveRun(NamedTuple):
@@ -163,6 +167,7 @@ class LiveSession:
                 0.0 if scene.blade is None else scene.blade.thickness,
                 asked.is_led,
             )
+        controls = PageControls(self._commands, asked.is_led, choices)
         if self._viewer is None:
             self._viewer = Viewer(
                 simulation.arm.model,
@@ -171,9 +176,7 @@ class LiveSession:
                 wireframe=self._page.wireframe,
                 port=self._page.port,
                 views=scene.views,
-                commands=self._commands,
-                is_led=asked.is_led,
-                choices=choices,
+                controls=controls,
             )
         else:
             self._viewer.begin(
@@ -181,8 +184,7 @@ class LiveSession:
                 title=simulation.title,
                 frame=simulation.frame,
                 views=scene.views,
-                is_led=asked.is_led,
-                choices=choices,
+                controls=controls,
             )
         return self._viewer
 
@@ -219,6 +221,7 @@ class LiveSession:
                 return self._begun(asked)
             except (ValueError, RunError, LinkError) as error:
                 run.controls.notice = f"the next run cannot begin: {error}"
+                _log.warning("%s", run.controls.notice)
                 run.show()
         return None
 

@@ -38,7 +38,8 @@ class LiveBlade:
         self.name = BLADE
         self._frame = frame
         self._path = RestingPath(hand, start, frame)
-        self._half = self._path.half
+        self.half = self._path.half
+        """Half the length of the edge [m]."""
         self.pose = LimitedPose(self._path.middle, self._path.rotation, workspace, dt)
         self.numbers = [float(number) for part in start for number in part]
         """Tip, heel and forward of the pose that leads, tissue frame."""
@@ -76,7 +77,7 @@ class LiveBlade:
         axes = np.empty(9)
         mujoco.mju_quat2Mat(axes, self.pose.rotation)
         _, along, back = axes.reshape(3, 3).T
-        middle, to_tip = self.pose.middle, self._half * along
+        middle, to_tip = self.pose.middle, self.half * along
         pose = BladeSegment(middle + to_tip, middle - to_tip, -back)
         self.numbers = [number for part in pose for number in part.tolist()]
         self._path.take(pose)

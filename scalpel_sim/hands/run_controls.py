@@ -20,7 +20,7 @@ from scalpel_sim.hands.commands import (
     Undo,
 )
 from scalpel_sim.hands.history import History
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.pace import Pace
 
 FRAMES_PER_STEP = 10
@@ -45,7 +45,7 @@ class RunControls:
         self,
         pace: Pace,
         history: History,
-        hand: LiveHand | None = None,
+        hand: LedHand | None = None,
         commands: deque[Command] | None = None,
         *,
         sleep: Callable[[float], None] = time.sleep,
@@ -132,6 +132,7 @@ class RunControls:
                 self.history.drop()  # nothing was led since
         if self.history.reset() if to_start else self.history.undo():
             self._frames_left, self._is_stepping = 0, False
+        self._let_go()  # it may have led at the moment to which it went back
         self._numbers_before_stroke = None
         self.on_change()
 

@@ -1,11 +1,13 @@
 """Messages between a run and the process of its live viewer."""
 
+from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import msgspec
 
 from bridge import TissueFrame
+from scalpel_sim.hands.commands import Command
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import LiveState, Readings
@@ -32,6 +34,17 @@ class Choices(NamedTuple):
     """Thickness of the blade [m]."""
     is_led: bool
     """Whether the page leads the blade."""
+
+
+class PageControls(NamedTuple):
+    """What a page may do with the run that it shows."""
+
+    commands: deque[Command]
+    """Receives its commands."""
+    is_led: bool = False
+    """Whether it leads the blade."""
+    choices: Choices | None = None
+    """What it may ask for in the next run; None: there is none."""
 
 
 class ViewerSettings(NamedTuple):

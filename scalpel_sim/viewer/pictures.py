@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
@@ -95,7 +95,7 @@ def live_state(controls: RunControls) -> LiveState:
     return LiveState(run, None if hand is None else _state_of_hand(hand))
 
 
-def _state_of_hand(hand: LiveHand) -> HandState:
+def _state_of_hand(hand: LedHand) -> HandState:
     """Return how a hand is, for the page that leads it."""
     return HandState(
         hand.tip,

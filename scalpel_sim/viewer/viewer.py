@@ -21,7 +21,7 @@ from scalpel_sim.hands.commands import Command, Release, command_of
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
-    Choices,
+    PageControls,
     SceneState,
     StartReply,
     ViewerSettings,
@@ -63,9 +63,7 @@ class Viewer:
         wireframe: bool = False,
         port: int | None = None,
         views: Sequence[ViewTable] = (),
-        commands: deque[Command] | None = None,
-        is_led: bool = False,
-        choices: Choices | None = None,
+        controls: PageControls | None = None,
     ) -> None:
         """Start the viewer's process and learn its address.
 
@@ -76,10 +74,7 @@ class Viewer:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
-            commands: What receives the commands of the page that controls the run; None: the page
-                shows, and controls nothing.
-            is_led: Whether that page leads the blade, too.
-            choices: What it may ask for in the next run.
+            controls: What the page may do with the run; None: it shows, and controls nothing.
 
         Raises:
             UsageError: the port does not exist.
@@ -95,9 +90,9 @@ class Viewer:
             wireframe,
             port,
             views,
-            has_controls=commands is not None,
-            is_led=is_led,
-            choices=choices,
+            has_controls=controls is not None,
+            is_led=controls is not None and controls.is_led,
+            choices=None if controls is None else controls.choices,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._changed = threading.Condition()
@@ -108,9 +103,9 @@ class Viewer:
         self._sender = threading.Thread(target=self._send_states, name="viewer", daemon=True)
         self._sender.start()
         self.url = self._start_reply().url
-        if commands is not None:
+        if controls is not None:
             self._listener = threading.Thread(
-                target=self._listen, args=(commands,), name="commands", daemon=True
+                target=self._listen, args=(controls.commands,), name="commands", daemon=True
             )
             self._listener.start()
 
@@ -164,11 +159,18 @@ class Viewer:
         *,
         title: str,
         frame: TissueFrame,
+        controls: PageControls,
         views: Sequence[ViewTable] = (),
-        is_led: bool = False,
-        choices: Choices | None = None,
     ) -> None:
-        """Show another run in the same page; the arguments are as at the start."""
+        """Show another run in the same page.
+
+        Args:
+            model: MuJoCo model whose shapes are shown.
+            title: Heading of the page.
+            frame: Pose of the tissue frame in the world.
+            controls: What the page may do with the run; its commands go where they went.
+            views: Cameras that the page offers; it begins with the first.
+        """
         shapes = list(shapes_of(model))
         with self._changed:
             self._settings = ViewerSettings(
@@ -179,8 +181,8 @@ class Viewer:
                 port=None,
                 views=views,
                 has_controls=True,
-                is_led=is_led,
-                choices=choices,
+                is_led=controls.is_led,
+                choices=controls.choices,
             )
             self._waiting = None
             self._changed.notify()

@@ -34,7 +34,7 @@ class Clock:
 def led(scene=GRID2, clock=None, seconds=math.inf) -> tuple[Simulation, LiveHand]:
     """Return a simulation at its start, and the hand that leads it."""
     simulation = prepare(scene, is_led=True)
-    hand = LiveHand.of(simulation, seconds=seconds, clock=clock or Clock())
+    hand = LiveHand(simulation, seconds=seconds, clock=clock or Clock())
     hand.take_over(simulation)
     return simulation, hand
 

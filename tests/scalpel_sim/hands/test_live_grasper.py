@@ -140,7 +140,7 @@ def at_start():
 @pytest.fixture
 def hand(at_start):
     """A hand at the start of the sheet."""
-    hand = LiveHand.of(at_start[0], clock=Clock())
+    hand = LiveHand(at_start[0], clock=Clock())
     hand.take_over(at_start[0])
     return hand
 

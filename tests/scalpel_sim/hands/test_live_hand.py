@@ -55,7 +55,7 @@ def at_start():
 @pytest.fixture
 def hand(at_start):
     """A hand at the start of the scene, that leads the arm of `at_start`."""
-    return LiveHand.of(at_start[0], clock=Clock())
+    return LiveHand(at_start[0], clock=Clock())
 
 
 def poses(hand, n, first=0):

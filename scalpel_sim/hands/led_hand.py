@@ -1,0 +1,128 @@
+"""A hand that somebody leads: it has the instruments, and what it did with them is recorded."""
+
+import abc
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+
+from scalpel_sim.hands.commands import LeadingCommand
+from scalpel_sim.hands.instrument import Instrument
+from scalpel_sim.hands.live_blade import LiveBlade
+from scalpel_sim.hands.live_grasper import LiveGrasper
+from scalpel_sim.simulation import Simulation
+from tissue import FloatArray
+
+
+class LedHand(abc.ABC):
+    """Leads blade and graspers towards wanted poses, in place of their scripts.
+
+    They start at rest, the blade is chosen, and nothing is held. Whoever leads says how to move
+    from where the chosen one wants to be, never where to be, so that nothing jumps when it is
+    engaged again.
+
+    A `Stroke` and `GraspMotion`s read from their rows lead to the same bits.
+
+    Args:
+        simulation: At its start, prepared to be led; its leaders stay until `take_over`.
+        seconds: How long it leads at most [s]; then it has ended.
+        clock: Wall time [s], by which silence is measured.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        *,
+        seconds: float = math.inf,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.commands: deque[LeadingCommand] = deque()
+        """What it is asked to do."""
+        self.stamp: float | None = None
+        """Stamp of the newest command that it has obeyed; None: there was none yet."""
+        self.is_engaged = False
+        """Whether it leads the chosen instrument."""
+        self.ended_at: float | None = None
+        """Simulated time at which it has ended [s]; from then on all rest."""
+        self.n_limited = 0
+        """Frames in which a limit of speed, turn rate or room held an instrument back."""
+        self._frame, self._clock = simulation.frame, clock
+        self._dt, self._seconds = simulation.dt, seconds
+        self._heard_at = -math.inf
+        self.blade = _live_blade(simulation)
+        self.graspers = _live_graspers(simulation)
+        self.instruments: tuple[Instrument, ...] = (self.blade, *self.graspers)
+        """What it may choose."""
+        self.chosen = 0
+        """Which of them it leads."""
+
+    @abc.abstractmethod
+    def _obey(self) -> bool:
+        """Do what was asked for since the last frame; return whether the run is to end."""
+
+    def take_over(self, simulation: Simulation) -> None:
+        """Lead the instruments of the simulation that it was made for, from its next frame on."""
+        simulation.leader = self
+        for grasper, live in zip(simulation.graspers, self.graspers, strict=True):
+            grasper.leader = live
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Where all instruments are led, and how far jaws are open: they tell moments apart."""
+        return tuple(number for each in self.instruments for number in each.numbers)
+
+    @property
+    def tip(self) -> FloatArray:
+        """Where the chosen instrument is led [m], world frame, shape (3,)."""
+        return self.instruments[self.chosen].tip
+
+    def lead(self, t: float) -> None:
+        """Lead the blade to its pose at time `t` [s], a step after the last one.
+
+        The graspers then know where they are to be led in this frame.
+        """
+        if self.ended_at is None:
+            has_ended = self._obey() or t >= self._seconds
+            for i, instrument in enumerate(self.instruments):
+                is_engaged = self.is_engaged and i == self.chosen
+                instrument.advance(t, is_engaged=is_engaged, moves=not has_ended)
+            self.n_limited += any([each.pose.was_limited() for each in self.instruments])
+            if has_ended:
+                self.finish(max(t, self._dt))
+        self.blade.lead(t)
+
+    def finish(self, t: float) -> None:
+        """End at time `t` [s], after the last frame, unless it has ended before."""
+        if self.ended_at is None:
+            self.ended_at = t
+            self.let_go()
+            for instrument in self.instruments:
+                instrument.finish(t)
+
+    def choose(self, instrument: int) -> None:
+        """Let go, and lead another instrument from now on, if there is one of that number."""
+        self.let_go()
+        if instrument < len(self.instruments):
+            self.chosen = instrument
+
+    def let_go(self) -> None:
+        """Have the chosen instrument rest where it is."""
+        self.is_engaged = False
+        self.instruments[self.chosen].pose.rest()
+
+
+def _live_blade(simulation: Simulation) -> LiveBlade:
+    """Return the blade of a simulation that was prepared to be led."""
+    assert simulation.workspace is not None
+    start, hand = simulation.stroke.start, simulation.arm.hand
+    return LiveBlade(hand, start, simulation.frame, simulation.workspace, simulation.dt)
+
+
+def _live_graspers(simulation: Simulation) -> tuple[LiveGrasper, ...]:
+    """Return the graspers of a simulation that was prepared to be led."""
+    found = []
+    for each in simulation.graspers:
+        assert each.workspace is not None
+        frame, dt = simulation.frame, simulation.dt
+        found.append(LiveGrasper(each.grasper, each.motion, frame, each.workspace, dt))
+    return tuple(found)
