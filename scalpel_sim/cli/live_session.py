@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from bridge import LinkError
-from scalpel_sim.cli.console import print_report, say
+from scalpel_sim.cli.console import SECONDS_PER_CHECK, print_report, say
 from scalpel_sim.cli.led_run import live_hand, perform_led
 from scalpel_sim.cli.options import PageOptions, TissueOptions
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions, prepared_run
@@ -29,10 +29,6 @@ from scalpel_sim.viewer.messages import Choices, PageControls
 from scalpel_sim.viewer.pictures import into_viewer, live_state, show_in
 from scalpel_sim.viewer.viewer import Viewer
 from tissue import MATERIALS
-
-SECONDS_PER_CHECK = 0.2
-"""How often a finished run checks whether another is asked for, or its page still wanted [s]."""
-
 
 _log = logging.getLogger("scalpel_sim")
 

@@ -67,8 +67,10 @@ def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_th
         for _ in range(2):
             with device_once_free(run.address) as client:
                 assert client.description.scene == "grid2"
+                wait_for_frames(client)
                 lead_forwards(client, 0.012)
         with device_once_free(run.address) as client:
+            wait_for_frames(client)
             lead_forwards(client, 1e-3)
             client.end()
         counts = re.findall(r"(\d+)", run.line_with("periods missed"))
@@ -82,6 +84,13 @@ def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_th
     engaged = np.genfromtxt(run.folder / STROKE, delimiter=",", names=True)["engaged"]
     assert np.count_nonzero(np.diff(engaged) > 0.0) >= 2, "it was taken hold of anew"
     assert_a_run_repeats(run.folder, tmp_path / "again")
+
+
+def wait_for_frames(client):
+    """Wait until frames have been done in which nobody held the blade, once the run has begun."""
+    begun = client.measured().time
+    while begun > 0.0 and client.measured().time < begun + 0.01:
+        pass
 
 
 def device_once_free(address):
