@@ -53,6 +53,8 @@ from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState
 from .tissue import Tissue as Tissue
+from .types import CUT_COLOUR as CUT_COLOUR
+from .types import SKIN_COLOUR as SKIN_COLOUR
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
 from .types import Energies as Energies
@@ -72,6 +74,7 @@ __all__ = [
     "BladeSweep",
     "BodyContacts",
     "BoolArray",
+    "CUT_COLOUR",
     "Chunks",
     "CutReport",
     "CutSettings",
@@ -97,6 +100,7 @@ __all__ = [
     "MeshMeasures",
     "Piece",
     "Preset",
+    "SKIN_COLOUR",
     "SameTypes",
     "RigidContacts",
     "SchemeStatistics",

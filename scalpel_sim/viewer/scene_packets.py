@@ -147,7 +147,7 @@ class ScenePackets:
         scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
         scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
         for body in self._bodies:
-            scene.set_pose(f"/bodies/{body}", *_position_and_rotation(body_poses[body]))
+            scene.set_pose(f"/bodies/{body}", *position_and_rotation(body_poses[body]))
         if readings is not None:
             scene.set_readings(readings, ARROW_LENGTH * self._diagonal)
         if hand is not None:
@@ -159,10 +159,10 @@ class ScenePackets:
     ) -> None:
         """Put one shape below its body's path, with an appearance of its own."""
         path, appearance = f"/bodies/{shape.body}/{shape.name}", f"appearance of {shape.name}"
-        position, rotation = _position_and_rotation(shape.pose)
+        position, rotation = position_and_rotation(shape.pose)
         mesh = shape.mesh
         if shape.kind == int(mujoco.mjtGeom.mjGEOM_PLANE):
-            body_position, body_rotation = _position_and_rotation(body_pose)
+            body_position, body_rotation = position_and_rotation(body_pose)
             below = ((centre - body_position) @ body_rotation - position) @ rotation
             mesh = _plane_around(mesh, below, TABLE_RADIUS * self._diagonal)
         scene.set_appearance(appearance, _appearance_of(shape))
@@ -235,7 +235,7 @@ def _plane_around(mesh: TriangleMesh, centre: FloatArray, radius: float) -> Tria
     return mesh._replace(positions=mesh.positions * scale + [centre[0], centre[1], 0.0])
 
 
-def _position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return position, shape (3,), and rotation, shape (3, 3), of a pose of shape (7,)."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))

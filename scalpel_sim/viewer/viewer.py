@@ -10,10 +10,11 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from types import TracebackType
-from typing import IO, cast
+from typing import IO, TYPE_CHECKING, cast
 
 import msgspec
 import mujoco
+import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
@@ -26,8 +27,14 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
+from scalpel_sim.viewer.newest_message import NewestMessage
 from scalpel_sim.viewer.scene3d import HandState, Readings
 from tissue import FloatArray, Surface
+
+if TYPE_CHECKING:  # importing it takes half a second
+    from meshcat import Visualizer
+
+    from scalpel_sim.viewer.meshcat_scene import MeshcatScene
 
 START_TIMEOUT = 30.0
 """How long the viewer's process may take to start [s]. It usually takes half a second."""
@@ -37,6 +44,9 @@ CLOSE_TIMEOUT = 3.0
 
 HIGHEST_PORT = 65535
 """Largest port number of TCP."""
+
+NO_BODIES = np.zeros((0, 7))
+"""Poses of the bodies of no model."""
 
 _PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
 """Program of the viewer's process."""
@@ -55,7 +65,7 @@ class Viewer:
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | None = None,
         *,
         title: str = "scalpel_sim",
         frame: TissueFrame | None = None,
@@ -63,11 +73,12 @@ class Viewer:
         port: int | None = None,
         views: Sequence[ViewTable] = (),
         commands: deque[Command] | None = None,
+        visualizer: "Visualizer | None" = None,
     ) -> None:
         """Start the viewer's process and learn its address.
 
         Args:
-            model: MuJoCo model whose shapes are shown.
+            model: MuJoCo model whose shapes are shown; None for the tissue alone.
             title: Heading of the page.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
@@ -75,15 +86,22 @@ class Viewer:
             views: Cameras that the page offers, as a scene has them; it begins with the first.
             commands: What receives the commands of the page that leads the blade; None: the page
                 shows, and leads nothing.
+            visualizer: A scene of meshcat, or a part of one, into which tissue, shapes and force
+                are drawn too. It stays its owner's: what else is in it is left alone.
 
         Raises:
-            UsageError: the port does not exist.
+            UsageError: the port does not exist, or `visualizer` is none.
             RunError: the port is in use, or the process did not start.
         """
         if port is not None and not 1 <= port <= HIGHEST_PORT:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
+        self._scene: MeshcatScene | None = None
+        if visualizer is not None:
+            from scalpel_sim.viewer import meshcat_scene
+
+            meshcat_scene.expect_visualizer(visualizer)
         self._process = _start_process()  # it starts while the shapes are made here
-        shapes = list(shapes_of(model))
+        shapes = [] if model is None else list(shapes_of(model))
         settings = ViewerSettings(
             title,
             shapes,
@@ -94,8 +112,8 @@ class Viewer:
             is_led=commands is not None,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
-        self._changed = threading.Condition()
-        self._waiting: ViewerSettings | SceneState | None = settings
+        self._messages: NewestMessage[ViewerSettings | SceneState] = NewestMessage()
+        self._messages.put(settings)
         self._is_closed = False
         self._listener: threading.Thread | None = None
         self._last_shown = -float("inf")
@@ -107,6 +125,8 @@ class Viewer:
                 target=self._listen, args=(commands,), name="commands", daemon=True
             )
             self._listener.start()
+        if visualizer is not None:
+            self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, settings.frame)
 
     def __enter__(self) -> "Viewer":
         return self
@@ -130,12 +150,13 @@ class Viewer:
         Call it before extracting a surface, which takes far longer.
         """
         passed = time.monotonic() - self._last_shown
-        return passed >= 1.0 / UPDATES_PER_SECOND and self.is_running
+        is_seen = self.is_running or (self._scene is not None and self._scene.is_drawn)
+        return passed >= 1.0 / UPDATES_PER_SECOND and is_seen
 
     def show(
         self,
         surface: Surface,
-        body_poses: FloatArray,
+        body_poses: FloatArray = NO_BODIES,
         readings: Readings | None = None,
         hand: HandState | None = None,
     ) -> None:
@@ -148,15 +169,17 @@ class Viewer:
             hand: How the hand is, if the page leads one.
         """
         self._last_shown = time.monotonic()
-        with self._changed:
-            self._waiting = SceneState(surface, body_poses, readings, hand)
-            self._changed.notify()
+        state = SceneState(surface, body_poses, readings, hand)
+        self._messages.put(state)
+        if self._scene is not None:
+            self._scene.show(state)
 
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify()
+        self._is_closed = True
+        if self._scene is not None:
+            self._scene.close()
+        self._messages.close()
         self._sender.join(CLOSE_TIMEOUT)
         if self._sender.is_alive():  # the process has stopped reading
             self._process.kill()
@@ -172,12 +195,7 @@ class Viewer:
     def _send_states(self) -> None:
         """Send the states that wait, until the viewer is closed or its process has ended."""
         try:
-            while True:
-                with self._changed:
-                    self._changed.wait_for(lambda: self._waiting is not None or self._is_closed)
-                    message, self._waiting = self._waiting, None
-                if message is None:
-                    break
+            while (message := self._messages.take()) is not None:
                 self._pipe.write(pickle.dumps(message, protocol=5))
                 self._pipe.flush()
         except OSError:  # the process has ended
