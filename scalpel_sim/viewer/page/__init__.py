@@ -11,6 +11,8 @@ _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
 _BUNDLE = Path("viewer", "dist", "main.min.js")
 """Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
+_OF_ALL_PAGES = ("scene_view.js", "controls.js", "looks.js", "picture.js")
+"""Scripts that every page has first, in order."""
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
@@ -27,11 +29,11 @@ def live_page(title: str, caption: str, token: str | None = None) -> str:
         RunError: meshcat's viewer was not found.
     """
     if token is None:
-        return _page(title, caption, ("scene_view.js", "controls.js", "live.js"))
+        return _page(title, caption, ("live.js",))
     return _page(
         title,
         caption,
-        ("scene_view.js", "controls.js", "hand_input.js", "gamepad.js", "hand.js", "live.js"),
+        ("hand_input.js", "gamepad.js", "hand.js", "live.js"),
         controls=(_HERE / "hand.html").read_text("utf-8"),
         data=f'<script>const TOKEN = "{token}";</script>',
         style=(_HERE / "hand.css").read_text("utf-8"),
@@ -50,7 +52,7 @@ def replay_page(title: str, caption: str, packets: str) -> str:
         RunError: meshcat's viewer was not found.
     """
     controls = (_HERE / "player.html").read_text("utf-8")
-    return _page(title, caption, ("scene_view.js", "controls.js", "replay.js"), controls, packets)
+    return _page(title, caption, ("replay.js",), controls, packets)
 
 
 def _page(
@@ -66,7 +68,7 @@ def _page(
     Args:
         title: Heading of the page.
         caption: Text below the heading.
-        scripts: Files of its scripts, in order.
+        scripts: Files of its own scripts, in order.
         controls: Elements of its bar.
         data: Script elements that come before these.
         style: Rules beside those of all pages.
@@ -78,7 +80,9 @@ def _page(
         controls=controls,
         meshcat=_meshcat_bundle().read_text("utf-8"),
         data=data,
-        scripts="\n".join((_HERE / script).read_text("utf-8") for script in scripts),
+        scripts="\n".join(
+            (_HERE / script).read_text("utf-8") for script in (*_OF_ALL_PAGES, *scripts)
+        ),
     )
 
 

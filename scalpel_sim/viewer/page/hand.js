@@ -33,7 +33,7 @@ class Hand {
         element("clutch").addEventListener("click", () => this.toggleClutch());
         element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
         element("end").addEventListener("click", () => this.say({ type: "end" }));
-        document.body.append(element("hint"));
+        element("above-bar").prepend(element("hint"));
         const pane = element("meshcat-pane");
         pane.tabIndex = 0;
         pane.setAttribute("role", "application");

@@ -11,7 +11,9 @@ const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
 const EXPOSURE = 1.0;
 
 const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: filtering it makes the shadows soft
-const WIRE_COLOUR = 0xffe4d8;
+const WIRE_COLOUR = 0xffe4d8; // on faces
+const GRID_COLOURS = { skin: 0x24323a, cut: 0xa3121a }; // of edges without faces
+const FAINT = 0.12; // opacity of the skin where the cut is shown alone
 const ARROW_COLOUR = 0xffb000;
 const CONTACT_COLOUR = 0x12509e;
 const CONTACT_SCALE = 30; // magnification: about thirty contacts along the edge share the force
@@ -29,6 +31,7 @@ class SceneView {
         this.appearances = new Map();
         this.wires = new Map();
         this.wireframe = false;
+        this.shown = "faces"; // or "grid", or "cut": see setShown
         this.showsContacts = true;
         this.prepare();
         const meshcatHandles = this.viewer.handle_command.bind(this.viewer);
@@ -107,28 +110,54 @@ class SceneView {
             mesh.name = "<object>";
             node.set_object(mesh);
         }
-        if (path[0] === "tissue") this.addWires(node.object);
+        if (path[0] === "tissue") this.addWires(node.object, path[1]);
         return true;
     }
 
-    addWires(mesh) {
+    // `part` is skin or cut.
+    addWires(mesh, part) {
         let wires = this.wires.get(mesh.uuid);
         if (!wires) {
             const material = new THREE.MeshBasicMaterial({
-                color: WIRE_COLOUR, wireframe: true, transparent: true, opacity: 0.7,
+                wireframe: true, transparent: true, opacity: 0.7,
                 polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1,
             });
             wires = new THREE.Mesh(mesh.geometry, material);
+            wires.part = part;
             this.wires.set(mesh.uuid, wires);
             mesh.add(wires);
+            this.showTissue();
         }
         wires.geometry = mesh.geometry;
-        wires.visible = this.wireframe;
     }
 
     setWireframe(on) {
         this.wireframe = on;
-        for (const wires of this.wires.values()) wires.visible = on;
+        this.showTissue();
+    }
+
+    // What is drawn of the tissue: its faces; the grid of all edges, those of the far side too; or the
+    // faces of the cut, with a faint skin around them.
+    setShown(shown) {
+        this.shown = shown;
+        this.showTissue();
+    }
+
+    showTissue() {
+        const isGrid = this.shown === "grid", isCut = this.shown === "cut";
+        for (const wires of this.wires.values()) {
+            const isFaint = isCut && wires.part === "skin";
+            wires.visible = isGrid || (this.wireframe && !isFaint);
+            const colour = isGrid ? GRID_COLOURS[wires.part] : WIRE_COLOUR;
+            wires.material.color.set(colour).convertSRGBToLinear();
+            wires.parent.castShadow = !isFaint;
+            const { material } = wires.parent;
+            material.visible = !isGrid; // the edges are children of the mesh, and stay
+            material.opacity = isFaint ? FAINT : 1;
+            material.transparent = isFaint;
+            material.depthWrite = !isFaint;
+            material.needsUpdate = true;
+        }
         this.viewer.set_dirty();
     }
 
