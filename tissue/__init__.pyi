@@ -65,6 +65,7 @@ from .types import Snapshot as Snapshot
 from .types import StageTimes as StageTimes
 from .types import StepResult as StepResult
 from .types import Surface as Surface
+from .types import SurfaceQuantity as SurfaceQuantity
 from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
 
@@ -113,6 +114,7 @@ __all__ = [
     "StateRules",
     "StepResult",
     "Surface",
+    "SurfaceQuantity",
     "TetrahedralMesh",
     "Tissue",
     "TissueError",

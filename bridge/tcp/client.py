@@ -41,8 +41,19 @@ from bridge.tcp.messages.text import (
     unpack_description,
     unpack_error,
 )
+from bridge.tcp.messages.values import pack_quantity, unpack_values, values_bytes
 from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
-from tissue import BladeSweep, Chunks, CutReport, Geom, Snapshot, StepResult, Surface
+from tissue import (
+    BladeSweep,
+    Chunks,
+    CutReport,
+    FloatArray,
+    Geom,
+    Snapshot,
+    StepResult,
+    Surface,
+    SurfaceQuantity,
+)
 
 _Value = TypeVar("_Value")
 
@@ -171,6 +182,11 @@ class TcpLink:
         """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
         return self._ask(MessageKind.SURFACE, b"", limit, unpack_surface)
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
+        limit, request = values_bytes(self._n_nodes), pack_quantity(quantity)
+        return self._ask(MessageKind.VALUES, request, limit, unpack_values)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

@@ -33,6 +33,7 @@ from bridge.tcp.messages.led_frames import (
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
 from bridge.tcp.messages.text import MAX_VIEWS, pack_description, pack_error
+from bridge.tcp.messages.values import pack_values, unpack_quantity
 from bridge.tcp.peer import Peer
 from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, MessageKind, pack_frame
 
@@ -289,6 +290,8 @@ class TissueServer:
             number = unpack_number(frame.payload, len(self._link.loads()))
             self._link.release(number)
             return pack_loads([self._link.loads()[number]])
+        if frame.kind == MessageKind.VALUES:
+            return pack_values(self._link.surface_values(unpack_quantity(frame.payload)))
         if frame.payload:
             raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
         if frame.kind == MessageKind.HELLO:
