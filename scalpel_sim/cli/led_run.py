@@ -13,8 +13,9 @@ from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import LONGEST_RUN
+from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
-from scalpel_sim.viewer.pictures import into_viewer, show_in, state_of_hand
+from scalpel_sim.viewer.pictures import into_viewer, show_if_wanted, show_in, state_of_hand
 from scalpel_sim.viewer.viewer import Viewer
 
 SECONDS_PER_LOOK = 0.02
@@ -51,7 +52,7 @@ def perform_led(
         RunError: the viewer has ended, and nobody can lead; or the run failed.
     """
     simulation = prepared.simulation
-    _wait_for_hand(viewer, hand)
+    _wait_for_hand(viewer, hand, simulation)
     pace = Pace()
     simulation.pictures.append(
         into_viewer(viewer, lambda: state_of_hand(hand, pace.factor)),
@@ -70,7 +71,7 @@ def perform_led(
     return summary
 
 
-def _wait_for_hand(viewer: Viewer, hand: LiveHand) -> None:
+def _wait_for_hand(viewer: Viewer, hand: LiveHand, simulation: Simulation) -> None:
     """Wait until a page engages the hand, or ends the run before it has begun."""
     with StopSignals() as stop:
         while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
@@ -78,4 +79,5 @@ def _wait_for_hand(viewer: Viewer, hand: LiveHand) -> None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:
                 raise RunError("the viewer has ended before anybody took hold of the blade")
+            show_if_wanted(viewer, simulation)
             time.sleep(SECONDS_PER_LOOK)

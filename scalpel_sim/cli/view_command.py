@@ -54,7 +54,12 @@ def view(
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.cli.scripted_run import perform_script
         from scalpel_sim.hands.pace import Pace
-        from scalpel_sim.viewer.pictures import into_viewer, show_in, state_of_hand
+        from scalpel_sim.viewer.pictures import (
+            into_viewer,
+            show_if_wanted,
+            show_in,
+            state_of_hand,
+        )
         from scalpel_sim.viewer.viewer import Viewer
 
         options = RunOptions(tissue, arm, client, output, printing)
@@ -85,7 +90,12 @@ def view(
                     )
                     show_in(viewer, simulation)
                 print_report(summary, prepared.folder, output.export, printing)
-                _stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
+
+                def is_watched() -> bool:
+                    show_if_wanted(viewer, simulation)
+                    return viewer.is_running
+
+                _stay_while(is_watched, f"{viewer.url} stays until Ctrl-C")
 
 
 def _wait_for_start(url: str) -> None:

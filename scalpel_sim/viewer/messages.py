@@ -1,6 +1,6 @@
 """Messages between a run and the process of its live viewer."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -9,10 +9,14 @@ from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import HandState, Readings
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 UPDATES_PER_SECOND = 25.0
 """Rate at which the pages are updated, per second of wall time."""
+
+
+NO_VALUES: Mapping[SurfaceQuantity, FloatArray] = {}
+"""No quantities."""
 
 
 class ViewerSettings(NamedTuple):
@@ -45,6 +49,8 @@ class SceneState(NamedTuple):
     """Numbers to show beside the picture."""
     hand: HandState | None = None
     """How the hand is, if the page leads one."""
+    values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
+    """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
 
 
 class StartReply(msgspec.Struct):

@@ -1,6 +1,7 @@
 """Callbacks that hand a running simulation to the live viewer and to the replay."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import get_args
 
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.output.force_parts import force_parts
@@ -9,6 +10,7 @@ from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
 from scalpel_sim.viewer.scene3d import HandState, Readings
 from scalpel_sim.viewer.viewer import Viewer
+from tissue import FloatArray, SurfaceQuantity
 
 
 def readings(simulation: Simulation) -> Readings | None:
@@ -49,6 +51,7 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
         simulation.link.surface(),
         body_poses(simulation.arm.data),
         readings(simulation),
+        values_in(simulation, get_args(SurfaceQuantity)),
     )
 
 
@@ -72,8 +75,25 @@ def into_viewer(
 def show_in(viewer: Viewer, simulation: Simulation, hand: HandState | None = None) -> None:
     """Show the present state of a simulation in a live viewer, also before the first frame."""
     viewer.show(
-        simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation), hand
+        simulation.link.surface(),
+        body_poses(simulation.arm.data),
+        readings(simulation),
+        hand,
+        values_in(simulation, sorted(viewer.wanted)),
     )
+
+
+def show_if_wanted(viewer: Viewer, simulation: Simulation) -> None:
+    """Show a simulation that rests once more, where a page wants a quantity that it lacks."""
+    if viewer.lacks_values:
+        show_in(viewer, simulation, viewer.hand)
+
+
+def values_in(
+    simulation: Simulation, quantities: Iterable[SurfaceQuantity]
+) -> dict[SurfaceQuantity, FloatArray]:
+    """Return quantities at the vertices of the surface."""
+    return {each: simulation.link.surface_values(each) for each in quantities}
 
 
 def state_of_hand(hand: LiveHand, factor: float) -> HandState:

@@ -1,6 +1,6 @@
 """Packets of scene commands that show a run: the arm, the table, the tissue and the forces."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -8,11 +8,13 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.colour_levels import levels_of
+from scalpel_sim.viewer.messages import NO_VALUES
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import Appearance, Camera, HandState, Readings, Scene3D
 from scalpel_sim.viewer.texture_mapping import map_texture
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 TISSUE = "/tissue"
 """Path of the tissue. Objects below it are in the tissue frame, all others in the world frame."""
@@ -133,6 +135,7 @@ class ScenePackets:
         body_poses: FloatArray,
         readings: Readings | None = None,
         hand: HandState | None = None,
+        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> bytes:
         """Return the packet that shows one instant.
 
@@ -141,11 +144,14 @@ class ScenePackets:
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
             hand: How the hand is that the page leads.
+            values: Quantities at the vertices of the surface, to be shown as colours.
         """
         scene = Scene3D()
-        textured = map_texture(surface, self._diagonal / TILES_PER_BODY)
+        levels, tops = levels_of(values)
+        textured = map_texture(surface, self._diagonal / TILES_PER_BODY, levels)
         scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
         scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
+        scene.set_scales(tops)
         for body in self._bodies:
             scene.set_pose(f"/bodies/{body}", *position_and_rotation(body_poses[body]))
         if readings is not None:

@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, cast
 
@@ -20,7 +20,9 @@ from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.hands.commands import Command, Release, command_of
 from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.viewer.colouring import wanted_of
 from scalpel_sim.viewer.messages import (
+    NO_VALUES,
     UPDATES_PER_SECOND,
     SceneState,
     StartReply,
@@ -29,7 +31,7 @@ from scalpel_sim.viewer.messages import (
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.newest_message import NewestMessage
 from scalpel_sim.viewer.scene3d import HandState, Readings
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 if TYPE_CHECKING:  # importing it takes half a second
     from meshcat import Visualizer
@@ -61,6 +63,7 @@ class Viewer:
 
     Attributes:
         url: Address of the page, which only this machine can open.
+        wanted: Quantities that pages show as colours now: give `show` their values.
     """
 
     def __init__(
@@ -116,15 +119,16 @@ class Viewer:
         self._messages.put(settings)
         self._is_closed = False
         self._listener: threading.Thread | None = None
+        self.wanted: frozenset[SurfaceQuantity] = frozenset()
+        self._shown: SceneState | None = None
         self._last_shown = -float("inf")
         self._sender = threading.Thread(target=self._send_states, name="viewer", daemon=True)
         self._sender.start()
         self.url = self._start_reply().url
-        if commands is not None:
-            self._listener = threading.Thread(
-                target=self._listen, args=(commands,), name="commands", daemon=True
-            )
-            self._listener.start()
+        self._listener = threading.Thread(
+            target=self._listen, args=(commands,), name="commands", daemon=True
+        )
+        self._listener.start()
         if visualizer is not None:
             self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, settings.frame)
 
@@ -159,6 +163,7 @@ class Viewer:
         body_poses: FloatArray = NO_BODIES,
         readings: Readings | None = None,
         hand: HandState | None = None,
+        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
@@ -167,12 +172,23 @@ class Viewer:
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
             hand: How the hand is, if the page leads one.
+            values: The quantities `wanted`, at the vertices of the surface, SI.
         """
         self._last_shown = time.monotonic()
-        state = SceneState(surface, body_poses, readings, hand)
+        state = self._shown = SceneState(surface, body_poses, readings, hand, values)
         self._messages.put(state)
         if self._scene is not None:
             self._scene.show(state)
+
+    @property
+    def lacks_values(self) -> bool:
+        """Whether a page wants to show a quantity that the last state did not have."""
+        return self._shown is not None and not self.wanted <= self._shown.values.keys()
+
+    @property
+    def hand(self) -> HandState | None:
+        """How the hand was in the last state."""
+        return None if self._shown is None else self._shown.hand
 
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
@@ -204,13 +220,16 @@ class Viewer:
             with contextlib.suppress(OSError):
                 self._pipe.close()
 
-    def _listen(self, commands: deque[Command]) -> None:
-        """Receive commands until the process ends, and then let go."""
+    def _listen(self, commands: deque[Command] | None) -> None:
+        """Receive what pages want to see, and commands, until the process ends; then let go."""
         for line in cast(IO[bytes], self._process.stdout):
-            command = command_of(line)
-            if command is not None:
+            wanted = wanted_of(line)
+            if wanted is not None:
+                self.wanted = frozenset(wanted.quantities)
+            elif commands is not None and (command := command_of(line)) is not None:
                 commands.append(command)
-        commands.append(Release())
+        if commands is not None:
+            commands.append(Release())
 
     def _start_reply(self) -> StartReply:
         """Wait for the first line of the process: the address of its page, or an error."""

@@ -11,7 +11,13 @@ _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
 _BUNDLE = Path("viewer", "dist", "main.min.js")
 """Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
-_OF_ALL_PAGES = ("scene_view.js", "controls.js", "looks.js", "picture.js")
+_OF_ALL_PAGES = (
+    "field_colours.js",
+    "scene_view.js",
+    "controls.js",
+    "looks.js",
+    "picture.js",
+)
 """Scripts that every page has first, in order."""
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""

@@ -19,11 +19,20 @@ function afterDrawing(callback) {
 // Where the page leads the blade: see hand.js.
 const hand = typeof Hand === "undefined" ? null : new Hand(sceneView);
 
+let run = null; // the socket, where there is one
+
+onQuantity = (quantity) => {
+    if (run === null || run.readyState !== WebSocket.OPEN) return;
+    run.send(JSON.stringify({ type: "colour", quantity: quantity || null }));
+};
+
 function follow() {
     const socket = new WebSocket(`ws://${location.host}/frames${hand ? hand.query : ""}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
         element("status").textContent = "live";
+        run = socket;
+        if (element("quantity").value) setQuantity(element("quantity").value); // as before a reload
         if (hand) hand.connect(socket);
     };
     socket.onmessage = (message) => {

@@ -36,7 +36,27 @@ function drawPicture() {
     drawTexts(context, MARGIN, MARGIN, [[document.title, ""]]);
     const rows = shownReadings();
     if (rows.length > 0) drawTexts(context, MARGIN, height - 2 * MARGIN - LINE * rows.length, rows);
+    if (sceneView.colours.isThere) drawScale(context, width, height);
     return canvas;
+}
+
+// The scale of colours, in the lower right corner.
+function drawScale(context, width, height) {
+    const { title, ticks } = scaleTexts(sceneView.colours);
+    const length = 220, x = width - MARGIN - length - 24, y = height - MARGIN - 2 * LINE - 32;
+    context.fillStyle = BOX_COLOUR;
+    context.fillRect(x, y, length + 24, 2 * LINE + 32);
+    const shade = context.createLinearGradient(x + 12, 0, x + 12 + length, 0);
+    gradient().forEach((colour, i, all) => shade.addColorStop(i / (all.length - 1), colour));
+    context.fillStyle = shade;
+    context.fillRect(x + 12, y + 6 + LINE, length, 14);
+    context.fillStyle = TEXT_COLOUR;
+    context.fillText(title, x + 12, y + 6 + LINE / 2);
+    ticks.forEach((tick, i) => {
+        const part = i / (ticks.length - 1); // the first begins at the left end, the last ends at the right
+        const at = x + 12 + part * (length - context.measureText(tick).width);
+        context.fillText(tick, at, y + 24 + 1.5 * LINE);
+    });
 }
 
 // Labels and values, as the page shows them.

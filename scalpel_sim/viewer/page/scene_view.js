@@ -30,6 +30,9 @@ class SceneView {
         this.chosen = 0;
         this.appearances = new Map();
         this.wires = new Map();
+        this.tissue = new Map(); // the meshes of skin and cut
+        this.colours = new FieldColours();
+        this.onScale = () => {};
         this.wireframe = false;
         this.shown = "faces"; // or "grid", or "cut": see setShown
         this.showsContacts = true;
@@ -41,6 +44,7 @@ class SceneView {
             set_object: (command) => this.setObject(command) || meshcatHandles(command),
             set_cameras: (command) => this.setCameras(command),
             set_wireframe: (command) => this.setWireframe(command.on),
+            set_scales: (command) => this.setScales(command.tops),
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),
         };
@@ -110,25 +114,24 @@ class SceneView {
             mesh.name = "<object>";
             node.set_object(mesh);
         }
-        if (path[0] === "tissue") this.addWires(node.object, path[1]);
+        if (path[0] === "tissue") this.addTissue(path[1], node.object, material);
         return true;
     }
 
-    // `part` is skin or cut.
-    addWires(mesh, part) {
-        let wires = this.wires.get(mesh.uuid);
+    // `part` is skin or cut; `material` is what it looks like where it shows no quantity.
+    addTissue(part, mesh, material) {
+        let wires = this.wires.get(part);
         if (!wires) {
-            const material = new THREE.MeshBasicMaterial({
+            wires = new THREE.Mesh(mesh.geometry, new THREE.MeshBasicMaterial({
                 wireframe: true, transparent: true, opacity: 0.7,
                 polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1,
-            });
-            wires = new THREE.Mesh(mesh.geometry, material);
-            wires.part = part;
-            this.wires.set(mesh.uuid, wires);
+            }));
             mesh.add(wires);
-            this.showTissue();
+            this.wires.set(part, wires);
         }
         wires.geometry = mesh.geometry;
+        this.tissue.set(part, { mesh, material });
+        this.showTissue();
     }
 
     setWireframe(on) {
@@ -143,20 +146,37 @@ class SceneView {
         this.showTissue();
     }
 
+    // A quantity as colours; "" for none.
+    setQuantity(quantity) {
+        this.colours.choose(quantity);
+        this.paintTissue();
+    }
+
+    setScales(tops) {
+        this.colours.setTops(tops);
+        this.paintTissue();
+    }
+
+    paintTissue() {
+        for (const { mesh } of this.tissue.values()) this.colours.paint(mesh.geometry);
+        this.showTissue();
+        this.onScale(this.colours);
+    }
+
     showTissue() {
         const isGrid = this.shown === "grid", isCut = this.shown === "cut";
-        for (const wires of this.wires.values()) {
-            const isFaint = isCut && wires.part === "skin";
+        for (const [part, { mesh, material: textured }] of this.tissue) {
+            const isFaint = isCut && part === "skin";
+            const wires = this.wires.get(part);
             wires.visible = isGrid || (this.wireframe && !isFaint);
-            const colour = isGrid ? GRID_COLOURS[wires.part] : WIRE_COLOUR;
-            wires.material.color.set(colour).convertSRGBToLinear();
-            wires.parent.castShadow = !isFaint;
-            const { material } = wires.parent;
+            wires.material.color.set(isGrid ? GRID_COLOURS[part] : WIRE_COLOUR).convertSRGBToLinear();
+            mesh.material = this.colours.isThere ? this.colours.materials.get(part) : textured;
+            mesh.castShadow = !isFaint;
+            const { material } = mesh;
             material.visible = !isGrid; // the edges are children of the mesh, and stay
             material.opacity = isFaint ? FAINT : 1;
             material.transparent = isFaint;
             material.depthWrite = !isFaint;
-            material.needsUpdate = true;
         }
         this.viewer.set_dirty();
     }
@@ -236,9 +256,12 @@ class SceneView {
 
 function geometryOf({ attributes, index }) {
     const geometry = new THREE.BufferGeometry();
+    geometry.userData.levels = {};
     for (const [name, { array, itemSize, normalized }] of Object.entries(attributes)) {
-        geometry.setAttribute(name, new THREE.BufferAttribute(array, itemSize, normalized));
+        if (name in QUANTITIES) geometry.userData.levels[name] = array;
+        else geometry.setAttribute(name, new THREE.BufferAttribute(array, itemSize, normalized));
     }
+    geometry.userData.tints = geometry.attributes.color;
     geometry.setIndex(new THREE.BufferAttribute(index.array, 1));
     return geometry;
 }
