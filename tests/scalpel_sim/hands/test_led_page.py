@@ -43,9 +43,11 @@ LAID_BARE = """() => {
 
 
 @pytest.fixture
-def view(tmp_path, request):
+def view(tmp_path, request, browser):
     with LedView(request.param, tmp_path / "led") as led:
         yield led
+    for context in browser.contexts:  # a page that is left open would lead the next run
+        context.close()
 
 
 def opened(browser, view):
