@@ -62,8 +62,8 @@ function chooseIn(list, choose) {
     });
 }
 
-// On a narrow screen the choices would hide the tissue.
-if (window.matchMedia("(max-width: 640px)").matches) element("display").open = false;
+// On a small screen the choices would hide the tissue.
+if (window.matchMedia("(max-width: 640px), (max-height: 500px)").matches) element("display").open = false;
 chooseIn(element("shown"), setShown);
 chooseIn(element("quantity"), setQuantity);
 onShortcut((key) => {

@@ -46,7 +46,7 @@ def shared_tab(browser, tmp_path_factory):
     tab.goto(local_file(path))
     tab.wait_for_function("typeof player !== 'undefined' && player.shown >= 0")
     tab.evaluate("player.pause(), player.seek(player.length)")
-    assert not tab.evaluate("element('display').open"), "the screen is narrow"
+    assert not tab.evaluate("element('display').open"), "the screen is small"
     tab.click("#display summary")
     tab.wait_for_function("sceneView.appearances.get('skin').map.image")
     yield tab
@@ -135,8 +135,8 @@ def test_the_cut_alone_keeps_its_colours_in_a_faint_skin(tab):
     assert tab.evaluate("sceneView.tissue.get('skin').mesh.material.opacity") < 0.5
 
 
-@pytest.mark.parametrize("size", [(1280, 800), (390, 844)])
-def test_no_panels_overlap_on_a_wide_and_a_narrow_screen(tab, size):
+@pytest.mark.parametrize("size", [(1280, 800), (390, 844), (844, 390), (700, 600)])
+def test_no_panels_overlap_on_a_wide_a_narrow_and_a_low_screen(tab, size):
     width, height = size
     tab.select_option("#quantity", "stress")
     tab.set_viewport_size({"width": width, "height": height})
