@@ -100,6 +100,7 @@ def test_a_turned_body_has_neither_strain_nor_stress(law):
     assert tissue.surface_values("stress").max() < 1e-9 * LAWS[law].young_modulus
 
 
+@pytest.mark.kernel
 def test_strain_is_that_of_a_slow_reference():
     mesh = bodies.jittered(3, 5)
     tissue = deformed(mesh, Material(), moved(mesh))
@@ -111,6 +112,7 @@ def test_strain_is_that_of_a_slow_reference():
     assert tissue.surface_values("strain") == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("law", SOLIDS)
 def test_stress_is_the_cauchy_stress_of_a_slow_reference(law):
     mesh = bodies.jittered(3, 5)
@@ -124,6 +126,7 @@ def test_stress_is_the_cauchy_stress_of_a_slow_reference(law):
     assert tissue.surface_values("stress") == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.kernel
 def test_stress_of_springs_is_the_virial_of_a_slow_reference():
     mesh, material = bodies.jittered(3, 5), LAWS["springs"]
     positions = moved(mesh)
