@@ -9,6 +9,7 @@ from typing import Any
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import (
     FINAL,
@@ -65,7 +66,7 @@ def perform(
     views: Sequence[ViewTable] = (),
     seconds: float | None = None,
     every_frame: Callable[[Simulation], None] | None = None,
-    hand: LiveHand | None = None,
+    controls: RunControls | None = None,
 ) -> Summary:
     """Do the run, and write its files.
 
@@ -80,14 +81,15 @@ def perform(
         views: Cameras that the replay offers; it begins with the first.
         seconds: How long to simulate [s]; None for the stroke and `REST_AFTER_STROKE`.
         every_frame: Called after each frame.
-        hand: Who leads the blade; what is done is written as `stroke.csv`, and the run ends with a
-            rest after the hand has ended.
+        controls: What a page asks of the run. If it has a hand, that leads the blade; what it does
+            is written as `stroke.csv`, and the run ends with a rest after the hand has ended.
 
     Raises:
         Interrupted: the user or the system ended the run.
         RunError: the run failed, or a file could not be written. The other files are.
     """
     seconds = run_time(simulation, seconds)
+    hand = None if controls is None else controls.hand
     body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
     at_first = simulation.link.snapshot()
     simulation.leader = hand or simulation.leader
@@ -106,8 +108,10 @@ def perform(
         views=views,
     )
     simulation.pictures.append(into_replay(replay))
+    if controls is not None:
+        controls.history.begin(outputs, replay)
     _warn_if_slow(simulation)
-    stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, hand)
+    stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
     status = stopped or (COMPLETE if failure is None else f"failed: {one_line(failure)}")
 
     unwritten = _Attempts()
@@ -150,10 +154,15 @@ def _run_frames(
     outputs: Outputs,
     seconds: float,
     every_frame: Callable[[Simulation], None] | None,
-    hand: LiveHand | None,
+    controls: RunControls | None,
 ) -> tuple[str | None, Exception | None]:
     """Do the frames, and return the signal that ended them early, and the error that did."""
+    hand = None if controls is None else controls.hand
     with StopSignals() as stop:
+
+        def obey() -> None:
+            while controls is not None and controls.obey() and stop.reason is None:
+                pass
 
         def after_frame(now: Simulation) -> bool:
             outputs.write_forces(now.recording)
@@ -161,10 +170,12 @@ def _run_frames(
                 outputs.write_stroke(hand.take_rows())
             if every_frame is not None:
                 every_frame(now)
+            obey()
             return stop.reason is not None or (hand is not None and _has_rested(now, hand))
 
         failure = None
         try:
+            obey()
             simulation.run(seconds, after_frame)
         except Exception as error:
             failure = error

@@ -6,16 +6,14 @@ from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
 from scalpel_sim.hands.commands import End, Engage
 from scalpel_sim.hands.live_hand import LiveHand
-from scalpel_sim.hands.pace import Pace
+from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.workspace import workspace_in
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import LONGEST_RUN
-from scalpel_sim.simulation import Simulation
 from scalpel_sim.stop_signals import StopSignals
-from scalpel_sim.viewer.pictures import into_viewer, show_if_wanted, show_in, state_of_hand
 from scalpel_sim.viewer.viewer import Viewer
 
 SECONDS_PER_LOOK = 0.02
@@ -36,7 +34,11 @@ def live_hand(prepared: PreparedRun) -> LiveHand:
 
 
 def perform_led(
-    prepared: PreparedRun, options: RunOptions, plotter: Plotter, viewer: Viewer, hand: LiveHand
+    prepared: PreparedRun,
+    options: RunOptions,
+    plotter: Plotter,
+    viewer: Viewer,
+    controls: RunControls,
 ) -> Summary:
     """Do the run from when somebody takes hold of the blade until they end it.
 
@@ -45,39 +47,34 @@ def perform_led(
         options: What the command line asks for.
         plotter: Draws the plots.
         viewer: Its page has shown the start.
-        hand: Obeys the commands of that page.
+        controls: Obey the commands of that page; they have a hand.
 
     Raises:
         Interrupted: the user or the system ended the run.
         RunError: the viewer has ended, and nobody can lead; or the run failed.
     """
     simulation = prepared.simulation
-    _wait_for_hand(viewer, hand, simulation)
-    pace = Pace()
-    simulation.pictures.append(
-        into_viewer(viewer, lambda: state_of_hand(hand, pace.factor)),
-    )
-    summary = perform(
+    _wait_for_hand(viewer, controls)
+    controls.pace.go_on()
+    return perform(
         simulation,
         Outputs(prepared.folder, plotter, simulation.recording.columns, options.output.export),
         scene=prepared.scene if options.client.connect is None else None,
         views=prepared.scene.views,
         settings=prepared.settings | {"stroke": simulation.stroke.name},
         seconds=LONGEST_RUN + REST_AFTER_STROKE,
-        every_frame=lambda now: pace.wait(now.dt),
-        hand=hand,
+        every_frame=lambda now: controls.pace.wait(now.dt),
+        controls=controls,
     )
-    show_in(viewer, simulation, state_of_hand(hand, pace.factor))
-    return summary
 
 
-def _wait_for_hand(viewer: Viewer, hand: LiveHand, simulation: Simulation) -> None:
+def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
     """Wait until a page engages the hand, or ends the run before it has begun."""
     with StopSignals() as stop:
-        while not any(isinstance(command, Engage | End) for command in list(hand.commands)):
+        while not any(isinstance(command, Engage | End) for command in list(controls.commands)):
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:
                 raise RunError("the viewer has ended before anybody took hold of the blade")
-            show_if_wanted(viewer, simulation)
+            controls.on_wait()
             time.sleep(SECONDS_PER_LOOK)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from scalpel_sim.cli.console import progress
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
+from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
@@ -16,6 +17,7 @@ def perform_script(
     options: RunOptions,
     plotter: Plotter,
     after_frame: Callable[[Simulation], None] = lambda simulation: None,
+    controls: RunControls | None = None,
 ) -> Summary:
     """Do the run, with a progress bar on a terminal.
 
@@ -24,6 +26,7 @@ def perform_script(
         options: What the command line asks for.
         plotter: Draws the plots.
         after_frame: Called after each frame.
+        controls: What a page asks of the run.
     """
     seconds = run_time(prepared.simulation, prepared.scene.seconds)
     with progress(seconds, options.printing) as advance:
@@ -46,4 +49,5 @@ def perform_script(
             settings=prepared.settings,
             seconds=seconds,
             every_frame=every_frame,
+            controls=controls,
         )

@@ -53,20 +53,18 @@ def view(
         from scalpel_sim.cli.led_run import live_hand, perform_led
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.cli.scripted_run import perform_script
+        from scalpel_sim.hands.history import History
         from scalpel_sim.hands.pace import Pace
-        from scalpel_sim.viewer.pictures import (
-            into_viewer,
-            show_if_wanted,
-            show_in,
-            state_of_hand,
-        )
-        from scalpel_sim.viewer.viewer import Viewer
+        from scalpel_sim.hands.run_controls import RunControls
+        from scalpel_sim.viewer.pictures import into_viewer, live_state, show_in
+        from scalpel_sim.viewer.viewer import PageControls, Viewer
 
         options = RunOptions(tissue, arm, client, output, printing)
         is_led = page.hand == "live"
         with prepared_run(scene, options, relaxation="verlet", is_led=is_led) as prepared:
             simulation = prepared.simulation
-            led = live_hand(prepared) if is_led else None
+            hand = live_hand(prepared) if is_led else None
+            controls = RunControls(Pace(), History(simulation), hand)
             with Viewer(
                 simulation.arm.model,
                 title=simulation.title,
@@ -74,27 +72,39 @@ def view(
                 wireframe=page.wireframe,
                 port=page.port,
                 views=prepared.scene.views,
-                commands=None if led is None else led.commands,
+                controls=PageControls(controls.commands, is_led),
             ) as viewer:
-                if led is not None:
-                    show_in(viewer, simulation, state_of_hand(led, 1.0))
-                    say(f"open {viewer.url} and lead the blade there")
-                    summary = perform_led(prepared, options, plotter, viewer, led)
-                else:
-                    show_in(viewer, simulation)
-                    simulation.pictures.append(into_viewer(viewer))
-                    _wait_for_start(viewer.url)
-                    pace = Pace()
-                    summary = perform_script(
-                        prepared, options, plotter, lambda now: pace.wait(now.dt)
-                    )
-                    show_in(viewer, simulation)
-                print_report(summary, prepared.folder, output.export, printing)
+
+                def show() -> None:
+                    show_in(viewer, simulation, live_state(controls))
+
+                def show_if_wanted() -> None:
+                    if viewer.lacks_values:
+                        show()
 
                 def is_watched() -> bool:
-                    show_if_wanted(viewer, simulation)
+                    show_if_wanted()
                     return viewer.is_running
 
+                show()
+                controls.on_change = show
+                controls.on_wait = show_if_wanted
+                simulation.pictures.append(into_viewer(viewer, lambda: live_state(controls)))
+                if is_led:
+                    say(f"open {viewer.url} and lead the blade there")
+                    summary = perform_led(prepared, options, plotter, viewer, controls)
+                else:
+                    _wait_for_start(viewer.url)
+                    controls.pace.go_on()
+                    summary = perform_script(
+                        prepared,
+                        options,
+                        plotter,
+                        lambda now: controls.pace.wait(now.dt),
+                        controls,
+                    )
+                show()
+                print_report(summary, prepared.folder, output.export, printing)
                 _stay_while(is_watched, f"{viewer.url} stays until Ctrl-C")
 
 

@@ -1,4 +1,4 @@
-"""What a page may ask of the hand: small messages as JSON, checked where they come in."""
+"""What a page may ask of the hand and of its run: small messages as JSON, checked at the border."""
 
 import math
 from typing import Annotated
@@ -14,12 +14,17 @@ FARTHEST_MOVE = 0.1
 FARTHEST_TURN = math.pi / 2.0
 """Largest turn of one message [rad]."""
 
+SLOWEST = 0.01
+"""Slowest motion that may be asked for: simulated time over wall time."""
+
 LATEST_STAMP = 1e12
 """Largest stamp [ms]: some thirty years."""
 
-LONGEST_SILENCE = 0.5
-"""Wall time without a message after which an engaged hand lets go [s]: the page says ten times a
-second that it is there."""
+LONGEST_SILENCE = 2.0
+"""Wall time without a message after which an engaged hand lets go [s]. The page says ten times a
+second that it is there, but where drawing takes all of the machine, its thread hangs for a second.
+Until then the blade goes no farther than it was asked to, and a page that is closed lets go at
+once."""
 
 _ThreeNumbers = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 _Stamp = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST_STAMP)]
@@ -67,7 +72,40 @@ class End(_Message, frozen=True, tag="end"):
     """The run is to end."""
 
 
-Command = Engage | Release | Move | Turn | StillThere | Lead | End
+class Pause(_Message, frozen=True, tag="pause"):
+    """The hand lets go, and time stands still."""
+
+
+class Resume(_Message, frozen=True, tag="resume"):
+    """Time goes on."""
+
+
+class Step(_Message, frozen=True, tag="step"):
+    """Time goes on for a moment, and stands still again."""
+
+
+class SlowMotion(_Message, frozen=True, tag="slow motion"):
+    """Time passes at another rate from now on."""
+
+    rate: Annotated[float, msgspec.Meta(ge=SLOWEST, le=1.0)]
+    """Simulated time over wall time, at most."""
+
+
+class Undo(_Message, frozen=True, tag="undo"):
+    """The run goes back to before the last stroke: to where the hand took hold for it."""
+
+
+class Reset(_Message, frozen=True, tag="reset"):
+    """The run goes back to its start."""
+
+
+HandCommand = Engage | Release | Move | Turn | StillThere | End
+"""What the hand obeys in its next frame."""
+
+RunCommand = Pause | Resume | Step | SlowMotion | Undo | Reset
+"""What is done between two frames."""
+
+Command = HandCommand | RunCommand | Lead
 
 _decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 

@@ -1,4 +1,4 @@
-"""Keeps a simulation at most at real time, and measures how fast it runs."""
+"""Keeps a simulation at most at real time, or slower, and measures how fast it runs."""
 
 import time
 from collections.abc import Callable
@@ -15,7 +15,7 @@ MEASURED_OVER = 0.5
 
 
 class Pace:
-    """Slows a simulation to real time where it is faster.
+    """Slows a simulation to real time, or to slow motion, where it is faster.
 
     Args:
         clock: Wall time [s].
@@ -27,6 +27,8 @@ class Pace:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
+        self.rate = 1.0
+        """Simulated time over wall time, at most."""
         self.factor = 1.0
         """Simulated time over wall time, lately."""
         self._clock, self._sleep = clock, sleep
@@ -35,7 +37,7 @@ class Pace:
 
     def wait(self, dt: float) -> None:
         """Wait, after a frame of that length [s], until its end is due."""
-        self._due += dt
+        self._due += dt / self.rate
         self._simulated += dt
         now = self._clock()
         if self._due - now > SHORTEST_PAUSE:
@@ -45,3 +47,8 @@ class Pace:
         if now - self._since >= MEASURED_OVER:
             self.factor = self._simulated / (now - self._since)
             self._simulated, self._since = 0.0, now
+
+    def go_on(self) -> None:
+        """Forget the time that has passed since the last frame: it was not the simulation's."""
+        self._due = self._since = self._clock()
+        self._simulated = 0.0

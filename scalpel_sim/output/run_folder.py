@@ -3,8 +3,9 @@
 import json
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import IO, TypeVar
+from typing import IO, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -32,9 +33,22 @@ STROKE = "stroke.csv"
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write, beside `STROKE`."""
 
+_HEAD_OF_STROKE = (",".join(LED_COLUMNS) + "\n").encode("ascii")
+
 FRAMES_PER_FLUSH = 25
 """Number of rows of `forces.csv` that are written together, which takes 0.1 ms: a kill loses a
 fortieth of a second."""
+
+
+class FilesMark(NamedTuple):
+    """How far the files of a run have got that grow with it."""
+
+    n_rows: int
+    """Rows of `forces.csv`."""
+    forces: int
+    """Length of `forces.csv` [bytes]."""
+    stroke: int
+    """Length of `stroke.csv` [bytes]."""
 
 
 class Outputs:
@@ -101,9 +115,26 @@ class Outputs:
         text = _csv(np.array(rows)) if rows else b""
         if self._stroke is None:
             self._stroke = _naming_path(self.path(STROKE), lambda p: p.open("wb", buffering=0))
-            text = (",".join(LED_COLUMNS) + "\n").encode("ascii") + text
+            text = _HEAD_OF_STROKE + text
         stroke = self._stroke
         _naming_path(self.path(STROKE), lambda _: stroke.write(text))
+
+    def mark(self) -> FilesMark:
+        """Return how far `forces.csv` and `stroke.csv` have got."""
+        stroke = len(_HEAD_OF_STROKE) if self._stroke is None else self._stroke.tell()
+        return FilesMark(self._n_written, self._forces.tell(), stroke)
+
+    def cut_back(self, mark: FilesMark) -> None:
+        """Take off what was written to `forces.csv` and `stroke.csv` after a mark.
+
+        Raises:
+            RunError: the system refuses.
+        """
+        self._n_written = mark.n_rows
+        ends = {FORCES: (self._forces, mark.forces), STROKE: (self._stroke, mark.stroke)}
+        for name, (file, end) in ends.items():
+            if file is not None:
+                _naming_path(self.path(name), partial(_cut_off, file, end))
 
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
@@ -130,6 +161,12 @@ class Outputs:
 
     def _append(self, text: bytes) -> None:
         _naming_path(self.path(FORCES), lambda _: self._forces.write(text))
+
+
+def _cut_off(file: IO[bytes], end: int, path: Path) -> None:
+    """Make an open file that long [bytes], and go on writing there; `path` is its name."""
+    file.truncate(end)
+    file.seek(end)
 
 
 def _csv(rows: FloatArray) -> bytes:

@@ -8,7 +8,7 @@ import msgspec
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import HandState, Readings
+from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
 
 UPDATES_PER_SECOND = 25.0
@@ -34,8 +34,10 @@ class ViewerSettings(NamedTuple):
     """Port of the page; None for the first free port."""
     views: Sequence[ViewTable] = ()
     """Cameras that the page offers."""
+    has_controls: bool = False
+    """Whether the page controls the run."""
     is_led: bool = False
-    """Whether the page leads the blade."""
+    """Whether it leads the blade, too."""
 
 
 class SceneState(NamedTuple):
@@ -47,8 +49,8 @@ class SceneState(NamedTuple):
     """Poses of all bodies of the MuJoCo model, see `model_shapes.body_poses`."""
     readings: Readings | None
     """Numbers to show beside the picture."""
-    hand: HandState | None = None
-    """How the hand is, if the page leads one."""
+    live: LiveState | None = None
+    """How the run is, if the page controls it."""
     values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
     """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
 

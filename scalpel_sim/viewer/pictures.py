@@ -3,21 +3,24 @@
 from collections.abc import Callable, Iterable
 from typing import get_args
 
-from scalpel_sim.hands.live_hand import LiveHand
+import numpy as np
+
+from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.simulation import DrawFrame, Simulation
 from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
-from scalpel_sim.viewer.scene3d import HandState, Readings
+from scalpel_sim.viewer.scene3d import HandState, LiveState, Readings, RunState
 from scalpel_sim.viewer.viewer import Viewer
 from tissue import FloatArray, SurfaceQuantity
 
 
-def readings(simulation: Simulation) -> Readings | None:
-    """Return the numbers to show beside the picture; None before the first frame."""
+def readings(simulation: Simulation) -> Readings:
+    """Return the numbers to show beside the picture."""
     wrench, result, frame = simulation.wrench, simulation.bridge.result, simulation.frame
-    if result is None:
-        return None
+    if result is None:  # before the first frame
+        n_tetrahedra = simulation.link.describe().n_tetrahedra
+        return Readings(0.0, np.zeros(3), np.zeros(3), 0.0, n_tetrahedra)
     contacts = result.contacts.of_blade
     on_tissue = contacts.normal_force[:, None] * contacts.normal + contacts.friction
     forward = frame.vectors_to_tissue(simulation.arm.blade.segment().forward)
@@ -56,37 +59,31 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
 
 
 def into_viewer(
-    viewer: Viewer, hand_state: Callable[[], HandState | None] = lambda: None
+    viewer: Viewer, live_state: Callable[[], LiveState | None] = lambda: None
 ) -> DrawFrame:
     """Return a callback that shows a simulation in a live viewer after each frame.
 
     Args:
         viewer: The viewer.
-        hand_state: Returns how the hand is that the page leads.
+        live_state: Returns how the run is that the page controls.
     """
 
     def draw(simulation: Simulation) -> None:
         if viewer.is_due():
-            show_in(viewer, simulation, hand_state())
+            show_in(viewer, simulation, live_state())
 
     return draw
 
 
-def show_in(viewer: Viewer, simulation: Simulation, hand: HandState | None = None) -> None:
+def show_in(viewer: Viewer, simulation: Simulation, live: LiveState | None = None) -> None:
     """Show the present state of a simulation in a live viewer, also before the first frame."""
     viewer.show(
         simulation.link.surface(),
         body_poses(simulation.arm.data),
         readings(simulation),
-        hand,
+        live,
         values_in(simulation, sorted(viewer.wanted)),
     )
-
-
-def show_if_wanted(viewer: Viewer, simulation: Simulation) -> None:
-    """Show a simulation that rests once more, where a page wants a quantity that it lacks."""
-    if viewer.lacks_values:
-        show_in(viewer, simulation, viewer.hand)
 
 
 def values_in(
@@ -96,11 +93,14 @@ def values_in(
     return {each: simulation.link.surface_values(each) for each in quantities}
 
 
-def state_of_hand(hand: LiveHand, factor: float) -> HandState:
-    """Return how a hand is, for the page that leads it.
-
-    Args:
-        hand: The hand.
-        factor: How fast the simulation runs, over real time.
-    """
-    return HandState(hand.tip, hand.is_engaged, hand.ended_at is not None, hand.stamp, factor)
+def live_state(controls: RunControls) -> LiveState:
+    """Return how a run is, for the page that controls it."""
+    hand, pace, history = controls.hand, controls.pace, controls.history
+    return LiveState(
+        RunState(
+            controls.is_paused, pace.rate, pace.factor, history.can_go_back, history.n_strokes
+        ),
+        None
+        if hand is None
+        else HandState(hand.tip, hand.is_engaged, hand.ended_at is not None, hand.stamp),
+    )

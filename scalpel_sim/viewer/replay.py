@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -112,6 +113,15 @@ class ReplayWriter:
         if n_triangles * BYTES_PER_TRIANGLE > FILE_LIMIT and len(self._frames) > 2:
             self._frames = self._frames[::2]
             self._interval *= 2.0
+
+    def mark(self) -> float:
+        """Return the simulated time of the last frame [s]."""
+        return self._frames[-1].time if self._frames else -math.inf
+
+    def cut_back(self, mark: float) -> None:
+        """Forget the frames that were added after a mark."""
+        self._frames = [frame for frame in self._frames if frame.time <= mark]
+        self._last = None
 
     def write(self, path: Path) -> None:
         """Write the page.

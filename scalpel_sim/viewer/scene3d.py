@@ -89,8 +89,29 @@ class HandState(NamedTuple):
     """Whether the run will not follow it any more."""
     stamp: float | None
     """Stamp of the newest command that the picture shows; None: there was none yet."""
+
+
+class RunState(NamedTuple):
+    """How the run is that the page controls."""
+
+    is_paused: bool
+    """Whether its time stands still."""
+    rate: float
+    """Simulated time over wall time, at most: below 1 it is slow motion."""
     real_time: float
-    """How fast the simulation runs, over real time."""
+    """Simulated time over wall time, lately."""
+    can_go_back: bool
+    """Whether it can go back to its start."""
+    n_strokes: int
+    """How many strokes can be undone."""
+
+
+class LiveState(NamedTuple):
+    """What a page shows of the run that it controls."""
+
+    run: RunState
+    hand: HandState | None = None
+    """The hand that it leads; None: a script leads it."""
 
 
 class Camera(NamedTuple):
@@ -217,15 +238,29 @@ class Scene3D:
         """Say which value of each quantity the level 255 of the meshes before stands for, SI."""
         self._add("set_scales", tops=dict(tops))
 
-    def set_hand(self, hand: HandState) -> None:
-        """Show how the hand is that the page leads."""
+    def set_live(self, live: LiveState) -> None:
+        """Show how the run is that the page controls, and its hand."""
+        self._set_run(live.run)
+        if live.hand is not None:
+            self._set_hand(live.hand)
+
+    def _set_hand(self, hand: HandState) -> None:
         self._add(
             "set_hand",
             tip=hand.tip.tolist(),
             engaged=hand.is_engaged,
             ended=hand.has_ended,
             stamp=hand.stamp,
-            real_time=hand.real_time,
+        )
+
+    def _set_run(self, run: RunState) -> None:
+        self._add(
+            "set_run",
+            paused=run.is_paused,
+            rate=run.rate,
+            real_time=run.real_time,
+            can_go_back=run.can_go_back,
+            strokes=run.n_strokes,
         )
 
     def take(self) -> bytes:

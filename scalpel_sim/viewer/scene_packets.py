@@ -11,7 +11,7 @@ from scalpel_sim.viewer import textures
 from scalpel_sim.viewer.colour_levels import levels_of
 from scalpel_sim.viewer.messages import NO_VALUES
 from scalpel_sim.viewer.model_shapes import Shape
-from scalpel_sim.viewer.scene3d import Appearance, Camera, HandState, Readings, Scene3D
+from scalpel_sim.viewer.scene3d import Appearance, Camera, LiveState, Readings, Scene3D
 from scalpel_sim.viewer.texture_mapping import map_texture
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import FloatArray, Surface, SurfaceQuantity
@@ -134,7 +134,7 @@ class ScenePackets:
         surface: Surface,
         body_poses: FloatArray,
         readings: Readings | None = None,
-        hand: HandState | None = None,
+        live: LiveState | None = None,
         values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> bytes:
         """Return the packet that shows one instant.
@@ -143,7 +143,7 @@ class ScenePackets:
             surface: Surface of the body, tissue frame.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
-            hand: How the hand is that the page leads.
+            live: How the run is that the page controls.
             values: Quantities at the vertices of the surface, to be shown as colours.
         """
         scene = Scene3D()
@@ -156,8 +156,8 @@ class ScenePackets:
             scene.set_pose(f"/bodies/{body}", *position_and_rotation(body_poses[body]))
         if readings is not None:
             scene.set_readings(readings, ARROW_LENGTH * self._diagonal)
-        if hand is not None:
-            scene.set_hand(hand)
+        if live is not None:
+            scene.set_live(live)
         return scene.take()
 
     def _set_shape(

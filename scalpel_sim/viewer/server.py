@@ -3,7 +3,7 @@
 `viewer.Viewer` starts it and sends pickles to its standard input: first a `ViewerSettings`, then
 any number of `SceneState`s. The process replies with one line on its standard output, a
 `StartReply` as JSON, and ends when its input ends. A line follows where other quantities are to be
-shown as colours than before, and, where the page leads the blade, for each of its commands. The
+shown as colours than before, and, where the page controls the run, for each of its commands. The
 pickles never leave the two processes.
 """
 
@@ -61,7 +61,7 @@ _HOW_TO_LEAD = "Drag with the right button to turn the view."
 """Text below the heading of the live page."""
 
 N_BYTES_OF_TOKEN = 32
-"""Random bytes in the token of a page that leads: nobody guesses it."""
+"""Random bytes in the token of a page that controls its run: nobody guesses it."""
 
 
 class NewestState:
@@ -235,12 +235,12 @@ def _print_line(message: StartReply | Command | Wanted) -> None:
 def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
     """Start to serve the page, and return its address, or why it cannot be served."""
     leading, token = None, None
-    if settings.is_led:
+    if settings.has_controls:
         token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
         leading = Leadership(token, _print_line)
     try:
         how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
-        document = live_page(settings.title, _CAPTION + how, token)
+        document = live_page(settings.title, _CAPTION + how, token, is_led=settings.is_led)
     except RunError as error:
         return StartReply(error=str(error))
     application = tornado.web.Application()

@@ -10,7 +10,7 @@ import time
 from collections import deque
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, cast
+from typing import IO, TYPE_CHECKING, NamedTuple, cast
 
 import msgspec
 import mujoco
@@ -30,7 +30,7 @@ from scalpel_sim.viewer.messages import (
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.newest_message import NewestMessage
-from scalpel_sim.viewer.scene3d import HandState, Readings
+from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
 
 if TYPE_CHECKING:  # importing it takes half a second
@@ -54,6 +54,15 @@ _PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
 """Program of the viewer's process."""
 
 
+class PageControls(NamedTuple):
+    """What a page controls of a run."""
+
+    commands: deque[Command]
+    """Receives its commands."""
+    is_led: bool = False
+    """Whether it leads the blade, too."""
+
+
 class Viewer:
     """Shows a run in any number of browser tabs, and never makes the run wait.
 
@@ -75,7 +84,7 @@ class Viewer:
         wireframe: bool = False,
         port: int | None = None,
         views: Sequence[ViewTable] = (),
-        commands: deque[Command] | None = None,
+        controls: PageControls | None = None,
         visualizer: "Visualizer | None" = None,
     ) -> None:
         """Start the viewer's process and learn its address.
@@ -87,8 +96,7 @@ class Viewer:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
-            commands: What receives the commands of the page that leads the blade; None: the page
-                shows, and leads nothing.
+            controls: What the page controls; None: it shows, and controls nothing.
             visualizer: A scene of meshcat, or a part of one, into which tissue, shapes and force
                 are drawn too. It stays its owner's: what else is in it is left alone.
 
@@ -112,7 +120,8 @@ class Viewer:
             wireframe,
             port,
             views,
-            is_led=commands is not None,
+            has_controls=controls is not None,
+            is_led=controls is not None and controls.is_led,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
         self._messages: NewestMessage[ViewerSettings | SceneState] = NewestMessage()
@@ -126,7 +135,10 @@ class Viewer:
         self._sender.start()
         self.url = self._start_reply().url
         self._listener = threading.Thread(
-            target=self._listen, args=(commands,), name="commands", daemon=True
+            target=self._listen,
+            args=(controls,),
+            name="commands",
+            daemon=True,
         )
         self._listener.start()
         if visualizer is not None:
@@ -162,7 +174,7 @@ class Viewer:
         surface: Surface,
         body_poses: FloatArray = NO_BODIES,
         readings: Readings | None = None,
-        hand: HandState | None = None,
+        live: LiveState | None = None,
         values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
@@ -171,11 +183,11 @@ class Viewer:
             surface: Surface of the body, tissue frame. Kept, not copied.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
-            hand: How the hand is, if the page leads one.
+            live: How the run is, if the page controls it.
             values: The quantities `wanted`, at the vertices of the surface, SI.
         """
         self._last_shown = time.monotonic()
-        state = self._shown = SceneState(surface, body_poses, readings, hand, values)
+        state = self._shown = SceneState(surface, body_poses, readings, live, values)
         self._messages.put(state)
         if self._scene is not None:
             self._scene.show(state)
@@ -184,11 +196,6 @@ class Viewer:
     def lacks_values(self) -> bool:
         """Whether a page wants to show a quantity that the last state did not have."""
         return self._shown is not None and not self.wanted <= self._shown.values.keys()
-
-    @property
-    def hand(self) -> HandState | None:
-        """How the hand was in the last state."""
-        return None if self._shown is None else self._shown.hand
 
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
@@ -220,16 +227,16 @@ class Viewer:
             with contextlib.suppress(OSError):
                 self._pipe.close()
 
-    def _listen(self, commands: deque[Command] | None) -> None:
+    def _listen(self, controls: PageControls | None) -> None:
         """Receive what pages want to see, and commands, until the process ends; then let go."""
         for line in cast(IO[bytes], self._process.stdout):
             wanted = wanted_of(line)
             if wanted is not None:
                 self.wanted = frozenset(wanted.quantities)
-            elif commands is not None and (command := command_of(line)) is not None:
-                commands.append(command)
-        if commands is not None:
-            commands.append(Release())
+            elif controls is not None and (command := command_of(line)) is not None:
+                controls.commands.append(command)
+        if controls is not None:
+            controls.commands.append(Release())
 
     def _start_reply(self) -> StartReply:
         """Wait for the first line of the process: the address of its page, or an error."""

@@ -23,26 +23,29 @@ _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
 
-def live_page(title: str, caption: str, token: str | None = None) -> str:
+def live_page(title: str, caption: str, token: str | None = None, *, is_led: bool = False) -> str:
     """Return a page that follows a run over a web socket.
 
     Args:
         title: Heading of the page.
         caption: Text below the heading.
-        token: What the page shows the server so as to lead the blade; None: it leads nothing.
+        token: What the page shows the server so as to control the run; None: it controls nothing.
+        is_led: Whether the page leads the blade, too.
 
     Raises:
         RunError: meshcat's viewer was not found.
     """
     if token is None:
         return _page(title, caption, ("live.js",))
+    hand = ("hand_input.js", "gamepad.js", "hand.js") if is_led else ()
+    parts = ("hand", "run") if is_led else ("run",)
     return _page(
         title,
         caption,
-        ("hand_input.js", "gamepad.js", "hand.js", "live.js"),
-        controls=(_HERE / "hand.html").read_text("utf-8"),
+        ("run.js", *hand, "live.js"),
+        controls="".join((_HERE / f"{part}.html").read_text("utf-8") for part in parts),
         data=f'<script>const TOKEN = "{token}";</script>',
-        style=(_HERE / "hand.css").read_text("utf-8"),
+        style="".join((_HERE / f"{part}.css").read_text("utf-8") for part in parts),
     )
 
 

@@ -2,20 +2,17 @@
 "use strict";
 
 const ALIVE_EVERY = 100; // how often an engaged hand says that the page is there [ms]
-const SILENT_AFTER = 400; // silence after which the run may have let go [ms]
+const SILENT_AFTER = 1600; // silence after which the run may have let go [ms]
 const SHORTEST_STEP = 200; // how long a step holds the blade at least [ms]
 const LONGEST_STEP = 5000; // and at most, where no picture shows it
 const N_LAGS_SHOWN = 30; // of which the median is shown
 const MOST_LAGS = 2000; // that are kept
-const SLOWER = 0.95; // factor of real time below which the page says so
 
 class Hand {
-    constructor(view) {
+    constructor(view, run) {
         this.view = view;
         this.viewer = view.viewer;
-        this.query = `?token=${encodeURIComponent(TOKEN)}`;
-        this.socket = null;
-        this.leads = false;
+        this.run = run;
         this.isClutchOpen = false;
         this.isEngaged = false;
         this.hasMoved = false;
@@ -23,17 +20,17 @@ class Hand {
         this.holders = new Map(); // what holds the blade, and since when it only finishes a step [ms]
         this.tip = null; // in the last picture [m], world frame
         this.isAtRest = true; // whether it was there in the picture before
-        this.sentAt = 0;
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
         view.onHand = (state) => this.show(state);
+        run.onChange = () => this.onRunChange();
+        run.onInterruption = () => this.forget();
         setInterval(() => this.sayAlive(), ALIVE_EVERY);
         window.addEventListener("blur", () => this.letGoOfAll());
         document.addEventListener("visibilitychange", () => document.hidden && this.letGoOfAll());
         element("clutch").addEventListener("click", () => this.toggleClutch());
-        element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
-        element("end").addEventListener("click", () => this.say({ type: "end" }));
-        element("above-bar").prepend(element("hint"));
+        element("end").addEventListener("click", () => run.say({ type: "end" }));
+        document.querySelector("footer").before(element("hint"));
         const pane = element("meshcat-pane");
         pane.tabIndex = 0;
         pane.setAttribute("role", "application");
@@ -48,46 +45,41 @@ class Hand {
 
     // Whether the input of this page leads the blade.
     get isClosed() {
-        return this.leads && this.tip !== null && !this.isClutchOpen && !this.hasEnded;
+        return this.run.leads && this.tip !== null && !this.isClutchOpen && !this.hasEnded;
     }
 
-    connect(socket) {
-        this.socket = socket;
-    }
-
-    disconnect() {
+    // Let go, and do not wait for what was asked: the run goes on from elsewhere.
+    forget() {
         this.letGoOfAll();
-        this.socket = null;
-        this.leads = false;
-        this.showControls();
+        this.unshown = [];
     }
 
-    say(message) {
-        if (this.socket === null || this.socket.readyState !== WebSocket.OPEN) return;
-        this.socket.send(JSON.stringify(message));
-        this.sentAt = performance.now();
+    // Who controls the run, or the connection to it, has changed.
+    onRunChange() {
+        if (!this.run.leads) this.letGoOfAll();
+        this.showControls();
     }
 
     // After a silence the run has let go, or will: then the page engages anew.
     sayAlive() {
         this.letGoOfSteps();
         if (!this.isEngaged) return;
-        const wasSilent = performance.now() - this.sentAt > SILENT_AFTER;
-        this.say({ type: wasSilent ? "engage" : "still there" });
+        const wasSilent = performance.now() - this.run.sentAt > SILENT_AFTER;
+        this.run.say({ type: wasSilent ? "engage" : "still there" });
     }
 
     // Hold the blade until `letGo`; or, for a step, until a picture shows that it is done.
     hold(holder, isStep = false) {
         if (!this.isClosed) return;
         this.holders.set(holder, isStep ? performance.now() : Infinity);
-        if (!this.isEngaged) this.say({ type: "engage" });
+        if (!this.isEngaged) this.run.say({ type: "engage" });
         this.isEngaged = true;
     }
 
     letGo(holder) {
         this.holders.delete(holder);
         if (!this.isEngaged || this.holders.size > 0) return;
-        this.say({ type: "release" });
+        this.run.say({ type: "release" });
         this.isEngaged = false;
     }
 
@@ -121,8 +113,8 @@ class Hand {
 
     lead(message) {
         if (!this.isEngaged || !this.isClosed) return;
-        if (performance.now() - this.sentAt > SILENT_AFTER) this.sayAlive();
-        this.say(message);
+        if (performance.now() - this.run.sentAt > SILENT_AFTER) this.sayAlive();
+        this.run.say(message);
         this.unshown.push(message.stamp);
         if (!this.hasMoved) {
             this.hasMoved = true;
@@ -149,15 +141,8 @@ class Hand {
         return height / renderer.domElement.clientHeight;
     }
 
-    // The server says who leads, each time that changes.
-    onLeading({ leads }) {
-        this.leads = leads;
-        if (!leads) this.letGoOfAll();
-        this.showControls();
-    }
-
     // A picture says how the hand is in it.
-    show({ tip, engaged, ended, stamp, real_time: realTime }) {
+    show({ tip, engaged, ended, stamp }) {
         this.isAtRest = this.tip !== null && tip.every((x, axis) => x === this.tip[axis]);
         this.tip = tip;
         if (ended && !this.hasEnded) this.letGoOfAll();
@@ -165,8 +150,6 @@ class Hand {
         document.body.classList.toggle("engaged", engaged);
         element("take-over").disabled = engaged;
         if (stamp !== null) this.noteLags(stamp);
-        const pace = realTime < SLOWER ? `${realTime.toFixed(1)} of real time` : "real time";
-        element("pace").textContent = pace;
         this.showControls();
     }
 
@@ -188,17 +171,17 @@ class Hand {
         // With Ctrl the controls exchange the two.
         controls.mouseButtons.LEFT = this.isClosed ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
-        for (const id of ["clutch", "end"]) element(id).disabled = !this.leads || this.hasEnded;
-        element("take-over").hidden = this.leads || this.socket === null || this.hasEnded;
+        for (const id of ["clutch", "end"]) element(id).disabled = !this.run.leads || this.hasEnded;
         element("hint").textContent = this.hint();
         element("hint").hidden = element("hint").textContent === "";
     }
 
     hint() {
         if (this.hasEnded) return "The run has ended.";
-        if (this.socket === null || this.tip === null) return "";
-        if (!this.leads) return "Another tab leads the blade.";
+        if (this.run.socket === null || this.tip === null) return "";
+        if (!this.run.leads) return "Another tab leads the blade.";
         if (this.isClutchOpen) return "Drags turn the view. Space: lead the blade again.";
+        if (this.run.isPaused) return "Time stands still: press \"go on\", or K";
         if (this.hasMoved) return "";
         return "Press on the picture and drag: the blade follows";
     }

@@ -16,28 +16,29 @@ function afterDrawing(callback) {
     setTimeout(once, LONGEST_DRAWING);
 }
 
-// Where the page leads the blade: see hand.js.
-const hand = typeof Hand === "undefined" ? null : new Hand(sceneView);
+// Where the page controls the run, and leads its blade: see run.js and hand.js.
+const run = typeof Run === "undefined" ? null : new Run(sceneView);
+const hand = typeof Hand === "undefined" ? null : new Hand(sceneView, run);
 
-let run = null; // the socket, where there is one
+let openSocket = null;
 
 onQuantity = (quantity) => {
-    if (run === null || run.readyState !== WebSocket.OPEN) return;
-    run.send(JSON.stringify({ type: "colour", quantity: quantity || null }));
+    if (openSocket === null || openSocket.readyState !== WebSocket.OPEN) return;
+    openSocket.send(JSON.stringify({ type: "colour", quantity: quantity || null }));
 };
 
 function follow() {
-    const socket = new WebSocket(`ws://${location.host}/frames${hand ? hand.query : ""}`);
+    const socket = new WebSocket(`ws://${location.host}/frames${run ? run.query : ""}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
         element("status").textContent = "live";
-        run = socket;
+        openSocket = socket;
         if (element("quantity").value) setQuantity(element("quantity").value); // as before a reload
-        if (hand) hand.connect(socket);
+        if (run) run.connect(socket);
     };
     socket.onmessage = (message) => {
         if (typeof message.data === "string") {
-            hand.onLeading(JSON.parse(message.data));
+            run.onLeading(JSON.parse(message.data));
             return;
         }
         viewer.handle_command_bytearray(new Uint8Array(message.data));
@@ -45,7 +46,7 @@ function follow() {
         afterDrawing(() => { if (socket.readyState === WebSocket.OPEN) socket.send("drawn"); });
     };
     socket.onclose = () => {
-        if (hand) hand.disconnect();
+        if (run) run.disconnect();
         element("status").textContent = "the run has ended; waiting for the next run";
         setTimeout(waitForNextRun, RETRY_AFTER);
     };

@@ -26,6 +26,7 @@ class SceneView {
         this.onReadings = onReadings;
         this.onCameras = onCameras;
         this.onHand = () => {};
+        this.onRun = () => {};
         this.cameras = [];
         this.chosen = 0;
         this.appearances = new Map();
@@ -47,6 +48,7 @@ class SceneView {
             set_scales: (command) => this.setScales(command.tops),
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),
+            set_run: (command) => this.onRun(command),
         };
         this.viewer.handle_command = (command) => {
             (own[command.type] || meshcatHandles)(command);

@@ -1,13 +1,20 @@
 """Runs of a scene that a script leads as a person would: by commands."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
 from scalpel_sim import SCENES, Simulation, prepare
 from scalpel_sim.hands.commands import Engage, Move, Turn
+from scalpel_sim.hands.history import History
 from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.pace import Pace
+from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.workspace import workspace_in
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.run_folder import Outputs
+from scalpel_sim.run import perform
 
 GRID2 = SCENES["grid2"]
 
@@ -40,6 +47,17 @@ def led(scene=GRID2, clock=None, seconds=math.inf) -> tuple[Simulation, LiveHand
     )
     simulation.leader = hand
     return simulation, hand
+
+
+def controls_of(simulation: Simulation, hand: LiveHand | None) -> RunControls:
+    """Return the controls of a run, which has no page."""
+    return RunControls(Pace(), History(simulation), hand)
+
+
+def done(simulation: Simulation, folder: Path, **others):
+    """Do a run that writes its files to a folder."""
+    with Plotter() as plotter:
+        perform(simulation, Outputs(folder, plotter), settings={}, **others)
 
 
 def move(x=0.0, y=0.0, z=0.0, stamp=0.0) -> Move:

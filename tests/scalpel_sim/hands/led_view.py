@@ -1,4 +1,4 @@
-"""A live run that waits for a hand, in another process, and what a page does to lead it."""
+"""A live run in another process, and what a page does to lead it."""
 
 import os
 import re
@@ -10,12 +10,12 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 
-class LedView:
-    """A `scalpel-sim view --hand live` in another process."""
+class LiveView:
+    """A `scalpel-sim view` in another process."""
 
     def __init__(self, scene, folder, *options):
         self.folder = folder
-        command = [sys.executable, "-m", "scalpel_sim", "view", scene, "--hand", "live"]
+        command = [sys.executable, "-m", "scalpel_sim", "view", scene]
         self.process = subprocess.Popen(
             [*command, *options, "--out", str(folder)],
             stdin=subprocess.DEVNULL,
@@ -24,7 +24,7 @@ class LedView:
             text=True,
             env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         )
-        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("open http")).group()
+        self.url = re.search(r"http://127\.0\.0\.1:\d+/", self.line_with("http://")).group()
 
     def line_with(self, text):
         """Wait for a line of the log, and return it."""
@@ -42,6 +42,13 @@ class LedView:
     def __exit__(self, *_):
         self.process.kill()
         self.process.communicate()
+
+
+class LedView(LiveView):
+    """A `scalpel-sim view --hand live` in another process."""
+
+    def __init__(self, scene, folder, *options):
+        super().__init__(scene, folder, "--hand", "live", *options)
 
 
 def token_in(url):

@@ -54,7 +54,7 @@ def opened(browser, view):
     """Return a tab that shows the start."""
     tab = new_tab(browser)
     tab.goto(view.url)
-    tab.wait_for_function("hand.tip !== null")
+    tab.wait_for_function("hand.tip !== null && run.socket !== null")
     return tab
 
 
@@ -186,11 +186,11 @@ def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, b
     assert not moves(lambda: press("ArrowUp", 4), 0.0)
     press(" ", 1)
 
-    assert not other.evaluate("hand.leads")
+    assert not other.evaluate("run.leads")
     assert other.inner_text("#hint") == "Another tab leads the blade."
     tab.close()
     other.click("#take-over")
-    other.wait_for_function("hand.leads")
+    other.wait_for_function("run.leads")
     tab = other
     assert moves(lambda: press("ArrowUp", 4), 1e-3)
     assert np.linalg.norm(tip(tab) - at_first) > 3e-3

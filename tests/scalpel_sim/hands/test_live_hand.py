@@ -7,21 +7,30 @@ import pytest
 from scalpel_sim import SCENES, StrokeTable, prepare, read_scene
 from scalpel_sim.arm.placement import PlacementError
 from scalpel_sim.hands.commands import LONGEST_SILENCE, End, Engage, Release, StillThere
-from scalpel_sim.hands.live_hand import (
+from scalpel_sim.hands.limited_pose import (
     ARRIVED,
     FARTHEST_AHEAD,
     MOST_SPEED,
     MOST_TURN_RATE,
-    LiveHand,
 )
+from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.workspace import ROOM
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS
 from scalpel_sim.output.run_folder import FINAL, STROKE, Outputs
-from scalpel_sim.run import REST_AFTER_STROKE, perform
+from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
-from tests.scalpel_sim.hands.led_runs import GRID2, Clock, led, move, through_the_body, turn
+from tests.scalpel_sim.hands.led_runs import (
+    GRID2,
+    Clock,
+    controls_of,
+    done,
+    led,
+    move,
+    through_the_body,
+    turn,
+)
 
 ROBOT = read_scene(Path(__file__).parents[3] / "docs" / "examples" / "robot.toml")
 """A scene with an arm of its own."""
@@ -49,7 +58,7 @@ def hand(at_start):
         simulation.arm.hand,
         simulation.stroke,
         simulation.frame,
-        first._workspace,
+        first._pose._workspace,
         dt=DT,
         clock=Clock(),
     )
@@ -158,12 +167,6 @@ def test_poses_at_rest_take_no_rows(hand):
     assert 10 < len(hand.take_rows()) < 400
 
 
-def done(simulation, folder, **others):
-    """Do a run that writes its files to a folder."""
-    with Plotter() as plotter:
-        perform(simulation, Outputs(folder, plotter), settings={}, **others)
-
-
 def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
     scene = changed(GRID2, relaxation="verlet")
     simulation, hand = led(scene)
@@ -174,7 +177,13 @@ def test_a_run_of_what_was_recorded_gives_the_same_bits(tmp_path):
         if len(now.recording) == 700:
             hand.commands.append(End())
 
-    done(simulation, tmp_path / "led", seconds=10.0, every_frame=every_frame, hand=hand)
+    done(
+        simulation,
+        tmp_path / "led",
+        seconds=10.0,
+        every_frame=every_frame,
+        controls=controls_of(simulation, hand),
+    )
     assert simulation.result.cut_area > 1e-3
     assert simulation.time == pytest.approx(0.7 + REST_AFTER_STROKE, abs=2e-3)
 

@@ -20,9 +20,7 @@ pytestmark = pytest.mark.browser
 SHADE = 0.02
 """Largest error of a colour that is read between two of the seventeen of the page, of 1."""
 
-SHOW_PANELS = """(on) => document.querySelectorAll("header, dl, footer").forEach((panel) => {
-    panel.style.visibility = on ? "visible" : "hidden";
-})"""
+SHOW_PANELS = "(on) => { element('overlay').style.visibility = on ? 'visible' : 'hidden'; }"
 
 FROM_ABOVE = """() => {
     viewer.controls.target.set(0, 0.07, 0);
@@ -222,14 +220,14 @@ def test_a_key_saves_the_picture_with_heading_and_readings_under_scene_and_time(
     assert download.value.suggested_filename == "block-a-cut-1.250s.png"
     picture = saved(download.value)
     assert picture.shape[:2] == tuple(tab.evaluate("[innerHeight, innerWidth]"))
-    tab.evaluate("document.querySelectorAll('header, dl, footer').forEach((e) => e.hidden = true)")
+    tab.evaluate("element('overlay').hidden = true")
     tab.evaluate(
         "document.head.insertAdjacentHTML('beforeend', '<style id=bare>*[hidden], "
         "#scene-tree { display: none !important }</style>')"
     )
     tab.evaluate(UNTIL_DRAWN)
     screen = np.asarray(Image.open(io.BytesIO(tab.screenshot())).convert("RGB"), dtype=int)
-    tab.evaluate("document.querySelectorAll('header, dl, footer').forEach((e) => e.hidden = false)")
+    tab.evaluate("element('overlay').hidden = false")
     tab.evaluate("element('bare').remove()")
     differs = np.abs(picture - screen).max(axis=2) > 24
     texts = np.zeros_like(differs)

@@ -252,7 +252,7 @@ def test_a_live_page_asks_the_run_for_what_it_shows_as_colours(viewer, browser):
     tab, other = new_tab(browser), new_tab(browser)
     for page in (tab, other):
         page.goto(viewer.url)
-        page.wait_for_function("sceneView.tissue.size === 2 && run !== null")
+        page.wait_for_function("sceneView.tissue.size === 2 && openSocket !== null")
     for page in (tab, other):
         page.click("#display summary")
     tab.keyboard.press("q")

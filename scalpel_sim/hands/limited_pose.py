@@ -1,0 +1,90 @@
+"""A pose that follows a wanted one: in its workspace, at a limited speed, never far behind."""
+
+import math
+
+import mujoco
+import numpy as np
+
+from tissue import FloatArray
+
+MOST_SPEED = 0.2
+"""Highest speed of the middle of the edge [m/s]: three times that of an unhurried incision, and a
+tenth of `FASTEST`. A faster blade would skip elements in a frame."""
+
+MOST_TURN_RATE = 2.0
+"""Highest rate at which the blade turns [rad/s]: the ends of an edge of 80 mm then move at 0.08 m/s
+more."""
+
+FOLLOWING_TIME = 0.02
+"""Time constant with which the hand follows [s]: a page sends a move every 16 ms, and between two
+of them the blade should not stop."""
+
+FARTHEST_AHEAD, MOST_AHEAD_TURN = 0.04, 0.4
+"""How far the wanted pose may be ahead of the hand [m, rad]: what it does in a fifth of a second.
+What is asked beyond is lost, so that the blade stops soon after the person does."""
+
+ARRIVED, ARRIVED_TURN = 1e-7, 1e-6
+"""Distance [m] and angle [rad] from the wanted pose at which the hand is there: a thousandth of a
+frame's motion."""
+
+
+class LimitedPose:
+    """The pose of an instrument that goes towards where it is wanted. Tissue frame.
+
+    It starts at rest.
+
+    Args:
+        middle: Where the middle of the instrument is [m], shape (3,).
+        rotation: How it is turned (w, x, y, z).
+        workspace: Lowest and highest place of its middle [m], shape (2, 3).
+        dt: Length of a frame [s].
+    """
+
+    def __init__(
+        self, middle: FloatArray, rotation: FloatArray, workspace: FloatArray, dt: float
+    ) -> None:
+        self.middle, self.rotation = middle.copy(), rotation.copy()
+        """Where it is [m], and how it is turned."""
+        self.wanted, self.wanted_rotation = middle.copy(), rotation.copy()
+        """Where it is wanted."""
+        self._workspace, self._dt = workspace, dt
+
+    def move(self, by: FloatArray) -> None:
+        """Move the wanted pose by a displacement [m], as far as it may be ahead."""
+        ahead = np.clip(self.wanted + by, *self._workspace) - self.middle
+        self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
+
+    def turn(self, by: FloatArray) -> None:
+        """Turn the wanted pose by a rotation vector [rad], as far as it may be ahead."""
+        turn, turned = np.array([1.0, 0.0, 0.0, 0.0]), np.empty(4)
+        mujoco.mju_quatIntegrate(turn, by, 1.0)
+        mujoco.mju_mulQuat(turned, turn, self.wanted_rotation)
+        ahead = np.empty(3)
+        mujoco.mju_subQuat(ahead, turned, self.rotation)
+        self.wanted_rotation[:] = self.rotation
+        mujoco.mju_quatIntegrate(self.wanted_rotation, _shortened(ahead, MOST_AHEAD_TURN), 1.0)
+
+    def rest(self) -> None:
+        """Want it to be where it is."""
+        self.wanted[:] = self.middle
+        self.wanted_rotation[:] = self.rotation
+
+    def step(self) -> bool:
+        """Go one frame towards the wanted pose; return whether it was elsewhere."""
+        way, turn = self.wanted - self.middle, np.empty(3)
+        mujoco.mju_subQuat(turn, self.wanted_rotation, self.rotation)
+        distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
+        share = 1.0 - math.exp(-self._dt / FOLLOWING_TIME)
+        if distance > ARRIVED:
+            self.middle += way * min(share, MOST_SPEED * self._dt / distance)
+        if angle > ARRIVED_TURN:
+            rate = min(share, MOST_TURN_RATE * self._dt / angle)
+            mujoco.mju_quatIntegrate(self.rotation, turn, rate)
+            mujoco.mju_normalize4(self.rotation)
+        return distance > ARRIVED or angle > ARRIVED_TURN
+
+
+def _shortened(vector: FloatArray, longest: float) -> FloatArray:
+    """Return a vector of at most that length."""
+    length = math.hypot(*vector.tolist())
+    return vector if length <= longest else vector * (longest / length)

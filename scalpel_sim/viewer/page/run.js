@@ -1,0 +1,111 @@
+// The run of the page: it stands still, goes slowly and goes back as the person asks. The first tab
+// controls it; another takes over.
+"use strict";
+
+const SLOWER = 0.95; // factor of real time, of what was asked for, below which the page says so
+
+class Run {
+    constructor(view) {
+        this.query = `?token=${encodeURIComponent(TOKEN)}`;
+        this.socket = null;
+        this.leads = false;
+        this.state = null; // in the last picture: see RunState
+        this.sentAt = 0; // when something was said last [ms]
+        this.onChange = () => {};
+        view.onRun = (state) => this.show(state);
+        element("pause").addEventListener("click", () => this.togglePause());
+        element("step").addEventListener("click", () => this.step());
+        element("rate").addEventListener("change", (event) => this.setRate(Number(event.target.value)));
+        element("undo").addEventListener("click", () => this.undo());
+        element("reset").addEventListener("click", () => this.ask({ type: "reset" }));
+        element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
+        window.addEventListener("keydown", (event) => this.onKey(event));
+        this.showControls();
+    }
+
+    get isPaused() {
+        return this.state !== null && this.state.paused;
+    }
+
+    connect(socket) {
+        this.socket = socket;
+        this.onChange();
+        this.showControls();
+    }
+
+    disconnect() {
+        this.socket = null;
+        this.onLeading({ leads: false });
+    }
+
+    say(message) {
+        if (this.socket === null || this.socket.readyState !== WebSocket.OPEN) return;
+        this.socket.send(JSON.stringify(message));
+        this.sentAt = performance.now();
+    }
+
+    // What does not go together with a blade that is held.
+    ask(message) {
+        this.onInterruption();
+        this.say(message);
+    }
+
+    onInterruption() {}
+
+    togglePause() {
+        this.ask({ type: this.isPaused ? "resume" : "pause" });
+    }
+
+    step() {
+        this.say({ type: this.isPaused ? "step" : "pause" });
+    }
+
+    undo() {
+        this.ask({ type: "undo" });
+    }
+
+    setRate(rate) {
+        this.say({ type: "slow motion", rate });
+    }
+
+    onKey(event) {
+        const { target, key } = event;
+        if (event.altKey || event.metaKey || (target instanceof Element && target.matches("select, input"))) return;
+        const action = event.ctrlKey
+            ? { z: () => this.undo() }[key]
+            : { k: () => this.togglePause(), ".": () => this.step() }[key];
+        if (action === undefined || !this.leads) return;
+        event.preventDefault();
+        action();
+    }
+
+    // The server says who controls the run, each time that changes.
+    onLeading({ leads }) {
+        this.leads = leads;
+        this.onChange();
+        this.showControls();
+    }
+
+    // A picture says how the run is in it.
+    show(state) {
+        this.state = state;
+        this.showControls();
+    }
+
+    showControls() {
+        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes } = this.state ||
+            { paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0 };
+        for (const id of ["pause", "step", "rate"]) element(id).disabled = !this.leads;
+        element("pause").textContent = paused ? "go on" : "pause";
+        element("rate").value = String(rate);
+        element("undo").disabled = !this.leads || strokes === 0;
+        element("reset").disabled = !this.leads || !canGoBack;
+        element("take-over").hidden = this.leads || this.socket === null;
+        element("pace").textContent = paused ? "paused" : paceOf(realTime, rate);
+    }
+}
+
+function paceOf(realTime, rate) {
+    if (realTime >= SLOWER * rate) return rate === 1 ? "real time" : "slow motion";
+    return `${realTime.toPrecision(1)} of real time: this machine is too slow`;
+}

@@ -1,0 +1,84 @@
+"""A visitor stops the time of a run in the live page, slows it down, and goes back."""
+
+import numpy as np
+import pytest
+
+from tests.browser import new_tab
+from tests.scalpel_sim.hands.led_view import LedView, LiveView
+from tests.scalpel_sim.hands.test_led_page import drag, tip, until_it_rests
+
+TIME = """(() => Number(element("time").textContent.split(" ")[0]))()"""
+"""The simulated time that the page shows [s]."""
+
+A_WHILE = 400
+"""In which a run that goes on shows other times [ms]."""
+
+
+@pytest.fixture
+def scripted(tmp_path, browser):
+    """A tab that shows a run that a script leads."""
+    with LiveView("grid2", tmp_path / "out", "--seconds", "1000") as view:
+        tab = new_tab(browser)
+        tab.goto(view.url)
+        tab.wait_for_function("run.leads && run.state !== null")
+        yield tab
+        assert tab.failures == []
+
+
+@pytest.mark.browser
+def test_a_run_pauses_goes_on_by_steps_and_in_slow_motion(scripted):
+    tab = scripted
+    tab.click("#pause")
+    tab.wait_for_function("run.isPaused")
+    assert tab.inner_text("#pause") == "go on" and tab.inner_text("#pace") == "paused"
+    before = tab.evaluate(TIME)
+    tab.wait_for_timeout(A_WHILE)
+    assert tab.evaluate(TIME) == before
+    tab.click("#step")
+    tab.wait_for_function(f"{TIME} === {before + 0.01:.2f}")
+    tab.keyboard.press(".")
+    tab.wait_for_function(f"{TIME} === {before + 0.02:.2f}")
+    tab.select_option("#rate", "0.1")
+    tab.wait_for_function("run.state.rate === 0.1")
+    tab.focus("#rate")
+    tab.keyboard.press("k")  # a key in a list of choices is its own
+    assert tab.evaluate("run.isPaused")
+    tab.focus("#step")
+    tab.keyboard.press("k")
+    tab.wait_for_function(f"!run.isPaused && {TIME} > {before + 0.02:.2f}")
+    tab.wait_for_function("run.state.real_time < 0.11")
+
+
+@pytest.mark.browser
+def test_a_reset_takes_a_scripted_run_back_to_its_start(scripted):
+    tab = scripted
+    tab.wait_for_function(f"{TIME} > 0.1")
+    tab.click("#pause")
+    tab.wait_for_function("run.isPaused")
+    before = tab.evaluate(TIME)
+    tab.click("#reset")
+    tab.wait_for_function(f"{TIME} < {before}")
+    tab.click("#pause")
+    tab.wait_for_function(f"!run.isPaused && {TIME} > 0.03")
+
+
+@pytest.mark.browser
+def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
+    with LedView("grid2", tmp_path / "led") as view:
+        tab = new_tab(browser)
+        tab.goto(view.url)
+        tab.wait_for_function("hand.isClosed")
+        assert tab.is_disabled("#undo")
+        drag(tab, 60, 0)
+        until_it_rests(tab)
+        between = tip(tab)
+        drag(tab, 0, 60)
+        until_it_rests(tab)
+        assert not np.allclose(tip(tab), between, atol=1e-4)
+        tab.keyboard.press("Control+z")
+        tab.wait_for_function("run.state.strokes === 1")
+        assert np.allclose(tip(tab), between, atol=1e-4)
+        tab.click("#undo")
+        tab.wait_for_function("run.state.strokes === 0")
+        assert tab.is_disabled("#undo")
+        assert tab.failures == []
