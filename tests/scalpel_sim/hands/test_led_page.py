@@ -199,7 +199,7 @@ def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, b
 
 @pytest.mark.browser
 @pytest.mark.parametrize("view", ["grid2"], indirect=True)
-def test_a_run_that_waits_and_one_that_has_ended_show_stress_where_it_is_asked_for(view, browser):
+def test_a_run_that_waits_is_paused_or_has_ended_shows_what_is_asked_for(view, browser):
     tab = opened(browser, view)
     tab.click("#display summary")
     tab.select_option("#quantity", "displacement")
@@ -210,6 +210,10 @@ def test_a_run_that_waits_and_one_that_has_ended_show_stress_where_it_is_asked_f
     tab.keyboard.press("ArrowUp")
     until_it_rests(tab)
     assert tab.evaluate("sceneView.colours.isThere")
+    tab.click("#pause")
+    tab.wait_for_function("run.isPaused")
+    tab.select_option("#quantity", "displacement")
+    tab.wait_for_function("sceneView.colours.isThere")
     end(tab, view)
     tab.select_option("#quantity", "strain")
     tab.wait_for_function("sceneView.colours.isThere")
