@@ -18,6 +18,12 @@ from .coupling.limits import DeviceLimits as DeviceLimits
 from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.passivity import PassivityCounters as PassivityCounters
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
+from .device.client import DeviceClient as DeviceClient
+from .device.server import DEFAULT_DEVICE_PORT as DEFAULT_DEVICE_PORT
+from .device.server import DeviceServer as DeviceServer
+from .device.values import CartesianPose as CartesianPose
+from .device.values import DeviceDescription as DeviceDescription
+from .device.values import DeviceState as DeviceState
 from .frames import TissueFrame as TissueFrame
 from .led_frames import FrameHold as FrameHold
 from .led_frames import FrameLoad as FrameLoad
@@ -32,6 +38,7 @@ from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
 from .tcp.address import DEFAULT_HOST as DEFAULT_HOST
 from .tcp.address import DEFAULT_PORT as DEFAULT_PORT
+from .tcp.address import parse_address as parse_address
 from .tcp.client import TcpLink as TcpLink
 from .tcp.keys import chosen_key as chosen_key
 from .tcp.keys import write_new_key as write_new_key
@@ -40,12 +47,18 @@ from .tcp.server import serve as serve
 __all__ = [
     "ArmGeom",
     "Bridge",
+    "CartesianPose",
     "Collisions",
     "Counters",
     "CouplingError",
+    "DEFAULT_DEVICE_PORT",
     "DEFAULT_HOST",
     "DEFAULT_PORT",
+    "DeviceClient",
+    "DeviceDescription",
     "DeviceLimits",
+    "DeviceServer",
+    "DeviceState",
     "Fixture",
     "FixtureBox",
     "FixtureMesh",
@@ -74,6 +87,7 @@ __all__ = [
     "VirtualCoupling",
     "chosen_key",
     "compiled_arithmetic",
+    "parse_address",
     "serve",
     "write_new_key",
 ]

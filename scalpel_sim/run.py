@@ -8,7 +8,7 @@ from typing import Any
 
 from bridge import LinkError, TissueDescription
 from scalpel_sim.errors import Interrupted, RunError, one_line
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.export import export_surface
 from scalpel_sim.output.run_folder import (
@@ -35,6 +35,9 @@ _log = logging.getLogger(__name__)
 
 REST_AFTER_STROKE = 0.3
 """How long a run continues after the stroke's end [s]: the tissue swings out, and the cut gapes."""
+
+ENDED_IN_PAGE = "ended in the page"
+"""The status of a run of a script that somebody has ended in the live page."""
 
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
@@ -112,8 +115,7 @@ def perform(
         controls.history.begin(outputs, replay)
     _warn_if_slow(simulation)
     stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
-    status = stopped or (COMPLETE if failure is None else f"failed: {one_line(failure)}")
-
+    status = _status_of(stopped, failure, controls)
     unwritten = _Attempts()
     with unwritten:
         outputs.write_forces(simulation.recording, all_rows=True)
@@ -171,7 +173,9 @@ def _run_frames(
             if every_frame is not None:
                 every_frame(now)
             obey()
-            return stop.reason is not None or (hand is not None and _has_rested(now, hand))
+            if hand is not None:
+                return stop.reason is not None or _has_rested(now, hand)
+            return stop.reason is not None or (controls is not None and controls.has_ended)
 
         failure = None
         try:
@@ -182,7 +186,17 @@ def _run_frames(
     return stop.reason, failure
 
 
-def _has_rested(simulation: Simulation, hand: LiveHand) -> bool:
+def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
+    """Return how a run ended, for its summary."""
+    if stopped is not None:
+        return stopped
+    if failure is not None:
+        return f"failed: {one_line(failure)}"
+    is_cut_short = controls is not None and controls.hand is None and controls.has_ended
+    return ENDED_IN_PAGE if is_cut_short else COMPLETE
+
+
+def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
     """Return whether a run has gone on for `REST_AFTER_STROKE` after its hand has ended."""
     if hand.ended_at is None:
         return False

@@ -42,7 +42,7 @@ class Partner(Protocol):
 
 
 class Leader(Protocol):
-    """What leads the hand: a `StrokeFollower`, or a person by a `LiveHand`."""
+    """What leads the hand: a `StrokeFollower`, or somebody by a `LedHand`."""
 
     def lead(self, t: float) -> None:
         """Lead the blade to its pose at time `t` [s], a step after the last one."""

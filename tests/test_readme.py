@@ -19,6 +19,7 @@ HELPS = (
     "run",
     "view",
     "serve",
+    "spacemouse",
     "key",
     "materials",
     "figure",
@@ -59,6 +60,7 @@ def page_of(case: tuple[str, object]) -> str:
 @pytest.fixture
 def in_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))  # of processes that the code starts
 
 
 @pytest.mark.parametrize("case", blocks("python"), ids=page_of)

@@ -49,7 +49,7 @@ def bound_socket(host: str, port: int, *, has_key: bool) -> socket.socket:
     if not has_key and not all(is_loopback(address) for *_, address in found):
         raise ValueError(
             f"{host!r} is open to other machines, and that takes a key: make one with "
-            "`scalpel-sim key FILE`, and give it with --key FILE here and where the arm is. Or "
+            "`scalpel-sim key FILE`, and give the file here and on the other machine. Or "
             "listen on 127.0.0.1 and connect through an SSH tunnel"
         )
     family, kind, protocol, _, address = found[0]

@@ -73,8 +73,8 @@ class Peer:
             raise MessageError(f"request {sequence} came after request {self.sequence}")
         self.sequence = sequence
 
-    def send(self, frames: Iterable[bytes]) -> None:
-        """Send all frames. A slow reader is waited for until `SEND_SECONDS` have passed.
+    def send(self, frames: Iterable[bytes], seconds: float) -> None:
+        """Send all frames. A slow reader is waited for until so many seconds have passed.
 
         Raises:
             OSError: the other end is gone, or reads too slowly.
@@ -87,7 +87,7 @@ class Peer:
                 n_sent = 0
             if n_sent == len(frame):
                 continue
-            deadline = deadline or time.monotonic() + SEND_SECONDS
+            deadline = deadline or time.monotonic() + seconds
             self.socket.settimeout(max(deadline - time.monotonic(), 1e-3))
             self.socket.sendall(memoryview(frame)[n_sent:])
             self.socket.setblocking(False)

@@ -1,24 +1,19 @@
 """The server's end of the TCP link: holds a tissue for another process.
 
-It serves one client at a time, with a new tissue for each, so that every run starts the same. A
-client that is silent, sends half a message, garbage or too much, or dies, loses only its own
-connection.
+It serves one client at a time, with a new tissue for each, so that every run starts the same.
 """
 
 from __future__ import annotations
 
 import contextlib
 import logging
-import selectors
 import signal
-import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from bridge.link import InProcessLink, LinkError, SceneView
-from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT, bound_socket, format_address
-from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
+from bridge.link import InProcessLink, SceneView
+from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
 from bridge.tcp.messages.cut_report import pack_cut_report
@@ -32,18 +27,15 @@ from bridge.tcp.messages.led_frames import (
 )
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
-from bridge.tcp.messages.text import MAX_VIEWS, pack_description, pack_error
+from bridge.tcp.messages.text import MAX_VIEWS, pack_description
 from bridge.tcp.messages.values import pack_values, unpack_quantity
-from bridge.tcp.peer import Peer
-from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, MessageKind, pack_frame
+from bridge.tcp.single_client import SingleClientServer
+from bridge.tcp.wire import Frame, MessageError, MessageKind
 
 if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
     from tissue import Tissue
 
 _logger = logging.getLogger(__name__)
-
-MAX_CONNECTIONS = 8
-"""Largest number of open connections: that of the client, and of peers that want to become it."""
 
 
 def serve(
@@ -84,8 +76,8 @@ def serve(
     _logger.info("stopped")
 
 
-class TissueServer:
-    """A listening socket, the peers that are connected to it, and the tissue of the client.
+class TissueServer(SingleClientServer):
+    """Serves a tissue to one client at a time.
 
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
@@ -117,158 +109,20 @@ class TissueServer:
             )
         self._make_tissue = make_tissue
         self._scene, self._views = scene, tuple(views)
-        self._key = key
-        try:
-            self._listener = bound_socket(host, port, has_key=key is not None)
-        except OSError as cause:
-            raise LinkError(
-                f"cannot listen at {format_address((host, port))}: {cause.strerror}. Choose "
-                "another port, or 0 for a free one"
-            ) from cause
+        super().__init__("the tissue", host, port, key)
         try:
             self._link = self._new_link()
-            self._listener.listen(MAX_CONNECTIONS)
         except BaseException:
-            self._listener.close()
+            self.close()
             raise
-        self._listener.setblocking(False)
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(self._listener, selectors.EVENT_READ)
-        self._peers: list[Peer] = []
-        self._client: Peer | None = None
 
-    def __enter__(self) -> TissueServer:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    @property
-    def address(self) -> str:
-        """Address that the server listens on, "HOST:PORT"."""
-        return format_address(self._listener.getsockname())
-
-    def run(self) -> None:
-        """Serve until an exception such as KeyboardInterrupt."""
-        while True:
-            for key, _ in self._selector.select(self._seconds_to_deadline()):
-                if key.fileobj is self._listener:
-                    self._accept()
-                else:
-                    self._receive(key.data)
-            now = time.monotonic()
-            for peer in [p for p in self._peers if p.deadline is not None and p.deadline < now]:
-                self._refuse(peer, "you were silent for too long")
-
-    def close(self) -> None:
-        """Close every connection and the listening socket."""
-        for peer in self._peers:
-            peer.close()
-        self._peers.clear()
-        self._selector.close()
-        self._listener.close()
+    def _forget_client(self) -> None:
+        """Make a new tissue for the next client."""
+        self._link = self._new_link()
 
     def _new_link(self) -> InProcessLink:
         """Return a link to a new tissue."""
         return InProcessLink(self._make_tissue(), self._scene, self._views)
-
-    def _seconds_to_deadline(self) -> float | None:
-        """Return the time to the next deadline of a peer [s]; None if there is none."""
-        deadlines = [peer.deadline for peer in self._peers if peer.deadline is not None]
-        return max(0.0, min(deadlines) - time.monotonic()) if deadlines else None
-
-    def _accept(self) -> None:
-        try:
-            connection, where = self._listener.accept()
-        except OSError as error:  # the peer has gone again, or no file descriptor is left
-            _logger.warning("a connection could not be accepted: %s", error)
-            return
-        peer = Peer(connection, format_address(where))
-        self._peers.append(peer)
-        self._selector.register(connection, selectors.EVENT_READ, peer)
-        if len(self._peers) > MAX_CONNECTIONS:
-            self._refuse(peer, f"{MAX_CONNECTIONS} connections are open; there may be no more")
-
-    def _receive(self, peer: Peer) -> None:
-        """Read from a peer, and answer each complete request."""
-        if peer not in self._peers:
-            return  # dropped while an earlier event was handled
-        try:
-            data = peer.socket.recv(READ_BYTES)
-        except BlockingIOError:
-            return
-        except OSError as error:
-            return self._drop(peer, f"the connection broke: {error}")
-        if not data:
-            return self._drop(peer, "it has closed the connection")
-        peer.channel.feed(data)
-        try:
-            while peer in self._peers and (frame := peer.take()) is not None:
-                if peer is self._client or self._becomes_client(peer, frame):
-                    self._answer(peer, frame)
-        except MessageError as error:  # the start of the next message is unknown
-            if peer is not self._client and peer.channel.is_authenticated:
-                _logger.warning("%s has another key", peer.name)
-                return self._refuse(peer, "your key is not the one of this server")
-            return self._refuse(peer, str(error))
-
-    def _becomes_client(self, peer: Peer, frame: Frame) -> bool:
-        """Continue the handshake; return whether the frame is a HELLO that ends it.
-
-        Without a key that is the first HELLO, which is empty. With a key the first HELLO has the
-        client's nonce, and is answered by a CHALLENGE with the server's; the second HELLO has an
-        authentication tag.
-        """
-        if frame.kind != MessageKind.HELLO:
-            self._refuse(peer, "the first message must be a HELLO")
-        elif self._key is None and frame.payload:
-            self._refuse(peer, "you have a key, and this server has none: serve with --key")
-        elif self._key is not None and not peer.channel.is_authenticated:
-            self._challenge(peer, frame, self._key)
-        elif self._client is not None:
-            self._refuse(
-                peer,
-                f"the client {self._client.name} has the tissue, and only one at a time can; "
-                "try again when it has disconnected, or start another server on another port",
-            )
-        else:
-            if not peer.channel.is_authenticated:
-                peer.sequence = frame.sequence - 1
-            peer.become_client()
-            self._client = peer
-            _logger.info("client %s has the tissue", peer.name)
-            return True
-        return False
-
-    def _challenge(self, peer: Peer, frame: Frame, key: bytes) -> None:
-        """Send the server's nonce, and require authentication tags from now on."""
-        if len(frame.payload) != NONCE_BYTES:
-            return self._refuse(
-                peer, "this server asks for a key: give the same one with --key FILE"
-            )
-        nonce = new_nonce()
-        peer.sequence = frame.sequence
-        self._send(peer, MessageKind.CHALLENGE, nonce)
-        keys = direction_keys(key, frame.payload, nonce)
-        peer.channel.authenticate(outgoing=keys.to_client, incoming=keys.to_server)
-
-    def _answer(self, peer: Peer, frame: Frame) -> None:
-        try:
-            peer.check_sequence(frame.sequence)
-            reply = self._reply(frame)
-            if len(reply) > LARGEST_REPLY:
-                raise MessageError(f"the reply has {len(reply)} bytes, over {LARGEST_REPLY}")
-        except MessageError as error:
-            _logger.warning("refused a request of %s: %s", peer.name, error)
-            self._send(peer, MessageKind.ERROR, pack_error(str(error)), frame.sequence)
-        except (
-            Exception
-        ) as error:  # a failure of the tissue is reported and does not end the server
-            _logger.exception("the tissue of %s failed", peer.name)
-            text = f"{type(error).__name__}: {error}"
-            self._send(peer, MessageKind.ERROR, pack_error(text), frame.sequence)
-        else:
-            self._send(peer, MessageKind(frame.kind), reply, frame.sequence)
 
     def _reply(self, frame: Frame) -> bytes:
         """Return the payload of the reply to a request.
@@ -336,34 +190,6 @@ class TissueServer:
         except ValueError as error:
             raise MessageError(str(error)) from error
         return b""
-
-    def _send(
-        self, peer: Peer, kind: MessageKind, payload: bytes, sequence: int | None = None
-    ) -> None:
-        if sequence is None:
-            sequence = peer.sequence
-        try:
-            peer.send(peer.channel.pack(kind, sequence, payload))
-        except OSError as error:
-            self._drop(peer, f"its reply cannot be sent: {error}")
-
-    def _refuse(self, peer: Peer, reason: str) -> None:
-        """Send the reason, if that is possible without waiting, and drop the peer."""
-        sequence, text = (peer.sequence + 1) % (1 << 32), pack_error(reason)
-        if peer is self._client:
-            frame = b"".join(peer.channel.pack(MessageKind.ERROR, sequence, text))
-        else:  # without a tag: a peer with no key, or another one, could not verify it
-            frame = pack_frame(MessageKind.ERROR, sequence, text)
-        self._drop(peer, reason, frame)
-
-    def _drop(self, peer: Peer, reason: str, final_frame: bytes = b"") -> None:
-        _logger.info("dropped %s: %s", peer.name, reason)
-        self._peers.remove(peer)
-        self._selector.unregister(peer.socket)
-        peer.close(final_frame)
-        if peer is self._client:
-            self._client = None
-            self._link = self._new_link()
 
 
 @contextlib.contextmanager

@@ -58,6 +58,9 @@ class MessageKind(enum.IntEnum):
     COLLIDE = 13
     TIE = 14
     VALUES = 15
+    SERVO = 16
+    MEASURED = 17
+    END = 18
 
 
 class Frame(NamedTuple):

@@ -5,7 +5,7 @@ import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
 
@@ -15,15 +15,18 @@ from scalpel_sim.cli.console import log_to_stderr, print_report, say, say_error
 from scalpel_sim.cli.new_command import new
 from scalpel_sim.cli.options import (
     CONNECTION,
+    DEVICE,
     OUTPUT,
     ArmOptions,
     ClientOptions,
+    DeviceOptions,
     Flag,
     OutputOptions,
     PrintOptions,
     SceneName,
     TissueOptions,
 )
+from scalpel_sim.cli.spacemouse_command import spacemouse
 from scalpel_sim.cli.view_command import view
 from scalpel_sim.cli.warm_up_command import warm_up
 from scalpel_sim.errors import (
@@ -58,6 +61,8 @@ def _run(
     tissue: TissueOptions = TissueOptions(),
     arm: ArmOptions = ArmOptions(),
     client: ClientOptions = ClientOptions(),
+    hand: Annotated[Literal["script", "device"], Parameter(group=DEVICE)] = "script",
+    device: DeviceOptions = DeviceOptions(),
     output: OutputOptions = OutputOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
@@ -70,19 +75,36 @@ def _run(
     scalpel-sim run slab --stroke curved --toughness 10
     scalpel-sim run organ --material liver --blade-thickness 0.001 --out out/liver
     scalpel-sim run --mesh organ.msh --scale 0.001 --fix bottom --material mine.toml
+    scalpel-sim run --hand device --listen 127.0.0.1:8767
     ```
+
+    Args:
+        hand: Who leads the blade: script, the strokes of the scene; or device, a program that
+            connects, at real-time speed. The motion is then advanced by --relaxation verlet, unless
+            you choose another or the tissue stiffens.
     """
     with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
+        from scalpel_sim.cli.device_run import check_device_options, device_run, perform_device
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.cli.scripted_run import perform_script
 
         options = RunOptions(tissue, arm, client, output, printing)
-        with prepared_run(scene, options, audits=True) as prepared:
-            summary = perform_script(prepared, options, plotter)
+        is_led = hand == "device"
+        check_device_options(device, is_led=is_led)
+        relaxation = "verlet" if is_led else None
+        with prepared_run(
+            scene, options, audits=not is_led, relaxation=relaxation, is_led=is_led
+        ) as prepared:
+            if is_led:
+                with device_run(prepared, device) as led:
+                    summary = perform_device(prepared, options, plotter, led)
+            else:
+                summary = perform_script(prepared, options, plotter)
             print_report(summary, prepared.folder, output.export, printing)
 
 
 app.command(view)
+app.command(spacemouse)
 
 
 @app.command(name="serve")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scalpel_sim.cli.options import PrintOptions
+from scalpel_sim.stop_signals import StopSignals
 
 if TYPE_CHECKING:  # an error of use should be printed without waiting for a compiler
     from scalpel_sim.output.summary import Summary
@@ -17,6 +18,8 @@ if TYPE_CHECKING:  # an error of use should be printed without waiting for a com
 
 SECONDS_PER_PROGRESS = 0.1
 """Interval at which the progress bar is drawn [s]."""
+SECONDS_PER_CHECK = 0.2
+"""How often a finished `view` checks whether its page is still wanted [s]."""
 SECONDS_PER_LINE = 5.0
 """Interval at which progress is printed where standard error is no terminal [s]."""
 
@@ -141,3 +144,11 @@ def print_report(
         print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
         if exports:
             print(f"exported: {', '.join(map(str, exports))}")
+
+
+def stay_while(condition: Callable[[], bool], message: str) -> None:
+    """Print a message, and return when the condition fails, or on Ctrl-C."""
+    with StopSignals() as stop:
+        say(message)  # from now on Ctrl-C ends it without a traceback
+        while condition() and stop.reason is None:
+            time.sleep(SECONDS_PER_CHECK)

@@ -2,16 +2,15 @@
 
 import time
 
+from scalpel_sim.cli.hand_run import perform_by_hand
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
-from scalpel_sim.hands.commands import End, Engage
+from scalpel_sim.hands.commands import Begin, End, Engage
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.hands.workspace import workspace_in
 from scalpel_sim.output.plot_process import Plotter
-from scalpel_sim.output.run_folder import Outputs
 from scalpel_sim.output.summary import Summary
-from scalpel_sim.run import REST_AFTER_STROKE, perform
 from scalpel_sim.scene_parts.scene import LONGEST_RUN
 from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.viewer.viewer import Viewer
@@ -39,8 +38,10 @@ def perform_led(
     plotter: Plotter,
     viewer: Viewer,
     controls: RunControls,
-) -> Summary:
+) -> Summary | None:
     """Do the run from when somebody takes hold of the blade until they end it.
+
+    Where they ask for another run before, there is none.
 
     Args:
         prepared: The run.
@@ -53,25 +54,18 @@ def perform_led(
         Interrupted: the user or the system ended the run.
         RunError: the viewer has ended, and nobody can lead; or the run failed.
     """
-    simulation = prepared.simulation
     _wait_for_hand(viewer, controls)
-    controls.pace.go_on()
-    return perform(
-        simulation,
-        Outputs(prepared.folder, plotter, simulation.recording.columns, options.output.export),
-        scene=prepared.scene if options.client.connect is None else None,
-        views=prepared.scene.views,
-        settings=prepared.settings | {"stroke": simulation.stroke.name},
-        seconds=LONGEST_RUN + REST_AFTER_STROKE,
-        every_frame=lambda now: controls.pace.wait(now.dt),
-        controls=controls,
-    )
+    if any(isinstance(command, Begin) for command in list(controls.commands)):
+        return None
+    return perform_by_hand(prepared, options, plotter, controls)
 
 
 def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
     """Wait until a page engages the hand, or ends the run before it has begun."""
     with StopSignals() as stop:
-        while not any(isinstance(command, Engage | End) for command in list(controls.commands)):
+        while not any(
+            isinstance(command, Engage | End | Begin) for command in list(controls.commands)
+        ):
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:

@@ -35,7 +35,8 @@ _SOLVER = Group("Solver", sort_key=4)
 _ARM = Group("Arm", sort_key=5)
 CONNECTION = Group("Connection", sort_key=6)
 _PAGE = Group("Page", sort_key=7)
-OUTPUT = Group("Output", sort_key=8)
+DEVICE = Group("Device", sort_key=8)
+OUTPUT = Group("Output", sort_key=9)
 
 
 @Parameter(name="*", group=_BODY)
@@ -204,13 +205,32 @@ class ClientOptions:
 class PageOptions:
     """The page of a live run."""
 
-    hand: Literal["script", "live"] = "script"
-    """Who leads the blade: script, the strokes of the scene; or live, you in the page, until you
-    end it there or --seconds have passed. What you did is written as stroke.csv."""
+    hand: Literal["script", "live", "device"] = "script"
+    """Who leads the blade: script, the strokes of the scene; live, you in the page, until you
+    end it there or --seconds have passed; or device, a program that connects. What you did is
+    written as stroke.csv."""
     wireframe: Flag = False
     "Show the edges of the mesh."
     port: int | None = None
     "Port of the page, on this machine only [default: any free port]."
+
+
+@Parameter(name="*", group=DEVICE)
+@dataclass(frozen=True)
+class DeviceOptions:
+    """A device that leads the blade, with `--hand device`."""
+
+    listen: str | None = None
+    """HOST:PORT at which the run waits for the device: any host with a key, else one of this
+    machine alone; port 0 for any free one [default: 127.0.0.1:8767]."""
+    listen_key: Path | None = None
+    """Let only devices lead that have the key in this file [default: the key in SCALPEL_SIM_KEY,
+    if that is set]."""
+    watchdog: float | None = None
+    "The blade rests when no pose has come for so long, in wall time [s; default: 0.04]."
+    client_stops: Literal["hold", "end"] | None = None
+    """What a device that falls silent, or disconnects, does to the run: hold [default], the blade
+    rests until a device comes again; or end, the run ends."""
 
 
 @Parameter(name="*", group=OUTPUT)

@@ -1,1 +1,1 @@
-"""A person's hand, which leads the blade in place of a planned stroke."""
+"""Hands that somebody leads, in place of a planned stroke: by the page, or by a device."""

@@ -26,6 +26,11 @@ second that it is there, but where drawing takes all of the machine, its thread 
 Until then the blade goes no farther than it was asked to, and a page that is closed lets go at
 once."""
 
+HIGHEST_TOUGHNESS, THICKEST_BLADE = 1e4, 2e-3
+"""Highest fracture toughness [J/m2] and thickest blade [m] that a page may ask for: beyond those of
+skin and of any scalpel."""
+
+_Name = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{0,64}$")]
 _ThreeNumbers = Annotated[list[float], msgspec.Meta(min_length=3, max_length=3)]
 _Stamp = Annotated[float, msgspec.Meta(ge=0.0, le=LATEST_STAMP)]
 
@@ -99,13 +104,28 @@ class Reset(_Message, frozen=True, tag="reset"):
     """The run goes back to its start."""
 
 
-HandCommand = Engage | Release | Move | Turn | StillThere | End
+class Begin(_Message, frozen=True, tag="begin"):
+    """The run is to end, and another to begin. What is None is as in the scene."""
+
+    scene: _Name = ""
+    """The scene; empty: that of the command line."""
+    material: _Name | None = None
+    """Material by name."""
+    toughness: Annotated[float, msgspec.Meta(ge=0.0, le=HIGHEST_TOUGHNESS)] | None = None
+    """Fracture toughness [J/m2]."""
+    blade_thickness: Annotated[float, msgspec.Meta(ge=0.0, le=THICKEST_BLADE)] | None = None
+    """Thickness of the blade [m]."""
+    is_led: bool = False
+    """Whether the page leads the blade in it."""
+
+
+LeadingCommand = Engage | Release | Move | Turn | StillThere | End
 """What the hand obeys in its next frame."""
 
 RunCommand = Pause | Resume | Step | SlowMotion | Undo | Reset
 """What is done between two frames."""
 
-Command = HandCommand | RunCommand | Lead
+Command = LeadingCommand | RunCommand | Begin | Lead
 
 _decoder: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 

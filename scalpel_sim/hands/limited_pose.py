@@ -48,11 +48,14 @@ class LimitedPose:
         self.wanted, self.wanted_rotation = middle.copy(), rotation.copy()
         """Where it is wanted."""
         self._workspace, self._dt = workspace, dt
+        self._is_limited = False
 
     def move(self, by: FloatArray) -> None:
         """Move the wanted pose by a displacement [m], as far as it may be ahead."""
-        ahead = np.clip(self.wanted + by, *self._workspace) - self.middle
+        asked = self.wanted + by
+        ahead = np.clip(asked, *self._workspace) - self.middle
         self.wanted[:] = self.middle + _shortened(ahead, FARTHEST_AHEAD)
+        self._is_limited |= math.dist(asked.tolist(), self.wanted.tolist()) > ARRIVED
 
     def turn(self, by: FloatArray) -> None:
         """Turn the wanted pose by a rotation vector [rad], as far as it may be ahead."""
@@ -61,6 +64,7 @@ class LimitedPose:
         mujoco.mju_mulQuat(turned, turn, self.wanted_rotation)
         ahead = np.empty(3)
         mujoco.mju_subQuat(ahead, turned, self.rotation)
+        self._is_limited |= math.hypot(*ahead.tolist()) > MOST_AHEAD_TURN
         self.wanted_rotation[:] = self.rotation
         mujoco.mju_quatIntegrate(self.wanted_rotation, _shortened(ahead, MOST_AHEAD_TURN), 1.0)
 
@@ -76,12 +80,20 @@ class LimitedPose:
         distance, angle = math.hypot(*way.tolist()), math.hypot(*turn.tolist())
         share = 1.0 - math.exp(-self._dt / FOLLOWING_TIME)
         if distance > ARRIVED:
-            self.middle += way * min(share, MOST_SPEED * self._dt / distance)
+            most = MOST_SPEED * self._dt / distance
+            self._is_limited |= most < share
+            self.middle += way * min(share, most)
         if angle > ARRIVED_TURN:
-            rate = min(share, MOST_TURN_RATE * self._dt / angle)
-            mujoco.mju_quatIntegrate(self.rotation, turn, rate)
+            most = MOST_TURN_RATE * self._dt / angle
+            self._is_limited |= most < share
+            mujoco.mju_quatIntegrate(self.rotation, turn, min(share, most))
             mujoco.mju_normalize4(self.rotation)
         return distance > ARRIVED or angle > ARRIVED_TURN
+
+    def was_limited(self) -> bool:
+        """Return whether a limit has held it back since the last call."""
+        was_limited, self._is_limited = self._is_limited, False
+        return was_limited
 
 
 def _shortened(vector: FloatArray, longest: float) -> FloatArray:

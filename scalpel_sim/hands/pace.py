@@ -20,18 +20,22 @@ class Pace:
     Args:
         clock: Wall time [s].
         sleep: Waits for so many seconds.
+        shortest_pause: Shortest pause that slows the run [s]; 0: it waits after each frame, as a
+            device needs it.
     """
 
     def __init__(
         self,
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
+        shortest_pause: float = SHORTEST_PAUSE,
     ) -> None:
         self.rate = 1.0
         """Simulated time over wall time, at most."""
         self.factor = 1.0
         """Simulated time over wall time, lately."""
         self._clock, self._sleep = clock, sleep
+        self._shortest_pause = shortest_pause
         self._due = self._since = clock()
         self._simulated = 0.0
 
@@ -40,7 +44,7 @@ class Pace:
         self._due += dt / self.rate
         self._simulated += dt
         now = self._clock()
-        if self._due - now > SHORTEST_PAUSE:
+        if self._due - now > self._shortest_pause:
             self._sleep(self._due - now)
             now = self._clock()
         self._due = max(self._due, now - MOST_BEHIND)

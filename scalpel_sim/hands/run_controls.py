@@ -5,10 +5,11 @@ from collections import deque
 from collections.abc import Callable
 
 from scalpel_sim.hands.commands import (
+    Begin,
     Command,
     End,
     Engage,
-    HandCommand,
+    LeadingCommand,
     Pause,
     Reset,
     Resume,
@@ -17,13 +18,13 @@ from scalpel_sim.hands.commands import (
     Undo,
 )
 from scalpel_sim.hands.history import History
-from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.pace import Pace
 
 FRAMES_PER_STEP = 10
 """Frames of a step: a hundredth of a second, in which a blade that cuts goes half a millimetre."""
 
-SECONDS_PER_LOOK = 0.01
+SECONDS_ASLEEP = 0.01
 """How often a run that stands still looks for commands [s]."""
 
 
@@ -34,6 +35,7 @@ class RunControls:
         pace: How fast time passes.
         history: Where the run can go back to.
         hand: Obeys the commands that lead the blade; None: a script leads it.
+        commands: What the page asks; any thread may append. None: there is no page.
         sleep: Waits for so many seconds.
     """
 
@@ -41,15 +43,22 @@ class RunControls:
         self,
         pace: Pace,
         history: History,
-        hand: LiveHand | None = None,
+        hand: LedHand | None = None,
+        commands: deque[Command] | None = None,
         *,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.commands: deque[Command] = deque()
-        """What the page asks; any thread may append."""
+        self.commands: deque[Command] = deque() if commands is None else commands
+        """What the page asks."""
         self.pace, self.history, self.hand = pace, history, hand
         self.is_paused = False
         """Whether time stands still."""
+        self.has_ended = False
+        """Whether the page has ended the run."""
+        self.next: Begin | None = None
+        """The run that the page has asked for after this one."""
+        self.notice = ""
+        """What the page is to tell the person."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
         self.on_wait: Callable[[], None] = lambda: None
@@ -72,18 +81,15 @@ class RunControls:
             self._is_stepping = False
             self.on_change()  # pictures skip most frames
         self.on_wait()
-        self._sleep(SECONDS_PER_LOOK)
+        self._sleep(SECONDS_ASLEEP)
         self.pace.go_on()
         return True
 
     def _do(self, command: Command) -> None:
-        if isinstance(command, HandCommand):
+        if isinstance(command, LeadingCommand):
             if isinstance(command, Engage):
                 self._begin_stroke()
-            if isinstance(command, End):
-                self.is_paused = False
-            if self.hand is not None:
-                self.hand.commands.append(command)
+            self._pass_on(command)
         elif isinstance(command, Pause | Resume):
             self._let_go()
             self.is_paused, self._frames_left = isinstance(command, Pause), 0
@@ -95,6 +101,16 @@ class RunControls:
             self.on_change()
         elif isinstance(command, Undo | Reset):
             self._go_back(isinstance(command, Reset))
+        elif isinstance(command, Begin):
+            self.next = command
+            self._pass_on(End())
+
+    def _pass_on(self, command: LeadingCommand) -> None:
+        """Have the hand obey."""
+        if isinstance(command, End):
+            self.is_paused, self.has_ended = False, True
+        if self.hand is not None:
+            self.hand.commands.append(command)
 
     def _begin_stroke(self) -> None:
         """Keep the present, to which an undo goes back; a stroke that led nowhere is none."""
@@ -112,6 +128,7 @@ class RunControls:
                 self.history.drop()  # nothing was led since
         if self.history.reset() if to_start else self.history.undo():
             self._frames_left, self._is_stepping = 0, False
+        self._let_go()  # it may have led at the moment to which it went back
         self._pose_before_stroke = None
         self.on_change()
 

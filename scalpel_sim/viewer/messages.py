@@ -1,11 +1,13 @@
 """Messages between a run and the process of its live viewer."""
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
 
 from bridge import TissueFrame
+from scalpel_sim.hands.commands import Command
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import LiveState, Readings
@@ -19,8 +21,38 @@ NO_VALUES: Mapping[SurfaceQuantity, FloatArray] = {}
 """No quantities."""
 
 
+class Choices(NamedTuple):
+    """What a page may ask for in the next run, and what this one has."""
+
+    first: str
+    """Name of the scene of the command line."""
+    scenes: list[str]
+    """Scenes; empty: that of the command line."""
+    scene: str
+    materials: list[str]
+    material: str
+    """Empty: as in the scene."""
+    toughness: float
+    """Fracture toughness [J/m2]."""
+    blade_thickness: float
+    """Thickness of the blade [m]."""
+    is_led: bool
+    """Whether the page leads the blade."""
+
+
+class PageControls(NamedTuple):
+    """What a page may do with the run that it shows."""
+
+    commands: deque[Command]
+    """Receives its commands."""
+    is_led: bool = False
+    """Whether it leads the blade."""
+    choices: Choices | None = None
+    """What it may ask for in the next run; None: there is none."""
+
+
 class ViewerSettings(NamedTuple):
-    """The first message to the viewer's process: what stays the same during the run."""
+    """The first message to the viewer's process, and of each run that follows in the same page."""
 
     title: str
     """Heading of the page."""
@@ -31,13 +63,15 @@ class ViewerSettings(NamedTuple):
     wireframe: bool
     """Whether the edges of the tissue's triangles are drawn at the start."""
     port: int | None
-    """Port of the page; None for the first free port."""
+    """Port of the page; None for the first free port. That of the first run stays."""
     views: Sequence[ViewTable] = ()
     """Cameras that the page offers."""
     has_controls: bool = False
     """Whether the page controls the run."""
     is_led: bool = False
     """Whether it leads the blade, too."""
+    choices: Choices | None = None
+    """What it may ask for in the next run; None: there is none."""
 
 
 class SceneState(NamedTuple):

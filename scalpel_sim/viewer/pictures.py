@@ -98,7 +98,13 @@ def live_state(controls: RunControls) -> LiveState:
     hand, pace, history = controls.hand, controls.pace, controls.history
     return LiveState(
         RunState(
-            controls.is_paused, pace.rate, pace.factor, history.can_go_back, history.n_strokes
+            controls.is_paused,
+            pace.rate,
+            pace.factor,
+            history.can_go_back,
+            history.n_strokes,
+            controls.has_ended,
+            controls.notice,
         ),
         None
         if hand is None

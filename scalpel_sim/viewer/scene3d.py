@@ -104,6 +104,10 @@ class RunState(NamedTuple):
     """Whether it can go back to its start."""
     n_strokes: int
     """How many strokes can be undone."""
+    has_ended: bool = False
+    """Whether the page has ended it."""
+    notice: str = ""
+    """What the person is told."""
 
 
 class LiveState(NamedTuple):
@@ -261,6 +265,8 @@ class Scene3D:
             real_time=run.real_time,
             can_go_back=run.can_go_back,
             strokes=run.n_strokes,
+            ended=run.has_ended,
+            notice=run.notice,
         )
 
     def take(self) -> bytes:

@@ -49,6 +49,9 @@ LAST_PORT = 7099
 DRAWN = "drawn"
 """Message of a page that has drawn a packet."""
 
+RELOAD = '{"reload":true}'
+"""Message to a page that is to be loaded anew."""
+
 LAST_STATE_TIMEOUT = 1.0
 """Time for the pages to draw the last state before the process ends [s]."""
 
@@ -65,10 +68,15 @@ N_BYTES_OF_TOKEN = 32
 
 
 class NewestState:
-    """The newest scene state that came through the pipe. Older states are dropped."""
+    """The newest scene state that came through the pipe. Older states are dropped.
 
-    def __init__(self) -> None:
-        self.state: SceneState | None = None
+    Args:
+        settings: Those of the first run.
+    """
+
+    def __init__(self, settings: ViewerSettings) -> None:
+        self.shown: tuple[ViewerSettings, SceneState | None] = (settings, None)
+        """The run that is shown, and its state."""
         self.has_ended = threading.Event()
         self.on_change: Callable[[], object] = lambda: None
         """Called by the thread that reads, after each state and at the end."""
@@ -77,7 +85,9 @@ class NewestState:
         """Read scene states from the pipe until it ends."""
         try:
             while True:
-                self.state = pickle.load(pipe)
+                message = pickle.load(pipe)
+                begins = isinstance(message, ViewerSettings)
+                self.shown = (message, None) if begins else (self.shown[0], message)
                 self.on_change()
         except (EOFError, pickle.UnpicklingError):  # closed, or cut off inside a pickle
             self.has_ended.set()
@@ -97,6 +107,12 @@ class OpenPages:
         self._newest: bytes | None = None
         self._shown: SceneState | None = None
         self._pages: set[PageSocket] = set()
+
+    def begin(self, packets: ScenePackets) -> None:
+        """Have all pages load anew, to show another run."""
+        self._packets, self._opening, self._newest = packets, None, None
+        for page in list(self._pages):
+            page.say(RELOAD)
 
     def show(self, state: SceneState | None) -> None:
         """Send a scene state to every page that is ready for it, if the state is a new one."""
@@ -191,40 +207,88 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._open_pages.remove(self)
 
 
+class Site:
+    """The document of the page, and who may control the run that it shows.
+
+    Args:
+        settings: Those of the first run.
+
+    Raises:
+        RunError: meshcat's viewer was not found.
+    """
+
+    def __init__(self, settings: ViewerSettings) -> None:
+        self._token: str | None = None
+        self.leading: Leadership | None = None
+        """Which page controls the run; None: none does."""
+        if settings.has_controls:
+            self._token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
+            self.leading = Leadership(self._token, _print_line)
+        self.begin(settings)
+
+    def begin(self, settings: ViewerSettings) -> None:
+        """Serve the page of a run."""
+        how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
+        self.document = live_page(
+            settings.title,
+            _CAPTION + how,
+            self._token,
+            is_led=settings.is_led,
+            choices=settings.choices,
+        )
+
+
 class PageRequest(tornado.web.RequestHandler):
     """A browser's request for the page."""
 
-    def initialize(self, document: str) -> None:
-        """Set the document to serve; called by tornado."""
-        self._document = document
+    def initialize(self, site: Site) -> None:
+        """Set what has the document to serve; called by tornado."""
+        self._site = site
 
     def get(self) -> None:
         """Send the page."""
         self.set_header("Cache-Control", "no-store")
         # Another page must not show this one in a frame, and have its visitor click there.
         self.set_header("Content-Security-Policy", "frame-ancestors 'none'")
-        self.write(self._document)
+        self.write(self._site.document)
 
 
-async def serve(settings: ViewerSettings, newest: NewestState) -> None:
+async def serve(newest: NewestState) -> None:
     """Serve scene states until the input has ended. Prints the `StartReply` first."""
-    packets = ScenePackets(
-        settings.shapes, settings.frame, wireframe=settings.wireframe, views=settings.views
-    )
-    open_pages = OpenPages(packets)
+    settings, _ = newest.shown
+    open_pages = OpenPages(_packets_of(settings))
     has_changed, loop = asyncio.Event(), asyncio.get_running_loop()
     newest.on_change = lambda: loop.call_soon_threadsafe(has_changed.set)
     has_changed.set()  # what came before it was set
-    reply = _start(settings, open_pages)
+    try:
+        site = Site(settings)
+    except RunError as error:
+        _print_line(StartReply(error=str(error)))
+        return
+    reply = _start(site, open_pages, settings.port)
     _print_line(reply)
     if reply.error:
         return
-    while not newest.has_ended.is_set():
+    while True:
+        has_ended = newest.has_ended.is_set()
+        begun, state = newest.shown
+        if begun is not settings:
+            settings = begun
+            site.begin(settings)
+            open_pages.begin(_packets_of(settings))
+        open_pages.show(state)
+        if has_ended:
+            break
         await has_changed.wait()
         has_changed.clear()
-        open_pages.show(newest.state)
-    open_pages.show(newest.state)
     await open_pages.wait_until_drawn()
+
+
+def _packets_of(settings: ViewerSettings) -> ScenePackets:
+    """Return what makes the packets of a run."""
+    return ScenePackets(
+        settings.shapes, settings.frame, wireframe=settings.wireframe, views=settings.views
+    )
 
 
 def _print_line(message: StartReply | Command | Wanted) -> None:
@@ -232,34 +296,25 @@ def _print_line(message: StartReply | Command | Wanted) -> None:
     print(msgspec.json.encode(message).decode(), flush=True)
 
 
-def _start(settings: ViewerSettings, open_pages: OpenPages) -> StartReply:
+def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
     """Start to serve the page, and return its address, or why it cannot be served."""
-    leading, token = None, None
-    if settings.has_controls:
-        token = secrets.token_urlsafe(N_BYTES_OF_TOKEN)
-        leading = Leadership(token, _print_line)
-    try:
-        how = _HOW_TO_LEAD if settings.is_led else _HOW_TO_LOOK
-        document = live_page(settings.title, _CAPTION + how, token, is_led=settings.is_led)
-    except RunError as error:
-        return StartReply(error=str(error))
     application = tornado.web.Application()
     application.add_handlers(
         OWN_NAMES,
         [
-            (r"/", PageRequest, {"document": document}),
+            (r"/", PageRequest, {"site": site}),
             (
                 r"/frames",
                 PageSocket,
                 {
                     "open_pages": open_pages,
                     "colouring": Colouring(_print_line),
-                    "leading": leading,
+                    "leading": site.leading,
                 },
             ),
         ],
     )
-    return _listen(application, settings.port)
+    return _listen(application, port)
 
 
 def _listen(application: tornado.web.Application, port: int | None) -> StartReply:
@@ -281,7 +336,6 @@ def _listen(application: tornado.web.Application, port: int | None) -> StartRepl
 def serve_page() -> None:
     """Run the process that `viewer.Viewer` starts."""
     logging.getLogger("tornado.access").setLevel(logging.ERROR)
-    settings = pickle.load(sys.stdin.buffer)
-    newest = NewestState()
+    newest = NewestState(pickle.load(sys.stdin.buffer))
     threading.Thread(target=newest.read, args=(sys.stdin.buffer,), daemon=True).start()
-    asyncio.run(serve(settings, newest))
+    asyncio.run(serve(newest))

@@ -7,10 +7,9 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, NamedTuple, cast
+from typing import IO, TYPE_CHECKING, cast
 
 import msgspec
 import mujoco
@@ -18,18 +17,18 @@ import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.hands.commands import Command, Release, command_of
+from scalpel_sim.hands.commands import Release, command_of
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.colouring import wanted_of
 from scalpel_sim.viewer.messages import (
     NO_VALUES,
     UPDATES_PER_SECOND,
+    PageControls,
     SceneState,
     StartReply,
     ViewerSettings,
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
-from scalpel_sim.viewer.newest_message import NewestMessage
 from scalpel_sim.viewer.scene3d import LiveState, Readings
 from tissue import FloatArray, Surface, SurfaceQuantity
 
@@ -52,15 +51,6 @@ NO_BODIES = np.zeros((0, 7))
 
 _PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
 """Program of the viewer's process."""
-
-
-class PageControls(NamedTuple):
-    """What a page controls of a run."""
-
-    commands: deque[Command]
-    """Receives its commands."""
-    is_led: bool = False
-    """Whether it leads the blade, too."""
 
 
 class Viewer:
@@ -96,7 +86,7 @@ class Viewer:
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
-            controls: What the page controls; None: it shows, and controls nothing.
+            controls: What the page may do with the run; None: it shows, and controls nothing.
             visualizer: A scene of meshcat, or a part of one, into which tissue, shapes and force
                 are drawn too. It stays its owner's: what else is in it is left alone.
 
@@ -113,7 +103,7 @@ class Viewer:
             meshcat_scene.expect_visualizer(visualizer)
         self._process = _start_process()  # it starts while the shapes are made here
         shapes = [] if model is None else list(shapes_of(model))
-        settings = ViewerSettings(
+        self._settings: ViewerSettings | None = ViewerSettings(
             title,
             shapes,
             frame or TissueFrame(),
@@ -122,10 +112,11 @@ class Viewer:
             views,
             has_controls=controls is not None,
             is_led=controls is not None and controls.is_led,
+            choices=None if controls is None else controls.choices,
         )
         self._pipe = cast(IO[bytes], self._process.stdin)
-        self._messages: NewestMessage[ViewerSettings | SceneState] = NewestMessage()
-        self._messages.put(settings)
+        self._changed = threading.Condition()
+        self._waiting: SceneState | None = None
         self._is_closed = False
         self._listener: threading.Thread | None = None
         self.wanted: frozenset[SurfaceQuantity] = frozenset()
@@ -135,14 +126,11 @@ class Viewer:
         self._sender.start()
         self.url = self._start_reply().url
         self._listener = threading.Thread(
-            target=self._listen,
-            args=(controls,),
-            name="commands",
-            daemon=True,
+            target=self._listen, args=(controls,), name="commands", daemon=True
         )
         self._listener.start()
         if visualizer is not None:
-            self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, settings.frame)
+            self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, frame or TissueFrame())
 
     def __enter__(self) -> "Viewer":
         return self
@@ -187,8 +175,10 @@ class Viewer:
             values: The quantities `wanted`, at the vertices of the surface, SI.
         """
         self._last_shown = time.monotonic()
-        state = self._shown = SceneState(surface, body_poses, readings, live, values)
-        self._messages.put(state)
+        with self._changed:
+            state = self._waiting = SceneState(surface, body_poses, readings, live, values)
+            self._changed.notify()
+        self._shown = state
         if self._scene is not None:
             self._scene.show(state)
 
@@ -197,12 +187,47 @@ class Viewer:
         """Whether a page wants to show a quantity that the last state did not have."""
         return self._shown is not None and not self.wanted <= self._shown.values.keys()
 
+    def begin(
+        self,
+        model: mujoco.MjModel,
+        *,
+        title: str,
+        frame: TissueFrame,
+        controls: PageControls,
+        views: Sequence[ViewTable] = (),
+    ) -> None:
+        """Show another run in the same page.
+
+        Args:
+            model: MuJoCo model whose shapes are shown.
+            title: Heading of the page.
+            frame: Pose of the tissue frame in the world.
+            controls: What the page may do with the run; its commands go where they went.
+            views: Cameras that the page offers; it begins with the first.
+        """
+        shapes = list(shapes_of(model))
+        with self._changed:
+            self._settings = ViewerSettings(
+                title,
+                shapes,
+                frame,
+                wireframe=False,
+                port=None,
+                views=views,
+                has_controls=True,
+                is_led=controls.is_led,
+                choices=controls.choices,
+            )
+            self._waiting = None
+            self._changed.notify()
+
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
-        self._is_closed = True
         if self._scene is not None:
             self._scene.close()
-        self._messages.close()
+        with self._changed:
+            self._is_closed = True
+            self._changed.notify()
         self._sender.join(CLOSE_TIMEOUT)
         if self._sender.is_alive():  # the process has stopped reading
             self._process.kill()
@@ -218,7 +243,18 @@ class Viewer:
     def _send_states(self) -> None:
         """Send the states that wait, until the viewer is closed or its process has ended."""
         try:
-            while (message := self._messages.take()) is not None:
+            while True:
+                with self._changed:
+                    self._changed.wait_for(
+                        lambda: self._settings or self._waiting or self._is_closed
+                    )
+                    message: ViewerSettings | SceneState | None
+                    if self._settings is not None:
+                        message, self._settings = self._settings, None
+                    else:
+                        message, self._waiting = self._waiting, None
+                if message is None:
+                    break
                 self._pipe.write(pickle.dumps(message, protocol=5))
                 self._pipe.flush()
         except OSError:  # the process has ended

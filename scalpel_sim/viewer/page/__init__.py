@@ -2,10 +2,14 @@
 
 import html
 import importlib.util
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
+import msgspec
+
 from scalpel_sim.errors import RunError
+from scalpel_sim.viewer.messages import Choices
 
 _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
@@ -23,7 +27,14 @@ _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
 
-def live_page(title: str, caption: str, token: str | None = None, *, is_led: bool = False) -> str:
+def live_page(
+    title: str,
+    caption: str,
+    token: str | None = None,
+    *,
+    is_led: bool = False,
+    choices: Choices | None = None,
+) -> str:
     """Return a page that follows a run over a web socket.
 
     Args:
@@ -31,21 +42,30 @@ def live_page(title: str, caption: str, token: str | None = None, *, is_led: boo
         caption: Text below the heading.
         token: What the page shows the server so as to control the run; None: it controls nothing.
         is_led: Whether the page leads the blade, too.
+        choices: What the page may ask for in the next run.
 
     Raises:
         RunError: meshcat's viewer was not found.
     """
+    scripts = list(_OF_ALL_PAGES)
     if token is None:
-        return _page(title, caption, ("live.js",))
-    hand = ("hand_input.js", "gamepad.js", "hand.js") if is_led else ()
-    parts = ("hand", "run") if is_led else ("run",)
+        return _page(title, caption, [*scripts, "live.js"])
+    bars, panels = ["run"], []
+    scripts.append("run.js")
+    if is_led:
+        bars.insert(0, "hand")
+        scripts += ["hand_input.js", "gamepad.js", "hand.js"]
+    if choices is not None:
+        panels.append("choices")
+        scripts.append("choices.js")
     return _page(
         title,
         caption,
-        ("run.js", *hand, "live.js"),
-        controls="".join((_HERE / f"{part}.html").read_text("utf-8") for part in parts),
-        data=f'<script>const TOKEN = "{token}";</script>',
-        style="".join((_HERE / f"{part}.css").read_text("utf-8") for part in parts),
+        [*scripts, "live.js"],
+        controls="".join(_part(f"{bar}.html") for bar in bars),
+        data=f'<script>const TOKEN = "{token}", CHOICES = {_as_script(choices)};</script>',
+        style="".join(_part(f"{each}.css") for each in (*bars, *panels)),
+        panels="".join(_part(f"{panel}.html") for panel in panels),
     )
 
 
@@ -60,39 +80,51 @@ def replay_page(title: str, caption: str, packets: str) -> str:
     Raises:
         RunError: meshcat's viewer was not found.
     """
-    controls = (_HERE / "player.html").read_text("utf-8")
-    return _page(title, caption, ("replay.js",), controls, packets)
+    controls = _part("player.html")
+    return _page(title, caption, (*_OF_ALL_PAGES, "replay.js"), controls, packets)
 
 
 def _page(
     title: str,
     caption: str,
-    scripts: tuple[str, ...],
+    scripts: Sequence[str],
     controls: str = "",
     data: str = "",
     style: str = "",
+    panels: str = "",
 ) -> str:
     """Return one self-contained HTML document.
 
     Args:
         title: Heading of the page.
         caption: Text below the heading.
-        scripts: Files of its own scripts, in order.
+        scripts: Files of its scripts, in order.
         controls: Elements of its bar.
         data: Script elements that come before these.
         style: Rules beside those of all pages.
+        panels: Elements beside the picture.
     """
-    return Template((_HERE / "page.html").read_text("utf-8")).substitute(
+    return Template(_part("page.html")).substitute(
         title=html.escape(title),
         caption=html.escape(caption),
-        style=(_HERE / "page.css").read_text("utf-8") + style,
+        style=_part("page.css") + style,
         controls=controls,
+        panels=panels,
         meshcat=_meshcat_bundle().read_text("utf-8"),
         data=data,
-        scripts="\n".join(
-            (_HERE / script).read_text("utf-8") for script in (*_OF_ALL_PAGES, *scripts)
-        ),
+        scripts="\n".join(_part(script) for script in scripts),
     )
+
+
+def _part(name: str) -> str:
+    """Return a part of the pages."""
+    return (_HERE / name).read_text("utf-8")
+
+
+def _as_script(choices: Choices | None) -> str:
+    """Return choices as a value in a script, in which no tag can end the script."""
+    value = None if choices is None else choices._asdict()
+    return msgspec.json.encode(value).decode().replace("<", "\\u003c")
 
 
 def _meshcat_bundle() -> Path:

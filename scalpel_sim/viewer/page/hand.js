@@ -29,7 +29,6 @@ class Hand {
         window.addEventListener("blur", () => this.letGoOfAll());
         document.addEventListener("visibilitychange", () => document.hidden && this.letGoOfAll());
         element("clutch").addEventListener("click", () => this.toggleClutch());
-        element("end").addEventListener("click", () => run.say({ type: "end" }));
         document.querySelector("footer").before(element("hint"));
         const pane = element("meshcat-pane");
         pane.tabIndex = 0;
@@ -171,7 +170,7 @@ class Hand {
         // With Ctrl the controls exchange the two.
         controls.mouseButtons.LEFT = this.isClosed ? THREE.MOUSE.PAN : THREE.MOUSE.ROTATE;
         element("clutch").setAttribute("aria-pressed", String(!this.isClutchOpen));
-        for (const id of ["clutch", "end"]) element(id).disabled = !this.run.leads || this.hasEnded;
+        element("clutch").disabled = !this.run.leads || this.hasEnded;
         element("hint").textContent = this.hint();
         element("hint").hidden = element("hint").textContent === "";
     }

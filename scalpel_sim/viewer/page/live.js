@@ -27,6 +27,11 @@ onQuantity = (quantity) => {
     openSocket.send(JSON.stringify({ type: "colour", quantity: quantity || null }));
 };
 
+if (typeof NextRun !== "undefined") {
+    run.next = new NextRun(run, CHOICES);
+    run.showControls();
+}
+
 function follow() {
     const socket = new WebSocket(`ws://${location.host}/frames${run ? run.query : ""}`);
     socket.binaryType = "arraybuffer";
@@ -38,7 +43,9 @@ function follow() {
     };
     socket.onmessage = (message) => {
         if (typeof message.data === "string") {
-            run.onLeading(JSON.parse(message.data));
+            const said = JSON.parse(message.data);
+            if (said.reload) location.reload();
+            else run.onLeading(said);
             return;
         }
         viewer.handle_command_bytearray(new Uint8Array(message.data));

@@ -4,6 +4,10 @@
 
 const SLOWER = 0.95; // factor of real time, of what was asked for, below which the page says so
 
+const NO_STATE = {
+    paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0, ended: false, notice: "",
+};
+
 class Run {
     constructor(view) {
         this.query = `?token=${encodeURIComponent(TOKEN)}`;
@@ -11,6 +15,7 @@ class Run {
         this.leads = false;
         this.state = null; // in the last picture: see RunState
         this.sentAt = 0; // when something was said last [ms]
+        this.next = null; // what the next run is to be
         this.onChange = () => {};
         view.onRun = (state) => this.show(state);
         element("pause").addEventListener("click", () => this.togglePause());
@@ -18,6 +23,8 @@ class Run {
         element("rate").addEventListener("change", (event) => this.setRate(Number(event.target.value)));
         element("undo").addEventListener("click", () => this.undo());
         element("reset").addEventListener("click", () => this.ask({ type: "reset" }));
+        element("end").addEventListener("click", () => this.ask({ type: "end" }));
+        document.querySelector("footer").before(element("notice"));
         element("take-over").addEventListener("click", () => this.say({ type: "lead" }));
         window.addEventListener("keydown", (event) => this.onKey(event));
         this.showControls();
@@ -93,15 +100,18 @@ class Run {
     }
 
     showControls() {
-        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes } = this.state ||
-            { paused: false, rate: 1, real_time: 1, can_go_back: false, strokes: 0 };
-        for (const id of ["pause", "step", "rate"]) element(id).disabled = !this.leads;
+        const { paused, rate, real_time: realTime, can_go_back: canGoBack, strokes, ended, notice } =
+            this.state || NO_STATE;
+        for (const id of ["pause", "step", "rate", "end"]) element(id).disabled = !this.leads || ended;
         element("pause").textContent = paused ? "go on" : "pause";
         element("rate").value = String(rate);
-        element("undo").disabled = !this.leads || strokes === 0;
-        element("reset").disabled = !this.leads || !canGoBack;
+        element("undo").disabled = !this.leads || ended || strokes === 0;
+        element("reset").disabled = !this.leads || ended || !canGoBack;
         element("take-over").hidden = this.leads || this.socket === null;
-        element("pace").textContent = paused ? "paused" : paceOf(realTime, rate);
+        element("pace").textContent = ended ? "ended" : paused ? "paused" : paceOf(realTime, rate);
+        element("notice").textContent = notice;
+        element("notice").hidden = notice === "";
+        if (this.next) this.next.showControls();
     }
 }
 

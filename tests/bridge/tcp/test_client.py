@@ -16,7 +16,8 @@ from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
 from bridge.tcp.peer import HANDSHAKE_BYTES
-from bridge.tcp.server import MAX_CONNECTIONS, TissueServer
+from bridge.tcp.server import TissueServer
+from bridge.tcp.single_client import MAX_CONNECTIONS
 from bridge.tcp.wire import PROTOCOL_VERSION, MessageKind, pack_frame
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import (
@@ -373,7 +374,7 @@ def test_after_an_interrupted_request_replies_still_match_their_requests(link, m
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(link, "_answer_to", interrupt)
+        patch.setattr(link._connection, "_answer_to", interrupt)
         with pytest.raises(KeyboardInterrupt):
             link.snapshot()
     assert link.n_pieces() == 1

@@ -8,20 +8,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridge.device.messages import pack_state
 from bridge.tcp.address import parse_address
 from bridge.tcp.authentication import Authenticator, direction_keys
 from bridge.tcp.messages.geoms import MAX_GEOMS
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.text import MAX_VIEWS
 from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
-from bridge.tcp.server import MAX_CONNECTIONS
+from bridge.tcp.single_client import MAX_CONNECTIONS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
+from tests.bridge.device.served_blade import STATE
 from tests.bridge.tcp.serve_block import block_tissue
 from tissue import Energies, RigidContacts
 from tissue.contact.geoms.geom_contact import MOST_INCREMENTS
 
 DOCS = Path(__file__).parents[3] / "docs"
 WIRE = (DOCS / "wire.md").read_text(encoding="utf-8")
+STEP, DEVICE = WIRE.split("## A device that leads")
 CLIENT = DOCS / "examples" / "client.py"
 
 
@@ -51,6 +54,21 @@ def test_the_client_prints_why_the_server_refuses_it(start_server):
     server = start_server(key=bytes(32))
     done = run_client(parse_address(server.address)[1])
     assert done.returncode == 1 and "this server asks for a key" in done.stderr
+
+
+def test_the_numbers_of_a_state_are_where_the_table_says():
+    payload = pack_state(STATE._replace(n_missed=8, n_dropped=9))
+    rows = re.findall(r"^\| (\d+) \| (f64|i64|u32) x (\d)", DEVICE, re.MULTILINE)
+    types = {"f64": "<f8", "i64": "<i8", "u32": "<u4"}
+    found = [np.frombuffer(payload, types[t], int(n), int(at)).tolist() for at, t, n in rows]
+    assert found == [
+        [STATE.time, STATE.real_time_factor],
+        [*STATE.measured_cp.position, *STATE.measured_cp.orientation],
+        [*STATE.measured_cf.force, *STATE.measured_cf.torque],
+        [STATE.n_limited, 8, 9],
+        [1, 0],
+    ]
+    assert len(payload) == int(rows[-1][0]) + 8
 
 
 def test_every_kind_of_message_is_in_the_table():
@@ -87,7 +105,7 @@ def test_the_numbers_of_a_result_are_where_the_table_says():
         return np.frombuffer(payload, "<f8", count, offset)
 
     rows = re.findall(
-        r"^\| (\d+)(?: \+ (\d+)n)? \| f64 x (\d+)(n?) \| ([\w ]+)", WIRE, re.MULTILINE
+        r"^\| (\d+)(?: \+ (\d+)n)? \| f64 x (\d+)(n?) \| ([\w ]+)", STEP, re.MULTILINE
     )
     found = {
         name.strip(): at(int(offset) + int(each or 0) * n, int(count) * (n if per_contact else 1))

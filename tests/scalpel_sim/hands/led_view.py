@@ -51,10 +51,15 @@ class LedView(LiveView):
         super().__init__(scene, folder, "--hand", "live", *options)
 
 
+def document(url):
+    """Return the document of a page."""
+    with urllib.request.urlopen(url) as answer:
+        return answer.read().decode()
+
+
 def token_in(url):
     """Return the token in the document of a page that leads."""
-    with urllib.request.urlopen(url) as answer:
-        return re.search(r'const TOKEN = "([\w-]{40,})"', answer.read().decode()).group(1)
+    return re.search(r'const TOKEN = "([\w-]{40,})"', document(url)).group(1)
 
 
 async def page_of(url, origin, token):

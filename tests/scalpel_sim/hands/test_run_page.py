@@ -82,3 +82,29 @@ def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
         tab.wait_for_function("run.state.strokes === 0")
         assert tab.is_disabled("#undo")
         assert tab.failures == []
+
+
+@pytest.mark.browser
+def test_the_panel_begins_a_run_with_what_was_chosen_and_a_hand_takes_over(scripted):
+    tab = scripted
+    tab.click("summary")
+    assert tab.inner_text("#toughness-value") == "20 J/m²"
+    tab.fill("#toughness", "37")
+    tab.fill("#thickness", "0.3")
+    assert tab.inner_text("#toughness-value") == "30 J/m²"
+    tab.check("#by-hand")
+    tab.click("#begin")
+    tab.wait_for_function("typeof hand !== 'undefined' && hand !== null && hand.isClosed")
+    assert tab.inner_text("h1") == "grid2: led by hand"
+    tab.click("summary")
+    assert tab.inner_text("#toughness-value") == "30 J/m²"
+    assert tab.inner_text("#thickness-value") == "0.3 mm"
+    assert tab.inner_text("#swap") == "watch the script"
+
+
+@pytest.mark.browser
+def test_what_cannot_begin_says_why(scripted):
+    tab = scripted
+    tab.evaluate("""run.say({ type: "begin", scene: "nowhere" })""")
+    tab.wait_for_function("""element("notice").textContent.includes("nowhere")""")
+    assert tab.is_visible("#notice")

@@ -10,7 +10,7 @@ from tornado.httpclient import HTTPClientError
 from scalpel_sim import Viewer
 from scalpel_sim.hands.commands import LONGEST_SILENCE, Engage, Move, Release
 from scalpel_sim.viewer.leading import MESSAGES_PER_SECOND, MOST_AT_ONCE, Leadership
-from scalpel_sim.viewer.viewer import PageControls
+from scalpel_sim.viewer.messages import PageControls
 from tests.scalpel_sim.hands.led_runs import Clock
 from tests.scalpel_sim.hands.led_view import page_of, token_in
 from tests.scalpel_sim.little_arm import FRAME, little_arm
@@ -145,7 +145,9 @@ def test_only_a_page_of_this_server_with_its_token_may_lead(leading, origin, tok
 @pytest.fixture
 def led_viewer():
     commands = deque()
-    with Viewer(little_arm()[0], frame=FRAME, controls=PageControls(commands)) as viewer:
+    with Viewer(
+        little_arm()[0], frame=FRAME, controls=PageControls(commands, is_led=True)
+    ) as viewer:
         viewer.commands = commands
         yield viewer
 

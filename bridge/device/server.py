@@ -1,0 +1,134 @@
+"""The run's end of the link to a device that leads its blade."""
+
+import logging
+import time
+from typing import Protocol
+
+from bridge.device.messages import (
+    ServoRequest,
+    pack_device_description,
+    pack_state,
+    unpack_servo,
+)
+from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
+from bridge.tcp.address import DEFAULT_HOST
+from bridge.tcp.peer import Peer
+from bridge.tcp.single_client import SingleClientServer
+from bridge.tcp.wire import Frame, MessageError, MessageKind
+
+_logger = logging.getLogger(__name__)
+
+DEFAULT_DEVICE_PORT = 8767
+"""Port at which a run waits for a device: the one after that of a tissue."""
+
+
+class LedByDevice(Protocol):
+    """What a device leads."""
+
+    def servo_cp(self, pose: CartesianPose, *, holds: bool) -> None:
+        """Lead the blade as the device has moved to a pose; without `holds` it rests.
+
+        Raises:
+            ValueError: the device cannot have moved so.
+        """
+
+    def let_go(self) -> None:
+        """Let the blade rest where it is."""
+
+    def lose_client(self) -> None:
+        """Do what is due when the device has gone: the blade rests where it is, at least."""
+
+    def end(self) -> None:
+        """End the stroke."""
+
+    def state(self) -> DeviceState:
+        """Return how the blade is."""
+
+
+class DeviceServer(SingleClientServer):
+    """Lets one device at a time lead a blade; it is served between two frames.
+
+    What is refused, a device that leaves, and a stream that cannot be read let go of the blade.
+
+    Args:
+        led: What the device leads.
+        description: What a device should know of it.
+        host: Host to listen on; without a key only loopback.
+        port: Port to listen on; 0 for a free one.
+        key: Key that a device must have too; None to serve any device on this machine.
+
+    Raises:
+        ValueError: the host is not on loopback and there is no key, or the port is out of range.
+        LinkError: the port is in use or not allowed.
+    """
+
+    # A device that does not read its replies must not make a frame wait.
+    _send_seconds = 0.0
+    # Nor must one that sends too much: these are some forty poses, which take 3 ms.
+    _read_bytes = 4096
+
+    def __init__(
+        self,
+        led: LedByDevice,
+        description: DeviceDescription,
+        *,
+        host: str = DEFAULT_HOST,
+        port: int = DEFAULT_DEVICE_PORT,
+        key: bytes | None = None,
+    ) -> None:
+        super().__init__("the blade", host, port, key)
+        self._led, self._description = led, description
+        self._stamp: float | None = None
+        self._is_refusing = False
+        self._n_missed = self._n_dropped = 0
+
+    def serve_for(self, seconds: float) -> None:
+        """Answer what has come and what comes within so long [s]; 0: only what has come."""
+        until = time.monotonic() + seconds
+        self._serve_once(max(seconds, 0.0))
+        while (left := until - time.monotonic()) > 0.0:
+            self._serve_once(left)
+
+    def state(self) -> DeviceState:
+        """Return how the blade is, with what was counted of the devices so far."""
+        return self._led.state()._replace(n_missed=self._n_missed, n_dropped=self._n_dropped)
+
+    def _forget_client(self) -> None:
+        self._stamp, self._is_refusing = None, False
+        self._led.lose_client()
+
+    def _note_refusal(self, peer: Peer, error: MessageError) -> None:
+        """Let go of the blade; log the first of refusals in a row, of which there may be many."""
+        self._n_dropped += 1
+        self._led.let_go()
+        if not self._is_refusing:
+            super()._note_refusal(peer, error)
+        self._is_refusing = True
+
+    def _reply(self, frame: Frame) -> bytes:
+        if frame.kind == MessageKind.SERVO:
+            self._servo(unpack_servo(frame.payload))
+        elif frame.payload:
+            raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
+        elif frame.kind == MessageKind.HELLO:
+            return pack_device_description(self._description)
+        elif frame.kind == MessageKind.END:
+            self._led.end()
+        elif frame.kind != MessageKind.MEASURED:
+            raise MessageError(f"there is no request of kind {frame.kind} where a device leads")
+        return pack_state(self.state())
+
+    def _servo(self, request: ServoRequest) -> None:
+        """Lead the blade, and count the periods since the last pose in which none was sent.
+
+        Raises:
+            MessageError: the device cannot have moved so.
+        """
+        if self._stamp is not None:
+            self._n_missed += max(round((request.stamp - self._stamp) / request.period) - 1, 0)
+        self._stamp = request.stamp
+        try:
+            self._led.servo_cp(request.servo_cp, holds=request.holds)
+        except ValueError as error:
+            raise MessageError(str(error)) from error
+        self._is_refusing = False

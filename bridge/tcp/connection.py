@@ -1,0 +1,197 @@
+"""A client's connection: requests, their replies, and the handshake with a key."""
+
+import contextlib
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
+
+from bridge.link import LinkError
+from bridge.tcp.address import is_loopback, parse_address
+from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
+from bridge.tcp.channel import LARGEST_PART, Channel
+from bridge.tcp.messages.text import LARGEST_ERROR, unpack_error
+from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
+
+_Value = TypeVar("_Value")
+
+CONNECT_SECONDS = 5.0
+"""Longest wait for a connection [s]. On loopback it is there at once or not at all."""
+ANSWER_SECONDS = 60.0
+"""Longest wait for an answer [s]. A step takes a millisecond, but the first steps of a newly
+installed server compile."""
+
+
+class Served(NamedTuple):
+    """What is on the other side, as messages to a person name it."""
+
+    name: str
+    """Such as "the tissue"."""
+    missing: str
+    """Such as "no tissue is served"."""
+    remedy: str
+    """What to do where it is missing."""
+
+
+class Connection:
+    """A connection to a server, for one request at a time. Not to be shared between threads.
+
+    When the server refuses a request, the connection stays open; when it fails, it is closed.
+
+    Args:
+        address: Address of the server, "HOST:PORT".
+        served: What is there.
+        timeout: Longest wait for an answer [s].
+        key: Key that both sides share; None for a server on this machine without a key.
+
+    Raises:
+        ValueError: the address is malformed, or of another machine and there is no key.
+        LinkError: there is no server at the address, or it has another version of the protocol.
+    """
+
+    def __init__(self, address: str, served: Served, timeout: float, key: bytes | None) -> None:
+        self._address, self._timeout = address, timeout
+        self._where = f"{served.name} at {address}"
+        self._sequence = 0
+        self._channel = Channel()
+        self._socket: socket.socket | None = _connect(
+            address, served, timeout, has_key=key is not None
+        )
+        try:
+            if key is not None:
+                self._authenticate(key)
+        except LinkError:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Close the connection."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def ask(
+        self,
+        kind: MessageKind,
+        payload: bytes,
+        limit: int,
+        unpack: Callable[[bytes], _Value],
+        reply_kind: MessageKind | None = None,
+    ) -> _Value:
+        """Send a request and return the content of its reply.
+
+        Args:
+            kind: Kind of the request.
+            payload: Content of the request.
+            limit: Largest content of the reply [byte].
+            unpack: Function from the content of the reply to the value to return.
+            reply_kind: Kind of the reply; None for that of the request.
+
+        Raises:
+            LinkError: the server refuses the request, or did not answer.
+        """
+        if self._socket is None:
+            raise LinkError(f"the link to {self._where} is closed")
+        if len(payload) > LARGEST_PART:
+            raise LinkError(
+                f"a request of {len(payload):,} bytes for {self._where}; at most "
+                f"{LARGEST_PART:,} are allowed. Hold fewer points, or give meshes of fewer vertices"
+            )
+        sequence = self._sequence
+        self._sequence = (sequence + 1) % (1 << 32)
+        try:
+            for message in self._channel.pack(kind, sequence, payload):
+                self._socket.sendall(message)
+            answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket)
+            if answer.kind == MessageKind.ERROR:
+                error = unpack_error(answer.payload)
+            elif answer.kind != (reply_kind or kind):
+                raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
+            else:
+                return unpack(answer.payload)
+        except TimeoutError as cause:
+            self.close()
+            raise LinkError(f"{self._where} did not answer within {self._timeout:g} s") from cause
+        except (OSError, MessageError) as cause:
+            self.close()
+            raise LinkError(f"the link to {self._where} broke: {cause}") from cause
+        raise LinkError(f"{self._where} refused: {error}")
+
+    def _authenticate(self, key: bytes) -> None:
+        """Exchange nonces with the server, and authenticate all messages that follow.
+
+        The server is authenticated too: without the key, the tag of its next reply would be wrong.
+        """
+        mine = new_nonce()
+        theirs = self.ask(
+            MessageKind.HELLO, mine, NONCE_BYTES, _checked_nonce, reply_kind=MessageKind.CHALLENGE
+        )
+        keys = direction_keys(key, mine, theirs)
+        self._channel.authenticate(keys.to_server, keys.to_client, plain_error_may_come=True)
+
+    def _answer_to(self, sequence: int, limit: int, connection: socket.socket) -> Frame:
+        """Return the reply to the request with this number; drop replies to earlier requests."""
+        deadline = time.monotonic() + self._timeout
+        limit = min(limit, LARGEST_REPLY)
+        parts: list[bytes] = []
+        n_bytes = 0
+        while True:
+            frame = self._channel.take()
+            if frame is None:
+                if time.monotonic() > deadline:  # for a slow trickle: a read has its own limit
+                    raise TimeoutError
+                data = connection.recv(READ_BYTES)
+                if not data:
+                    raise ConnectionResetError("the other side has closed it")
+                self._channel.feed(data)
+            elif frame.sequence == sequence:  # others answer a request that Ctrl-C interrupted
+                n_bytes += len(frame.payload)
+                if n_bytes > limit:
+                    raise MessageError(f"a reply of {n_bytes} bytes; at most {limit} are allowed")
+                if not (frame.kind & MORE or parts):
+                    return frame
+                parts.append(frame.payload)
+                if not frame.kind & MORE:
+                    return frame._replace(payload=b"".join(parts))
+
+
+def _checked_nonce(payload: bytes) -> bytes:
+    if len(payload) != NONCE_BYTES:
+        raise MessageError(f"a challenge of {len(payload)} bytes; wanted {NONCE_BYTES}")
+    return payload
+
+
+def _connect(address: str, served: Served, timeout: float, *, has_key: bool) -> socket.socket:
+    """Return a connection that sends small messages at once.
+
+    Raises:
+        ValueError: the address is malformed, or of another machine and there is no key.
+        LinkError: no server can be reached there.
+    """
+    host, port = parse_address(address)
+    seconds = min(timeout, CONNECT_SECONDS)
+    try:
+        found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        if not has_key and not all(is_loopback(where) for *_, where in found):
+            raise ValueError(
+                f"{address} is another machine, and that takes a key: give the key of its server "
+                "with --key FILE, or connect through an SSH tunnel"
+            )
+        connection = _first_that_answers([where for *_, where in found], seconds)
+    except TimeoutError as cause:
+        raise LinkError(f"no server answers at {address} within {seconds:g} s") from cause
+    except ConnectionRefusedError as cause:
+        raise LinkError(f"{served.missing} at {address}; {served.remedy}") from cause
+    except OSError as cause:
+        raise LinkError(f"{address} cannot be reached: {cause.strerror or cause}") from cause
+    connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    connection.settimeout(timeout)
+    return connection
+
+
+def _first_that_answers(addresses: list[Any], seconds: float) -> socket.socket:
+    """Return a connection to one of the addresses of a host; raise the error of the last one."""
+    for where in addresses[:-1]:
+        with contextlib.suppress(OSError):
+            return socket.create_connection(where[:2], seconds)
+    return socket.create_connection(addresses[-1][:2], seconds)

@@ -1,0 +1,39 @@
+"""Leads a blade of `scalpel-sim run --hand device`; no package needed: python device.py [PORT]."""
+
+import socket
+import struct
+import sys
+import time
+import zlib
+
+HELLO, ERROR, SERVO, MEASURED, END = 1, 6, 16, 17, 18
+PERIOD, SPEED, SECONDS = 1e-3, 0.02, 3.0  # s, m/s, s
+connection = socket.create_connection(("127.0.0.1", int([*sys.argv, "8767"][1])))
+connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+
+def ask(sequence, kind, payload=b""):
+    """Return the payload of the reply to a request."""
+    head = struct.pack("<4sHHIII", b"SCUT", 7, kind, sequence, len(payload), zlib.crc32(payload))
+    connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
+    head = connection.recv(24, socket.MSG_WAITALL)
+    _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)
+    reply = connection.recv(length, socket.MSG_WAITALL)
+    if answer == ERROR or zlib.crc32(reply) != checksum:
+        sys.exit(reply.decode(errors="replace"))
+    return struct.unpack("<15d3q2I", reply) if kind != HELLO else reply.decode()
+
+
+print(ask(0, HELLO))
+x, y, z, *turned = ask(1, MEASURED)[2:9]  # measured_cp
+start = time.monotonic()
+for k in range(round(SECONDS / PERIOD)):
+    now = time.monotonic() - start
+    wanted = (x, y + SPEED * min(now, SECONDS), z, *turned)  # servo_cp: read your device here
+    state = ask(2 + k, SERVO, struct.pack("<9dI", now, PERIOD, *wanted, 1))
+    force = state[9:12]  # measured_cf: exert it here
+    if k % 300 == 0:
+        print(f"{state[0]:.3f} s: tip at y {1e3 * state[3]:+.1f} mm, {force[1]:+.3f} N along y")
+    time.sleep(max(0.0, start + (k + 1) * PERIOD - time.monotonic()))
+limited, missed, dropped = ask(2 + k + 1, END)[15:18]
+print(f"frames limited {limited}, periods missed {missed}, messages dropped {dropped}")

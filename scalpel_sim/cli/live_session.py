@@ -1,0 +1,248 @@
+"""Runs that are shown live in one page, one after the other, as the person there asks."""
+
+import logging
+import sys
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from types import TracebackType
+from typing import NamedTuple, Self
+
+from bridge import LinkError
+from scalpel_sim.cli.console import SECONDS_PER_CHECK, print_report, say
+from scalpel_sim.cli.led_run import live_hand, perform_led
+from scalpel_sim.cli.options import PageOptions, TissueOptions
+from scalpel_sim.cli.run_setup import PreparedRun, RunOptions, prepared_run
+from scalpel_sim.cli.scripted_run import perform_script
+from scalpel_sim.errors import RunError
+from scalpel_sim.hands.commands import Begin, Command
+from scalpel_sim.hands.history import History
+from scalpel_sim.hands.pace import Pace
+from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.summary import Summary
+from scalpel_sim.scenes import SCENES
+from scalpel_sim.stop_signals import StopSignals
+from scalpel_sim.viewer.messages import Choices, PageControls
+from scalpel_sim.viewer.pictures import into_viewer, live_state, show_in
+from scalpel_sim.viewer.viewer import Viewer
+from tissue import MATERIALS
+
+_log = logging.getLogger("scalpel_sim")
+
+
+class _LiveRun(NamedTuple):
+    """A run that the page shows."""
+
+    asked: Begin
+    prepared: PreparedRun
+    controls: RunControls
+    show: Callable[[], None]
+    """Shows it as it is now."""
+
+
+class LiveSession:
+    """The page, and the runs in it.
+
+    Args:
+        scene: The scene of the first run; None for the default one.
+        options: What the command line asks for.
+        page: What it asks for of the page.
+        plotter: Draws the plots of the first run. It is closed here.
+    """
+
+    def __init__(
+        self, scene: str | None, options: RunOptions, page: PageOptions, plotter: Plotter
+    ) -> None:
+        self._scene, self._options, self._page, self._plotter = scene, options, page, plotter
+        self._commands: deque[Command] = deque()
+        self._viewer: Viewer | None = None
+        self._open = ExitStack()
+        """The link of the run that is shown."""
+        self._first = ""
+        """Name of the scene of the first run."""
+        self._n_runs = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._viewer is not None:
+            self._viewer.close()
+        self._open.close()
+        self._plotter.close()
+
+    def perform(self) -> None:
+        """Do runs until Ctrl-C, or until the viewer has ended.
+
+        Raises:
+            UsageError: the first run makes no sense.
+            LinkError: its tissue is elsewhere, and cannot be reached.
+            Interrupted: the user or the system ended a run.
+            RunError: a run failed.
+        """
+        run: _LiveRun | None = self._begun(Begin(is_led=self._page.hand == "live"))
+        while run is not None:
+            summary = self._done(run)
+            run.show()
+            if summary is not None and self._viewer is not None:
+                output, printing = self._options.output, self._options.printing
+                print_report(summary, run.prepared.folder, output.export, printing)
+                say(f"{self._viewer.url} stays until Ctrl-C")
+            run = self._after(run)
+
+    def _begun(self, asked: Begin) -> _LiveRun:
+        """Prepare a run, and show it."""
+        with ExitStack() as stack:
+            options = self._options_of(asked)
+            prepared = stack.enter_context(
+                prepared_run(
+                    asked.scene or self._scene,
+                    options,
+                    relaxation="verlet",
+                    is_led=asked.is_led,
+                )
+            )
+            if self._n_runs:
+                self._plotter.close()  # it has drawn the plots of one run
+                self._plotter = Plotter()
+                folder = prepared.folder
+                prepared = prepared._replace(
+                    folder=folder.with_name(f"{folder.name}-{self._n_runs + 1}")
+                )
+            simulation = prepared.simulation
+            hand = live_hand(prepared) if asked.is_led else None
+            self._commands.clear()
+            controls = RunControls(Pace(), History(simulation), hand, self._commands)
+            viewer = self._shown(prepared, asked)
+
+            def show() -> None:
+                show_in(viewer, simulation, live_state(controls))
+
+            show()
+            controls.on_change = show
+            controls.on_wait = lambda: show() if viewer.lacks_values else None
+            simulation.pictures.append(into_viewer(viewer, lambda: live_state(controls)))
+            before, self._open = self._open, stack.pop_all()
+            before.close()
+        return _LiveRun(asked, prepared, controls, show)
+
+    def _options_of(self, asked: Begin) -> RunOptions:
+        """Return the options of a run: those of the command line, and what the page asks for."""
+        tissue = self._options.tissue
+        if asked.scene:  # what the command line says of the body is about another scene
+            tissue = TissueOptions(solver=tissue.solver)
+        material, blade = tissue.material, tissue.blade
+        if asked.material is not None:
+            material = replace(material, material=asked.material)
+        if asked.toughness is not None:
+            material = replace(material, toughness=asked.toughness)
+        if asked.blade_thickness is not None:
+            blade = replace(blade, blade_thickness=asked.blade_thickness)
+        return self._options._replace(tissue=replace(tissue, material=material, blade=blade))
+
+    def _shown(self, prepared: PreparedRun, asked: Begin) -> Viewer:
+        """Return the viewer, in which the run begins."""
+        simulation, scene = prepared.simulation, prepared.scene
+        choices = None
+        if self._options.client.connect is None:
+            self._first = self._first or scene.name
+            choices = Choices(
+                self._first,
+                ["", *(name for name in SCENES if name != self._first)],
+                asked.scene,
+                list(MATERIALS),
+                asked.material or "",
+                scene.material.toughness,
+                0.0 if scene.blade is None else scene.blade.thickness,
+                asked.is_led,
+            )
+        controls = PageControls(self._commands, asked.is_led, choices)
+        if self._viewer is None:
+            self._viewer = Viewer(
+                simulation.arm.model,
+                title=simulation.title,
+                frame=simulation.frame,
+                wireframe=self._page.wireframe,
+                port=self._page.port,
+                views=scene.views,
+                controls=controls,
+            )
+        else:
+            self._viewer.begin(
+                simulation.arm.model,
+                title=simulation.title,
+                frame=simulation.frame,
+                views=scene.views,
+                controls=controls,
+            )
+        return self._viewer
+
+    def _done(self, run: _LiveRun) -> Summary | None:
+        """Do a run; None where another was asked for before it began."""
+        assert self._viewer is not None
+        prepared, controls = run.prepared, run.controls
+        url, options = self._viewer.url, self._options
+        if run.asked.is_led:
+            if self._n_runs == 0:
+                say(f"open {url} and lead the blade there")
+            summary = perform_led(prepared, options, self._plotter, self._viewer, controls)
+        else:
+            if self._n_runs == 0:
+                _wait_for_start(url)
+            controls.pace.go_on()
+            summary = perform_script(
+                prepared,
+                options,
+                self._plotter,
+                lambda now: controls.pace.wait(now.dt),
+                controls,
+            )
+        self._n_runs += summary is not None
+        return summary
+
+    def _after(self, run: _LiveRun) -> _LiveRun | None:
+        """Wait until the page asks for another run, and begin it; None: it is not wanted."""
+        run.controls.has_ended = True
+        while (asked := self._asked_next(run)) is not None:
+            run.controls.notice = "preparing the next run"
+            run.show()
+            try:
+                return self._begun(asked)
+            except (ValueError, RunError, LinkError) as error:
+                run.controls.notice = f"the next run cannot begin: {error}"
+                _log.warning("%s", run.controls.notice)
+                run.show()
+        return None
+
+    def _asked_next(self, run: _LiveRun) -> Begin | None:
+        """Wait for what the page asks for next; None on Ctrl-C or where the viewer has ended."""
+        assert self._viewer is not None
+        with StopSignals() as stop:
+            while self._viewer.is_running and stop.reason is None:
+                asked, run.controls.next = run.controls.next, None
+                if asked is not None:
+                    return asked
+                while self._commands:
+                    command = self._commands.popleft()
+                    if isinstance(command, Begin):
+                        return command
+                run.controls.on_wait()
+                time.sleep(SECONDS_PER_CHECK)
+        return None
+
+
+def _wait_for_start(url: str) -> None:
+    """Print where the page is; at a terminal, wait until it has been opened."""
+    if sys.stdin is not None and sys.stdin.isatty():
+        say(f"open {url}, then press Enter to begin")
+        sys.stdin.readline()
+    else:
+        say(f"live at {url}")

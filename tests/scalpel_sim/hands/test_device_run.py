@@ -1,0 +1,156 @@
+"""`scalpel-sim run --hand device`, led by a fake device from another process."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from bridge import DeviceClient, LinkError, write_new_key
+from bridge.tcp.keys import read_key
+from scalpel_sim.cli.app import command_line
+from scalpel_sim.output.recording import COLUMNS, read_forces
+from scalpel_sim.output.run_folder import FINAL, FORCES, SCENE, STROKE, SUMMARY
+from tests.scalpel_sim.hands.device_runs import lead_forwards
+
+UNTIMED = COLUMNS.index("cd_s")
+"""Columns from here on are wall times."""
+
+
+class DeviceRunProcess:
+    """A run that waits for a device, in another process."""
+
+    def __init__(self, command, folder, *options):
+        self.folder = folder
+        arguments = [command, "grid2", "--hand", "device", "--listen", "127.0.0.1:0", *options]
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "scalpel_sim", *arguments, "--out", str(folder)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        )
+        self.address = self.line_with("waiting for a device at").split()[-1]
+
+    def line_with(self, text):
+        """Wait for a line of the log, and return it."""
+        lines = []
+        for line in self.process.stderr:
+            lines.append(line)
+            if text in line:
+                return line
+        raise AssertionError(f"it ended without saying '{text}', but {lines}")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.kill()
+        self.process.communicate()
+
+
+def assert_a_run_repeats(led, folder):
+    """Do what was recorded once more, and compare the bits."""
+    assert command_line(["run", str(led / SCENE), "-q", "--out", str(folder)]) == 0
+    assert (folder / FINAL).read_bytes() == (led / FINAL).read_bytes()
+    rows = [read_forces(each / FORCES).rows[:, :UNTIMED] for each in (led, folder)]
+    assert np.array_equal(*rows, equal_nan=True)
+
+
+def test_devices_lead_a_cut_in_turn_until_one_ends_it_and_a_run_repeats_it_to_the_bit(tmp_path):
+    with DeviceRunProcess("run", tmp_path / "led", "--tissue-every", "2") as run:
+        for _ in range(2):
+            with device_once_free(run.address) as client:
+                assert client.description.scene == "grid2"
+                wait_for_frames(client)
+                lead_forwards(client, 0.012)
+        with device_once_free(run.address) as client:
+            wait_for_frames(client)
+            lead_forwards(client, 1e-3)
+            client.end()
+        counts = re.findall(r"(\d+)", run.line_with("periods missed"))
+        assert len(counts) == 3 and counts[2] == "0"
+        assert run.process.wait(60) == 0
+    summary = json.loads((run.folder / SUMMARY).read_text())
+    assert summary["status"] == "complete" and summary["settings"]["tissue_every"] == 2
+    forces = read_forces(run.folder / FORCES)
+    assert np.ptp(forces.rows[:, COLUMNS.index("tip_y_m")]) > 0.02
+    assert summary["cut_area_m2"] > 0.0
+    engaged = np.genfromtxt(run.folder / STROKE, delimiter=",", names=True)["engaged"]
+    assert np.count_nonzero(np.diff(engaged) > 0.0) >= 2, "it was taken hold of anew"
+    assert_a_run_repeats(run.folder, tmp_path / "again")
+
+
+def wait_for_frames(client):
+    """Wait until frames have been done in which nobody held the blade, once the run has begun."""
+    begun = client.measured().time
+    while begun > 0.0 and client.measured().time < begun + 0.01:
+        pass
+
+
+def device_once_free(address):
+    """Return a client, as soon as the run has noticed that the last one has left."""
+    for _ in range(1000):
+        try:
+            return DeviceClient(address)
+        except LinkError as error:
+            assert "has the blade" in str(error)
+    raise AssertionError("the run never released its device")
+
+
+def test_a_run_ends_with_its_device_where_that_is_asked_for(tmp_path):
+    with DeviceRunProcess("run", tmp_path, "--client-stops", "end", "--watchdog", "0.1") as run:
+        with DeviceClient(run.address) as client:
+            assert client.description.watchdog == 0.1
+            lead_forwards(client, 4e-3)
+        assert run.process.wait(60) == 0
+    assert json.loads((tmp_path / SUMMARY).read_text())["status"] == "complete"
+
+
+def test_a_device_needs_the_key_of_the_run(tmp_path):
+    key = tmp_path / "device.key"
+    write_new_key(key)
+    with DeviceRunProcess("run", tmp_path / "led", "--listen-key", str(key)) as run:
+        with pytest.raises(LinkError, match="asks for a key"):
+            DeviceClient(run.address)
+        with DeviceClient(run.address, key=read_key(key)) as client:
+            lead_forwards(client, 1e-3)
+            client.end()
+        assert run.process.wait(60) == 0
+
+
+def test_the_page_shows_a_run_that_a_device_leads(tmp_path):
+    with DeviceRunProcess("view", tmp_path, "--seconds", "0.3") as run:
+        with DeviceClient(run.address) as client:
+            lead_forwards(client, 1.0)
+        run.line_with("stays until Ctrl-C")
+        run.process.send_signal(signal.SIGINT)
+        assert run.process.wait(60) == 0
+    assert json.loads((tmp_path / SUMMARY).read_text())["simulated_seconds"] < 1.0
+
+
+def test_an_interrupted_run_that_waits_for_a_device_ends(tmp_path):
+    with DeviceRunProcess("run", tmp_path) as run:
+        run.process.send_signal(signal.SIGINT)
+        run.line_with("before a device took hold of the blade")
+        assert run.process.wait(30) == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--listen", "127.0.0.1:0"], "--listen is for a device that leads; add --hand device"),
+        (["--hand", "device", "--watchdog", "0"], "--watchdog 0 is out of range"),
+        (["--hand", "device", "--watchdog", "nan"], "--watchdog nan is out of range"),
+        (["--hand", "device", "--listen", "here"], "'here' is not an address"),
+        (["--hand", "device", "--listen", "0.0.0.0:0"], "open to other machines"),
+    ],
+)
+def test_wrong_options_of_a_device_are_one_clear_error(options, message, tmp_path, capsys):
+    assert command_line(["run", "grid2", *options, "--out", str(tmp_path)]) == 2
+    assert message in capsys.readouterr().err
