@@ -21,6 +21,7 @@ from tissue import (
     Snapshot,
     StepResult,
     Surface,
+    SurfaceQuantity,
 )
 
 if TYPE_CHECKING:  # the side without the tissue starts without its compiler
@@ -149,6 +150,9 @@ class TissueLink(Protocol):
 
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""
@@ -287,6 +291,10 @@ class InProcessLink:
     def surface(self) -> Surface:
         """Return the boundary triangles, for a picture."""
         return self._tissue.surface()
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
+        return self._tissue.surface_values(quantity)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

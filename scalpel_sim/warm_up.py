@@ -203,6 +203,8 @@ def _cut(kernels: KernelSet, dt: float = _DT) -> None:
     tissue.step(None, dt)
     tissue.chunks()
     tissue.surface()
+    tissue.surface_values("strain")
+    tissue.surface_values("stress")
     tissue.snapshot()
     tissue.n_pieces()
     tissue.cut_report()

@@ -53,6 +53,8 @@ from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
 from .state.tissue_state import TissueState as TissueState
 from .tissue import Tissue as Tissue
+from .types import CUT_COLOUR as CUT_COLOUR
+from .types import SKIN_COLOUR as SKIN_COLOUR
 from .types import BodyContacts as BodyContacts
 from .types import Chunks as Chunks
 from .types import Energies as Energies
@@ -63,6 +65,7 @@ from .types import Snapshot as Snapshot
 from .types import StageTimes as StageTimes
 from .types import StepResult as StepResult
 from .types import Surface as Surface
+from .types import SurfaceQuantity as SurfaceQuantity
 from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
 
@@ -72,6 +75,7 @@ __all__ = [
     "BladeSweep",
     "BodyContacts",
     "BoolArray",
+    "CUT_COLOUR",
     "Chunks",
     "CutReport",
     "CutSettings",
@@ -97,6 +101,7 @@ __all__ = [
     "MeshMeasures",
     "Piece",
     "Preset",
+    "SKIN_COLOUR",
     "SameTypes",
     "RigidContacts",
     "SchemeStatistics",
@@ -109,6 +114,7 @@ __all__ = [
     "StateRules",
     "StepResult",
     "Surface",
+    "SurfaceQuantity",
     "TetrahedralMesh",
     "Tissue",
     "TissueError",

@@ -4,7 +4,7 @@ SI units. Every vector in this package is in the tissue frame. The suffixes `_t0
 the start and the end of a step.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from tissue.core.three_vectors import Wrench
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and only `Surface.to_trimesh` needs it
     from trimesh import Trimesh
+
+SurfaceQuantity = Literal["displacement", "strain", "stress"]
+"""What a picture can show of the deformation: see `Tissue.surface_values`."""
 
 SKIN_COLOUR = (156, 63, 50, 255)
 CUT_COLOUR = (212, 68, 60, 255)

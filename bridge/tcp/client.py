@@ -30,8 +30,19 @@ from bridge.tcp.messages.led_frames import (
 from bridge.tcp.messages.result import LARGEST_RESULT, unpack_result
 from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import LARGEST_DESCRIPTION, unpack_description
+from bridge.tcp.messages.values import pack_quantity, unpack_values, values_bytes
 from bridge.tcp.wire import MessageError, MessageKind
-from tissue import BladeSweep, Chunks, CutReport, Geom, Snapshot, StepResult, Surface
+from tissue import (
+    BladeSweep,
+    Chunks,
+    CutReport,
+    FloatArray,
+    Geom,
+    Snapshot,
+    StepResult,
+    Surface,
+    SurfaceQuantity,
+)
 
 _TISSUE = Served("the tissue", "no tissue is served", "start one there with: scalpel-sim serve")
 
@@ -152,6 +163,11 @@ class TcpLink:
         """Return the boundary triangles, for a picture."""
         limit = surface_bytes(self._n_tetrahedra)
         return self._connection.ask(MessageKind.SURFACE, b"", limit, unpack_surface)
+
+    def surface_values(self, quantity: SurfaceQuantity) -> FloatArray:
+        """Return a quantity at each vertex of `surface()`; see `Tissue.surface_values`."""
+        limit, request = values_bytes(self._n_nodes), pack_quantity(quantity)
+        return self._connection.ask(MessageKind.VALUES, request, limit, unpack_values)
 
     def n_pieces(self) -> int:
         """Return the number of connected pieces."""

@@ -28,6 +28,7 @@ from bridge.tcp.messages.led_frames import (
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
 from bridge.tcp.messages.text import MAX_VIEWS, pack_description
+from bridge.tcp.messages.values import pack_values, unpack_quantity
 from bridge.tcp.single_client import SingleClientServer
 from bridge.tcp.wire import Frame, MessageError, MessageKind
 
@@ -143,6 +144,8 @@ class TissueServer(SingleClientServer):
             number = unpack_number(frame.payload, len(self._link.loads()))
             self._link.release(number)
             return pack_loads([self._link.loads()[number]])
+        if frame.kind == MessageKind.VALUES:
+            return pack_values(self._link.surface_values(unpack_quantity(frame.payload)))
         if frame.payload:
             raise MessageError(f"a request of kind {frame.kind} carries {len(frame.payload)} bytes")
         if frame.kind == MessageKind.HELLO:

@@ -17,10 +17,10 @@ import zlib
 from typing import NamedTuple
 
 MAGIC = b"SCUT"
-PROTOCOL_VERSION = 7
+PROTOCOL_VERSION = 8
 """Version of the protocol. 3 added keys, long replies in parts, and the wrench at t1, stiffness,
 contacts and energies of a step; 6 added frames that are led; 7 added geoms
-that are led, and ties."""
+that are led, and ties; 8 added values at the surface."""
 
 LARGEST_FRAME = 1 << 20
 """Largest payload of a frame [byte], which must be held before it can be checked. A step request
@@ -57,6 +57,7 @@ class MessageKind(enum.IntEnum):
     FRAMES = 12
     COLLIDE = 13
     TIE = 14
+    VALUES = 15
     SERVO = 16
     MEASURED = 17
     END = 18

@@ -63,4 +63,5 @@ def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")
             if not viewer.is_running:
                 raise RunError("the viewer has ended before anybody took hold of the blade")
+            controls.on_wait()
             time.sleep(SECONDS_PER_LOOK)

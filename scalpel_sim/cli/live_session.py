@@ -128,6 +128,7 @@ class LiveSession:
 
             show()
             controls.on_change = show
+            controls.on_wait = lambda: show() if viewer.lacks_values else None
             simulation.pictures.append(into_viewer(viewer, lambda: live_state(controls)))
             before, self._open = self._open, stack.pop_all()
             before.close()
@@ -233,6 +234,7 @@ class LiveSession:
                     command = self._commands.popleft()
                     if isinstance(command, Begin):
                         return command
+                run.controls.on_wait()
                 time.sleep(SECONDS_PER_CHECK)
         return None
 

@@ -63,6 +63,8 @@ class RunControls:
         """What the page is to tell the person."""
         self.on_change: Callable[[], None] = lambda: None
         """Called after a change that no frame shows."""
+        self.on_wait: Callable[[], None] = lambda: None
+        """Called each time that a run which stands still looks for commands."""
         self._sleep = sleep
         self._frames_left, self._is_stepping = 0, False
         self._numbers_before_stroke: tuple[float, ...] | None = None
@@ -80,6 +82,7 @@ class RunControls:
         if self._is_stepping:
             self._is_stepping = False
             self.on_change()  # pictures skip most frames
+        self.on_wait()
         self._sleep(SECONDS_ASLEEP)
         self.pace.go_on()
         return True

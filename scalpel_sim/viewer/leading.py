@@ -24,6 +24,18 @@ MOST_AT_ONCE = 100.0
 """How many messages may come at once, after the page's thread has hung for a moment."""
 
 
+def is_own_page(host: str, origin: str | None) -> bool:
+    """Return whether a page came from this server, by what its browser says.
+
+    Args:
+        host: Name and port by which it asked for this server.
+        origin: Where its browser says that the page came from; None where it says nothing.
+    """
+    return origin is not None and hmac.compare_digest(
+        origin.lower().encode(), f"http://{host}".lower().encode()
+    )
+
+
 class LeadingPage(Protocol):
     """A page that may lead."""
 
@@ -65,9 +77,7 @@ class Leadership:
             origin: Where its browser says that the page came from; None where it says nothing.
             token: What it gave as the token.
         """
-        is_ours = origin is not None and hmac.compare_digest(
-            origin.lower().encode(), f"http://{host}".lower().encode()
-        )
+        is_ours = is_own_page(host, origin)
         return is_ours and hmac.compare_digest(token.encode(), self._token.encode())
 
     def add(self, page: LeadingPage) -> None:

@@ -1,7 +1,7 @@
 """Messages between a run and the process of its live viewer."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -11,10 +11,14 @@ from scalpel_sim.hands.commands import Command
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import LiveState, Readings
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 UPDATES_PER_SECOND = 25.0
 """Rate at which the pages are updated, per second of wall time."""
+
+
+NO_VALUES: Mapping[SurfaceQuantity, FloatArray] = {}
+"""No quantities."""
 
 
 class Choices(NamedTuple):
@@ -81,6 +85,8 @@ class SceneState(NamedTuple):
     """Numbers to show beside the picture."""
     live: LiveState | None = None
     """How the run is, if the page controls it."""
+    values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES
+    """Quantities at the vertices of the surface, for pages that show them as colours, SI."""
 
 
 class StartReply(msgspec.Struct):

@@ -1,6 +1,7 @@
 """Callbacks that hand a running simulation to the live viewer and to the replay."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from typing import get_args
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from scalpel_sim.viewer.model_shapes import body_poses
 from scalpel_sim.viewer.replay import ReplayWriter
 from scalpel_sim.viewer.scene3d import HandState, LiveState, Readings, RunState
 from scalpel_sim.viewer.viewer import Viewer
+from tissue import FloatArray, SurfaceQuantity
 
 
 def readings(simulation: Simulation) -> Readings:
@@ -53,6 +55,7 @@ def add_to(replay: ReplayWriter, simulation: Simulation) -> None:
         simulation.link.surface(),
         body_poses(simulation.arm.data),
         readings(simulation),
+        values_in(simulation, get_args(SurfaceQuantity)),
     )
 
 
@@ -76,8 +79,19 @@ def into_viewer(
 def show_in(viewer: Viewer, simulation: Simulation, live: LiveState | None = None) -> None:
     """Show the present state of a simulation in a live viewer, also before the first frame."""
     viewer.show(
-        simulation.link.surface(), body_poses(simulation.arm.data), readings(simulation), live
+        simulation.link.surface(),
+        body_poses(simulation.arm.data),
+        readings(simulation),
+        live,
+        values_in(simulation, sorted(viewer.wanted)),
     )
+
+
+def values_in(
+    simulation: Simulation, quantities: Iterable[SurfaceQuantity]
+) -> dict[SurfaceQuantity, FloatArray]:
+    """Return quantities at the vertices of the surface."""
+    return {each: simulation.link.surface_values(each) for each in quantities}
 
 
 def live_state(controls: RunControls) -> LiveState:

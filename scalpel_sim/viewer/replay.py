@@ -3,7 +3,7 @@
 import base64
 import gzip
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,12 +11,12 @@ import mujoco
 
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
-from scalpel_sim.viewer.messages import SceneState
+from scalpel_sim.viewer.messages import NO_VALUES, SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
 from scalpel_sim.viewer.scene3d import Readings
 from scalpel_sim.viewer.scene_packets import ScenePackets
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 FRAMES_PER_SECOND = 25.0
 """Frames kept per second of simulated time, as long as the file stays small enough."""
@@ -92,6 +92,7 @@ class ReplayWriter:
         surface: Surface,
         body_poses: FloatArray,
         readings: Readings | None = None,
+        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> None:
         """Add a frame, which is kept if enough time has passed, or if no other frame follows.
 
@@ -100,8 +101,9 @@ class ReplayWriter:
             surface: Surface of the body, tissue frame. Kept, not copied.
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
+            values: Quantities at the vertices of the surface, which the page offers as colours.
         """
-        frame = _Frame(time, SceneState(surface, body_poses, readings))
+        frame = _Frame(time, SceneState(surface, body_poses, readings, values=values))
         if not self.is_due(time):
             self._last = frame
             return

@@ -24,10 +24,11 @@ from scalpel_sim.tables.view import DEFAULT_FOV
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
 from tissue import Energies, FloatArray, IntArray
 
-_EXTENSION = {"int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
+_EXTENSION = {"uint8": 0x12, "int16": 0x13, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
 """MessagePack extension type of each kind of typed array. Source: msgpack-lite, the decoder inside
 meshcat's viewer."""
 _JAVASCRIPT_ARRAY = {
+    "uint8": "Uint8Array",
     "int16": "Int16Array",
     "uint16": "Uint16Array",
     "uint32": "Uint32Array",
@@ -168,6 +169,8 @@ class Scene3D:
             attributes["uv"] = _pack(mesh.uv, "float32")
         if mesh.tints is not None:
             attributes["color"] = _pack(mesh.tints * INT16_MAX, "int16", normalized=True)
+        for name, levels in mesh.levels.items():
+            attributes[name] = _pack(levels, "uint8", normalized=True)
         index_type = "uint16" if len(mesh.positions) <= np.iinfo(np.uint16).max else "uint32"
         geometry = {
             "uuid": f"{path} geometry",
@@ -240,6 +243,10 @@ class Scene3D:
             parts=[] if readings.parts is None else [math.hypot(*part) for part in readings.parts],
             energies=_energy_terms(readings.energies),
         )
+
+    def set_scales(self, tops: Mapping[str, float]) -> None:
+        """Say which value of each quantity the level 255 of the meshes before stands for, SI."""
+        self._add("set_scales", tops=dict(tops))
 
     def set_live(self, live: LiveState) -> None:
         """Show how the run is that the page controls, and its hand."""

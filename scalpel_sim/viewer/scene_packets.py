@@ -1,6 +1,6 @@
 """Packets of scene commands that show a run: the arm, the table, the tissue and the forces."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -8,11 +8,13 @@ import numpy as np
 from bridge import TissueFrame
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer import textures
+from scalpel_sim.viewer.colour_levels import levels_of
+from scalpel_sim.viewer.messages import NO_VALUES
 from scalpel_sim.viewer.model_shapes import Shape
 from scalpel_sim.viewer.scene3d import Appearance, Camera, LiveState, Readings, Scene3D
 from scalpel_sim.viewer.texture_mapping import map_texture
 from scalpel_sim.viewer.triangle_mesh import TriangleMesh
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
 
 TISSUE = "/tissue"
 """Path of the tissue. Objects below it are in the tissue frame, all others in the world frame."""
@@ -133,6 +135,7 @@ class ScenePackets:
         body_poses: FloatArray,
         readings: Readings | None = None,
         live: LiveState | None = None,
+        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> bytes:
         """Return the packet that shows one instant.
 
@@ -141,13 +144,16 @@ class ScenePackets:
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
             live: How the run is that the page controls.
+            values: Quantities at the vertices of the surface, to be shown as colours.
         """
         scene = Scene3D()
-        textured = map_texture(surface, self._diagonal / TILES_PER_BODY)
+        levels, tops = levels_of(values)
+        textured = map_texture(surface, self._diagonal / TILES_PER_BODY, levels)
         scene.set_mesh(f"{TISSUE}/skin", textured.skin, "skin")
         scene.set_mesh(f"{TISSUE}/cut", textured.cut, "cut")
+        scene.set_scales(tops)
         for body in self._bodies:
-            scene.set_pose(f"/bodies/{body}", *_position_and_rotation(body_poses[body]))
+            scene.set_pose(f"/bodies/{body}", *position_and_rotation(body_poses[body]))
         if readings is not None:
             scene.set_readings(readings, ARROW_LENGTH * self._diagonal)
         if live is not None:
@@ -159,10 +165,10 @@ class ScenePackets:
     ) -> None:
         """Put one shape below its body's path, with an appearance of its own."""
         path, appearance = f"/bodies/{shape.body}/{shape.name}", f"appearance of {shape.name}"
-        position, rotation = _position_and_rotation(shape.pose)
+        position, rotation = position_and_rotation(shape.pose)
         mesh = shape.mesh
         if shape.kind == int(mujoco.mjtGeom.mjGEOM_PLANE):
-            body_position, body_rotation = _position_and_rotation(body_pose)
+            body_position, body_rotation = position_and_rotation(body_pose)
             below = ((centre - body_position) @ body_rotation - position) @ rotation
             mesh = _plane_around(mesh, below, TABLE_RADIUS * self._diagonal)
         scene.set_appearance(appearance, _appearance_of(shape))
@@ -235,7 +241,7 @@ def _plane_around(mesh: TriangleMesh, centre: FloatArray, radius: float) -> Tria
     return mesh._replace(positions=mesh.positions * scale + [centre[0], centre[1], 0.0])
 
 
-def _position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+def position_and_rotation(pose: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return position, shape (3,), and rotation, shape (3, 3), of a pose of shape (7,)."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, np.ascontiguousarray(pose[3:]))

@@ -2,8 +2,9 @@
 
 `viewer.Viewer` starts it and sends pickles to its standard input: first a `ViewerSettings`, then
 any number of `SceneState`s. The process replies with one line on its standard output, a
-`StartReply` as JSON, and ends when its input ends. Where the page controls the run, a line follows
-for each of its commands. The pickles never leave the two processes.
+`StartReply` as JSON, and ends when its input ends. A line follows where other quantities are to be
+shown as colours than before, and, where the page controls the run, for each of its commands. The
+pickles never leave the two processes.
 """
 
 import asyncio
@@ -23,7 +24,8 @@ import tornado.websocket
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.hands.commands import Command
-from scalpel_sim.viewer.leading import Leadership
+from scalpel_sim.viewer.colouring import Colouring, Wanted, colour_of
+from scalpel_sim.viewer.leading import Leadership, is_own_page
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
     SceneState,
@@ -153,9 +155,12 @@ class OpenPages:
 class PageSocket(tornado.websocket.WebSocketHandler):
     """The connection to one open page."""
 
-    def initialize(self, open_pages: OpenPages, leading: Leadership | None) -> None:
+    def initialize(
+        self, open_pages: OpenPages, colouring: Colouring, leading: Leadership | None
+    ) -> None:
         """Set the pages that this page is one of, and who of them leads; called by tornado."""
         self._open_pages = open_pages
+        self._colouring = colouring
         self._leading = leading
         self.n_undrawn = 0
         self.last: bytes | None = None
@@ -169,9 +174,13 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._leading.add(self)
 
     def on_message(self, message: str | bytes) -> None:
-        """Handle a page's message: that it has drawn a packet, or a command."""
+        """Handle a page's message: that it has drawn a packet, a choice of colour, or a command."""
         if message != DRAWN:
-            if self._leading is not None:
+            colour = colour_of(message)
+            if colour is not None:
+                if is_own_page(self.request.host, self.request.headers.get("Origin")):
+                    self._colouring.choose(self, colour)
+            elif self._leading is not None:
                 self._leading.receive(self, message)
             return
         self.n_undrawn = max(0, self.n_undrawn - 1)
@@ -180,6 +189,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
     def on_close(self) -> None:
         """Handle a page that was closed."""
         self._open_pages.remove(self)
+        self._colouring.remove(self)
         if self._leading is not None:
             self._leading.remove(self)
 
@@ -281,7 +291,7 @@ def _packets_of(settings: ViewerSettings) -> ScenePackets:
     )
 
 
-def _print_line(message: StartReply | Command) -> None:
+def _print_line(message: StartReply | Command | Wanted) -> None:
     """Send a message to the run."""
     print(msgspec.json.encode(message).decode(), flush=True)
 
@@ -293,7 +303,15 @@ def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
         OWN_NAMES,
         [
             (r"/", PageRequest, {"site": site}),
-            (r"/frames", PageSocket, {"open_pages": open_pages, "leading": site.leading}),
+            (
+                r"/frames",
+                PageSocket,
+                {
+                    "open_pages": open_pages,
+                    "colouring": Colouring(_print_line),
+                    "leading": site.leading,
+                },
+            ),
         ],
     )
     return _listen(application, port)

@@ -6,6 +6,7 @@ charts). A vertex that lies in several charts becomes several vertices. A tint t
 without charts hides the seams between them.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,10 @@ TINT_DEPTH = 0.22
 """Standard deviation of the tint. Without the tint one sees that the texture repeats."""
 
 
+NO_LEVELS: Mapping[str, IntArray] = {}
+"""No quantities."""
+
+
 class TexturedSurface(NamedTuple):
     """A body's surface as two meshes, one for each texture."""
 
@@ -46,21 +51,26 @@ class TexturedSurface(NamedTuple):
     """Triangles of the cut faces."""
 
 
-def map_texture(surface: Surface, tile: float) -> TexturedSurface:
+def map_texture(
+    surface: Surface, tile: float, levels: Mapping[str, IntArray] = NO_LEVELS
+) -> TexturedSurface:
     """Return the skin and the cut faces of a body with texture coordinates, normals and tints.
 
     Args:
         surface: Boundary triangles of the body.
         tile: Length of the material that one repeat of the texture covers [m].
+        levels: Quantities at the vertices of the surface, see `TriangleMesh.levels`.
     """
     skin, cut = (
-        _textured_triangles(surface, surface.triangles[chosen], tile)
+        _textured_triangles(surface, surface.triangles[chosen], tile, levels)
         for chosen in (~surface.is_cut, surface.is_cut)
     )
     return TexturedSurface(skin, cut)
 
 
-def _textured_triangles(surface: Surface, triangles: IntArray, tile: float) -> TriangleMesh:
+def _textured_triangles(
+    surface: Surface, triangles: IntArray, tile: float, levels: Mapping[str, IntArray]
+) -> TriangleMesh:
     """Return some triangles of the surface as a mesh of its own."""
     rest_faces = _area_normals(surface.rest_positions, triangles)
     axis = np.abs(rest_faces).argmax(axis=1)
@@ -81,6 +91,7 @@ def _textured_triangles(surface: Surface, triangles: IntArray, tile: float) -> T
         normals=_unit(np.where(is_on_crease[:, None], of_chart, of_node)),
         uv=np.take_along_axis(rest, CHART_AXES[chart], axis=1) / tile + CHART_SHIFT[chart],
         tints=_tints(rest / tile),
+        levels={name: values[node] for name, values in levels.items()},
     )
 
 

@@ -1,5 +1,6 @@
 """The triangles that a view draws."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from tissue import FloatArray, IntArray
@@ -18,3 +19,5 @@ class TriangleMesh(NamedTuple):
     """Texture coordinates in repeats of the texture, shape (n_vertices, 2)."""
     tints: FloatArray | None = None
     """Factors of the colour between 0 and 1, shape (n_vertices, 3)."""
+    levels: Mapping[str, IntArray] = {}
+    """Quantities that may be shown as colours, from 0 to 255, by name; shape (n_vertices,) each."""

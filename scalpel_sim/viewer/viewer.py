@@ -7,19 +7,21 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import IO, cast
+from typing import IO, TYPE_CHECKING, cast
 
 import msgspec
 import mujoco
+import numpy as np
 
 from bridge import TissueFrame
 from scalpel_sim.errors import RunError, UsageError
-from scalpel_sim.hands.commands import Command, Release, command_of
+from scalpel_sim.hands.commands import Release, command_of
 from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.viewer.colouring import wanted_of
 from scalpel_sim.viewer.messages import (
+    NO_VALUES,
     UPDATES_PER_SECOND,
     PageControls,
     SceneState,
@@ -28,7 +30,12 @@ from scalpel_sim.viewer.messages import (
 )
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.scene3d import LiveState, Readings
-from tissue import FloatArray, Surface
+from tissue import FloatArray, Surface, SurfaceQuantity
+
+if TYPE_CHECKING:  # importing it takes half a second
+    from meshcat import Visualizer
+
+    from scalpel_sim.viewer.meshcat_scene import MeshcatScene
 
 START_TIMEOUT = 30.0
 """How long the viewer's process may take to start [s]. It usually takes half a second."""
@@ -38,6 +45,9 @@ CLOSE_TIMEOUT = 3.0
 
 HIGHEST_PORT = 65535
 """Largest port number of TCP."""
+
+NO_BODIES = np.zeros((0, 7))
+"""Poses of the bodies of no model."""
 
 _PROGRAM = "from scalpel_sim.viewer.server import serve_page; serve_page()"
 """Program of the viewer's process."""
@@ -52,11 +62,12 @@ class Viewer:
 
     Attributes:
         url: Address of the page, which only this machine can open.
+        wanted: Quantities that pages show as colours now: give `show` their values.
     """
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | None = None,
         *,
         title: str = "scalpel_sim",
         frame: TissueFrame | None = None,
@@ -64,28 +75,37 @@ class Viewer:
         port: int | None = None,
         views: Sequence[ViewTable] = (),
         controls: PageControls | None = None,
+        visualizer: "Visualizer | None" = None,
     ) -> None:
         """Start the viewer's process and learn its address.
 
         Args:
-            model: MuJoCo model whose shapes are shown.
+            model: MuJoCo model whose shapes are shown; None for the tissue alone.
             title: Heading of the page.
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             port: Port of the page; None for the first free port.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
             controls: What the page may do with the run; None: it shows, and controls nothing.
+            visualizer: A scene of meshcat, or a part of one, into which tissue, shapes and force
+                are drawn too. It stays its owner's: what else is in it is left alone.
 
         Raises:
-            UsageError: the port does not exist.
+            UsageError: the port does not exist, or `visualizer` is none.
             RunError: the port is in use, or the process did not start.
         """
         if port is not None and not 1 <= port <= HIGHEST_PORT:
             raise UsageError(f"port {port} does not exist; ports go from 1 to {HIGHEST_PORT}")
+        self._scene: MeshcatScene | None = None
+        if visualizer is not None:
+            from scalpel_sim.viewer import meshcat_scene
+
+            meshcat_scene.expect_visualizer(visualizer)
         self._process = _start_process()  # it starts while the shapes are made here
+        shapes = [] if model is None else list(shapes_of(model))
         self._settings: ViewerSettings | None = ViewerSettings(
             title,
-            list(shapes_of(model)),
+            shapes,
             frame or TissueFrame(),
             wireframe,
             port,
@@ -99,15 +119,18 @@ class Viewer:
         self._waiting: SceneState | None = None
         self._is_closed = False
         self._listener: threading.Thread | None = None
+        self.wanted: frozenset[SurfaceQuantity] = frozenset()
+        self._shown: SceneState | None = None
         self._last_shown = -float("inf")
         self._sender = threading.Thread(target=self._send_states, name="viewer", daemon=True)
         self._sender.start()
         self.url = self._start_reply().url
-        if controls is not None:
-            self._listener = threading.Thread(
-                target=self._listen, args=(controls.commands,), name="commands", daemon=True
-            )
-            self._listener.start()
+        self._listener = threading.Thread(
+            target=self._listen, args=(controls,), name="commands", daemon=True
+        )
+        self._listener.start()
+        if visualizer is not None:
+            self._scene = meshcat_scene.MeshcatScene(visualizer, shapes, frame or TissueFrame())
 
     def __enter__(self) -> "Viewer":
         return self
@@ -131,14 +154,16 @@ class Viewer:
         Call it before extracting a surface, which takes far longer.
         """
         passed = time.monotonic() - self._last_shown
-        return passed >= 1.0 / UPDATES_PER_SECOND and self.is_running
+        is_seen = self.is_running or (self._scene is not None and self._scene.is_drawn)
+        return passed >= 1.0 / UPDATES_PER_SECOND and is_seen
 
     def show(
         self,
         surface: Surface,
-        body_poses: FloatArray,
+        body_poses: FloatArray = NO_BODIES,
         readings: Readings | None = None,
         live: LiveState | None = None,
+        values: Mapping[SurfaceQuantity, FloatArray] = NO_VALUES,
     ) -> None:
         """Show the state of the scene. Returns immediately, whatever the viewer is doing.
 
@@ -147,11 +172,20 @@ class Viewer:
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
             live: How the run is, if the page controls it.
+            values: The quantities `wanted`, at the vertices of the surface, SI.
         """
         self._last_shown = time.monotonic()
         with self._changed:
-            self._waiting = SceneState(surface, body_poses, readings, live)
+            state = self._waiting = SceneState(surface, body_poses, readings, live, values)
             self._changed.notify()
+        self._shown = state
+        if self._scene is not None:
+            self._scene.show(state)
+
+    @property
+    def lacks_values(self) -> bool:
+        """Whether a page wants to show a quantity that the last state did not have."""
+        return self._shown is not None and not self.wanted <= self._shown.values.keys()
 
     def begin(
         self,
@@ -189,6 +223,8 @@ class Viewer:
 
     def close(self) -> None:
         """End the viewer's process. The pages keep showing the last state."""
+        if self._scene is not None:
+            self._scene.close()
         with self._changed:
             self._is_closed = True
             self._changed.notify()
@@ -227,13 +263,16 @@ class Viewer:
             with contextlib.suppress(OSError):
                 self._pipe.close()
 
-    def _listen(self, commands: deque[Command]) -> None:
-        """Receive commands until the process ends, and then let go."""
+    def _listen(self, controls: PageControls | None) -> None:
+        """Receive what pages want to see, and commands, until the process ends; then let go."""
         for line in cast(IO[bytes], self._process.stdout):
-            command = command_of(line)
-            if command is not None:
-                commands.append(command)
-        commands.append(Release())
+            wanted = wanted_of(line)
+            if wanted is not None:
+                self.wanted = frozenset(wanted.quantities)
+            elif controls is not None and (command := command_of(line)) is not None:
+                controls.commands.append(command)
+        if controls is not None:
+            controls.commands.append(Release())
 
     def _start_reply(self) -> StartReply:
         """Wait for the first line of the process: the address of its page, or an error."""

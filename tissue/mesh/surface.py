@@ -31,13 +31,29 @@ def boundary_triangles(
 
 def boundary_surface(body: Body) -> Surface:
     """Return the boundary with its own vertices: only nodes that some triangle uses."""
+    triangles, is_cut = _boundary(body)
+    used = _used_by(triangles, body)
+    nodes = np.flatnonzero(used)
+    vertex = np.cumsum(used) - 1
+    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut)
+
+
+def boundary_nodes(body: Body) -> IntArray:
+    """Return the nodes of the vertices of `boundary_surface`, in order, shape (n_vertices,)."""
+    return np.flatnonzero(_used_by(_boundary(body)[0], body))
+
+
+def _boundary(body: Body) -> tuple[IntArray, BoolArray]:
+    """Return the nodes of the boundary triangles, and whether they are faces of a cut."""
     room = 4 * body.n_tetrahedra
     triangles = np.empty((room, 3), dtype=np.int64)
     is_cut = np.empty(room, dtype=np.bool_)
     n = boundary_triangles(body, triangles, is_cut, OUTWARD)
-    triangles = triangles[:n]
+    return triangles[:n], is_cut[:n].copy()
+
+
+def _used_by(triangles: IntArray, body: Body) -> BoolArray:
+    """Return whether each node is one of the triangles, shape (n_nodes,)."""
     used = np.zeros(body.n_nodes, dtype=np.bool_)
     used[triangles] = True
-    nodes = np.flatnonzero(used)
-    vertex = np.cumsum(used) - 1
-    return Surface(body.positions[nodes], body.rest[nodes], vertex[triangles], is_cut[:n].copy())
+    return used

@@ -2,13 +2,13 @@
 
 from tissue.blade_shape import BladeShape
 from tissue.core.memento import Spares
-from tissue.loads.driven_body import DrivenBody
+from tissue.fields.deformed_body import DeformedBody
 from tissue.material import Material
 from tissue.state.identity import Identity
 from tissue.state.tissue_state import TissueState
 
 
-class SavedBody(DrivenBody):
+class SavedBody(DeformedBody):
     """A body whose state can be saved and loaded."""
 
     material: Material

@@ -15,6 +15,14 @@ _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
 _BUNDLE = Path("viewer", "dist", "main.min.js")
 """Path of the JavaScript bundle of meshcat's viewer inside the Python package meshcat."""
+_OF_ALL_PAGES = (
+    "field_colours.js",
+    "scene_view.js",
+    "controls.js",
+    "looks.js",
+    "picture.js",
+)
+"""Scripts that every page has first, in order."""
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
@@ -39,7 +47,7 @@ def live_page(
     Raises:
         RunError: meshcat's viewer was not found.
     """
-    scripts = ["scene_view.js", "controls.js"]
+    scripts = list(_OF_ALL_PAGES)
     if token is None:
         return _page(title, caption, [*scripts, "live.js"])
     bars, panels = ["run"], []
@@ -73,7 +81,7 @@ def replay_page(title: str, caption: str, packets: str) -> str:
         RunError: meshcat's viewer was not found.
     """
     controls = _part("player.html")
-    return _page(title, caption, ("scene_view.js", "controls.js", "replay.js"), controls, packets)
+    return _page(title, caption, (*_OF_ALL_PAGES, "replay.js"), controls, packets)
 
 
 def _page(

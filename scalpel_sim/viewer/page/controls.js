@@ -3,7 +3,10 @@
 
 const element = (id) => document.getElementById(id);
 
+let lastReadings = null;
+
 function showReadings(readings) {
+    lastReadings = readings;
     element("readings").hidden = false;
     element("time").textContent = `${readings.time.toFixed(2)} s`;
     element("force").textContent = `${readings.newtons.toFixed(2)} N`;
@@ -59,9 +62,20 @@ element("wireframe").addEventListener("change", (event) => setWireframe(event.ta
 element("contacts").addEventListener("change", (event) => setContacts(event.target.checked));
 element("home").addEventListener("click", () => chooseCamera(sceneView.chosen));
 element("view").addEventListener("change", (event) => chooseCamera(Number(event.target.value)));
-window.addEventListener("keydown", (event) => {
-    if (event.key === "w") setWireframe(!sceneView.wireframe);
-    if (event.key === "c") setContacts(!sceneView.showsContacts);
-    if (event.key === "h") chooseCamera(sceneView.chosen);
-    if (/^[1-9]$/.test(event.key) && event.key <= sceneView.cameras.length) chooseCamera(event.key - 1);
+
+// Call back with each key that is a shortcut: one that is pressed alone, and not in a list, whose own
+// keys choose from it.
+function onShortcut(callback) {
+    window.addEventListener("keydown", (event) => {
+        const isInList = event.target instanceof Element && event.target.matches("select");
+        if (event.ctrlKey || event.altKey || event.metaKey || isInList) return;
+        callback(event.key.toLowerCase());
+    });
+}
+
+onShortcut((key) => {
+    if (key === "w") setWireframe(!sceneView.wireframe);
+    if (key === "v") setContacts(!sceneView.showsContacts);
+    if (key === "h") chooseCamera(sceneView.chosen);
+    if (/^[1-9]$/.test(key) && key <= sceneView.cameras.length) chooseCamera(key - 1);
 });

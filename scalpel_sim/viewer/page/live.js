@@ -20,6 +20,13 @@ function afterDrawing(callback) {
 const run = typeof Run === "undefined" ? null : new Run(sceneView);
 const hand = typeof Hand === "undefined" ? null : new Hand(sceneView, run);
 
+let openSocket = null;
+
+onQuantity = (quantity) => {
+    if (openSocket === null || openSocket.readyState !== WebSocket.OPEN) return;
+    openSocket.send(JSON.stringify({ type: "colour", quantity: quantity || null }));
+};
+
 if (typeof NextRun !== "undefined") {
     run.next = new NextRun(run, CHOICES);
     run.showControls();
@@ -30,6 +37,8 @@ function follow() {
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
         element("status").textContent = "live";
+        openSocket = socket;
+        if (element("quantity").value) setQuantity(element("quantity").value); // as before a reload
         if (run) run.connect(socket);
     };
     socket.onmessage = (message) => {

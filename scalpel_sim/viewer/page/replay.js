@@ -144,6 +144,10 @@ async function start() {
         script.remove();
         if (frames.length === 1) viewer.handle_command(frames[0]);
     }
+    for (const frame of frames) { // the scale is that of the whole run
+        sceneView.colours.setTops(frame.commands.find(({ type }) => type === "set_scales").tops);
+    }
+    sceneView.colours.keepsRange = true;
     chart = new Chart(frames);
     player = new Player(frames, packed.map((script) => Number(script.dataset.time)));
     player.play();

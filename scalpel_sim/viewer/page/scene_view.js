@@ -11,7 +11,9 @@ const SKY = { above: 0xeaf2f6, below: 0x7a6a62, intensity: 0.8 };
 const EXPOSURE = 1.0;
 
 const SHADOW_MAP_PIXELS = 1024; // coarse on purpose: filtering it makes the shadows soft
-const WIRE_COLOUR = 0xffe4d8;
+const WIRE_COLOUR = 0xffe4d8; // on faces
+const GRID_COLOURS = { skin: 0x24323a, cut: 0xa3121a }; // of edges without faces
+const FAINT = 0.12; // opacity of the skin where the cut is shown alone
 const ARROW_COLOUR = 0xffb000;
 const CONTACT_COLOUR = 0x12509e;
 const CONTACT_SCALE = 30; // magnification: about thirty contacts along the edge share the force
@@ -29,7 +31,11 @@ class SceneView {
         this.chosen = 0;
         this.appearances = new Map();
         this.wires = new Map();
+        this.tissue = new Map(); // the meshes of skin and cut
+        this.colours = new FieldColours();
+        this.onScale = () => {};
         this.wireframe = false;
+        this.shown = "faces"; // or "grid", or "cut": see setShown
         this.showsContacts = true;
         this.prepare();
         const meshcatHandles = this.viewer.handle_command.bind(this.viewer);
@@ -39,6 +45,7 @@ class SceneView {
             set_object: (command) => this.setObject(command) || meshcatHandles(command),
             set_cameras: (command) => this.setCameras(command),
             set_wireframe: (command) => this.setWireframe(command.on),
+            set_scales: (command) => this.setScales(command.tops),
             set_readings: (command) => this.setReadings(command),
             set_hand: (command) => this.onHand(command),
             set_run: (command) => this.onRun(command),
@@ -109,28 +116,70 @@ class SceneView {
             mesh.name = "<object>";
             node.set_object(mesh);
         }
-        if (path[0] === "tissue") this.addWires(node.object);
+        if (path[0] === "tissue") this.addTissue(path[1], node.object, material);
         return true;
     }
 
-    addWires(mesh) {
-        let wires = this.wires.get(mesh.uuid);
+    // `part` is skin or cut; `material` is what it looks like where it shows no quantity.
+    addTissue(part, mesh, material) {
+        let wires = this.wires.get(part);
         if (!wires) {
-            const material = new THREE.MeshBasicMaterial({
-                color: WIRE_COLOUR, wireframe: true, transparent: true, opacity: 0.7,
+            wires = new THREE.Mesh(mesh.geometry, new THREE.MeshBasicMaterial({
+                wireframe: true, transparent: true, opacity: 0.7,
                 polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1,
-            });
-            wires = new THREE.Mesh(mesh.geometry, material);
-            this.wires.set(mesh.uuid, wires);
+            }));
             mesh.add(wires);
+            this.wires.set(part, wires);
         }
         wires.geometry = mesh.geometry;
-        wires.visible = this.wireframe;
+        this.tissue.set(part, { mesh, material });
+        this.showTissue();
     }
 
     setWireframe(on) {
         this.wireframe = on;
-        for (const wires of this.wires.values()) wires.visible = on;
+        this.showTissue();
+    }
+
+    // What is drawn of the tissue: its faces; the grid of all edges, those of the far side too; or the
+    // faces of the cut, with a faint skin around them.
+    setShown(shown) {
+        this.shown = shown;
+        this.showTissue();
+    }
+
+    // A quantity as colours; "" for none.
+    setQuantity(quantity) {
+        this.colours.choose(quantity);
+        this.paintTissue();
+    }
+
+    setScales(tops) {
+        this.colours.setTops(tops);
+        this.paintTissue();
+    }
+
+    paintTissue() {
+        for (const { mesh } of this.tissue.values()) this.colours.paint(mesh.geometry);
+        this.showTissue();
+        this.onScale(this.colours);
+    }
+
+    showTissue() {
+        const isGrid = this.shown === "grid", isCut = this.shown === "cut";
+        for (const [part, { mesh, material: textured }] of this.tissue) {
+            const isFaint = isCut && part === "skin";
+            const wires = this.wires.get(part);
+            wires.visible = isGrid || (this.wireframe && !isFaint);
+            wires.material.color.set(isGrid ? GRID_COLOURS[part] : WIRE_COLOUR).convertSRGBToLinear();
+            mesh.material = this.colours.isThere ? this.colours.materials.get(part) : textured;
+            mesh.castShadow = !isFaint;
+            const { material } = mesh;
+            material.visible = !isGrid; // the edges are children of the mesh, and stay
+            material.opacity = isFaint ? FAINT : 1;
+            material.transparent = isFaint;
+            material.depthWrite = !isFaint;
+        }
         this.viewer.set_dirty();
     }
 
@@ -209,9 +258,12 @@ class SceneView {
 
 function geometryOf({ attributes, index }) {
     const geometry = new THREE.BufferGeometry();
+    geometry.userData.levels = {};
     for (const [name, { array, itemSize, normalized }] of Object.entries(attributes)) {
-        geometry.setAttribute(name, new THREE.BufferAttribute(array, itemSize, normalized));
+        if (name in QUANTITIES) geometry.userData.levels[name] = array;
+        else geometry.setAttribute(name, new THREE.BufferAttribute(array, itemSize, normalized));
     }
+    geometry.userData.tints = geometry.attributes.color;
     geometry.setIndex(new THREE.BufferAttribute(index.array, 1));
     return geometry;
 }

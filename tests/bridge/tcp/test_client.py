@@ -61,6 +61,10 @@ def test_a_cut_over_tcp_is_the_same_as_in_process_bit_for_bit(link, upright):
     assert [bits(r) for r in results_here] == [bits(r) for r in results_there]
     assert bits(here.snapshot()) == bits(link.snapshot())
     assert bits(here.surface()) == bits(link.surface())
+    for quantity in ("displacement", "strain", "stress"):
+        values = link.surface_values(quantity)
+        assert bits(here.surface_values(quantity)) == bits(values)
+        assert len(values) == len(link.surface().positions) and values.max() > 0.0
     assert bits(here.chunks()) == bits(link.chunks())
     assert here.n_pieces() == link.n_pieces()
     assert bits(here.cut_report()) == bits(link.cut_report())
@@ -122,7 +126,7 @@ def test_a_failure_of_the_tissue_is_reported_with_its_message(link, upright):
         (bytes(100), "is not scalpel-sim"),
         (pack_frame(MessageKind.STEP, 0, pack_step(None, DT)), "the first message must be a HELLO"),
         (HELLO[:4] + b"\x63\x00" + HELLO[6:], "uses version 99"),
-        (HELLO[:4] + b"\x06\x00" + HELLO[6:], "uses version 6 of the protocol and this one 7"),
+        (HELLO[:4] + b"\x07\x00" + HELLO[6:], "uses version 7 of the protocol and this one 8"),
         (HELLO[:-1] + b"\x00", "its checksum is wrong"),
         (pack_frame(MessageKind.HELLO, 0, bytes(HANDSHAKE_BYTES + 1)), "at most 48 are allowed"),
     ],

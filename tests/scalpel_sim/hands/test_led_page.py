@@ -43,9 +43,11 @@ LAID_BARE = """() => {
 
 
 @pytest.fixture
-def view(tmp_path, request):
+def view(tmp_path, request, browser):
     with LedView(request.param, tmp_path / "led") as led:
         yield led
+    for context in browser.contexts:  # a page that is left open would lead the next run
+        context.close()
 
 
 def opened(browser, view):
@@ -193,3 +195,27 @@ def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, b
     assert moves(lambda: press("ArrowUp", 4), 1e-3)
     assert np.linalg.norm(tip(tab) - at_first) > 3e-3
     end(tab, view)
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("view", ["grid2"], indirect=True)
+def test_a_run_that_waits_is_paused_or_has_ended_shows_what_is_asked_for(view, browser):
+    tab = opened(browser, view)
+    tab.click("#display summary")
+    tab.select_option("#quantity", "displacement")
+    tab.wait_for_function("sceneView.colours.isThere")
+    tab.select_option("#quantity", "stress")
+    tab.wait_for_function("sceneView.colours.isThere")
+    tab.evaluate("document.activeElement.blur()")
+    tab.keyboard.press("ArrowUp")
+    until_it_rests(tab)
+    assert tab.evaluate("sceneView.colours.isThere")
+    tab.click("#pause")
+    tab.wait_for_function("run.isPaused")
+    tab.select_option("#quantity", "displacement")
+    tab.wait_for_function("sceneView.colours.isThere")
+    end(tab, view)
+    tab.select_option("#quantity", "strain")
+    tab.wait_for_function("sceneView.colours.isThere")
+    assert tab.inner_text("#scale-title") == "strain, largest principal"
+    assert tab.failures == []

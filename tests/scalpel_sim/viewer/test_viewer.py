@@ -8,6 +8,7 @@ import urllib.error
 import urllib.request
 
 import pytest
+from tornado.httpclient import HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
 from scalpel_sim import Viewer
@@ -168,6 +169,35 @@ def test_a_page_that_does_not_draw_gets_no_more_pictures(viewer):
     assert 1 <= len(packets) <= 2, "the opening and at most one picture"
 
 
+async def page_of(viewer, origin):
+    """Return the open socket of a page that says it came from there."""
+    headers = {} if origin is None else {"Origin": origin}
+    address = viewer.url.replace("http", "ws") + "frames"
+    return await websocket_connect(HTTPRequest(address, headers=headers))
+
+
+def test_only_pages_of_this_server_make_the_run_compute_what_they_show(viewer):
+    own = viewer.url.rstrip("/")
+
+    async def pages():
+        no_page, page, other = [await page_of(viewer, origin) for origin in (None, own, own)]
+        with pytest.raises(HTTPClientError, match="403"):
+            await page_of(viewer, "http://evil.example")
+        await no_page.write_message('{"type": "colour", "quantity": "displacement"}')
+        await page.write_message('{"type": "colour", "quantity": "heat"}')
+        await page.write_message('{"type": "colour", "quantity": "strain"}')
+        await other.write_message('{"type": "colour", "quantity": "stress"}')
+        until(lambda: viewer.wanted == {"strain", "stress"}, "both choices")
+        await page.write_message('{"type": "colour", "quantity": null}')
+        until(lambda: viewer.wanted == {"stress"}, "one to show none")
+        other.close()
+        async with asyncio.timeout(PATIENCE):
+            while viewer.wanted:
+                await asyncio.sleep(0.02)
+
+    in_a_thread(pages)
+
+
 def in_a_thread(coroutine) -> None:
     """Run a coroutine where no other event loop is running."""
     failures = []
@@ -207,3 +237,42 @@ def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
     assert viewer.is_running
     assert run.longest < NO_WAIT
     assert tab.failures == other.failures == []
+
+
+def values(top):
+    """Return a quantity that grows from one side of the cut block to the other."""
+    surface = cut_tissue()[2]
+    return top * surface.rest_positions[:, 0] / surface.rest_positions[:, 0].max()
+
+
+@pytest.mark.browser
+def test_a_live_page_asks_the_run_for_what_it_shows_as_colours(viewer, browser):
+    poses = body_poses(little_arm()[1])
+    viewer.show(cut_tissue()[2], poses, readings(0.0))
+    tab, other = new_tab(browser), new_tab(browser)
+    for page in (tab, other):
+        page.goto(viewer.url)
+        page.wait_for_function("sceneView.tissue.size === 2 && openSocket !== null")
+    for page in (tab, other):
+        page.click("#display summary")
+    tab.keyboard.press("q")
+    tab.select_option("#quantity", "stress")
+    other.select_option("#quantity", "strain")
+    assert tab.inner_text("#scale-title").endswith("not in this picture yet")
+    until(lambda: viewer.wanted == {"strain", "stress"}, "both choices")
+    assert viewer.lacks_values
+    both = {"strain": values(0.4), "stress": values(1500.0)}
+    viewer.show(cut_tissue()[2], poses, readings(0.0), values=both)
+    assert not viewer.lacks_values
+    for page, ticks, title in (
+        (tab, ["0", "1", "\u2265 2"], "stress, von Mises [kPa]"),
+        (other, ["0", "0.25", "\u2265 0.5"], "strain, largest principal"),
+    ):
+        page.wait_for_function("sceneView.colours.isThere")
+        assert page.inner_text("#scale-ticks").split("\n") == ticks
+        assert page.inner_text("#scale-title") == title
+    tab.reload()
+    until(lambda: viewer.wanted == {"strain"}, "the page to be gone")
+    for page in (tab, other):
+        page.close()
+        assert page.failures == []

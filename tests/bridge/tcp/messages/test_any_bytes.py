@@ -31,6 +31,12 @@ from bridge.tcp.messages.led_frames import (
 from bridge.tcp.messages.result import pack_result, unpack_result
 from bridge.tcp.messages.step import pack_step, unpack_step
 from bridge.tcp.messages.text import pack_description, pack_error, unpack_description, unpack_error
+from bridge.tcp.messages.values import (
+    pack_quantity,
+    pack_values,
+    unpack_quantity,
+    unpack_values,
+)
 from bridge.tcp.wire import MessageError
 from tests.bridge.tcp.serve_block import block_tissue
 from tissue import BladeSegment, BladeSweep, Geom, Wrench
@@ -78,6 +84,8 @@ def real_messages():
         "snapshot": (pack_snapshot(tissue.snapshot()), unpack_snapshot),
         "chunks": (pack_chunks(tissue.chunks()), unpack_chunks),
         "surface": (pack_surface(tissue.surface()), unpack_surface),
+        "quantity": (pack_quantity("strain"), unpack_quantity),
+        "values": (pack_values(np.arange(9.0)), unpack_values),
         "pieces": (pack_pieces(1), unpack_pieces),
         "cut report": (pack_cut_report(tissue.cut_report()), unpack_cut_report),
         "description": (pack_description(described), unpack_description),
@@ -157,4 +165,8 @@ def is_valid(what, value):
         return np.isfinite(value.bounds).all() and value.material.density > 0.0
     if what == "error":
         return value.isprintable()
+    if what == "quantity":
+        return value in ("displacement", "strain", "stress")
+    if what == "values":
+        return np.isfinite(value).all()
     return what == "cut report" or value >= 0

@@ -1,0 +1,1 @@
+"""Strain and stress at the nodes of the body, for pictures."""
