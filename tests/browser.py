@@ -34,10 +34,15 @@ TIMEOUT = 60_000
 """How long a page may take [ms]: drawing in software on a busy machine is slow."""
 
 
+def first_installed(names: tuple[str, ...]) -> str | None:
+    """Return the path of the first of these programs that is installed."""
+    return next(filter(None, map(shutil.which, names)), None)
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """Start Chromium without a window; skip the test if it is not installed."""
-    executable = next(filter(None, map(shutil.which, NAMES)), None)
+    executable = first_installed(NAMES)
     if executable is None:
         pytest.skip("no Chromium on this machine: apt-get install chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="pip install playwright")

@@ -14,7 +14,7 @@ connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
 def ask(sequence, kind, payload=b""):
     """Return the payload of the reply to a request."""
-    head = struct.pack("<4sHHIII", b"SCUT", 7, kind, sequence, len(payload), zlib.crc32(payload))
+    head = struct.pack("<4sHHIII", b"SCUT", 8, kind, sequence, len(payload), zlib.crc32(payload))
     connection.sendall(head + struct.pack("<I", zlib.crc32(head)) + payload)
     head = connection.recv(24, socket.MSG_WAITALL)
     _, _, answer, _, length, checksum, _ = struct.unpack("<4sHHIIII", head)

@@ -146,9 +146,18 @@ def print_report(
             print(f"exported: {', '.join(map(str, exports))}")
 
 
-def stay_while(condition: Callable[[], bool], message: str) -> None:
-    """Print a message, and return when the condition fails, or on Ctrl-C."""
+def stay_while(
+    condition: Callable[[], bool], message: str, on_wait: Callable[[], None] = lambda: None
+) -> None:
+    """Print a message, and return when the condition fails, or on Ctrl-C.
+
+    Args:
+        condition: Whether to go on.
+        message: What to print.
+        on_wait: Called time and again.
+    """
     with StopSignals() as stop:
         say(message)  # from now on Ctrl-C ends it without a traceback
         while condition() and stop.reason is None:
+            on_wait()
             time.sleep(SECONDS_PER_CHECK)

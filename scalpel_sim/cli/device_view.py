@@ -55,9 +55,10 @@ def view_device(
 
         show()
         controls.on_change = show
+        controls.on_wait = lambda: show() if viewer.lacks_values else None
         simulation.pictures.append(into_viewer(viewer, lambda: live_state(controls)))
         say(f"live at {viewer.url}")
         summary = perform_device(prepared, options, plotter, led, check)
         show()
         print_report(summary, prepared.folder, options.output.export, options.printing)
-        stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C")
+        stay_while(lambda: viewer.is_running, f"{viewer.url} stays until Ctrl-C", controls.on_wait)

@@ -2,6 +2,7 @@
 
 import time
 
+from scalpel_sim.cli.console import say
 from scalpel_sim.cli.hand_run import perform_by_hand
 from scalpel_sim.cli.run_setup import PreparedRun, RunOptions
 from scalpel_sim.errors import Interrupted, RunError
@@ -58,6 +59,7 @@ def perform_led(
 def _wait_for_hand(viewer: Viewer, controls: RunControls) -> None:
     """Wait until a page chooses or takes hold, or ends the run before it has begun."""
     with StopSignals() as stop:
+        say(f"open {viewer.url} and lead the blade there")
         while not any(isinstance(command, _BEGIN) for command in list(controls.commands)):
             if stop.reason is not None:
                 raise Interrupted(f"{stop.reason} before anybody took hold of the blade")

@@ -95,8 +95,7 @@ class LiveSession:
             if summary is not None and self._viewer is not None:
                 output, printing = self._options.output, self._options.printing
                 print_report(summary, run.prepared.folder, output.export, printing)
-                say(f"{self._viewer.url} stays until Ctrl-C")
-            run = self._after(run)
+            run = self._after(run, summary is not None)
 
     def _begun(self, asked: Begin) -> _LiveRun:
         """Prepare a run, and show it."""
@@ -191,8 +190,6 @@ class LiveSession:
         prepared, controls = run.prepared, run.controls
         url, options = self._viewer.url, self._options
         if run.asked.is_led:
-            if self._n_runs == 0:
-                say(f"open {url} and lead the blade there")
             summary = perform_led(prepared, options, self._plotter, self._viewer, controls)
         else:
             if self._n_runs == 0:
@@ -208,10 +205,11 @@ class LiveSession:
         self._n_runs += summary is not None
         return summary
 
-    def _after(self, run: _LiveRun) -> _LiveRun | None:
+    def _after(self, run: _LiveRun, has_files: bool) -> _LiveRun | None:
         """Wait until the page asks for another run, and begin it; None: it is not wanted."""
         run.controls.has_ended = True
-        while (asked := self._asked_next(run)) is not None:
+        while (asked := self._asked_next(run, says=has_files)) is not None:
+            has_files = False
             run.controls.notice = "preparing the next run"
             run.show()
             try:
@@ -222,10 +220,12 @@ class LiveSession:
                 run.show()
         return None
 
-    def _asked_next(self, run: _LiveRun) -> Begin | None:
+    def _asked_next(self, run: _LiveRun, *, says: bool) -> Begin | None:
         """Wait for what the page asks for next; None on Ctrl-C or where the viewer has ended."""
         assert self._viewer is not None
         with StopSignals() as stop:
+            if says:  # from now on Ctrl-C ends it without a traceback
+                say(f"{self._viewer.url} stays until Ctrl-C")
             while self._viewer.is_running and stop.reason is None:
                 asked, run.controls.next = run.controls.next, None
                 if asked is not None:

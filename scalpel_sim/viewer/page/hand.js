@@ -23,6 +23,7 @@ class Hand {
         this.isAtRest = true; // whether it was there in the picture before
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
+        this.coarseness = new Coarseness(view);
         view.onHand = (state) => this.show(state);
         run.onChange = () => this.onRunChange();
         run.onInterruption = () => this.forget();
@@ -74,6 +75,7 @@ class Hand {
         this.holders.set(holder, isStep ? performance.now() : Infinity);
         if (!this.isEngaged) this.run.say({ type: "engage" });
         this.isEngaged = true;
+        this.coarseness.setLed(true);
     }
 
     letGo(holder) {
@@ -81,6 +83,7 @@ class Hand {
         if (!this.isEngaged || this.holders.size > 0) return;
         this.run.say({ type: "release" });
         this.isEngaged = false;
+        this.coarseness.setLed(false);
     }
 
     letGoOfSteps() {

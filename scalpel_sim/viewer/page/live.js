@@ -48,9 +48,13 @@ function follow() {
             else run.onLeading(said);
             return;
         }
+        const since = performance.now();
         viewer.handle_command_bytearray(new Uint8Array(message.data));
         element("wireframe").checked = sceneView.wireframe;
-        afterDrawing(() => { if (socket.readyState === WebSocket.OPEN) socket.send("drawn"); });
+        afterDrawing(() => {
+            if (hand) hand.coarseness.note(performance.now() - since);
+            if (socket.readyState === WebSocket.OPEN) socket.send("drawn");
+        });
     };
     socket.onclose = () => {
         if (run) run.disconnect();

@@ -62,6 +62,7 @@ class SceneView {
             viewer.set_property(path, "visible", false);
         }
         viewer.hide_background();
+        this.fullPixelRatio = viewer.renderer.getPixelRatio();
         viewer.renderer.setClearAlpha(0); // the page shows through as the background
         viewer.renderer.outputEncoding = THREE.sRGBEncoding;
         viewer.renderer.toneMapping = THREE.ACESFilmicToneMapping;
@@ -134,6 +135,13 @@ class SceneView {
         wires.geometry = mesh.geometry;
         this.tissue.set(part, { mesh, material });
         this.showTissue();
+    }
+
+    // Draw with or without shadows, and with a share of the pixels in each direction.
+    setDrawing({ shadows, pixels }) {
+        this.lamp.castShadow = shadows;
+        this.viewer.renderer.setPixelRatio(pixels * this.fullPixelRatio);
+        this.viewer.set_dirty();
     }
 
     setWireframe(on) {

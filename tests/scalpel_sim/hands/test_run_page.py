@@ -22,6 +22,7 @@ def scripted(tmp_path, browser):
         tab.goto(view.url)
         tab.wait_for_function("run.leads && run.state !== null")
         yield tab
+        tab.close()  # it would lead the next run at this port
         assert tab.failures == []
 
 
@@ -81,6 +82,7 @@ def test_a_stroke_is_undone_in_the_page(tmp_path, browser):
         tab.click("#undo")
         tab.wait_for_function("run.state.strokes === 0")
         assert tab.is_disabled("#undo")
+        tab.close()  # it would lead the next run at this port
         assert tab.failures == []
 
 
