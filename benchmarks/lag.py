@@ -28,9 +28,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder, LedView(scene, Path(folder)) as view:
             lags, pace = lags_in(view.url)
         median, late = (lags[round(share * (len(lags) - 1))] for share in (0.5, 0.99))
-        print(
-            f"{scene}: {len(lags)} inputs, median {median:.0f} ms, 99 % {late:.0f} ms; speed: {pace}"
-        )
+        print(f"{scene}: {len(lags)} inputs, median {median:.0f} ms, 99 % {late:.0f} ms; {pace}")
 
 
 def lags_in(url: str) -> tuple[list[float], str]:

@@ -1,5 +1,6 @@
 """Callbacks that hand a running simulation to the live viewer and to the replay."""
 
+import math
 from collections.abc import Callable, Iterable
 from typing import get_args
 
@@ -34,6 +35,7 @@ def readings(simulation: Simulation) -> Readings:
         contact_points=frame.points_to_world(contacts.point),
         contact_forces=frame.vectors_to_world(-on_tissue),
         parts=force_parts(contacts, forward),
+        hands=[(each.name, math.hypot(*each.wrench.force)) for each in simulation.graspers],
         energies=result.energies,
     )
 

@@ -74,6 +74,8 @@ class Readings(NamedTuple):
     """Force on the blade at each of these points [N], world frame, shape (n_contacts, 3)."""
     parts: ForceParts | None = None
     """The force in parts: of the edge, of the faces, and of friction."""
+    hands: Sequence[tuple[str, float]] = ()
+    """Name of each grasper, and the force of the tissue on it [N]."""
     energies: Energies | None = None
     """Energy balance: where the work of the blade went. None without an audit."""
 
@@ -241,6 +243,7 @@ class Scene3D:
                 np.hstack([readings.contact_points, readings.contact_forces]), "float32"
             ),
             parts=[] if readings.parts is None else [math.hypot(*part) for part in readings.parts],
+            hands=[{"name": name, "newtons": force} for name, force in readings.hands],
             energies=_energy_terms(readings.energies),
         )
 

@@ -49,7 +49,7 @@ def live_page(
     """
     scripts = list(_OF_ALL_PAGES)
     if token is None:
-        return _page(title, caption, [*scripts, "live.js"])
+        return _page(title, caption, [*scripts, "force_plot.js", "live.js"])
     bars, panels = ["run"], []
     scripts.append("run.js")
     if is_led:
@@ -61,7 +61,7 @@ def live_page(
     return _page(
         title,
         caption,
-        [*scripts, "live.js"],
+        [*scripts, "force_plot.js", "live.js"],
         controls="".join(_part(f"{bar}.html") for bar in bars),
         data=f'<script>const TOKEN = "{token}", CHOICES = {_as_script(choices)};</script>',
         style="".join(_part(f"{each}.css") for each in (*bars, *panels)),

@@ -4,6 +4,7 @@
 const element = (id) => document.getElementById(id);
 
 let lastReadings = null;
+let onReadings = () => {}; // where they are plotted
 
 function showReadings(readings) {
     lastReadings = readings;
@@ -12,9 +13,25 @@ function showReadings(readings) {
     element("force").textContent = `${readings.newtons.toFixed(2)} N`;
     element("parts").parentElement.hidden = readings.parts.length === 0;
     element("parts").textContent = `${readings.parts.map((part) => part.toFixed(2)).join(" · ")} N`;
+    showHands(readings.hands);
     showEnergies(readings.energies);
+    onReadings(readings);
     element("area").textContent = `${(readings.cut_area * 1e6).toFixed(0)} mm²`;
     element("tetrahedra").textContent = readings.tetrahedra.toLocaleString("en");
+}
+
+// The forces on what graspers hold, a row for each.
+function showHands(hands) {
+    for (const row of document.querySelectorAll("#readings .hand")) row.remove();
+    for (const { name, newtons } of hands) {
+        const row = document.createElement("div");
+        const [term, force] = [document.createElement("dt"), document.createElement("dd")];
+        row.className = "hand";
+        term.textContent = `force on the grasper ${name}`;
+        force.textContent = `${newtons.toFixed(2)} N`;
+        row.append(term, force);
+        element("area").parentElement.before(row);
+    }
 }
 
 // A bar that shows where the work of the blade went. Terms that gave energy back are left out.

@@ -20,6 +20,9 @@ function afterDrawing(callback) {
 const run = typeof Run === "undefined" ? null : new Run(sceneView);
 const hand = typeof Hand === "undefined" ? null : new Hand(sceneView, run);
 
+const forcePlot = new ForcePlot();
+onReadings = (readings) => forcePlot.add(readings);
+
 let openSocket = null;
 
 onQuantity = (quantity) => {

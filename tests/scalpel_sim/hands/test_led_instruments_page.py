@@ -221,8 +221,8 @@ def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
     touch("touchStart", {"x": x, "y": y})
     for share in np.linspace(0.0, 1.0, 20):
         touch("touchMove", {"x": x + share * pixels, "y": y - 0.5 * share * pixels})
-    tab.wait_for_function("hand.isEngaged")
-    touch("touchEnd")
+    tab.wait_for_function("hand.isEngaged && hand.unshown.length === 0 && hand.isAtRest")
+    touch("touchEnd")  # what is not done by then is lost
     until_it_rests(tab)
     way = tip(tab) - before
     assert way @ right == pytest.approx(0.004, rel=0.05)

@@ -239,6 +239,24 @@ def test_the_live_page_follows_the_run_and_tabs_come_and_go(viewer, browser):
     assert tab.failures == other.failures == []
 
 
+@pytest.mark.browser
+def test_the_live_page_shows_the_forces_of_all_hands_and_plots_them(viewer, browser):
+    surface, poses = cut_tissue()[2], body_poses(little_arm()[1])
+    tab = new_tab(browser)
+    tab.goto(viewer.url)
+    for time_now, newtons in ((1.0, 0.2), (2.0, 0.4), (1.5, 0.3)):  # after an undo it is earlier
+        now = readings(time_now)._replace(hands=[("left", newtons)])
+        viewer.show(surface, poses, now)
+        tab.wait_for_function(f"lastReadings !== null && lastReadings.time === {time_now}")
+    assert tab.inner_text("#readings .hand") == "force on the grasper left\n0.30 N"
+    assert tab.evaluate("forcePlot.rows.map(([time, , grasper]) => [time, grasper])") == [
+        [1.0, 0.2],
+        [1.5, 0.3],
+    ]
+    tab.close()
+    assert tab.failures == []
+
+
 def values(top):
     """Return a quantity that grows from one side of the cut block to the other."""
     surface = cut_tissue()[2]

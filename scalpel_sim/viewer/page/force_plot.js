@@ -1,0 +1,49 @@
+// A plot of the last seconds of the forces on the blade and on the graspers, in the live page.
+"use strict";
+
+const SECONDS_SHOWN = 5; // of simulated time
+const LOWEST_PEAK = 0.1; // [N] at the upper side at least: else noise would fill the plot
+const BLADE_LINE = "#a33b30";
+const GRASPER_LINES = ["#12509e", "#3d6b2f"];
+
+class ForcePlot {
+    constructor() {
+        this.rows = []; // [s, N on the blade, N on each grasper]
+        this.canvas = document.createElement("canvas");
+        this.canvas.id = "chart";
+        this.canvas.width = 2 * 316;
+        this.canvas.height = 2 * 54;
+        this.canvas.setAttribute("role", "img");
+        element("readings").append(this.canvas);
+    }
+
+    // After an undo the time is an earlier one, and what came later did not happen.
+    add({ time, newtons, hands }) {
+        this.rows = this.rows.filter(([then]) => then < time && then > time - SECONDS_SHOWN);
+        this.rows.push([time, newtons, ...hands.map((hand) => hand.newtons)]);
+        this.draw();
+    }
+
+    draw() {
+        const { width, height } = this.canvas;
+        const context = this.canvas.getContext("2d");
+        const now = this.rows[this.rows.length - 1][0];
+        const peak = Math.max(LOWEST_PEAK, ...this.rows.flatMap(([, ...forces]) => forces));
+        const x = (time) => width - 6 - (width - 12) * (now - time) / SECONDS_SHOWN;
+        const y = (force) => height - 6 - (height - 34) * force / peak;
+        context.clearRect(0, 0, width, height);
+        context.lineWidth = 3;
+        context.lineJoin = "round";
+        for (const [i, colour] of [BLADE_LINE, ...GRASPER_LINES].entries()) {
+            context.strokeStyle = colour;
+            context.beginPath();
+            for (const row of this.rows) if (i + 1 < row.length) context.lineTo(x(row[0]), y(row[i + 1]));
+            context.stroke();
+        }
+        context.fillStyle = "#43545b";
+        context.font = "20px sans-serif";
+        context.fillText(`${peak.toFixed(2)} N, last ${SECONDS_SHOWN} s`, 6, 20);
+        this.canvas.setAttribute("aria-label",
+            `forces over the last ${SECONDS_SHOWN} seconds, at most ${peak.toFixed(2)} newtons`);
+    }
+}
