@@ -17,6 +17,12 @@ from scalpel_sim.run import perform
 
 GRID2 = SCENES["grid2"]
 
+DT = 1e-3
+"""Length of a frame [s]."""
+
+ROUNDING = 1e-12
+"""By which a limit may be passed, in its unit."""
+
 PERIOD = 16
 """Frames between two moves of a page that draws sixty pictures a second."""
 
@@ -48,6 +54,15 @@ def done(simulation: Simulation, folder: Path, **others):
     """Do a run that writes its files to a folder."""
     with Plotter() as plotter:
         perform(simulation, Outputs(folder, plotter), settings={}, **others)
+
+
+def poses(hand, n, first=0):
+    """Return tip, heel and forward of the hand in `n` frames, shape (n, 9)."""
+    found = []
+    for k in range(first, first + n):
+        hand.lead(k * DT)
+        found.append(hand.blade.numbers)
+    return np.array(found)
 
 
 def move(x=0.0, y=0.0, z=0.0, stamp=0.0) -> Move:

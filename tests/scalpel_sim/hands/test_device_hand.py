@@ -11,13 +11,7 @@ from scalpel_sim.hands.commands import FARTHEST_MOVE, FARTHEST_TURN
 from scalpel_sim.hands.device_hand import WATCHDOG, DeviceHand
 from scalpel_sim.hands.limited_pose import FARTHEST_AHEAD, MOST_SPEED, MOST_TURN_RATE
 from scalpel_sim.hands.workspace import ROOM
-from tests.scalpel_sim.hands.led_runs import Clock, led
-
-DT = 1e-3
-"""Length of a frame [s]."""
-
-ROUNDING = 1e-12
-"""By which a limit may be passed, in its unit."""
+from tests.scalpel_sim.hands.led_runs import DT, ROUNDING, Clock, led, poses
 
 SETTLED = 1e-6
 """How near the blade comes to the pose that is wanted [m]."""
@@ -45,15 +39,6 @@ def pose(x=0.0, y=0.0, z=0.0, turn=(0.0, 0.0, 0.0)):
     orientation = np.array([1.0, 0.0, 0.0, 0.0])
     mujoco.mju_quatIntegrate(orientation, np.array(turn), 1.0)
     return CartesianPose(np.array([x, y, z]), orientation)
-
-
-def poses(hand, n, first=0):
-    """Return tip, heel and forward of the hand in `n` frames, shape (n, 9)."""
-    found = []
-    for k in range(first, first + n):
-        hand.lead(k * DT)
-        found.append(hand.blade.numbers)
-    return np.array(found)
 
 
 def led_by(hand, n, stylus, first=0):

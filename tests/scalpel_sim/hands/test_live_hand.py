@@ -21,12 +21,15 @@ from scalpel_sim.run import REST_AFTER_STROKE
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.strokes.stroke import FASTEST, LED_COLUMNS
 from tests.scalpel_sim.hands.led_runs import (
+    DT,
     GRID2,
+    ROUNDING,
     Clock,
     controls_of,
     done,
     led,
     move,
+    poses,
     through_the_body,
     turn,
 )
@@ -40,12 +43,6 @@ UNTIMED = COLUMNS.index("cd_s")
 LEAST_ROOM = 0.01
 """Room in each direction in which a hand can do something in a body of some 30 mm [m]."""
 
-DT = 1e-3
-"""Length of a frame [s]."""
-
-ROUNDING = 1e-12
-"""By which a limit may be passed, in its unit."""
-
 
 @pytest.fixture(scope="module")
 def at_start():
@@ -56,15 +53,6 @@ def at_start():
 def hand(at_start):
     """A hand at the start of the scene, that leads the arm of `at_start`."""
     return LiveHand(at_start[0], clock=Clock())
-
-
-def poses(hand, n, first=0):
-    """Return tip, heel and forward of the hand in `n` frames, shape (n, 9)."""
-    found = []
-    for k in range(first, first + n):
-        hand.lead(k * DT)
-        found.append(hand.blade.numbers)
-    return np.array(found)
 
 
 def middles(found):
