@@ -167,7 +167,8 @@ def test_views_are_chosen_by_their_names_or_by_keys(tab, tmp_path):
     select.select_option("beside the arms")
     own = tab.evaluate("viewer.camera.position.toArray()")
     tab.keyboard.press("9")
-    assert tab.evaluate("viewer.camera.position.toArray()") == own
+    # With each picture the controls of the view may round the place anew.
+    assert tab.evaluate("viewer.camera.position.toArray()") == pytest.approx(own, rel=1e-12)
     tab.evaluate("viewer.camera.position.set(1, 1, 1)")
     tab.click("#home")
     assert tab.evaluate("viewer.camera.position.toArray()") == pytest.approx(own)
