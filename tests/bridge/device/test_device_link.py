@@ -98,8 +98,10 @@ def test_a_stream_that_cannot_be_read_lets_go_and_another_device_may_come(served
         read_one(peer)
         peer.sendall(garbage)
         wait_for(blade, "lose_client")
+    assert blade.asked[-1] == ("lose_client",)
     with DeviceClient(address) as client:
         client.servo_cp(ORIGIN, UNTURNED)
+        assert blade.asked[-1][0] == "servo_cp"
 
 
 def test_a_second_device_is_refused_while_one_leads(served):

@@ -59,6 +59,7 @@ def test_a_reset_takes_a_scripted_run_back_to_its_start(scripted):
     before = tab.evaluate(TIME)
     tab.click("#reset")
     tab.wait_for_function(f"{TIME} < {before}")
+    assert tab.evaluate(TIME) == 0.0 and tab.inner_text("#area") == "0 mm²"
     tab.click("#pause")
     tab.wait_for_function(f"!run.isPaused && {TIME} > 0.03")
 
