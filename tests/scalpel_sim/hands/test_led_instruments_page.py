@@ -72,17 +72,17 @@ STEER = """(way) => new Promise((done) => {
     };
 })"""
 
-TILT = """([axis, deflection]) => new Promise((done) => {
-    // Tilt one stick along an axis until some messages have been said.
+TILT = """([axis, deflection, least]) => new Promise((done) => {
+    // Tilt one stick along an axis until the page has asked for that much [m, or rad].
     const axes = [0, 0, 0, 0];
     axes[axis] = deflection;
-    let said = 0;
+    let asked = 0;
     hand.lead = (message) => {
-        said += 1;
+        asked += Math.hypot(...message.by);
         Hand.prototype.lead.call(hand, message);
     };
     navigator.getGamepads = () => {
-        if (said < 4) return pad(axes);
+        if (asked < least) return pad(axes);
         delete hand.lead;
         navigator.getGamepads = () => pad([0, 0, 0, 0]);
         done();
@@ -185,14 +185,14 @@ def test_the_controls_of_the_page_choose_an_instrument_and_say_what_the_jaws_wil
 def test_the_right_stick_leads_in_depth_and_turns(view, tab):
     away = np.array(tab.evaluate("hand.inWorld([0, 0, 1])"))
     before = tip(tab)
-    tab.evaluate(TILT, [3, 1.0])  # towards the eye, where the workspace is wide
+    tab.evaluate(TILT, [3, 1.0, 3 * LEAST_STEP])  # towards the eye, where the workspace is wide
     until_it_rests(tab)
     way = tip(tab) - before
     assert way @ away < -LEAST_STEP
     assert way == pytest.approx((way @ away) * away, abs=0.05 * LEAST_STEP)
 
     before = tip(tab)  # the blade turns about the middle of its edge, which stands upright
-    tab.evaluate(TILT, [2, 1.0])
+    tab.evaluate(TILT, [2, 1.0, 0.3])
     until_it_rests(tab)
     assert np.linalg.norm(tip(tab) - before) > LEAST_STEP
     end(tab, view)
