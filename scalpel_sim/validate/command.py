@@ -60,14 +60,14 @@ def validate(
         _validate_case(case, out or Path("out") / case.stem, printing)
         return
     from scalpel_sim.cli.run_setup import load_kernels
-    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.run_folder import make_folder
     from scalpel_sim.output.summary import versions
     from scalpel_sim.validate.results import count_verdicts, validation_as_json
     from scalpel_sim.validate.scenes import chosen_scenes
 
     out = out or _FOLDER
     scenes = chosen_scenes(only or ())
-    check_folder(out)
+    make_folder(out)
     with log_to_stderr(printing):
         load_kernels(printing)
         runs = _run(scenes, quick=quick, printing=printing)
@@ -99,12 +99,12 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
     from scalpel_sim.cases.case_file import read_case
     from scalpel_sim.cases.expected import check_expected, curves_of
     from scalpel_sim.cases.report import CaseFindings, case_as_json, print_case, write_case
-    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.run_folder import make_folder
     from scalpel_sim.output.summary import versions
 
     case = read_case(path)
     curves = curves_of(case)
-    check_folder(out)
+    make_folder(out)
     with log_to_stderr(printing):
         started = time.perf_counter()
         record = _run_case(case, printing)
