@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from scalpel_sim.cli.console import log_to_stderr, say
 from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import CheckError, RunError, UsageError
+from tissue import whole_file
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.cases.case_file import CaseFile
@@ -175,9 +176,10 @@ def _write(folder: Path, runs: Sequence["SceneRun"], text: str, *, quick: bool) 
                 name = f"validation_{run.scene.name}{i + 1 if i else ''}.png"
                 draw_plot(plot, folder / name)
                 names[run.scene.name].append(name)
-        (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
         page = validation_page(runs, names, quick=quick)
-        (folder / PAGE_FILE).write_text(page, encoding="utf-8")
+        for name, content in ((JSON_FILE, text + "\n"), (PAGE_FILE, page)):
+            with whole_file(folder / name) as unfinished:
+                unfinished.write_text(content, encoding="utf-8")
     except OSError as error:
         raise RunError(
             f"{error.filename or folder}: cannot be written ({error.strerror or error}); "
