@@ -150,7 +150,7 @@ class Outputs:
         n_new = len(recording) - self._n_written
         if n_new < (1 if all_rows else FRAMES_PER_FLUSH):
             return
-        rows = _csv(recording.rows[self._n_written :])
+        rows = _csv(recording.since(self._n_written))
         self._n_written = len(recording)
         _append(self._forces, rows)
 
