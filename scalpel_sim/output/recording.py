@@ -1,7 +1,7 @@
 """What happened in each frame, as one table of numbers."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 
@@ -20,6 +20,9 @@ def _vector(name: str, unit: str) -> tuple[str, ...]:
     return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
 
 
+WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
+"""Columns that differ from run to run: what frames took."""
+
 COLUMNS = (
     "time_s",
     *_vector("tip", "m"),
@@ -37,12 +40,7 @@ COLUMNS = (
     "anchored_length_m",
     "work_of_blade_j",
     *ACCOUNT,
-    "cd_s",
-    "gc_s",
-    "rx_s",
-    "rd_s",
-    "frame_s",
-    "recording_s",
+    *WALL_TIMES,
 )
 """Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
 averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the
@@ -116,6 +114,11 @@ class Recording:
             RunError: there are more than memory holds, and the disk is full.
         """
         return self._store.rows()
+
+    def rows_from(self, first: int) -> Iterator[FloatArray]:
+        """Yield the frames after so many, one by one: a view, until the next."""
+        for part in self._store.parts(first):
+            yield from part
 
     def column(self, name: str) -> FloatArray:
         """Return one column, shape (n_frames,). A view where memory holds all frames."""

@@ -95,20 +95,20 @@ class RowStore:
         mapped = mmap.mmap(self._file.fileno(), self._n * self._row.size, access=mmap.ACCESS_READ)
         return np.frombuffer(mapped).reshape(self._shape)
 
-    def parts(self) -> Iterator[FloatArray]:
-        """Yield all rows in turn, some thousands at a time. Each is a view, until the next comes.
+    def parts(self, first: int = 0) -> Iterator[FloatArray]:
+        """Yield the rows from one on, some thousands at a time: a view, until the next comes.
 
         Raises:
             RunError: the file cannot be written, or not be read.
         """
         if self._file is None:
-            yield self._room[: self._n]
+            yield self._room[first : self._n]
             return
         self._write()
         part = np.empty((_ROWS_PER_READ, self._shape[1]))
-        for first in range(0, self._n, _ROWS_PER_READ):
-            found = part[: min(_ROWS_PER_READ, self._n - first)]
-            self._file.seek(first * self._row.size)
+        for begin in range(first, self._n, _ROWS_PER_READ):
+            found = part[: min(_ROWS_PER_READ, self._n - begin)]
+            self._file.seek(begin * self._row.size)
             if self._file.readinto(found.data.cast("B")) != found.nbytes:  # type: ignore[attr-defined]
                 raise RunError("the temporary file of the recording cannot be read")
             yield found

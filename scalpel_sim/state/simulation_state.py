@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import mujoco
 import numpy as np
 
-from bridge import InProcessLink, LedGrip
+from bridge import InProcessLink, LedGrip, Proxy
 from scalpel_sim.arm.grip import Grip
 from scalpel_sim.state.made_alike import expect_alike, settings_of
 from tissue import Around, FloatArray, Memento, StateError, StateRules, TissueState
@@ -30,7 +30,7 @@ _RULES = StateRules(
     # Where a stroke leads depends on the time alone. So what a hand did is gone on with by the
     # stroke that was recorded.
     unwritten=frozenset({"Simulation.leader", "LedGrasper.leader"}),
-    made={kind.__name__: kind for kind in (Grip, LedGrip)},
+    made={kind.__name__: kind for kind in (Grip, LedGrip, Proxy)},
 )
 """What of arm and bridge is state; the tissue has its own."""
 
@@ -143,6 +143,7 @@ class SimulationState:
                     "the tissue is in another process, and a state cannot be loaded over a link: "
                     "run without --connect"
                 )
+            link.tissue.expect_state(self._tissue)
             expect_alike(simulation, source.settings)
             link.tissue.load_state(self._tissue, Around(simulation, _RULES))
             simulation.wall_seconds = source.wall_seconds

@@ -3,7 +3,7 @@
 import struct
 import tempfile
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -89,8 +89,14 @@ class FrameLog:
         self.n_bytes = n_bytes
 
     def close(self) -> None:
-        """Close the file, which stays where it has a name."""
+        """Close the file, which stays where it has a name. May be called twice."""
         self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
 
 def _plain(value: Any) -> Any:

@@ -154,10 +154,6 @@ class ReplayWriter:
         self._last = None
         self._read_log()
 
-    def close(self) -> None:
-        """Close the file of the frames."""
-        self._log.close()
-
     def write(self, path: Path) -> None:
         """Write the page.
 

@@ -1,6 +1,5 @@
 """Puts a tree of objects to a memento in plain form, which another process may have written."""
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -8,7 +7,7 @@ import numpy as np
 
 from tissue.core.lazy_fields import plain_class
 from tissue.core.memento import StateRules
-from tissue.core.memento_writing import LENGTHS, PACKED, TAILS
+from tissue.core.memento_writing import LENGTHS, PACKED, TAILS, name_of_tuple
 from tissue.core.memory_blocks import PackedMemory, unpacked
 from tissue.core.struct_memory import memory_of
 from tissue.core.structs import Arrays
@@ -166,10 +165,8 @@ class _Reader:
         name = node["tuple"]
         now = list(live) if isinstance(live, tuple) else []
         items = self._items(node["items"], now, are_in_tuple=True)
-        if name == "tuple":
+        if name == name_of_tuple(tuple):
             self._made[number] = tuple(items)
-        elif plain_class(type(live)).__name__ == name:
-            self._made[number] = tuple.__new__(plain_class(type(live)), items)
         elif name in self._tuple_classes:
             self._made[number] = tuple.__new__(self._tuple_classes[name], items)
         else:
@@ -246,10 +243,9 @@ def _room(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
 
 
 def _tuple_classes(packages: Iterable[str]) -> dict[str, type]:
-    """Return the classes of tuples of some packages by name, but for those that share one."""
+    """Return the classes of tuples of some packages by their names."""
     ours = [kind for kind in _subclasses(tuple) if kind.__module__.partition(".")[0] in packages]
-    n = Counter(kind.__name__ for kind in ours)
-    return {kind.__name__: kind for kind in ours if n[kind.__name__] == 1}
+    return {name_of_tuple(kind): plain_class(kind) for kind in ours}
 
 
 def _subclasses(kind: type) -> list[type]:

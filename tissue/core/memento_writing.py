@@ -100,8 +100,10 @@ class _Writer:
             numbers = [number for each in value._names for number in getattr(value, each)]
             return {"vectors": name, "numbers": [self.value(number) for number in numbers]}
         if isinstance(value, tuple):
-            name = plain_class(type(value)).__name__
-            return {"tuple": name, "items": [self.value(item) for item in value]}
+            return {
+                "tuple": name_of_tuple(type(value)),
+                "items": [self.value(item) for item in value],
+            }
         return {"kept": name}
 
     def _field(self, struct: Arrays, name: str) -> Any:
@@ -114,6 +116,12 @@ class _Writer:
         if isinstance(value, np.ndarray):
             return {"dtype": value.dtype.str, "shape": list(value.shape)} | _within(struct, value)
         return self.value(value)
+
+
+def name_of_tuple(kind: type) -> str:
+    """Return the name of a class of tuples with its module: some classes share the name alone."""
+    plain = plain_class(kind)
+    return f"{plain.__module__}.{plain.__name__}"
 
 
 def _omitted(rules: StateRules) -> Iterable[str]:

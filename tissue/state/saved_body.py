@@ -46,6 +46,14 @@ class SavedBody(DeformedBody):
                 attachment.is_released = True
                 attachment.forget()
 
+    def expect_state(self, state: TissueState) -> None:
+        """Refuse a state of another body, other settings or another version, and change nothing.
+
+        Raises:
+            StateError: the message says what differs.
+        """
+        state.expect_of(self._identity)
+
     def _begin_state(self) -> None:
         """Note which body this is, before any cut."""
         system = self._system

@@ -130,6 +130,14 @@ class TissueState:
             raise StateError(f"the state has no part '{name}': it is of a tissue alone")
         return found
 
+    def expect_of(self, identity: Identity) -> None:
+        """Refuse to be of a tissue with another identity.
+
+        Raises:
+            StateError: the message says what differs.
+        """
+        identity.expect(self._identity)
+
     def load_into(self, tissue: Any, identity: Identity, around: Around | None = None) -> None:
         """Put a tissue to this state.
 
@@ -139,7 +147,7 @@ class TissueState:
         if self._memento is not None and self._memento.root is tissue:
             self._memento.restore()
             return
-        identity.expect(self._identity)
+        self.expect_of(identity)
         content = self._written()
         root, rules = (tissue, RULES) if around is None else around
         both = RULES if around is None else rules.with_others(RULES)
