@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader
-from tissue.io.cell_types import CellType, expect_tetrahedra
+from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
@@ -65,9 +65,13 @@ class Elements:
         """Return the tetrahedra between nodes with `tags`, shape (n_nodes,), at `positions`.
 
         Raises:
-            MeshError: There are no tetrahedra, a tag occurs twice, or no node has the tag.
+            MeshError: There are no tetrahedra, or cells that cannot be ignored beside them; a tag
+                occurs twice, or no node has the tag.
         """
         expect_tetrahedra(self._counts, _CELL_TYPES, _TETRAHEDRON)
+        for number in self._counts.keys() - {_TETRAHEDRON}:
+            cell_type = _CELL_TYPES[number]
+            expect_ignorable(cell_type.n_nodes, f"an element, one of the {cell_type.name},")
         wanted = np.concatenate(self._tetrahedra)
         order = np.argsort(tags, kind="stable")
         in_order = tags[order]
