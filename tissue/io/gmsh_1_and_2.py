@@ -103,7 +103,7 @@ def _elements_as_text(
                 f"its line, found {on_lines[k]}",
                 at,
             )
-        elements.add(number, records[:, stride - cell_type.n_nodes :])
+        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
         start, n_read = start + records.size, n_read + len(records)
     if start != len(flat):
         reader.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
@@ -139,7 +139,8 @@ def _elements_in_binary(reader: ByteReader, byte_order: str) -> Elements:
             )
         stride = 1 + n_tags + cell_type.n_nodes
         flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {cell_type.name}")
-        elements.add(number, as_ints(flat).reshape(n_here, stride)[:, stride - cell_type.n_nodes :])
+        records = as_ints(flat).reshape(n_here, stride)
+        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
         n_read += n_here
     _expect_end(reader, "$EndElements")
     return elements

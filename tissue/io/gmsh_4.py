@@ -143,7 +143,7 @@ def _elements(section: _Section) -> Elements:
         records = section.sizes(n_here * width, f"numbers of {cell_type.name}").reshape(
             n_here, width
         )
-        elements.add(number, records[:, 1:])
+        elements.add(number, records[:, 0], records[:, 1:])
         found += n_here
     section.end()
     if found != n_elements:

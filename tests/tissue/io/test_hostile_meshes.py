@@ -178,6 +178,15 @@ def test_two_gmsh_elements_that_are_read_as_two_others_are_refused(tmp_path):
     assert "element 1 of 24 (triangles): expected 8 numbers on its line, found 9" in message
 
 
+def test_a_triangle_in_the_place_of_a_tetrahedron_is_refused(tmp_path):
+    lines = FILES["gmsh 2.2 .msh"].split(b"\n")
+    at = lines.index(b"$Elements") + 2
+    assert lines[at + 2].startswith(b"3 2 ") and lines[at + 3].startswith(b"4 4 ")
+    lines[at + 3] = lines[at + 2]
+    message = refusal_of(tmp_path, "a.msh", b"\n".join(lines))
+    assert "element 3, one of the triangles, occurs twice" in message
+
+
 def test_a_block_of_elements_of_another_dimension_is_refused(tmp_path):
     data = FILES["gmsh 4.1 .msh"].replace(b"\n3 1 4\n", b"\n3 1 3\n")
     assert "expected quadrangles in a block of dimension 2, found one of dimension 3" in refusal_of(
