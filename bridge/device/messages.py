@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 
 from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
+from bridge.scene_names import WANTED_NAME, is_scene_name
 from bridge.tcp.messages.poses import LARGEST_COORDINATE
 from bridge.tcp.wire import MessageError
 from tissue import Wrench
@@ -128,12 +129,15 @@ def unpack_device_description(payload: bytes) -> DeviceDescription:
     """Return the description in the reply to a HELLO.
 
     Raises:
-        MessageError: the other side is no run that a device leads.
+        MessageError: the other side is no run that a device leads, or its scene has no valid name.
     """
     try:
-        return _description_decoder.decode(payload)
+        found = _description_decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(
             "it is no run that a device leads; start one there with: scalpel-sim run --hand device "
             f"({error})"
         ) from error
+    if not is_scene_name(found.scene):
+        raise MessageError(f"the run's scene is {found.scene[:80]!r}; wanted {WANTED_NAME}")
+    return found

@@ -4,6 +4,8 @@ import logging
 import time
 from typing import Protocol
 
+from msgspec import structs
+
 from bridge.device.messages import (
     ServoRequest,
     pack_device_description,
@@ -11,6 +13,7 @@ from bridge.device.messages import (
     unpack_servo,
 )
 from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
+from bridge.scene_names import sent_scene_name
 from bridge.tcp.address import DEFAULT_HOST
 from bridge.tcp.peer import Peer
 from bridge.tcp.single_client import SingleClientServer
@@ -77,7 +80,8 @@ class DeviceServer(SingleClientServer):
         key: bytes | None = None,
     ) -> None:
         super().__init__("the blade", host, port, key)
-        self._led, self._description = led, description
+        self._led = led
+        self._description = structs.replace(description, scene=sent_scene_name(description.scene))
         self._stamp: float | None = None
         self._is_refusing = False
         self._n_missed = self._n_dropped = 0

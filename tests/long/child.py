@@ -1,7 +1,10 @@
 """A child process that runs cases one by one, so that its death or a hang has the case's number."""
 
 import contextlib
+import ctypes
+import gc
 import importlib
+import itertools
 import multiprocessing
 import os
 import resource
@@ -20,11 +23,11 @@ PATIENCE = 60.0
 for a processor many times as long as it computes."""
 
 N_FIRST = 500
-"""Cases after which memory must not grow: by then caches and pools of the allocator are full."""
+"""Cases after which memory must not grow, and from look to look: by then caches are full."""
 
-GROWTH_ALLOWED = 8 << 20
-"""Growth of the memory of a child over all its later cases [byte]: what pools of the allocator vary
-by. A leak of a file of 1 kB in each of 100,000 cases would be 100 MB."""
+GROWTH_ALLOWED = 4 << 20
+"""Growth of the memory of a child over all its later cases [byte], after what the allocator keeps
+for later was given back. A leak of 1 kB in each of 100,000 cases would be 100 MB."""
 
 ROOM = 512 << 20
 """Address space that a child may take beyond what it has at the start [byte]; more is an error."""
@@ -38,7 +41,7 @@ class Outcome(NamedTuple):
     seconds: float
     """Processor time [s]."""
     memory: int
-    """Memory that the child has in use [byte]."""
+    """Memory that the child had in use when it was last looked at [byte]."""
 
 
 class Child:
@@ -59,13 +62,9 @@ class Child:
         outcome = self._outcome(case)
         assert not outcome.failure, outcome.failure
         assert outcome.seconds < HANG, f"case {case} took {outcome.seconds:.1f} s"
-        self._n_cases += 1
-        if self._n_cases == N_FIRST:
-            self._memory = outcome.memory
+        self._memory = self._memory or outcome.memory
         growth = outcome.memory - self._memory
-        assert self._n_cases < N_FIRST or growth < GROWTH_ALLOWED, (
-            f"memory has grown by {growth >> 10} KiB since case {N_FIRST} of this process"
-        )
+        assert growth < GROWTH_ALLOWED, f"the memory of this process has grown by {growth} bytes"
 
     def close(self) -> None:
         """End the process."""
@@ -96,22 +95,26 @@ class Child:
         self._process = context.Process(target=_serve, args=(theirs, *self._call), daemon=True)
         self._process.start()
         theirs.close()
-        self._n_cases = self._memory = 0
+        self._memory = 0
 
 
 def _serve(pipe: Connection, module: str, function: str, arguments: tuple[object, ...]) -> None:
     """Run the cases that come through a pipe until it is closed."""
     call = getattr(importlib.import_module(module), function)
     _limit_memory()
+    memory = 0
     with contextlib.suppress(EOFError):
-        while True:
+        for n in itertools.count():
             case = pipe.recv()
             failure, begun = "", time.process_time()
             try:
                 call(case, *arguments)
             except BaseException:
                 failure = traceback.format_exc()
-            pipe.send(Outcome(failure, time.process_time() - begun, memory_of_this_process()))
+            seconds = time.process_time() - begun
+            if n % N_FIRST == N_FIRST - 1:
+                memory = memory_of_this_process()
+            pipe.send(Outcome(failure, seconds, memory))
 
 
 def _limit_memory() -> None:
@@ -125,4 +128,8 @@ def memory_of_this_process() -> int:
     """Return the memory in use [byte]; 0 where the system does not say."""
     if sys.platform != "linux":
         return 0
+    gc.collect()
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

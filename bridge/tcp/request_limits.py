@@ -1,0 +1,77 @@
+"""What one request to a tissue may cost: a server that computes for long serves nobody."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from bridge.led_frames import FrameLoad, FramePose
+from bridge.tcp.wire import MessageError
+from tissue import FloatArray
+
+if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
+    from tissue import BladeSweep, Tissue
+
+FARTHEST_IN_A_REQUEST = 250.0
+"""How far the edge, or a frame that is led, may move in a request, in mean node sizes of the body.
+The edge is followed in quarters of a node size, so that these are a thousand increments. In a frame
+of a millisecond a scalpel moves by a hundredth of a node size."""
+
+MOST_STEPS_ASKED = 1000
+"""Steps of the integrator in a request that are always allowed. A frame of the scenes takes 1 to
+20."""
+
+MOST_WORK = 2e7
+"""Steps of the integrator times tetrahedra that are allowed where it is more: some 2 s."""
+
+
+class RequestLimits:
+    """The limits of the requests to a body.
+
+    Args:
+        tissue: The body, before it is cut: what cuts leave takes as long steps, by mass scaling.
+    """
+
+    def __init__(self, tissue: Tissue) -> None:
+        self._farthest = FARTHEST_IN_A_REQUEST * tissue.node_size
+        self._step = tissue.cut_report().initial.time_step
+
+    def check_step(self, sweep: BladeSweep | None, dt: float, n_tetrahedra: int) -> None:
+        """Check the motion of the blade, and the length of the step [s].
+
+        Raises:
+            MessageError: the step would take too long.
+        """
+        most_steps = max(MOST_STEPS_ASKED, MOST_WORK / n_tetrahedra)
+        if dt > most_steps * self._step:
+            raise MessageError(
+                f"a step of {dt:g} s, which takes some {dt / self._step:,.0f} steps of the "
+                f"integrator; at most {most_steps * self._step:.3g} s are allowed. Take shorter "
+                "steps"
+            )
+        if sweep is not None:
+            t0, t1 = sweep
+            for end, before, after in (("tip", t0.tip, t1.tip), ("heel", t0.heel, t1.heel)):
+                self._check_way(f"the {end} of the blade", before, after)
+
+    def check_poses(self, poses: Sequence[FramePose], before: Sequence[FrameLoad]) -> None:
+        """Check how far frames move.
+
+        Args:
+            poses: Where they will be.
+            before: What the body did to each in the last step, and where.
+
+        Raises:
+            MessageError: one moves too far.
+        """
+        for i, (pose, load) in enumerate(zip(poses, before, strict=True)):
+            self._check_way(f"frame {i}", load.wrench.point, pose.origin)
+
+    def _check_way(self, what: str, before: FloatArray, after: FloatArray) -> None:
+        way = math.dist(before.tolist(), after.tolist())
+        if not way <= self._farthest:
+            raise MessageError(
+                f"{what} moves by {way:.3g} m in one step; at most {self._farthest:.3g} m are "
+                f"allowed, {FARTHEST_IN_A_REQUEST:g} times the mean node size. Take shorter steps"
+            )
