@@ -25,6 +25,11 @@ DEFAULT_DEVICE_PORT = 8767
 """Port at which a run waits for a device: the one after that of a tissue."""
 
 
+LONGEST_PAUSE = 3600.0
+"""Longest pause of which the periods are counted as missed [s]: whatever a device says, their sum
+stays a number that a reply has room for."""
+
+
 class LedByDevice(Protocol):
     """What a device leads."""
 
@@ -129,7 +134,8 @@ class DeviceServer(SingleClientServer):
             MessageError: the device cannot have moved so.
         """
         if self._stamp is not None:
-            self._n_missed += max(round((request.stamp - self._stamp) / request.period) - 1, 0)
+            pause = min(max(request.stamp - self._stamp, 0.0), LONGEST_PAUSE)
+            self._n_missed += max(round(pause / request.period) - 1, 0)
         self._stamp = request.stamp
         try:
             self._led.servo_cp(request.servo_cp, holds=request.holds)

@@ -18,6 +18,11 @@ FARTHEST_IN_A_REQUEST = 250.0
 The edge is followed in quarters of a node size, so that these are a thousand increments. In a frame
 of a millisecond a scalpel moves by a hundredth of a node size."""
 
+LARGEST_SWEEP = 2500.0
+"""Area that the edge may sweep in a request, as its length times how far it moves, in squares of
+the mean node size; also its length, in node sizes. Points along the edge, some to a node size, are
+followed in each increment."""
+
 MOST_STEPS_ASKED = 1000
 """Steps of the integrator in a request that are always allowed. A frame of the scenes takes 1 to
 20."""
@@ -34,6 +39,7 @@ class RequestLimits:
     """
 
     def __init__(self, tissue: Tissue) -> None:
+        self._node_size = tissue.node_size
         self._farthest = FARTHEST_IN_A_REQUEST * tissue.node_size
         self._step = tissue.cut_report().initial.time_step
 
@@ -51,9 +57,7 @@ class RequestLimits:
                 "steps"
             )
         if sweep is not None:
-            t0, t1 = sweep
-            for end, before, after in (("tip", t0.tip, t1.tip), ("heel", t0.heel, t1.heel)):
-                self._check_way(f"the {end} of the blade", before, after)
+            self._check_sweep(sweep)
 
     def check_poses(self, poses: Sequence[FramePose], before: Sequence[FrameLoad]) -> None:
         """Check how far frames move.
@@ -68,10 +72,32 @@ class RequestLimits:
         for i, (pose, load) in enumerate(zip(poses, before, strict=True)):
             self._check_way(f"frame {i}", load.wrench.point, pose.origin)
 
-    def _check_way(self, what: str, before: FloatArray, after: FloatArray) -> None:
-        way = math.dist(before.tolist(), after.tolist())
+    def _check_sweep(self, sweep: BladeSweep) -> None:
+        (tip_t0, heel_t0, _), (tip_t1, heel_t1, _) = sweep
+        travel = max(
+            self._check_way("the tip of the blade", tip_t0, tip_t1),
+            self._check_way("the heel of the blade", heel_t0, heel_t1),
+        )
+        length = max(_distance(tip_t0, heel_t0), _distance(tip_t1, heel_t1))
+        size = self._node_size
+        if max(length / size, length * travel / size**2) > LARGEST_SWEEP:
+            raise MessageError(
+                f"an edge of {length:.3g} m moves by {travel:.3g} m in one step; the length is at "
+                f"most {LARGEST_SWEEP * size:.3g} m, and length times travel at most "
+                f"{LARGEST_SWEEP * size**2:.3g} m2, {LARGEST_SWEEP:g} squares of the mean node "
+                "size. Take shorter steps, or a shorter blade"
+            )
+
+    def _check_way(self, what: str, before: FloatArray, after: FloatArray) -> float:
+        """Return how far something moves [m]."""
+        way = _distance(before, after)
         if not way <= self._farthest:
             raise MessageError(
                 f"{what} moves by {way:.3g} m in one step; at most {self._farthest:.3g} m are "
                 f"allowed, {FARTHEST_IN_A_REQUEST:g} times the mean node size. Take shorter steps"
             )
+        return way
+
+
+def _distance(a: FloatArray, b: FloatArray) -> float:
+    return math.dist(a.tolist(), b.tolist())

@@ -16,14 +16,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 HANG = 2.0
-"""Processor time that a case may take at most [s]."""
+"""Processor time that a file or a frame may take at most [s]."""
 
 PATIENCE = 60.0
 """Wall time after which a case that has not come back is ended [s]: on a busy machine a case waits
 for a processor many times as long as it computes."""
 
 N_FIRST = 500
-"""Cases after which memory must not grow, and from look to look: by then caches are full."""
+"""Cases after which memory is looked at for the first time, and again and again: by then caches are
+full."""
 
 GROWTH_ALLOWED = 4 << 20
 """Growth of the memory of a child over all its later cases [byte], after what the allocator keeps
@@ -51,17 +52,21 @@ class Child:
         module: Name of the module; it is imported in the child.
         function: Name of the function.
         arguments: Arguments after the number of the case.
+        longest: Processor time that a case may take at most [s].
     """
 
-    def __init__(self, module: str, function: str, *arguments: object) -> None:
+    def __init__(
+        self, module: str, function: str, *arguments: object, longest: float = HANG
+    ) -> None:
         self._call = (module, function, arguments)
+        self._longest = longest
         self._process: multiprocessing.process.BaseProcess | None = None
 
     def run(self, case: int) -> None:
         """Run a case; fail if it fails, takes too long, takes memory, or ends the process."""
         outcome = self._outcome(case)
         assert not outcome.failure, outcome.failure
-        assert outcome.seconds < HANG, f"case {case} took {outcome.seconds:.1f} s"
+        assert outcome.seconds < self._longest, f"case {case} took {outcome.seconds:.1f} s"
         self._memory = self._memory or outcome.memory
         growth = outcome.memory - self._memory
         assert growth < GROWTH_ALLOWED, f"the memory of this process has grown by {growth} bytes"

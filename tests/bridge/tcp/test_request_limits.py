@@ -43,6 +43,15 @@ def test_a_blade_that_turns_its_heel_too_far_is_refused(link, upright):
     expect_refusal(link, "the heel of the blade moves by 2 m", BladeSweep(before, after), DT)
 
 
+def test_a_long_blade_that_moves_far_is_refused(link, upright):
+    after = upright(0.009, 0.01)
+    long = after._replace(heel=after.heel + np.array([0.0, 0.0, 1.0]))
+    match = "an edge of 1.03 m moves by 1 m in one step; .* times travel at most 0.0787 m2, 2500"
+    expect_refusal(link, match, BladeSweep(after, long), DT)
+    longer = after._replace(heel=after.heel + np.array([0.0, 0.0, 20.0]))
+    expect_refusal(link, "the length is at most 14 m", BladeSweep(longer, longer), DT)
+
+
 def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
     sweep = BladeSweep(upright(0.009, 0.01 - 0.99 * FARTHEST), upright(0.009, 0.01))
     assert link.step(sweep, DT).cut_area > 0.0

@@ -23,7 +23,12 @@ from bridge.tcp.peer import (
     SEND_SECONDS,
     SILENCE_SECONDS,
 )
-from bridge.tcp.request_limits import FARTHEST_IN_A_REQUEST, MOST_STEPS_ASKED, MOST_WORK
+from bridge.tcp.request_limits import (
+    FARTHEST_IN_A_REQUEST,
+    LARGEST_SWEEP,
+    MOST_STEPS_ASKED,
+    MOST_WORK,
+)
 from bridge.tcp.single_client import MAX_STRANGERS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.device.served_blade import STATE
@@ -101,6 +106,7 @@ def test_the_limits_are_those_of_the_server():
     gone = IDLE_SECONDS + N_PROBES * PROBE_SECONDS
     assert f"has not answered the system for {gone} s" in WIRE
     assert f"more than {FARTHEST_IN_A_REQUEST:g} times the mean node size" in WIRE
+    assert f"more than {LARGEST_SWEEP:,.0f} squares of the mean node size" in WIRE
     assert f"more than {MOST_STEPS_ASKED:,} steps of the integrator" in WIRE
     assert f"more than {MOST_WORK / 1e6:g} million" in WIRE
     assert f"{WANTED_NAME}" in WIRE
