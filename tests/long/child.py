@@ -26,7 +26,7 @@ N_FIRST = 500
 """Cases after which memory is looked at for the first time, and again and again: by then caches are
 full."""
 
-GROWTH_ALLOWED = 4 << 20
+GROWTH_ALLOWED = 8 << 20
 """Growth of the memory of a child over all its later cases [byte], after what the allocator keeps
 for later was given back. A leak of 1 kB in each of 100,000 cases would be 100 MB."""
 

@@ -85,7 +85,7 @@ def replay_page(title: str, caption: str, packets: str) -> str:
     """
     controls = _part("player.html")
     page = _page(title, caption, (*_OF_ALL_PAGES, "replay.js"), controls, packets)
-    policy = policy_of(page, "'none'")
+    policy = policy_of(page, "data:")  # its packets, as it unpacks them
     return page.replace(_CHARSET, f"{_CHARSET}\n{_POLICY.format(policy)}", 1)
 
 
