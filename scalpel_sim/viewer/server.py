@@ -10,6 +10,7 @@ pickles never leave the two processes.
 import asyncio
 import errno
 import logging
+import os
 import pickle
 import secrets
 import sys
@@ -33,7 +34,7 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.page import live_page
-from scalpel_sim.viewer.page.policy import policy_of
+from scalpel_sim.viewer.page.policy import PAGE_HEADERS, policy_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 
 LOOPBACK = "127.0.0.1"
@@ -63,16 +64,6 @@ _CAPTION = (
 _HOW_TO_LOOK = "Drag to turn the view, scroll to zoom."
 _HOW_TO_LEAD = "Drag with the right button to turn the view."
 """Text below the heading of the live page."""
-
-HEADERS = {
-    "Cache-Control": "no-store",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Cross-Origin-Resource-Policy": "same-origin",
-}
-"""Headers of every answer: the page is for nobody but who asked for it."""
 
 MOST_PAGES = 16
 """Pages at most that are shown the run at once."""
@@ -294,7 +285,7 @@ class PageRequest(tornado.web.RequestHandler):
 
     def set_default_headers(self) -> None:
         """Set the headers of every answer; called by tornado."""
-        for name, value in HEADERS.items():
+        for name, value in PAGE_HEADERS.items():
             self.set_header(name, value)
 
     def get(self) -> None:
@@ -396,3 +387,5 @@ def serve_page() -> None:
     newest = NewestState(pickle.load(sys.stdin.buffer))
     threading.Thread(target=newest.read, args=(sys.stdin.buffer,), daemon=True).start()
     asyncio.run(serve(newest))
+    # The thread may be reading. At its own end Python would want the lock of that, and abort.
+    os._exit(0)

@@ -3,13 +3,18 @@
 import pytest
 
 from tests.battery import battery
-from tests.long.child import HANG, Child
+from tests.long.child import GROWTH_WITH_KERNELS, HANG, Child
 from tests.long.frame_mutations import N_FRAMES
 
 
 @pytest.fixture(scope="module")
 def servers():
-    child = Child("tests.long.frame_mutations", "converse", longest=N_FRAMES * HANG)
+    child = Child(
+        "tests.long.frame_mutations",
+        "converse",
+        longest=N_FRAMES * HANG,
+        growth=GROWTH_WITH_KERNELS,
+    )
     yield child
     child.close()
 
