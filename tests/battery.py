@@ -221,9 +221,10 @@ def totals_of(config: pytest.Config) -> dict[str, Total]:
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     """Fail where a battery has more disagreements than it may."""
     is_worker = hasattr(session.config, "workerinput")
-    if not is_worker and exitstatus == pytest.ExitCode.OK:
-        if any(total.disagrees for total in totals_of(session.config).values()):
-            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+    if is_worker or exitstatus != pytest.ExitCode.OK:
+        return
+    if any(total.disagrees for total in totals_of(session.config).values()):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(
