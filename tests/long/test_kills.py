@@ -2,22 +2,20 @@
 
 import re
 import signal
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.run_folder import ENERGY_PLOT, RUN_FILES
 from tests.battery import battery
-from tests.long.counted_run import count_in
+from tests.long.forked_runs import ForkedRuns, count_in
 from tests.processes import start
 from tests.run_files import names_in
 from tests.whole_runs import broken_files
-
-COUNTED = (sys.executable, "-m", "tests.long.counted_run")
 
 MOST_LOST = 100
 """Frames of a millisecond that a kill may cost."""
@@ -30,13 +28,19 @@ SAID = re.compile(
 """Messages of a run that a signal ended."""
 
 
+@pytest.fixture(scope="module")
+def forked_runs():
+    with ForkedRuns() as runs:
+        yield runs
+
+
 def wait_for(program, condition):
     while program.poll() is None and not condition():
         time.sleep(0.002)
 
 
 @battery(n_per_change=6, n_long=1_000)
-def test_a_run_that_is_killed_at_any_instant_leaves_whole_files(case):
+def test_a_run_that_is_killed_at_any_instant_leaves_whole_files(case, forked_runs):
     random = np.random.default_rng(case)
     number = random.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
     instant = ("start", "frames", "writing")[case % 3]
@@ -44,8 +48,8 @@ def test_a_run_that_is_killed_at_any_instant_leaves_whole_files(case):
         folder, count = Path(name) / "run", Path(name) / "count"
         seconds = {"start": 0.05, "frames": 1000.0, "writing": random.uniform(0.01, 0.3)}[instant]
         words = ("run", "grid2", "-q", "--seconds", str(seconds), "--out", str(folder))
-        is_counted = instant != "start"  # the counter would be loaded before the program
-        program = start(str(count), *words, program=COUNTED) if is_counted else start(*words)
+        is_counted = instant != "start"  # that is of a program that loads itself
+        program = forked_runs.start(count, *words) if is_counted else start(*words)
         if not is_counted:
             time.sleep(random.uniform(0.0, 3.0))
         elif instant == "frames":

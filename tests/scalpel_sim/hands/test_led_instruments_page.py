@@ -201,7 +201,7 @@ def test_the_right_stick_leads_in_depth_and_turns(view, tab):
 
 @pytest.mark.browser
 def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
-    context = browser.new_context(viewport=WINDOW, has_touch=True)
+    context = browser.new_context(viewport=WINDOW, has_touch=True, bypass_csp=True)
     tab = context.new_page()
     tab.set_default_timeout(TIMEOUT)
     tab.failures = []
