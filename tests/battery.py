@@ -7,11 +7,12 @@ A battery is a test with an argument `case`, the seed from which all of the case
         random = np.random.default_rng(case)
         ...
 
-The test is called once for each case; fixtures are made once for some hundred of them.
+The test is called once for each case; fixtures are made once for some hundred of them. What a case
+adds to the fixture `tally`, a Counter, is printed at the end.
 """
 
 import shlex
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from time import perf_counter
 from typing import NamedTuple
@@ -27,8 +28,12 @@ N_GROUPS = 100
 LONG_TIMEOUT = 6 * 3600
 """Time limit of a group in a long run [s]; an hour of simulated time is one case."""
 
-PROPERTY = "battery"
-"""Name of the entry in the report of a test that says how many cases were run."""
+DONE, TALLY = "battery", "tally"
+"""Names of the entries in the report of a test: how many cases were run, and what they counted."""
+
+
+class Disagreement(AssertionError):
+    """A failure that a known share of the cases may have: `battery(..., disagreements=0.01)`."""
 
 
 class Cases(NamedTuple):
@@ -49,11 +54,27 @@ class Done(NamedTuple):
     n_cases: int
     n_failed: int
     seconds: float
+    disagreements: list[str]
+    """The commands of those cases."""
+    allowed: float
+    """Share of the cases that may be disagreements."""
 
 
-def battery(n_per_change: int, n_long: int) -> pytest.MarkDecorator:
-    """Mark a test as a battery of that many cases for each change, and in a long run."""
-    return pytest.mark.long(n_per_change=n_per_change, n_long=n_long)
+def battery(n_per_change: int, n_long: int, disagreements: float = 0.0) -> pytest.MarkDecorator:
+    """Mark a test as a battery.
+
+    Args:
+        n_per_change: Number of cases for each change.
+        n_long: Number of cases in a long run.
+        disagreements: Share of all cases that may raise `Disagreement`.
+    """
+    return pytest.mark.long(n_per_change=n_per_change, n_long=n_long, disagreements=disagreements)
+
+
+@pytest.fixture
+def tally() -> Counter[str]:
+    """A counter whose totals over all cases are printed at the end."""
+    return Counter()
 
 
 def first_and_end(text: str) -> tuple[int, int]:
@@ -77,7 +98,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     mark = metafunc.definition.get_closest_marker("long")
     if mark is not None:
-        groups = list(groups_of_cases(metafunc.config, **mark.kwargs))
+        sizes = (mark.kwargs["n_per_change"], mark.kwargs["n_long"])
+        groups = list(groups_of_cases(metafunc.config, *sizes))
         metafunc.parametrize("case", groups, ids=[cases.name for cases in groups])
 
 
@@ -102,26 +124,34 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
     """Call a battery once for each case; fail at the end, with the command for each failure."""
-    if pyfuncitem.get_closest_marker("long") is None:
+    mark = pyfuncitem.get_closest_marker("long")
+    if mark is None:
         return None
     names = pyfuncitem._fixtureinfo.argnames
     arguments = {name: pyfuncitem.funcargs[name] for name in names}
     cases: Cases = arguments.pop("case")
     failures: list[str] = []
+    disagreements: list[str] = []
     n_done, begun = 0, perf_counter()
     try:
         for case in range(cases.first, cases.end):
+            command = command_of(pyfuncitem, cases, case)
             try:
                 pyfuncitem.obj(case=case, **arguments)
+            except Disagreement as error:
+                disagreements.append(f"{command}  # {error}")
             except (Exception, pytest.fail.Exception):
                 shown = pyfuncitem.repr_failure(pytest.ExceptionInfo.from_current())
-                failures.append(f"{shown}\n\n{command_of(pyfuncitem, cases, case)}\n")
+                failures.append(f"{shown}\n\n{command}\n")
             n_done += 1
             if len(failures) == MOST_FAILURES:
                 break
     finally:
-        done = Done(n_done, len(failures), perf_counter() - begun)
-        pyfuncitem.user_properties.append((PROPERTY, tuple(done)))
+        seconds, allowed = perf_counter() - begun, mark.kwargs["disagreements"]
+        done = Done(n_done, len(failures), seconds, disagreements, allowed)
+        pyfuncitem.user_properties.append((DONE, tuple(done)))
+        plain = {name: int(n) for name, n in arguments.get("tally", {}).items()}
+        pyfuncitem.user_properties.append((TALLY, plain))
     if failures:
         several = f"{len(failures)} of {n_done} cases failed; each is followed by its command\n\n"
         pytest.fail(several + "\n".join(failures), pytrace=False)
@@ -138,16 +168,74 @@ def command_of(item: pytest.Function, cases: Cases, case: int) -> str:
     return shlex.join(["pytest", *size, node, "--case", str(case)])
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Print how many cases of each battery were run, how many failed, and how long they took."""
-    done = defaultdict(list)
-    for reports in terminalreporter.stats.values():
+class Total:
+    """What all groups of a battery came to."""
+
+    def __init__(self) -> None:
+        self.groups: list[Done] = []
+        self.tally: Counter[str] = Counter()
+
+    @property
+    def n_cases(self) -> int:
+        return sum(group.n_cases for group in self.groups)
+
+    @property
+    def disagreements(self) -> list[str]:
+        return [command for group in self.groups for command in group.disagreements]
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether more cases disagree than may."""
+        return len(self.disagreements) > self.groups[0].allowed * self.n_cases
+
+    def lines(self) -> Iterator[str]:
+        n_failed = sum(group.n_failed for group in self.groups)
+        seconds = sum(group.seconds for group in self.groups)
+        yield f"{self.n_cases} cases, {n_failed} failed, {seconds:.1f} s"
+        if self.disagreements:
+            share = len(self.disagreements) / self.n_cases
+            allowed = f"at most {self.groups[0].allowed:.2%} may"
+            yield f"{len(self.disagreements)} disagree ({share:.2%}; {allowed})"
+            yield from self.disagreements
+        if self.tally:
+            yield ", ".join(f"{name}: {n}" for name, n in sorted(self.tally.items()))
+
+
+def totals_of(config: pytest.Config) -> dict[str, Total]:
+    """Return the totals of the batteries that were run, by the name of the test."""
+    totals: dict[str, Total] = defaultdict(Total)
+    terminal = config.pluginmanager.getplugin("terminalreporter")
+    for reports in terminal.stats.values() if terminal else ():
         for report in reports:
             for name, value in getattr(report, "user_properties", ()):
-                if name == PROPERTY and report.when == "call":
-                    done[report.nodeid.partition("[")[0]].append(Done(*value))
-    if done:
+                if getattr(report, "when", None) == "call":
+                    total = totals[report.nodeid.partition("[")[0]]
+                    if name == DONE:
+                        total.groups.append(Done(*value))
+                    elif name == TALLY:
+                        total.tally.update(value)
+    return {node: total for node, total in totals.items() if total.groups}
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    """Fail where a battery has more disagreements than it may."""
+    is_worker = hasattr(session.config, "workerinput")
+    if is_worker or exitstatus != pytest.ExitCode.OK:
+        return
+    if any(total.disagrees for total in totals_of(session.config).values()):
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(
+    terminalreporter: pytest.TerminalReporter, config: pytest.Config
+) -> None:
+    """Print how many cases of each battery were run, how many failed, and how long they took."""
+    totals = totals_of(config)
+    if totals:
         terminalreporter.section("batteries")
-    for node, groups in sorted(done.items()):
-        n, n_failed, seconds = map(sum, zip(*groups, strict=True))
-        terminalreporter.write_line(f"{node}: {n} cases, {n_failed} failed, {seconds:.1f} s")
+    for node, total in sorted(totals.items()):
+        first, *others = total.lines()
+        terminalreporter.write_line(f"{node}: {first}", red=total.disagrees)
+        for line in others:
+            terminalreporter.write_line(f"  {line}", red=total.disagrees)

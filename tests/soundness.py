@@ -60,6 +60,13 @@ def n_pieces(tetrahedra: IntArray) -> int:
     return _n_groups(len(tetrahedra), _pairs(faces_of(tetrahedra)) // 4)
 
 
+def piece_volumes(body: Snapshot) -> tuple[IntArray, FloatArray]:
+    """Return the piece of each tetrahedron, shape (n_tets,), and volumes of pieces at rest [m3]."""
+    pairs = _pairs(faces_of(body.tetrahedra)) // 4
+    piece = _groups(len(body.tetrahedra), pairs)[1]
+    return piece, np.bincount(piece, weights=volumes(body.rest_positions, body.tetrahedra))
+
+
 def n_split_stars(tetrahedra: IntArray, pairs: IntArray | None = None) -> int:
     """Return how many nodes connect groups of tetrahedra that share no face at the node.
 
@@ -184,8 +191,14 @@ def _pairs(faces: Faces) -> IntArray:
 
 def _n_groups(n: int, pairs: IntArray) -> int:
     """Return the number of connected groups of `n` items, given pairs that are connected."""
+    return _groups(n, pairs)[0]
+
+
+def _groups(n: int, pairs: IntArray) -> tuple[int, IntArray]:
+    """Return the number of connected groups of `n` items, and the group of each, shape (n,)."""
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
+    count, group = connected_components(graph, directed=False)
+    return int(count), group
 
 
 def smallest_altitude(rest: FloatArray, tetrahedra: IntArray) -> float:

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 
 BATTERY = """
 import pytest
-from tests.battery import battery
+from tests.battery import Disagreement, battery
 
 @battery(n_per_change=10, n_long=1000)
 def test_squares_end_in_other_digits_than_7(case):
@@ -23,21 +23,27 @@ def test_squares_end_in_other_digits_than_7(case):
 def test_steps(tmp_path, case, step):
     assert tmp_path.is_dir()
     assert case * step != 6
+
+@battery(n_per_change=100, n_long=1000, disagreements=0.01)
+def test_few_disagree(tally, case):
+    tally["odd"] += case % 2
+    if case % 100 == 50 or case == 999:
+        raise Disagreement("why")
 """
 
 
 @pytest.fixture
 def run(tmp_path):
-    """Return a function that runs pytest on the batteries above and returns what it printed."""
+    """Return a function that runs pytest on these batteries and returns what it printed."""
     (tmp_path / "test_small.py").write_text(BATTERY)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n    long: a battery\n")
 
-    def run_with(*options):
+    def run_with(*options, status=False):
         command = [sys.executable, "-m", "pytest", "-p", "tests.battery", *options]
         done = subprocess.run(
             command, cwd=tmp_path, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
         )
-        return done.stdout + done.stderr
+        return done.returncode if status else done.stdout + done.stderr
 
     return run_with
 
@@ -59,7 +65,7 @@ def test_a_change_runs_the_few_cases_and_a_long_run_the_many(run):
     printed = run()
     assert counts(printed, SQUARES) == (10, 1)
     assert counts(printed, STEPS) == (10, 1)
-    printed = run("--long")
+    printed = run("--long", "-k", "squares or steps")
     assert counts(printed, SQUARES) == (1000, 10)
     assert counts(printed, STEPS) == (100, 2)
 
@@ -91,3 +97,14 @@ def test_two_processes_share_a_long_battery(run):
     assert counts(printed, SQUARES) == (1000, 10)
     assert "[gw0]" in printed
     assert "[gw1]" in printed
+
+
+def test_a_known_share_of_the_cases_may_disagree_and_each_is_printed(run):
+    printed = run("-k", "disagree")
+    assert counts(printed, "test_few_disagree") == (100, 0)
+    assert "1 disagree (1.00%; at most 1.00% may)" in printed
+    assert "  pytest test_small.py::test_few_disagree --case 50  # why" in printed
+    assert "odd: 50" in printed
+    assert run("-k", "disagree", status=True) == 0
+    assert run("-k", "disagree", "--cases", "0:99", status=True) == 1
+    assert run("-k", "disagree", "--long", "-n", "2", "--dist", "load", status=True) == 1

@@ -57,7 +57,14 @@ def live_page(
     scripts.append("run.js")
     if is_led:
         bars.insert(0, "hand")
-        scripts += ["coarseness.js", "hand_input.js", "gamepad.js", "instruments.js", "hand.js"]
+        scripts += [
+            "coarseness.js",
+            "depth.js",
+            "hand_input.js",
+            "gamepad.js",
+            "instruments.js",
+            "hand.js",
+        ]
     if choices is not None:
         panels.append("choices")
         scripts.append("choices.js")

@@ -1,0 +1,226 @@
+"""A long run of everything: strokes, a led hand, tabs of the page, servers that are killed.
+
+It is divided into lives of a body, which is then made anew: with a blade without an arm, with a
+hand that leads the arm, and with an arm whose tissue is in another process, in turn.
+"""
+
+import gc
+import itertools
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridge import LinkError, TcpLink
+from scalpel_sim import SCENES, Simulation, Viewer, prepare
+from scalpel_sim.bench.random_strokes import random_stroke
+from scalpel_sim.hands.commands import Engage, Move, Turn
+from scalpel_sim.hands.live_hand import LiveHand
+from scalpel_sim.scene_body import make_tissue
+from scalpel_sim.viewer.pictures import into_viewer
+from tests.child import ROOT, answer
+from tissue import BladeSweep, Energies, Tissue, block
+
+SCENE = replace(
+    SCENES["grid2"], mesh=partial(block, (3, 4, 3), (0.04, 0.04, 0.04)), floor=-0.02, audit=True
+)
+"""A block of 216 tetrahedra that is held at its sides, as in the paper, above a floor."""
+
+DT = 1e-3
+"""Length of a frame [s]."""
+
+LIFE = 20.0
+"""Simulated time of a life [s]: three of them are the first minute."""
+
+SETTLING, RESTING = 0.25, 0.05
+"""The end of a life, in which the body comes to rest and then is watched, as shares of it."""
+
+PERIOD = 16
+"""Frames between two messages of a page that draws sixty pictures a second."""
+
+HAND_SPEED = 0.05
+"""Fastest that a hand moves along an axis [m/s]."""
+
+CHANGE_EVERY = 100 * PERIOD
+"""Frames after which a hand goes elsewhere."""
+
+PAUSE_EVERY, PAUSE = 4000, 500
+"""Frames after which a hand pauses, and of a pause."""
+
+
+class Life(NamedTuple):
+    """What a life came to."""
+
+    kind: str
+    frames: int
+    residual: float
+    """Largest residual of the account, as a share of the work that was done on the body."""
+    drift: float
+    """How far a node moved while the body was watched [m]."""
+
+
+def run(seed: int, seconds: float, life: float = LIFE) -> dict[str, Any]:
+    """Run for so long of simulated time.
+
+    Returns:
+        For each life a row of `Life`, as `lives`; the memory after each life of this process and of
+        the process that serves the page, as `memory` and `page_memory` [bytes]; `tabs` opened.
+    """
+    random = np.random.default_rng(seed)
+    kinds: list[Callable[..., Life]] = [strokes, led, served]
+    lives, memory, page_memory = [], [], []
+    first = prepare(SCENE)
+    with Viewer(first.arm.model, frame=first.frame) as viewer, open_tabs(viewer.url, seed) as tabs:
+        del first
+        for i in range(round(seconds / life)):
+            lives.append(kinds[i % len(kinds)](random, life, viewer))
+            gc.collect()
+            memory.append(resident(os.getpid()))
+            page_memory.append(resident(viewer._process.pid))
+        assert viewer.is_running
+        n_tabs = tabs_opened(tabs)
+    return {"lives": lives, "memory": memory, "page_memory": page_memory, "tabs": n_tabs}
+
+
+# Lives.
+
+
+def strokes(random: np.random.Generator, life: float, viewer: Viewer) -> Life:
+    """Make random strokes of a blade without an arm; then leave the body alone."""
+    tissue = make_tissue(SCENE)
+    residual, n, n_most = 0.0, 0, busy_frames(life)
+    while n < n_most:
+        poses = random_stroke(tissue, random)
+        for sweep in itertools.starmap(BladeSweep, itertools.pairwise(poses)):
+            tissue.step(sweep, DT)
+            n += 1
+        for _ in range(50):
+            energies = tissue.step(None, DT).energies
+            n += 1
+        residual = max(residual, share(energies))
+    return Life("strokes", *at_rest(tissue, life, n, residual))
+
+
+def busy_frames(life: float) -> int:
+    """Return the frames of a life before the body is left alone."""
+    return round((1.0 - SETTLING - RESTING) * life / DT)
+
+
+def at_rest(tissue: Tissue, life: float, n: int, residual: float) -> tuple[int, float, float]:
+    """Leave the body alone for the rest of a life; return its frames, residual and drift."""
+    n_rest, n_all = round(RESTING * life / DT), round(life / DT)
+    for _ in range(n, n_all - n_rest):
+        tissue.step(None, DT)
+    before = tissue.snapshot().positions
+    for _ in range(n_rest):
+        energies = tissue.step(None, DT).energies
+    drift = np.linalg.norm(tissue.snapshot().positions - before, axis=1).max()
+    return n_all, max(residual, share(energies)), float(drift)
+
+
+def led(random: np.random.Generator, life: float, viewer: Viewer) -> Life:
+    """Lead the arm by a hand that wanders through the body, with pauses; then let go."""
+    simulation = prepare(SCENE, is_led=True)
+    simulation.pictures.append(into_viewer(viewer))
+    hand = LiveHand(simulation, clock=lambda: 0.0)
+    hand.take_over(simulation)
+    hand.commands.append(Engage())
+    low, high = simulation.link.describe().bounds
+    target = high
+
+    def command(now: Simulation) -> None:
+        nonlocal target
+        n = len(now.recording)
+        if n % PERIOD == 0 and n % PAUSE_EVERY > PAUSE:
+            middle = np.reshape(hand.blade.numbers, (3, 3))[:2].mean(axis=0)
+            if n % CHANGE_EVERY == 0:
+                target = random.uniform(low, high)
+            way = np.clip(target - middle, -HAND_SPEED * DT * PERIOD, HAND_SPEED * DT * PERIOD)
+            hand.commands.append(Move(way.tolist(), float(n)))
+            hand.commands.append(Turn(random.normal(0.0, 2e-3, 3).tolist(), float(n)))
+
+    n = busy_frames(life)
+    simulation.run(n * DT, command)
+    residual = share(simulation.result.energies)
+    return Life("led hand", *at_rest(simulation.link._tissue, life, n, residual))
+
+
+def served(random: np.random.Generator, life: float, viewer: Viewer) -> Life:
+    """Cut tissue in another process, which is killed in the midst of it."""
+    server = subprocess.Popen(
+        [sys.executable, "-m", "tests.long.soak_server"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        with closing(TcpLink(server.stdout.readline().strip())) as link:
+            simulation = prepare(SCENE, link)
+            simulation.pictures.append(into_viewer(viewer))
+            simulation.run(life * random.uniform(0.9, 1.0))
+            residual = share(simulation.result.energies)
+            server.send_signal(signal.SIGKILL)
+            try:
+                simulation.run(life)
+            except LinkError:
+                return Life("killed server", len(simulation.recording), residual, 0.0)
+        raise AssertionError("the run went on without its tissue")
+    finally:
+        server.kill()
+        server.wait()
+        server.stdout.close()
+
+
+def share(energies: Energies | None) -> float:
+    """Return the residual of an account as a share of the work."""
+    assert energies is not None
+    return abs(energies.residual) / max(abs(energies.work_of_blade), LEAST_WORK)
+
+
+LEAST_WORK = 1e-3
+"""Work below which the residual is no share of it [J]: a stroke through the body takes 30 mJ."""
+
+
+# Tabs and memory.
+
+
+@contextmanager
+def open_tabs(url: str, seed: int) -> Iterator[subprocess.Popen[str]]:
+    """Yield a process that opens and closes tabs of a page."""
+    tabs = subprocess.Popen(
+        [sys.executable, "-m", "tests.long.soak_tabs", url, str(seed)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield tabs
+    finally:
+        tabs.kill()
+        tabs.communicate()
+
+
+def tabs_opened(tabs: subprocess.Popen[str]) -> int:
+    """Have the process end; return how many tabs it opened."""
+    return int(tabs.communicate("end\n")[0])
+
+
+def resident(pid: int) -> int:
+    """Return the memory of a process that is in use [bytes]."""
+    pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+if __name__ == "__main__":
+    answer(run)

@@ -1,0 +1,46 @@
+"""An hour of simulated time: memory stays flat, the account closes, nothing drifts at rest."""
+
+import pytest
+
+from tests.battery import battery
+from tests.child import Child
+from tests.long.soak import LIFE, Life
+
+HOUR = 3600.0
+"""Simulated time of a long run [s]."""
+
+SHORT, SHORT_LIFE = 24.0, 4.0
+"""Simulated time for each change, and of a life in it [s]."""
+
+LIMIT = 5 * 3600.0
+"""Longest time that it may take [s]."""
+
+GROWTH = 5e6
+"""Most by which memory may grow after the first minute [bytes]."""
+
+RESIDUAL = 0.01
+"""Largest residual of the account of energy, as a share of the work of the blade."""
+
+DRIFT = 1e-5
+"""Farthest that a node may move while the body is at rest [m]: it was cut by centimetres."""
+
+
+@pytest.fixture
+def soak():
+    child = Child("tests.long.soak", LIMIT)
+    yield child
+    child.close()
+
+
+@battery(n_per_change=1, n_long=1)
+def test_nothing_grows_or_drifts_and_the_account_closes(soak, tally, request, case):
+    seconds, life = (HOUR, LIFE) if request.config.getoption("long") else (SHORT, SHORT_LIFE)
+    reply = soak.ask(seed=case, seconds=seconds, life=life)
+    lives = [Life(*row) for row in reply["lives"]]
+    tally["frames"] += sum(life.frames for life in lives)
+    tally["lives"] += len(lives)
+    tally["tabs"] += reply["tabs"]
+    assert [life for life in lives if life.residual > RESIDUAL] == []
+    assert [life for life in lives if life.drift > DRIFT] == []
+    for memory in (reply["memory"], reply["page_memory"]):
+        assert max(memory[3:]) - max(memory[:3]) < GROWTH
