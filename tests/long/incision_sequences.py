@@ -41,6 +41,8 @@ MOVED = (
     Variant(widened=-1.0, crumb=2.0),
     Variant(aside=1),
     Variant(aside=2),
+    Variant(widened=1.0, crumb=0.5, aside=3),
+    Variant(widened=-1.0, crumb=2.0, aside=4),
 )
 
 
