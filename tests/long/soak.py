@@ -4,6 +4,7 @@ It is divided into lives of a body, which is then made anew: with a blade withou
 hand that leads the arm, and with an arm whose tissue is in another process, in turn.
 """
 
+import ctypes
 import gc
 import itertools
 import os
@@ -40,7 +41,7 @@ DT = 1e-3
 LIFE = 20.0
 """Simulated time of a life [s]: three of them are the first minute."""
 
-SETTLING, RESTING = 0.25, 0.05
+SETTLING, RESTING = 0.4, 0.05
 """The end of a life, in which the body comes to rest and then is watched, as shares of it."""
 
 PERIOD = 16
@@ -86,7 +87,7 @@ def run(seed: int, seconds: float, life: float = LIFE) -> dict[str, Any]:
         del first
         for i in range(round(seconds / life)):
             lives.append(kinds[i % len(kinds)](random, life, viewer))
-            gc.collect()
+            give_back_memory()
             memory.append(resident(os.getpid()))
             page_memory.append(resident(viewer._process.pid))
             print(i, *lives[-1], memory[-1], page_memory[-1], file=sys.stderr, flush=True)
@@ -239,6 +240,12 @@ def open_tabs(url: str, seed: int) -> Iterator[subprocess.Popen[str]]:
 def tabs_opened(tabs: subprocess.Popen[str]) -> int:
     """Have the process end; return how many tabs it opened."""
     return int(tabs.communicate("end\n")[0])
+
+
+def give_back_memory() -> None:
+    """Give memory that is not in use back to the system, or what is left varies with its holes."""
+    gc.collect()
+    ctypes.CDLL(None).malloc_trim(0)
 
 
 def resident(pid: int) -> int:

@@ -23,14 +23,14 @@ def knife():
     child.close()
 
 
-@battery(n_per_change=4, n_long=5_000)
+@battery(n_per_change=3, n_long=5_000)
 def test_strokes_of_a_blade_leave_a_sound_body(blade, tally, case):
     reply = blade.ask(case=case)
     assert reply["faults"] == []
     tally["strokes"] += reply["n_strokes"]
 
 
-@battery(n_per_change=6, n_long=5_000, disagreements=0.01)
+@battery(n_per_change=4, n_long=5_000, disagreements=0.01)
 def test_incisions_leave_a_sound_body_in_the_pieces_of_an_exact_cut(knife, tally, case):
     """Or in a number that the same cuts leave where each is moved by the path error."""
     reply = knife.ask(case=case)

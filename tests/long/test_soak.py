@@ -9,7 +9,7 @@ from tests.long.soak import LIFE, Life
 HOUR = 3600.0
 """Simulated time of a long run [s]."""
 
-SHORT, SHORT_LIFE = 24.0, 4.0
+SHORT, SHORT_LIFE = 32.0, 8.0
 """Simulated time for each change, and of a life in it [s]."""
 
 LIMIT = 5 * 3600.0
