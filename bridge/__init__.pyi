@@ -36,6 +36,7 @@ from .link import LinkError as LinkError
 from .link import SceneView as SceneView
 from .link import TissueDescription as TissueDescription
 from .link import TissueLink as TissueLink
+from .scene_names import sent_scene_name as sent_scene_name
 from .tcp.address import DEFAULT_HOST as DEFAULT_HOST
 from .tcp.address import DEFAULT_PORT as DEFAULT_PORT
 from .tcp.address import parse_address as parse_address
@@ -88,6 +89,7 @@ __all__ = [
     "chosen_key",
     "compiled_arithmetic",
     "parse_address",
+    "sent_scene_name",
     "serve",
     "write_new_key",
 ]

@@ -4,17 +4,17 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from msgspec import structs
 
-from bridge import LinkError, TissueDescription
+from bridge import LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
-from scalpel_sim.output.export import export_surface
+from scalpel_sim.output.run_end import Attempts, EndedRun, write_end, write_led
 from scalpel_sim.output.run_folder import (
-    FINAL,
     FRAMES_PER_FLUSH,
     INITIAL,
     SCENE,
@@ -22,7 +22,7 @@ from scalpel_sim.output.run_folder import (
     Outputs,
     grasp_file,
 )
-from scalpel_sim.output.summary import COMPLETE, RunFacts, Summary, summarise
+from scalpel_sim.output.summary import COMPLETE, Summary
 from scalpel_sim.scene_file.writing import scene_text
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
@@ -30,9 +30,9 @@ from scalpel_sim.stop_signals import StopSignals
 from scalpel_sim.strokes.asked_area import asked_area
 from scalpel_sim.tables.stroke import StrokeTable
 from scalpel_sim.tables.view import ViewTable
-from scalpel_sim.viewer.pictures import add_to, into_replay
+from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import pieces_of
+from tissue import Snapshot
 
 _log = logging.getLogger(__name__)
 
@@ -42,25 +42,11 @@ REST_AFTER_STROKE = 0.3
 ENDED_IN_PAGE = "ended in the page"
 """The status of a run of a script that somebody has ended in the live page."""
 
+LONGEST_WAIT = 2.0
+"""How long a run that is to end waits for a tissue in another process [s]."""
+
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
-
-
-class _Attempts:
-    """Attempts to write files, one a `with`: a failed one is logged, and the next is made."""
-
-    def __init__(self) -> None:
-        self.errors: list[Exception] = []
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, traceback: object) -> bool:
-        if not isinstance(error, (RunError, LinkError)):
-            return False
-        self.errors.append(error)
-        _log.warning("%s", error)
-        return True
 
 
 def perform(
@@ -97,63 +83,88 @@ def perform(
     """
     seconds = run_time(simulation, seconds)
     hand = None if controls is None else controls.hand
-    body, title = simulation.link.describe(), simulation.title  # the link may be lost on the way
-    at_first = simulation.link.snapshot()
-    if hand is not None:
-        hand.take_over(simulation)
-    if scene is not None and hand is not None:
-        scene = _led_scene(scene, outputs)
+    replay = ReplayWriter(
+        simulation.arm.model, title=simulation.title, frame=simulation.frame, views=views
+    )
+    with outputs, StopSignals() as stop:
+        body, title = simulation.link.describe(), simulation.title  # the link may be lost
+        at_first = simulation.link.snapshot()
+        if hand is not None:
+            hand.take_over(simulation)
+        _write_start(outputs, at_first, _scene_to_write(scene, hand, outputs))
+        # What graspers move is elsewhere when the blade comes.
+        asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
+        simulation.pictures.append(into_replay(replay))
+        if controls is not None:
+            controls.history.begin(outputs, replay)
+        _warn_if_slow(simulation)
+        failure = _run_frames(simulation, outputs, seconds, every_frame, controls, stop)
+        stopped = stop.reason
+        status = _status_of(stopped, failure, controls)
+        summary, attempts = write_end(
+            EndedRun(
+                simulation,
+                outputs,
+                replay,
+                hand,
+                body,
+                title,
+                asked,
+                settings,
+                status,
+                failure,
+            )
+        )
+    _raise_what_ended_it(stop, stopped, simulation.time, failure, attempts, outputs.folder)
+    return summary
+
+
+def _raise_what_ended_it(
+    stop: StopSignals,
+    stopped: str | None,
+    time: float,
+    failure: Exception | None,
+    attempts: Attempts,
+    folder: Path,
+) -> None:
+    """Raise the first error of a run, or the signal that came, if there was one.
+
+    Args:
+        stop: The signals until the last file was written.
+        stopped: The signal that ended the frames.
+        time: Simulated time [s].
+        failure: The error that ended the frames.
+        attempts: Attempts to write the last files.
+        folder: Where they are.
+
+    Raises:
+        Interrupted: the user or the system ended the run, or wanted to when it had ended.
+        RunError: the run failed, or a file could not be written.
+    """
+    kept = f"{folder} holds what was done"
+    if attempts.unwritten:
+        kept += f", but not {', '.join(dict.fromkeys(attempts.unwritten))}"
+    if failure is not None:
+        raise RunError(f"after {time:.3f} s: {one_line(failure)}; {kept}") from failure
+    if stopped is not None:
+        raise Interrupted(f"{stopped} after {time:.3f} s; {kept}")
+    if attempts.errors:
+        raise RunError(f"{one_line(attempts.errors[0])}; {kept}") from attempts.errors[0]
+    if stop.reason is not None:
+        raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
+
+
+def _write_start(outputs: Outputs, at_first: Snapshot, scene: Scene | None) -> None:
+    """Write what is known before the first frame, and keep space for what comes after the last.
+
+    Raises:
+        RunError: the system refuses, or there is no room for a run.
+    """
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
     outputs.write_mesh(INITIAL, at_first)
-    # What graspers move is elsewhere when the blade comes.
-    asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
-    replay = ReplayWriter(
-        simulation.arm.model,
-        title=title,
-        frame=simulation.frame,
-        views=views,
-    )
-    simulation.pictures.append(into_replay(replay))
-    if controls is not None:
-        controls.history.begin(outputs, replay)
-    _warn_if_slow(simulation)
-    stopped, failure = _run_frames(simulation, outputs, seconds, every_frame, controls)
-    status = _status_of(stopped, failure, controls)
-    unwritten = _Attempts()
-    with unwritten:
-        outputs.write_forces(simulation.recording, all_rows=True)
-    if hand is not None:
-        hand.finish(simulation.time)
-        with unwritten:
-            _write_led(outputs, hand)
-    summary = summarise(
-        simulation.recording,
-        _facts(simulation, body, status, settings, outputs, unwritten, asked),
-    )
-    with unwritten:
-        outputs.write_summary(summary)
-    outputs.start_plots(title)  # by another process, while this one writes the replay
-    with unwritten:
-        add_to(replay, simulation)
-    with unwritten:
-        outputs.write_replay(replay)
-    for path in outputs.exports:
-        with unwritten:
-            export_surface(simulation.link.surface(), path)
-    with unwritten:
-        outputs.finish_plots()
-    outputs.close()
-
-    kept = f"{outputs.folder} holds what was done"
-    if failure is not None:
-        raise RunError(f"after {simulation.time:.3f} s: {one_line(failure)}; {kept}") from failure
-    if stopped is not None:
-        raise Interrupted(f"{stopped} after {simulation.time:.3f} s; {kept}")
-    if unwritten.errors:
-        raise unwritten.errors[0]
-    return summary
+    outputs.keep_reserve()
 
 
 def _run_frames(
@@ -162,33 +173,44 @@ def _run_frames(
     seconds: float,
     every_frame: Callable[[Simulation], None] | None,
     controls: RunControls | None,
-) -> tuple[str | None, Exception | None]:
-    """Do the frames, and return the signal that ended them early, and the error that did."""
+    stop: StopSignals,
+) -> Exception | None:
+    """Do the frames, and return the error that ended them early."""
     hand = None if controls is None else controls.hand
-    with StopSignals() as stop:
 
-        def obey() -> None:
-            while controls is not None and controls.obey() and stop.reason is None:
-                pass
+    def obey() -> None:
+        while controls is not None and controls.obey() and stop.reason is None:
+            pass
 
-        def after_frame(now: Simulation) -> bool:
-            outputs.write_forces(now.recording)
-            if hand is not None and len(now.recording) % FRAMES_PER_FLUSH == 0:
-                _write_led(outputs, hand)
-            if every_frame is not None:
-                every_frame(now)
-            obey()
-            if hand is not None:
-                return stop.reason is not None or _has_rested(now, hand)
-            return stop.reason is not None or (controls is not None and controls.has_ended)
+    def after_frame(now: Simulation) -> bool:
+        outputs.write_forces(now.recording)
+        if hand is not None and len(now.recording) % FRAMES_PER_FLUSH == 0:
+            write_led(outputs, hand)
+        if every_frame is not None:
+            every_frame(now)
+        obey()
+        if hand is not None:
+            return stop.reason is not None or _has_rested(now, hand)
+        return stop.reason is not None or (controls is not None and controls.has_ended)
 
-        failure = None
-        try:
-            obey()
+    def give_up() -> None:
+        if stop.seconds > LONGEST_WAIT:
+            raise LinkError(f"{stop.reason}, and the tissue, in another process, does not answer")
+
+    link = simulation.link
+    try:
+        if isinstance(link, TcpLink):
+            link.while_waiting = give_up
+        obey()
+        if stop.reason is None:
             simulation.run(seconds, after_frame)
-        except Exception as error:
-            failure = error
-    return stop.reason, failure
+        if isinstance(link, TcpLink):  # what it answers for the last files may be long
+            link.while_waiting = lambda: None
+    except Exception as error:
+        return error
+    except KeyboardInterrupt:  # a frame that hangs, as where the tissue is elsewhere
+        _log.warning("%s in the middle of a frame", stop.reason)
+    return None
 
 
 def _status_of(stopped: str | None, failure: Exception | None, controls: RunControls | None) -> str:
@@ -210,55 +232,16 @@ def _has_rested(simulation: Simulation, hand: LedHand) -> bool:
     return len(simulation.recording) >= n_frames
 
 
-def _led_scene(scene: Scene, outputs: Outputs) -> Scene:
-    """Return the scene that repeats what the hand will have done."""
+def _scene_to_write(scene: Scene | None, hand: LedHand | None, outputs: Outputs) -> Scene | None:
+    """Return the scene that repeats what will have been done."""
+    if scene is None or hand is None:
+        return scene
     recorded = StrokeTable(kind="recorded", file=str(outputs.path(STROKE)))
     graspers = [
         structs.replace(each, motion=[], recorded=str(outputs.path(grasp_file(each.name))))
         for each in scene.graspers
     ]
     return replace(scene, strokes=(recorded,), graspers=tuple(graspers), seconds=None)
-
-
-def _write_led(outputs: Outputs, hand: LedHand) -> None:
-    """Write what the hand has done since the last call."""
-    outputs.write_stroke(hand.blade.take_rows())
-    for grasper in hand.graspers:
-        outputs.write_grasp(grasper.name, grasper.take_rows())
-
-
-def _facts(
-    simulation: Simulation,
-    body: TissueDescription,
-    status: str,
-    settings: dict[str, Any],
-    outputs: Outputs,
-    unwritten: _Attempts,
-    asked: float | None,
-) -> RunFacts:
-    """Write the final mesh, and return the facts of the run; `body` is as it was at the start."""
-    link, bridge = simulation.link, simulation.bridge
-    pieces = quality = None
-    with unwritten:
-        end = link.snapshot()
-        pieces = pieces_of(end)
-        quality = link.cut_report()
-        outputs.write_mesh(FINAL, end)
-    return RunFacts(
-        scene=body.scene,
-        status=status,
-        dt=simulation.dt,
-        wall_seconds=simulation.wall_seconds,
-        tetrahedra_initial=body.n_tetrahedra,
-        tetrahedra_final=(bridge.result or body).n_tetrahedra,
-        pieces=pieces,
-        quality=quality,
-        asked_area=asked,
-        counters=bridge.counters.as_numbers(),
-        touched=simulation.touching.frames,
-        settings=settings,
-        held_points=[load.n_points for load in bridge.frame_loads],
-    )
 
 
 def _warn_if_slow(simulation: Simulation) -> None:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from bridge import TissueLink
+from bridge import TissueLink, sent_scene_name
 from scalpel_sim.errors import UsageError, unknown
 from scalpel_sim.scene_file.build import scene_in
 from scalpel_sim.scene_file.reading import SHIPPED_SCENES, read_scene_file, shipped_scene
@@ -62,7 +62,7 @@ def scene_of(link: TissueLink, scene: Scene | None = None) -> Scene:
     """
     body = link.describe()
     if scene is not None:
-        if scene.name != body.scene:
+        if body.scene not in (scene.name, sent_scene_name(scene.name)):
             raise UsageError(f"the body there is that of '{body.scene}', not of '{scene.name}'")
         return replace(scene, material=body.material)
     views = received_views(body.views)

@@ -32,6 +32,8 @@ from .integrators.options import Hierarchical as Hierarchical
 from .integrators.options import Verlet as Verlet
 from .io.mesh_io import read_mesh as read_mesh
 from .io.mesh_io import write_vtu as write_vtu
+from .io.whole_file import remove_unfinished as remove_unfinished
+from .io.whole_file import whole_file as whole_file
 from .loads.attachment import Attachment as Attachment
 from .loads.frame_path import FramePath as FramePath
 from .loads.ligament import Ligament as Ligament
@@ -136,7 +138,9 @@ __all__ = [
     "n_compiled_kernels",
     "pieces_of",
     "read_mesh",
+    "remove_unfinished",
     "spring_error",
     "toughness_law_of",
+    "whole_file",
     "write_vtu",
 ]

@@ -8,12 +8,13 @@ import msgspec
 import numpy as np
 
 from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
+from bridge.scene_names import WANTED_NAME, is_scene_name
 from bridge.tcp.messages.poses import LARGEST_COORDINATE
 from bridge.tcp.wire import MessageError
 from tissue import Wrench
 
-LONGEST_PERIOD = 1.0
-"""Longest period [s]. A device sends up to a thousand poses a second."""
+SHORTEST_PERIOD, LONGEST_PERIOD = 1e-5, 1.0
+"""Shortest and longest period [s]. A device sends up to a thousand poses a second."""
 
 LARGEST_DEVICE_DESCRIPTION = 1 << 12
 """Largest description [byte]: a name and three numbers."""
@@ -58,10 +59,10 @@ def unpack_servo(payload: bytes) -> ServoRequest:
     if len(payload) != _SERVO.size:
         raise MessageError(f"a pose of {len(payload)} bytes; wanted {_SERVO.size}")
     stamp, period, *numbers, holds = _SERVO.unpack(payload)
-    if not (math.isfinite(stamp) and 0.0 < period <= LONGEST_PERIOD):
+    if not (math.isfinite(stamp) and SHORTEST_PERIOD <= period <= LONGEST_PERIOD):
         raise MessageError(
             f"a stamp of {stamp} s and a period of {period} s; wanted a finite stamp, and a period "
-            f"above 0 and of at most {LONGEST_PERIOD:g} s"
+            f"from {SHORTEST_PERIOD:g} to {LONGEST_PERIOD:g} s"
         )
     # The comparisons are false for NaN.
     if not all(-LARGEST_COORDINATE <= x <= LARGEST_COORDINATE for x in numbers[:3]):
@@ -128,12 +129,15 @@ def unpack_device_description(payload: bytes) -> DeviceDescription:
     """Return the description in the reply to a HELLO.
 
     Raises:
-        MessageError: the other side is no run that a device leads.
+        MessageError: the other side is no run that a device leads, or its scene has no valid name.
     """
     try:
-        return _description_decoder.decode(payload)
+        found = _description_decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(
             "it is no run that a device leads; start one there with: scalpel-sim run --hand device "
             f"({error})"
         ) from error
+    if not is_scene_name(found.scene):
+        raise MessageError(f"the run's scene is {found.scene[:80]!r}; wanted {WANTED_NAME}")
+    return found

@@ -4,6 +4,8 @@ import logging
 import time
 from typing import Protocol
 
+from msgspec import structs
+
 from bridge.device.messages import (
     ServoRequest,
     pack_device_description,
@@ -11,6 +13,7 @@ from bridge.device.messages import (
     unpack_servo,
 )
 from bridge.device.values import CartesianPose, DeviceDescription, DeviceState
+from bridge.scene_names import sent_scene_name
 from bridge.tcp.address import DEFAULT_HOST
 from bridge.tcp.peer import Peer
 from bridge.tcp.single_client import SingleClientServer
@@ -20,6 +23,11 @@ _logger = logging.getLogger(__name__)
 
 DEFAULT_DEVICE_PORT = 8767
 """Port at which a run waits for a device: the one after that of a tissue."""
+
+
+LONGEST_PAUSE = 3600.0
+"""Longest pause of which the periods are counted as missed [s]: whatever a device says, their sum
+stays a number that a reply has room for."""
 
 
 class LedByDevice(Protocol):
@@ -77,7 +85,8 @@ class DeviceServer(SingleClientServer):
         key: bytes | None = None,
     ) -> None:
         super().__init__("the blade", host, port, key)
-        self._led, self._description = led, description
+        self._led = led
+        self._description = structs.replace(description, scene=sent_scene_name(description.scene))
         self._stamp: float | None = None
         self._is_refusing = False
         self._n_missed = self._n_dropped = 0
@@ -125,7 +134,8 @@ class DeviceServer(SingleClientServer):
             MessageError: the device cannot have moved so.
         """
         if self._stamp is not None:
-            self._n_missed += max(round((request.stamp - self._stamp) / request.period) - 1, 0)
+            pause = min(max(request.stamp - self._stamp, 0.0), LONGEST_PAUSE)
+            self._n_missed += max(round(pause / request.period) - 1, 0)
         self._stamp = request.stamp
         try:
             self._led.servo_cp(request.servo_cp, holds=request.holds)

@@ -1,11 +1,11 @@
 """The client's end of the TCP link to a tissue in another process."""
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from bridge.led_frames import FrameHold, FrameLoad, FramePose, FrameTie, expect_each
 from bridge.led_geoms import NO_GEOMS, GeomLoads, GeomPoses, expect_pose_of_each, no_geom_loads
-from bridge.link import LinkError, TissueDescription
+from bridge.link import TissueDescription
 from bridge.tcp.connection import ANSWER_SECONDS, Connection, Served
 from bridge.tcp.messages.body import (
     PIECES_BYTES,
@@ -73,9 +73,18 @@ class TcpLink:
         self._connection = Connection(address, _TISSUE, timeout, key)
         try:
             self.describe()
-        except LinkError:
+        except BaseException:
             self.close()
             raise
+
+    @property
+    def while_waiting(self) -> Callable[[], object]:
+        """Called ten times a second while a call waits for an answer; what it raises ends that."""
+        return self._connection.while_waiting
+
+    @while_waiting.setter
+    def while_waiting(self, call: Callable[[], object]) -> None:
+        self._connection.while_waiting = call
 
     def describe(self) -> TissueDescription:
         """Return what the arm side must know of the body now."""

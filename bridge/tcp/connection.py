@@ -2,15 +2,18 @@
 
 import contextlib
 import socket
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, TypeVar
 
 from bridge.link import LinkError
 from bridge.tcp.address import is_loopback, parse_address
 from bridge.tcp.authentication import NONCE_BYTES, direction_keys, new_nonce
 from bridge.tcp.channel import LARGEST_PART, Channel
-from bridge.tcp.messages.text import LARGEST_ERROR, unpack_error
+from bridge.tcp.heartbeat import Heartbeat
+from bridge.tcp.keepalive import keep_alive
+from bridge.tcp.messages.text import LARGEST_DESCRIPTION, LARGEST_ERROR, unpack_error
 from bridge.tcp.wire import LARGEST_REPLY, MORE, READ_BYTES, Frame, MessageError, MessageKind
 
 _Value = TypeVar("_Value")
@@ -20,6 +23,8 @@ CONNECT_SECONDS = 5.0
 ANSWER_SECONDS = 60.0
 """Longest wait for an answer [s]. A step takes a millisecond, but the first steps of a newly
 installed server compile."""
+WAIT_SECONDS = 0.1
+"""Time from one call of `while_waiting` to the next [s]: who presses Ctrl-C waits no longer."""
 
 
 class Served(NamedTuple):
@@ -36,7 +41,8 @@ class Served(NamedTuple):
 class Connection:
     """A connection to a server, for one request at a time. Not to be shared between threads.
 
-    When the server refuses a request, the connection stays open; when it fails, it is closed.
+    When the server refuses a request, the connection stays open; when it fails, it is closed. While
+    its owner pauses it says that it is there.
 
     Args:
         address: Address of the server, "HOST:PORT".
@@ -54,21 +60,47 @@ class Connection:
         self._where = f"{served.name} at {address}"
         self._sequence = 0
         self._channel = Channel()
+        self._turn = threading.Lock()  # of the owner and the heartbeat
+        self._broken_by = ""
+        self._heartbeat: Heartbeat | None = None
+        self._asked_at = time.monotonic()
+        self.while_waiting: Callable[[], object] = lambda: None
+        """Called ten times a second while the owner waits for an answer. It may raise an error to
+        end that; the connection can still be used, unless a request was only sent in part."""
         self._socket: socket.socket | None = _connect(
             address, served, timeout, has_key=key is not None
         )
         try:
             if key is not None:
                 self._authenticate(key)
-        except LinkError:
+        except BaseException:
             self.close()
             raise
+        self._heartbeat = Heartbeat(self)
 
     def close(self) -> None:
         """Close the connection."""
+        if self._heartbeat is not None:
+            self._heartbeat.stop()
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+    def show_presence(self, silence: float) -> bool:
+        """Say something if nothing was asked for so long [s]; return whether that is still due."""
+        if not self._turn.acquire(blocking=False):
+            return True  # a request is under way
+        try:
+            if self._socket is None:
+                return False
+            if time.monotonic() - self._asked_at > silence:
+                self._asked(MessageKind.HELLO, b"", LARGEST_DESCRIPTION, lambda: None)
+        except LinkError as error:
+            if self._socket is None:
+                self._broken_by = str(error)
+        finally:
+            self._turn.release()
+        return self._socket is not None
 
     def ask(
         self,
@@ -90,32 +122,68 @@ class Connection:
         Raises:
             LinkError: the server refuses the request, or did not answer.
         """
-        if self._socket is None:
-            raise LinkError(f"the link to {self._where} is closed")
         if len(payload) > LARGEST_PART:
             raise LinkError(
                 f"a request of {len(payload):,} bytes for {self._where}; at most "
                 f"{LARGEST_PART:,} are allowed. Hold fewer points, or give meshes of fewer vertices"
             )
+        while not self._turn.acquire(timeout=WAIT_SECONDS):
+            self.while_waiting()
+        try:
+            answer = self._asked(kind, payload, limit, self.while_waiting)
+            if answer.kind != (reply_kind or kind):
+                raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
+            return unpack(answer.payload)
+        except MessageError as cause:
+            self.close()
+            raise LinkError(f"the link to {self._where} broke: {cause}") from cause
+        finally:
+            self._turn.release()
+
+    def _asked(
+        self, kind: MessageKind, payload: bytes, limit: int, while_waiting: Callable[[], object]
+    ) -> Frame:
+        """Send a request and return its reply, of which only the length is checked.
+
+        Raises:
+            LinkError: the server refuses the request, or did not answer.
+        """
+        if self._socket is None:
+            raise LinkError(self._broken_by or f"the link to {self._where} is closed")
         sequence = self._sequence
         self._sequence = (sequence + 1) % (1 << 32)
+        wait = _Wait(self._timeout, while_waiting)
         try:
-            for message in self._channel.pack(kind, sequence, payload):
-                self._socket.sendall(message)
-            answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket)
-            if answer.kind == MessageKind.ERROR:
-                error = unpack_error(answer.payload)
-            elif answer.kind != (reply_kind or kind):
-                raise MessageError(f"a reply of kind {answer.kind} to a request of kind {kind}")
-            else:
-                return unpack(answer.payload)
+            self._send(self._channel.pack(kind, sequence, payload), self._socket, wait)
+            answer = self._answer_to(sequence, max(limit, LARGEST_ERROR), self._socket, wait)
+            error = unpack_error(answer.payload) if answer.kind == MessageKind.ERROR else None
         except TimeoutError as cause:
             self.close()
             raise LinkError(f"{self._where} did not answer within {self._timeout:g} s") from cause
+        except LinkError:  # of `while_waiting`
+            raise
         except (OSError, MessageError) as cause:
             self.close()
             raise LinkError(f"the link to {self._where} broke: {cause}") from cause
-        raise LinkError(f"{self._where} refused: {error}")
+        finally:
+            self._asked_at = time.monotonic()
+        if error is not None:
+            raise LinkError(f"{self._where} refused: {error}")
+        return answer
+
+    def _send(self, messages: Iterator[bytes], connection: socket.socket, wait: "_Wait") -> None:
+        """Send a request, all its frames."""
+        try:
+            for message in messages:
+                rest = memoryview(message)
+                while rest:
+                    try:
+                        rest = rest[connection.send(rest) :]
+                    except TimeoutError:
+                        wait.go_on()
+        except BaseException:  # the server would take the next request for the rest of this one
+            self.close()
+            raise
 
     def _authenticate(self, key: bytes) -> None:
         """Exchange nonces with the server, and authenticate all messages that follow.
@@ -129,18 +197,22 @@ class Connection:
         keys = direction_keys(key, mine, theirs)
         self._channel.authenticate(keys.to_server, keys.to_client, plain_error_may_come=True)
 
-    def _answer_to(self, sequence: int, limit: int, connection: socket.socket) -> Frame:
+    def _answer_to(
+        self, sequence: int, limit: int, connection: socket.socket, wait: "_Wait"
+    ) -> Frame:
         """Return the reply to the request with this number; drop replies to earlier requests."""
-        deadline = time.monotonic() + self._timeout
         limit = min(limit, LARGEST_REPLY)
         parts: list[bytes] = []
         n_bytes = 0
         while True:
             frame = self._channel.take()
             if frame is None:
-                if time.monotonic() > deadline:  # for a slow trickle: a read has its own limit
-                    raise TimeoutError
-                data = connection.recv(READ_BYTES)
+                wait.check()  # for a slow trickle
+                try:
+                    data = connection.recv(READ_BYTES)
+                except TimeoutError:
+                    wait.go_on()
+                    continue
                 if not data:
                     raise ConnectionResetError("the other side has closed it")
                 self._channel.feed(data)
@@ -153,6 +225,29 @@ class Connection:
                 parts.append(frame.payload)
                 if not frame.kind & MORE:
                     return frame._replace(payload=b"".join(parts))
+
+
+class _Wait:
+    """A wait for the other side, in pieces of `WAIT_SECONDS`.
+
+    Args:
+        seconds: How long it may take [s].
+        while_waiting: Called after each piece.
+    """
+
+    def __init__(self, seconds: float, while_waiting: Callable[[], object]) -> None:
+        self._deadline = time.monotonic() + seconds
+        self._while_waiting = while_waiting
+
+    def check(self) -> None:
+        """Raise TimeoutError if it has taken too long."""
+        if time.monotonic() > self._deadline:
+            raise TimeoutError
+
+    def go_on(self) -> None:
+        """Do what is due after a piece."""
+        self.check()
+        self._while_waiting()
 
 
 def _checked_nonce(payload: bytes) -> bytes:
@@ -185,7 +280,8 @@ def _connect(address: str, served: Served, timeout: float, *, has_key: bool) -> 
     except OSError as cause:
         raise LinkError(f"{address} cannot be reached: {cause.strerror or cause}") from cause
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    connection.settimeout(timeout)
+    keep_alive(connection)
+    connection.settimeout(min(timeout, WAIT_SECONDS))
     return connection
 
 

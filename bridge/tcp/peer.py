@@ -7,12 +7,16 @@ from collections.abc import Iterable
 
 from bridge.tcp.authentication import NONCE_BYTES, TAG_BYTES
 from bridge.tcp.channel import Channel
+from bridge.tcp.keepalive import keep_alive
 from bridge.tcp.wire import LARGEST_FRAME, Frame, MessageError
 
 HANDSHAKE_SECONDS = 2.0
 """Longest time from a connection to the end of its handshake [s]."""
 FRAME_SECONDS = 2.0
 """Longest time from the first to the last byte of a message [s]. On loopback: microseconds."""
+SILENCE_SECONDS = 60.0
+"""Longest time from one request of the client to the next [s]. Our clients say that they are there
+while they pause; see `heartbeat`."""
 SEND_SECONDS = 10.0
 """Longest time for a peer to read a reply, all its parts [s]. The largest is a gibibyte."""
 HANDSHAKE_BYTES = NONCE_BYTES + TAG_BYTES
@@ -30,21 +34,30 @@ class Peer:
     def __init__(self, connection: socket.socket, name: str) -> None:
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        keep_alive(connection)
         self.socket = connection
         self.name = name
         self.channel = Channel(HANDSHAKE_BYTES)
         self.sequence = -1
         """Number of the last request."""
-        self.deadline: float | None = time.monotonic() + HANDSHAKE_SECONDS
-        """Time at which the server stops waiting [s on the monotonic clock]; None if nothing is
-        due."""
-        self._is_client = False
+        self.deadline = time.monotonic() + HANDSHAKE_SECONDS
+        """Time at which the server stops waiting [s on the monotonic clock]."""
+        self._is_client = self._is_within_a_frame = False
+
+    @property
+    def host(self) -> str:
+        """Host of the other end."""
+        return self.name.rpartition(":")[0]
 
     def become_client(self) -> None:
         """End the handshake: accept requests from now on."""
         self._is_client = True
         self.channel.limit_payload(LARGEST_FRAME)
-        self.deadline = None
+        self.wait_for_a_request()
+
+    def wait_for_a_request(self) -> None:
+        """Begin to wait for the client's next request."""
+        self.deadline = time.monotonic() + SILENCE_SECONDS
 
     def take(self) -> Frame | None:
         """Return the next request, or None if it is incomplete.
@@ -56,10 +69,10 @@ class Peer:
             MessageError: the request cannot be read, or its authentication tag is wrong.
         """
         frame = self.channel.take()
-        if self._is_client:
-            if frame is not None or not self.channel.is_within_a_frame:
-                self.deadline = None
-            elif self.deadline is None:
+        was_within, self._is_within_a_frame = self._is_within_a_frame, False
+        if self._is_client and frame is None and self.channel.is_within_a_frame:
+            self._is_within_a_frame = True
+            if not was_within:
                 self.deadline = time.monotonic() + FRAME_SECONDS
         return frame
 

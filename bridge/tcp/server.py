@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from bridge.link import InProcessLink, SceneView
+from bridge.scene_names import sent_scene_name
 from bridge.tcp.address import DEFAULT_HOST, DEFAULT_PORT
 from bridge.tcp.messages.body import pack_pieces, pack_snapshot, pack_surface
 from bridge.tcp.messages.chunks import pack_chunks
@@ -29,6 +30,7 @@ from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.step import unpack_step
 from bridge.tcp.messages.text import MAX_VIEWS, pack_description
 from bridge.tcp.messages.values import pack_values, unpack_quantity
+from bridge.tcp.request_limits import RequestLimits
 from bridge.tcp.single_client import SingleClientServer
 from bridge.tcp.wire import Frame, MessageError, MessageKind
 
@@ -52,7 +54,7 @@ def serve(
 
     Args:
         make_tissue: Function that makes the tissue for a client, the same every time.
-        scene: Name of what it makes, as the command line gives it.
+        scene: Name of what it makes, as the command line gives it; see `bridge.scene_names`.
         views: Where that is to be looked at from.
         host: Host to listen on; without a key only loopback.
         port: Port to listen on; 0 for a free one.
@@ -108,7 +110,7 @@ class TissueServer(SingleClientServer):
                 f"the scene has {len(views)} views; a client takes {MAX_VIEWS} at most"
             )
         self._make_tissue = make_tissue
-        self._scene, self._views = scene, tuple(views)
+        self._scene, self._views = sent_scene_name(scene), tuple(views)
         super().__init__("the tissue", host, port, key)
         try:
             self._link = self._new_link()
@@ -122,7 +124,9 @@ class TissueServer(SingleClientServer):
 
     def _new_link(self) -> InProcessLink:
         """Return a link to a new tissue."""
-        return InProcessLink(self._make_tissue(), self._scene, self._views)
+        tissue = self._make_tissue()
+        self._limits = RequestLimits(tissue)
+        return InProcessLink(tissue, self._scene, self._views)
 
     def _reply(self, frame: Frame) -> bytes:
         """Return the payload of the reply to a request.
@@ -131,9 +135,7 @@ class TissueServer(SingleClientServer):
             MessageError: the request is malformed or of an unknown kind.
         """
         if frame.kind == MessageKind.STEP:
-            link = self._link
-            result = link.step(*unpack_step(frame.payload, link.n_led, link.n_geoms))
-            return pack_result(result, link.loads(), link.geom_loads())
+            return self._stepped(frame.payload)
         if frame.kind == MessageKind.ATTACH:
             return self._added(partial(self._link.attach, unpack_hold(frame.payload)))
         if frame.kind == MessageKind.TIE:
@@ -163,6 +165,20 @@ class TissueServer(SingleClientServer):
         if frame.kind == MessageKind.QUALITY:
             return pack_cut_report(self._link.cut_report())
         raise MessageError(f"there is no request of kind {frame.kind}")
+
+    def _stepped(self, payload: bytes) -> bytes:
+        """Do a step, and return its result.
+
+        Raises:
+            MessageError: the request is malformed, or would take too long; nothing has moved then.
+        """
+        link = self._link
+        sweep, dt, poses, geoms = unpack_step(payload, link.n_led, link.n_geoms)
+        self._limits.check_step(sweep, dt, link.tissue.n_tetrahedra)
+        if poses:
+            self._limits.check_poses(poses, link.loads()[-link.n_led :])
+        result = link.step(sweep, dt, poses, geoms)
+        return pack_result(result, link.loads(), link.geom_loads())
 
     def _added(self, add: Callable[[], int]) -> bytes:
         """Let a frame hold tissue, and return the load on it.

@@ -22,8 +22,11 @@ from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, Mess
 
 _logger = logging.getLogger(__name__)
 
-MAX_CONNECTIONS = 8
-"""Largest number of open connections: that of the client, and of peers that want to become it."""
+MAX_STRANGERS = 8
+"""Largest number of open connections of peers that are not the client."""
+
+_BACKLOG = 64
+"""Connections that the system keeps until they are accepted, and that are accepted at once."""
 
 
 class SingleClientServer(abc.ABC):
@@ -49,7 +52,7 @@ class SingleClientServer(abc.ABC):
         self._served, self._key = served, key
         try:
             self._listener = bound_socket(host, port, has_key=key is not None)
-            self._listener.listen(MAX_CONNECTIONS)
+            self._listener.listen(_BACKLOG)
         except OSError as cause:
             raise LinkError(
                 f"cannot listen at {format_address((host, port))}: {cause.strerror}. Choose "
@@ -105,31 +108,42 @@ class SingleClientServer(abc.ABC):
 
     def _serve_once(self, seconds: float | None) -> None:
         """Wait for messages, at most so long [s], answer them, and drop who was silent too long."""
-        for key, _ in self._selector.select(seconds):
-            if key.fileobj is self._listener:
-                self._accept()
-            else:
+        ready = [key for key, _ in self._selector.select(seconds)]
+        for key in ready:
+            if key.fileobj is not self._listener:
                 self._receive(key.data)
+        # Newcomers last: one may take the place of a peer, but not of what that has sent.
+        if any(key.fileobj is self._listener for key in ready):
+            self._accept()
         now = time.monotonic()
-        for peer in [p for p in self._peers if p.deadline is not None and p.deadline < now]:
+        for peer in [p for p in self._peers if p.deadline < now]:
             self._refuse(peer, "you were silent for too long")
 
     def _seconds_to_deadline(self) -> float | None:
         """Return the time to the next deadline of a peer [s]; None if there is none."""
-        deadlines = [peer.deadline for peer in self._peers if peer.deadline is not None]
+        deadlines = [peer.deadline for peer in self._peers]
         return max(0.0, min(deadlines) - time.monotonic()) if deadlines else None
 
     def _accept(self) -> None:
-        try:
-            connection, where = self._listener.accept()
-        except OSError as error:  # the peer has gone again, or no file descriptor is left
-            _logger.warning("a connection could not be accepted: %s", error)
-            return
-        peer = Peer(connection, format_address(where))
-        self._peers.append(peer)
-        self._selector.register(connection, selectors.EVENT_READ, peer)
-        if len(self._peers) > MAX_CONNECTIONS:
-            self._refuse(peer, f"{MAX_CONNECTIONS} connections are open; there may be no more")
+        """Accept who has connected. Where there are too many, one that is no client has to go."""
+        for _ in range(_BACKLOG):
+            try:
+                connection, where = self._listener.accept()
+                peer = Peer(connection, format_address(where))
+            except BlockingIOError:
+                return
+            except OSError as error:  # the peer has gone again, or no file descriptor is left
+                _logger.warning("a connection could not be accepted: %s", error)
+                return
+            self._peers.append(peer)
+            self._selector.register(connection, selectors.EVENT_READ, peer)
+            self._receive(peer)  # what it has sent counts before the next one comes
+            strangers = [each for each in self._peers if each is not self._client]
+            if len(strangers) > MAX_STRANGERS:
+                self._refuse(
+                    _one_too_many(strangers),
+                    f"{MAX_STRANGERS} connections without a client are open; there may be no more",
+                )
 
     def _receive(self, peer: Peer) -> None:
         """Read from a peer, and answer each complete request."""
@@ -209,6 +223,7 @@ class SingleClientServer(abc.ABC):
             self._send(peer, MessageKind.ERROR, pack_error(text), frame.sequence)
         else:
             self._send(peer, MessageKind(frame.kind), reply, frame.sequence)
+        peer.wait_for_a_request()  # however long the answer took
 
     def _note_refusal(self, peer: Peer, error: MessageError) -> None:
         """Log that a request of the client is refused."""
@@ -241,3 +256,15 @@ class SingleClientServer(abc.ABC):
         if peer is self._client:
             self._client = None
             self._forget_client()
+
+
+def _one_too_many(strangers: list[Peer]) -> Peer:
+    """Return the peer that has to go: the oldest of the host that has the most connections.
+
+    So a newcomer always has a place, and time for a handshake: no number of connections that prove
+    no key keeps out a client that has it, nor those of one host a client on another. Who is about
+    to prove a key goes after those who have said nothing.
+    """
+    silent = [peer for peer in strangers[:-1] if not peer.channel.is_authenticated]
+    hosts = [peer.host for peer in strangers]
+    return max(silent or strangers, key=lambda peer: hosts.count(peer.host))

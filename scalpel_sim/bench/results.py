@@ -10,7 +10,7 @@ import numpy as np
 from scalpel_sim.bench.machine import describe_machine
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.summary import versions
-from tissue import FloatArray
+from tissue import FloatArray, whole_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -177,7 +177,8 @@ def save_results(path: Path, text: str) -> None:
         RunError: the file cannot be written.
     """
     try:
-        path.write_text(text + "\n", encoding="utf-8")
+        with whole_file(path) as unfinished:
+            unfinished.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise RunError(
             f"{path}: cannot be written ({error.strerror or error}); choose another --save"

@@ -17,6 +17,7 @@ from scalpel_sim.errors import RunError
 from scalpel_sim.validate.findings import FAIL, Check, Curve, Plot
 from scalpel_sim.validate.pictures import draw_plot
 from scalpel_sim.validate.report import bounds_text, value_text
+from tissue import whole_file
 
 TABLE_FILE, SUMMARY_FILE = "case.csv", "case.json"
 
@@ -51,7 +52,8 @@ def write_case(folder: Path, found: CaseFindings, versions: dict[str, str]) -> l
     try:
         _write_table(folder / TABLE_FILE, found.record)
         text = case_as_json(found, versions)
-        (folder / SUMMARY_FILE).write_text(text + "\n", encoding="utf-8")
+        with whole_file(folder / SUMMARY_FILE) as unfinished:
+            unfinished.write_text(text + "\n", encoding="utf-8")
         plots = {f"{record.name}.png": record.name for record in found.case.content.record}
         for file, name in plots.items():
             draw_plot(_plot(found, name), folder / file)
@@ -112,7 +114,7 @@ def print_case(found: CaseFindings, console: Console) -> None:
 
 def _write_table(path: Path, record: CaseRecord) -> None:
     """Write the columns, their units in the line of names."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow([f"{name}_{record.units[name].lower()}" for name in record.columns])
         writer.writerows(

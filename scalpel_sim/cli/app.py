@@ -1,7 +1,5 @@
 """The command line: `scalpel-sim run`, `view`, `serve`, `bench`, `validate`, and the others."""
 
-import gc
-import sys
 import traceback
 from collections.abc import Sequence
 from pathlib import Path
@@ -39,6 +37,7 @@ from scalpel_sim.errors import (
 )
 from scalpel_sim.figures.command import figure
 from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.stop_signals import raised_signal
 from scalpel_sim.validate.command import validate
 from scalpel_sim.version import version
 
@@ -47,6 +46,7 @@ PROGRAM = "scalpel-sim"
 app = App(
     name=PROGRAM,
     version=version,
+    suppress_keyboard_interrupt=False,  # `command_line` says what happened
     help="A MuJoCo robot arm holds a scalpel, cuts soft tissue for real, and feels it.\n\n"
     "Exit codes: 0 done, 1 the run failed or was interrupted, 2 wrong use or bad input, 3 a "
     "check of a validation failed.",
@@ -234,14 +234,6 @@ def _materials(
             print_presets(presets)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line, and end the process with its exit code."""
-    # What is loaded lives as long as the process: to look for cycles in it took 0.13 s of a start.
-    # `load_kernels` enables the collector again.
-    gc.disable()
-    sys.exit(command_line(sys.argv[1:] if arguments is None else arguments))
-
-
 def command_line(arguments: Sequence[str]) -> int:
     """Run the command that the arguments name, and return the exit code.
 
@@ -254,12 +246,14 @@ def command_line(arguments: Sequence[str]) -> int:
     except CycloptsError as error:
         say_error(f"{error} See {PROGRAM} --help.")
         return EXIT_WRONG_USE
-    except KeyboardInterrupt:
-        say_error("interrupted")
+    except KeyboardInterrupt as error:
+        say_error(str(error) or "interrupted")
         return EXIT_RUN_FAILED
     except Exception as error:
         if verbose:
             traceback.print_exc()
-        say_error(one_line(error))
+        # An extension that is interrupted while it is loaded says that it cannot be loaded.
+        is_cause = isinstance(error, ImportError) and raised_signal() is not None
+        say_error(str(raised_signal()) if is_cause else one_line(error))
         return exit_code(error)
     return EXIT_OK

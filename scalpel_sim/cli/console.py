@@ -141,7 +141,8 @@ def print_report(
         from scalpel_sim.output.report import print_summary
 
         print_summary(summary, Console())
-        print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+        names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+        print(f"files in {folder}: {', '.join(names)}")
         if exports:
             print(f"exported: {', '.join(map(str, exports))}")
 

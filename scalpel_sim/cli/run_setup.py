@@ -19,7 +19,7 @@ from scalpel_sim.cli.options import (
     TissueOptions,
 )
 from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
-from scalpel_sim.errors import UsageError
+from scalpel_sim.errors import Interrupted, UsageError
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
@@ -96,7 +96,30 @@ def prepared_run(
     Raises:
         UsageError: options that make no sense, or not together.
         LinkError: the tissue is elsewhere, and cannot be reached.
+        Interrupted: a signal came before it was prepared.
     """
+    try:
+        link, scene, simulation, settings = _prepared(
+            name, options, audits=audits, relaxation=relaxation, is_led=is_led
+        )
+    except KeyboardInterrupt as error:
+        raise Interrupted(f"{error} before the run began; no file was written") from error
+    try:
+        settings |= {"arm": simulation.arm.name}
+        yield PreparedRun(simulation, scene, _folder(options.output, scene), settings)
+    finally:
+        link.close()
+
+
+def _prepared(
+    name: str | None,
+    options: RunOptions,
+    *,
+    audits: bool,
+    relaxation: str | None,
+    is_led: bool,
+) -> tuple[TissueLink, Scene, Simulation, dict[str, Any]]:
+    """Return the tissue, the scene, the simulation, and what the command line resolved to."""
     client = options.client
     if client.key is not None and client.connect is None:
         raise UsageError("--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it")
@@ -106,11 +129,10 @@ def prepared_run(
     else:
         link, scene, settings = _tissue_elsewhere(name, options, client.connect)
     try:
-        simulation = prepare(scene, link, is_led=is_led)
-        settings |= {"arm": simulation.arm.name}
-        yield PreparedRun(simulation, scene, _folder(options.output, scene), settings)
-    finally:
+        return link, scene, prepare(scene, link, is_led=is_led), settings
+    except BaseException:
         link.close()
+        raise
 
 
 def _tissue_here(

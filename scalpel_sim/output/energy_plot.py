@@ -49,7 +49,7 @@ def plot_energies(recording: Recording, title: str, path: Path) -> None:
     for axes in (above, below):
         simplify(axes)
     figure.align_ylabels()
-    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
+    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH, format="png")
 
 
 def _stack(axes: Axes, time: np.ndarray, recording: Recording, sign: float) -> None:

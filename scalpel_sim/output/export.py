@@ -19,7 +19,7 @@ import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
 from scalpel_sim.output.run_folder import check_file
-from tissue import BoolArray, FloatArray, IntArray, Surface
+from tissue import BoolArray, FloatArray, IntArray, Surface, whole_file
 
 if TYPE_CHECKING:  # loading trimesh takes 0.3 s, and most runs export nothing
     from trimesh import Scene, Trimesh
@@ -51,7 +51,8 @@ def export_surface(surface: Surface, path: Path) -> None:
     if write is None:
         raise _unknown_ending(path)
     try:
-        path.write_bytes(write(surface))
+        with whole_file(path) as unfinished:
+            unfinished.write_bytes(write(surface))
     except OSError as error:
         raise RunError(
             f"{path}: cannot be written ({error.strerror or error}); choose another --export"

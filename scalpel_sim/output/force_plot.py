@@ -50,7 +50,7 @@ def plot_forces(recording: Recording, title: str, path: Path) -> None:
     for axes in (above, middle, below):
         simplify(axes)
     figure.align_ylabels()
-    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH)
+    FigureCanvasAgg(figure).print_figure(path, dpi=DOTS_PER_INCH, format="png")
 
 
 def simplify(axes: Axes) -> None:

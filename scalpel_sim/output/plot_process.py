@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import IO, cast
 
 from scalpel_sim.errors import RunError
+from tissue import whole_file
 
 _TIMEOUT = 60.0
 """How long a plot may take [s]. It takes a second, or ten when matplotlib first looks for fonts."""
@@ -94,6 +95,8 @@ def draw_requested_plots() -> None:
     if text:
         request = json.loads(text)
         recording = read_forces(Path(request["recorded"]))
-        plot_forces(recording, request["title"], Path(request["forces"]))
+        with whole_file(request["forces"]) as unfinished:
+            plot_forces(recording, request["title"], unfinished)
         if recording.is_audited:
-            plot_energies(recording, request["title"], Path(request["energies"]))
+            with whole_file(request["energies"]) as unfinished:
+                plot_energies(recording, request["title"], unfinished)

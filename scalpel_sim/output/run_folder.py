@@ -1,23 +1,29 @@
 """The folder of a run's files, which stays readable when the run ends early."""
 
+import contextlib
 import json
+import math
 import tempfile
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import IO, NamedTuple, TypeVar
+from types import TracebackType
+from typing import Any, NamedTuple, Self, TypeVar, cast
 
 import msgspec
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.disk_reserve import DiskReserve
+from scalpel_sim.output.folder_lock import FolderLock
+from scalpel_sim.output.growing_file import GrowingFile
 from scalpel_sim.output.plot_process import Plotter
 from scalpel_sim.output.recording import COLUMNS, Recording
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import FloatArray, Snapshot, write_vtu
+from tissue import FloatArray, Snapshot, remove_unfinished, whole_file, write_vtu
 
 T = TypeVar("T")
 
@@ -39,6 +45,14 @@ FRAMES_PER_FLUSH = 25
 """Number of rows of `forces.csv` that are written together, which takes 0.1 ms: a kill loses a
 fortieth of a second."""
 
+LAST_FILES = 28_000_000
+"""Size of the last files of a run without the body, at most [bytes]: the replay (its frames have a
+limit of 18 MB, and the page around them 2 MB), two plots, the summary, the last rows."""
+
+MOST_GROWTH = 2
+"""Size of `final.vtu` over that of `initial.vtu`, at most: a cut adds tetrahedra where it is. A
+larger one is written where the disk has room for it."""
+
 
 def grasp_file(name: str) -> str:
     """Return the name of the file of what a hand did with a grasper."""
@@ -56,18 +70,12 @@ class FilesMark(NamedTuple):
     """Lengths of the files of what a hand did, by name [bytes]."""
 
 
-class _LedFile(NamedTuple):
-    """A file of what a hand did."""
-
-    file: IO[bytes]
-    head: int
-    """Length of its first line [bytes]."""
-
-
 class Outputs:
     """A folder with the files of one run. Files of an earlier run are removed, and no others.
 
-    Every `write_` method raises RunError where the system refuses.
+    The folder is locked until `close`. Each file appears when it is whole; `forces.csv` and the
+    files of what a hand did grow by whole rows. Every `write_` method raises RunError where the
+    system refuses.
 
     Args:
         folder: The folder; it is made if there is none.
@@ -77,7 +85,7 @@ class Outputs:
 
     Raises:
         UsageError: the path is a file, or lies below one.
-        RunError: the folder cannot be made or written.
+        RunError: another run writes there, or the folder cannot be made or written.
     """
 
     def __init__(
@@ -89,21 +97,46 @@ class Outputs:
     ) -> None:
         self.folder, self.exports = folder, tuple(exports)
         self._plotter = plotter
-        check_folder(folder)
-        for name in RUN_FILES:
-            _naming_path(folder / name, lambda path: path.unlink(missing_ok=True))
-        self._forces = _naming_path(folder / FORCES, lambda path: path.open("ab", buffering=0))
-        self._append((",".join(columns) + "\n").encode("ascii"))
+        make_folder(folder)
+        self._lock = _naming_path(folder, FolderLock)
+        self._reserve: DiskReserve | None = None
+        try:
+            for name in RUN_FILES:
+                _naming_path(folder / name, _remove)
+            self._forces = self._growing(FORCES, columns)
+        except BaseException:
+            self._lock.release()
+            raise
         self._n_written = 0
-        self._led: dict[str, _LedFile] = {}
+        self._led: dict[str, GrowingFile] = {}
 
     def path(self, name: str) -> Path:
         """Return where a file of this run lies."""
         return self.folder / name
 
+    def keep_reserve(self) -> None:
+        """Keep space on the disk for the last files, once `initial.vtu` is written.
+
+        Raises:
+            RunError: there is not as much.
+        """
+        n_bytes = LAST_FILES + MOST_GROWTH * self.path(INITIAL).stat().st_size
+        try:
+            self._reserve = DiskReserve(self.folder, n_bytes)
+        except OSError as error:
+            raise RunError(
+                f"{self.folder}: no room for {n_bytes / 1e6:.0f} MB, which are kept for the last "
+                f"files of the run ({error.strerror or error}); make room, or choose another --out"
+            ) from error
+
+    def free_reserve(self) -> None:
+        """Give back the space that was kept, before the last files are written."""
+        if self._reserve is not None:
+            _naming_path(self.folder, lambda _: cast(DiskReserve, self._reserve).give_back())
+
     def write_scene(self, text: str) -> None:
         """Write `scene.toml`."""
-        _naming_path(self.path(SCENE), lambda path: path.write_text(text, encoding="utf-8"))
+        self._write_whole(SCENE, lambda path: path.write_text(text, encoding="utf-8"))
 
     def write_mesh(self, name: str, snapshot: Snapshot) -> None:
         """Write the body as `initial.vtu` or `final.vtu`."""
@@ -117,8 +150,9 @@ class Outputs:
         n_new = len(recording) - self._n_written
         if n_new < (1 if all_rows else FRAMES_PER_FLUSH):
             return
-        self._append(_csv(recording.rows[self._n_written :]))
+        rows = _csv(recording.rows[self._n_written :])
         self._n_written = len(recording)
+        _append(self._forces, rows)
 
     def write_stroke(self, rows: Sequence[Sequence[float]]) -> None:
         """Add rows of `LED_COLUMNS` to `stroke.csv`; the first call begins it anew."""
@@ -135,19 +169,19 @@ class Outputs:
 
         Numbers are written so that reading them gives the same bits.
         """
-        text = _csv(np.array(rows)) if rows else b""
         if name not in self._led:
-            file = _naming_path(self.path(name), lambda p: p.open("wb", buffering=0))
-            head = (",".join(columns) + "\n").encode("ascii")
-            self._led[name] = _LedFile(file, len(head))
-            text = head + text
-        led = self._led[name].file
-        _naming_path(self.path(name), lambda _: led.write(text))
+            self._led[name] = self._growing(name, columns)
+        _append(self._led[name], _csv(np.array(rows)) if rows else b"")
+
+    def write_pending(self) -> None:
+        """Add what the system refused before to `forces.csv` and the files of what a hand did."""
+        for file in (self._forces, *self._led.values()):
+            _append(file, b"")
 
     def mark(self) -> FilesMark:
         """Return how far `forces.csv` and the files of what a hand did have got."""
-        led = {name: file.tell() for name, (file, _) in self._led.items()}
-        return FilesMark(self._n_written, self._forces.tell(), led)
+        led = {name: file.length for name, file in self._led.items()}
+        return FilesMark(self._n_written, self._forces.length, led)
 
     def cut_back(self, mark: FilesMark) -> None:
         """Take off what was written to these files after a mark.
@@ -156,10 +190,9 @@ class Outputs:
             RunError: the system refuses.
         """
         self._n_written = mark.n_rows
-        _naming_path(self.path(FORCES), partial(_cut_off, self._forces, mark.forces))
-        for name, (file, head) in self._led.items():
-            end = mark.led.get(name, head)
-            _naming_path(self.path(name), partial(_cut_off, file, end))
+        _naming_path(self.path(FORCES), lambda _: self._forces.cut_back(mark.forces))
+        for name, file in self._led.items():
+            _naming_path(self.path(name), partial(_cut_back, file, mark.led.get(name)))
 
     def start_plots(self, title: str) -> None:
         """Have `force.png`, and with an audit `energy.png`, drawn from `forces.csv`."""
@@ -171,27 +204,62 @@ class Outputs:
 
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""
-        _naming_path(self.path(REPLAY), replay.write)
+        self._write_whole(REPLAY, replay.write)
 
     def write_summary(self, summary: Summary) -> None:
         """Write `summary.json`."""
         text = summary_json(summary) + "\n"
-        _naming_path(self.path(SUMMARY), lambda path: path.write_text(text, encoding="utf-8"))
+        self._write_whole(SUMMARY, lambda path: path.write_text(text, encoding="utf-8"))
 
     def close(self) -> None:
-        """Close `forces.csv` and what a hand did. May be called twice."""
-        self._forces.close()
-        for file, _ in self._led.values():
+        """Close the files that grow, and let another run have the folder. May be called twice."""
+        for file in (self._forces, *self._led.values()):
             file.close()
+        if self._reserve is not None:
+            with contextlib.suppress(OSError):
+                self._reserve.give_back()
+        self._lock.release()
 
-    def _append(self, text: bytes) -> None:
-        _naming_path(self.path(FORCES), lambda _: self._forces.write(text))
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _growing(self, name: str, columns: Sequence[str]) -> GrowingFile:
+        """Begin a file that grows."""
+        head = (",".join(columns) + "\n").encode("ascii")
+        return _naming_path(self.path(name), lambda path: GrowingFile(path, head))
+
+    def _write_whole(self, name: str, write: Callable[[Path], object]) -> None:
+        """Write a file that appears when it is whole."""
+
+        def write_aside(path: Path) -> None:
+            with whole_file(path) as unfinished:
+                write(unfinished)
+
+        _naming_path(self.path(name), write_aside)
 
 
-def _cut_off(file: IO[bytes], end: int, path: Path) -> None:
-    """Make an open file that long [bytes], and go on writing there; `path` is its name."""
-    file.truncate(end)
-    file.seek(end)
+def _append(file: GrowingFile, rows: bytes) -> None:
+    """Add rows to a file that grows."""
+    _naming_path(file.path, lambda _: file.append(rows))
+
+
+def _cut_back(file: GrowingFile, length: int | None, _: Path) -> None:
+    """Take off what was added to a file after it had this length."""
+    file.cut_back(length)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file of an earlier run, and what is left of one that was killed while it wrote."""
+    path.unlink(missing_ok=True)
+    remove_unfinished(path)
 
 
 def _csv(rows: FloatArray) -> bytes:
@@ -208,6 +276,17 @@ def _csv(rows: FloatArray) -> bytes:
 
 def check_folder(folder: Path) -> None:
     """Make sure that a run can write there, making the folder where there is none.
+
+    Raises:
+        UsageError: the path is a file, or lies below one.
+        RunError: another run writes there, or the folder cannot be made or written.
+    """
+    make_folder(folder)
+    _naming_path(folder, FolderLock).release()
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder where there is none, and make sure that it can be written.
 
     Raises:
         UsageError: the path is a file, or lies below one.
@@ -256,7 +335,16 @@ def check_file(path: Path, suffix: str, option: str) -> None:
 
 def summary_json(summary: Summary) -> str:
     """Return the summary as JSON text."""
-    return json.dumps(summary._asdict(), indent=2, allow_nan=False)
+    return json.dumps(_finite(summary._asdict()), indent=2, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    """Return a tree of JSON with null for each number that is not finite: JSON has no such."""
+    if isinstance(value, dict):
+        return {key: _finite(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _naming_path(path: Path, action: Callable[[Path], T]) -> T:

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from scalpel_sim.cli.console import log_to_stderr, say
 from scalpel_sim.cli.options import PrintOptions
 from scalpel_sim.errors import CheckError, RunError, UsageError
+from tissue import whole_file
 
 if TYPE_CHECKING:  # `--help` should not wait for it
     from scalpel_sim.cases.case_file import CaseFile
@@ -60,14 +61,14 @@ def validate(
         _validate_case(case, out or Path("out") / case.stem, printing)
         return
     from scalpel_sim.cli.run_setup import load_kernels
-    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.run_folder import make_folder
     from scalpel_sim.output.summary import versions
     from scalpel_sim.validate.results import count_verdicts, validation_as_json
     from scalpel_sim.validate.scenes import chosen_scenes
 
     out = out or _FOLDER
     scenes = chosen_scenes(only or ())
-    check_folder(out)
+    make_folder(out)
     with log_to_stderr(printing):
         load_kernels(printing)
         runs = _run(scenes, quick=quick, printing=printing)
@@ -99,12 +100,12 @@ def _validate_case(path: Path, out: Path, printing: PrintOptions) -> None:
     from scalpel_sim.cases.case_file import read_case
     from scalpel_sim.cases.expected import check_expected, curves_of
     from scalpel_sim.cases.report import CaseFindings, case_as_json, print_case, write_case
-    from scalpel_sim.output.run_folder import check_folder
+    from scalpel_sim.output.run_folder import make_folder
     from scalpel_sim.output.summary import versions
 
     case = read_case(path)
     curves = curves_of(case)
-    check_folder(out)
+    make_folder(out)
     with log_to_stderr(printing):
         started = time.perf_counter()
         record = _run_case(case, printing)
@@ -175,9 +176,10 @@ def _write(folder: Path, runs: Sequence["SceneRun"], text: str, *, quick: bool) 
                 name = f"validation_{run.scene.name}{i + 1 if i else ''}.png"
                 draw_plot(plot, folder / name)
                 names[run.scene.name].append(name)
-        (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
         page = validation_page(runs, names, quick=quick)
-        (folder / PAGE_FILE).write_text(page, encoding="utf-8")
+        for name, content in ((JSON_FILE, text + "\n"), (PAGE_FILE, page)):
+            with whole_file(folder / name) as unfinished:
+                unfinished.write_text(content, encoding="utf-8")
     except OSError as error:
         raise RunError(
             f"{error.filename or folder}: cannot be written ({error.strerror or error}); "

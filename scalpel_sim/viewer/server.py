@@ -8,9 +8,9 @@ pickles never leave the two processes.
 """
 
 import asyncio
-import contextlib
 import errno
 import logging
+import os
 import pickle
 import secrets
 import sys
@@ -26,6 +26,7 @@ from scalpel_sim.errors import RunError
 from scalpel_sim.hands.commands import Command
 from scalpel_sim.viewer.colouring import Colouring, Wanted, colour_of
 from scalpel_sim.viewer.leading import Leadership, is_own_page
+from scalpel_sim.viewer.limited_server import LimitedServer
 from scalpel_sim.viewer.messages import (
     UPDATES_PER_SECOND,
     SceneState,
@@ -33,6 +34,7 @@ from scalpel_sim.viewer.messages import (
     ViewerSettings,
 )
 from scalpel_sim.viewer.page import live_page
+from scalpel_sim.viewer.page.policy import PAGE_HEADERS, policy_of
 from scalpel_sim.viewer.scene_packets import ScenePackets
 
 LOOPBACK = "127.0.0.1"
@@ -62,6 +64,19 @@ _CAPTION = (
 _HOW_TO_LOOK = "Drag to turn the view, scroll to zoom."
 _HOW_TO_LEAD = "Drag with the right button to turn the view."
 """Text below the heading of the live page."""
+
+MOST_PAGES = 16
+"""Pages at most that are shown the run at once."""
+
+MOST_UNSENT = 8
+"""Messages at most that a page's socket holds because the page does not read them."""
+
+SECONDS_TO_ANSWER = 10.0
+"""How often a page is asked whether it reads, and how long its browser may take to answer [s]. The
+browser answers for a page that is hidden, or that is stopped in a debugger."""
+
+LARGEST_MESSAGE = 1 << 14
+"""Largest message of a page [byte]: commands have some hundred."""
 
 N_BYTES_OF_TOKEN = 32
 """Random bytes in the token of a page that controls its run: nobody guesses it."""
@@ -127,6 +142,11 @@ class OpenPages:
         for page in list(self._pages):
             self.send_newest(page)
 
+    @property
+    def are_too_many(self) -> bool:
+        """Whether there may be no more pages."""
+        return len(self._pages) >= MOST_PAGES
+
     def add(self, page: "PageSocket") -> None:
         """Show the run to a page that was opened."""
         self._pages.add(page)
@@ -164,9 +184,13 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._leading = leading
         self.n_undrawn = 0
         self.last: bytes | None = None
+        self._n_unsent = 0
 
     def open(self, *_: str, **__: str) -> None:
         """Handle a page that was opened. A page of another origin was refused by tornado."""
+        if self._open_pages.are_too_many:
+            self.close(reason=f"{MOST_PAGES} pages are open")
+            return
         self._open_pages.add(self)
         host, origin = self.request.host, self.request.headers.get("Origin")
         if self._leading and self._leading.may_lead(host, origin, self.get_argument("token", "")):
@@ -195,16 +219,30 @@ class PageSocket(tornado.websocket.WebSocketHandler):
 
     def say(self, text: str) -> None:
         """Send a text, which is not drawn."""
-        with contextlib.suppress(tornado.websocket.WebSocketClosedError):
-            self.write_message(text).add_done_callback(lambda sent: sent.exception())
+        self._write(text)
 
     def send(self, packet: bytes) -> None:
         """Send a packet, and count it until the page has drawn it."""
         self.n_undrawn += 1
+        self._write(packet)
+
+    def _write(self, message: str | bytes) -> None:
+        """Send a message; a page that does not read is closed."""
+        if self._n_unsent >= MOST_UNSENT:
+            self._open_pages.remove(self)
+            self.close(reason="the page does not read")
+            return
         try:
-            self.write_message(packet, binary=True).add_done_callback(lambda sent: sent.exception())
+            sending = self.write_message(message, binary=isinstance(message, bytes))
         except tornado.websocket.WebSocketClosedError:
             self._open_pages.remove(self)
+            return
+        self._n_unsent += 1
+        sending.add_done_callback(self._note_sent)
+
+    def _note_sent(self, sending: "asyncio.Future[None]") -> None:
+        self._n_unsent -= 1
+        sending.exception()  # the page is gone, and `on_close` knows
 
 
 class Site:
@@ -245,11 +283,17 @@ class PageRequest(tornado.web.RequestHandler):
         """Set what has the document to serve; called by tornado."""
         self._site = site
 
+    def set_default_headers(self) -> None:
+        """Set the headers of every answer; called by tornado."""
+        for name, value in PAGE_HEADERS.items():
+            self.set_header(name, value)
+
     def get(self) -> None:
         """Send the page."""
-        self.set_header("Cache-Control", "no-store")
-        # Another page must not show this one in a frame, and have its visitor click there.
-        self.set_header("Content-Security-Policy", "frame-ancestors 'none'")
+        # Not every browser takes 'self' for a web socket. Another page must not show this one in a
+        # frame, and have its visitor click there.
+        policy = policy_of(self._site.document, f"'self' ws://{self.request.host}")
+        self.set_header("Content-Security-Policy", f"{policy}; frame-ancestors 'none'")
         self.write(self._site.document)
 
 
@@ -298,7 +342,11 @@ def _print_line(message: StartReply | Command | Wanted) -> None:
 
 def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
     """Start to serve the page, and return its address, or why it cannot be served."""
-    application = tornado.web.Application()
+    application = tornado.web.Application(
+        websocket_ping_interval=SECONDS_TO_ANSWER,
+        websocket_ping_timeout=SECONDS_TO_ANSWER,
+        websocket_max_message_size=LARGEST_MESSAGE,
+    )
     application.add_handlers(
         OWN_NAMES,
         [
@@ -314,15 +362,15 @@ def _start(site: Site, open_pages: OpenPages, port: int | None) -> StartReply:
             ),
         ],
     )
-    return _listen(application, port)
+    return _listen(LimitedServer(application), port)
 
 
-def _listen(application: tornado.web.Application, port: int | None) -> StartReply:
+def _listen(server: LimitedServer, port: int | None) -> StartReply:
     """Listen on `port`, or on the first free port, and return the address."""
     candidates = range(FIRST_PORT, LAST_PORT + 1) if port is None else [port]
     for candidate in candidates:
         try:
-            application.listen(candidate, address=LOOPBACK)
+            server.listen(candidate, address=LOOPBACK)
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
                 return StartReply(error=f"cannot listen on port {candidate}: {error.strerror}")
@@ -339,3 +387,5 @@ def serve_page() -> None:
     newest = NewestState(pickle.load(sys.stdin.buffer))
     threading.Thread(target=newest.read, args=(sys.stdin.buffer,), daemon=True).start()
     asyncio.run(serve(newest))
+    # The thread may be reading. At its own end Python would want the lock of that, and abort.
+    os._exit(0)

@@ -140,3 +140,11 @@ def test_a_scene_is_not_put_around_the_body_of_another():
     with pytest.raises(UsageError, match="the body there is that of 'grid2', not of 'slab'"):
         scene_of(link, SCENES["slab"])
     assert prepare(scene_of(link, SCENES["grid2"]), link).link is link
+
+
+def test_a_name_with_a_dot_is_that_of_its_scene_over_a_link():
+    scene = replace(SCENES["grid2"], name="grid.2")
+    with served(scene) as link:
+        assert link.describe().scene == "grid_2"
+        assert scene_of(link, scene).name == "grid.2"
+        assert scene_of(link).name == "grid_2"

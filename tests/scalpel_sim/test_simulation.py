@@ -16,6 +16,7 @@ from scalpel_sim.run import REST_AFTER_STROKE, perform, run_time
 from scalpel_sim.scene_body import check_scene, make_tissue, pulled_apart
 from scalpel_sim.scene_parts.scene import changed
 from scalpel_sim.scenes import DEFAULT_SCENE, scene_called, scene_of
+from tests.run_files import names_in
 from tissue import Tissue, block, write_vtu
 
 GRID2 = SCENES["grid2"]
@@ -201,7 +202,7 @@ def test_a_run_that_loses_its_tissue_keeps_all_files_but_the_final_mesh(tmp_path
     with pytest.raises(RunError, match=r"after 0\.150 s: the server is gone; .* holds"):
         perform_in(tmp_path, simulation)
     assert len(read_forces(tmp_path / "forces.csv")) == 150
-    assert {path.name for path in tmp_path.iterdir()} == UNAUDITED - {"final.vtu"}
+    assert set(names_in(tmp_path)) == UNAUDITED - {"final.vtu"}
 
 
 def test_a_run_that_ends_by_a_bug_keeps_its_files_too(tmp_path):
@@ -209,7 +210,7 @@ def test_a_run_that_ends_by_a_bug_keeps_its_files_too(tmp_path):
     simulation.pictures.append(lambda now: 1 / (now.time < 0.1))
     with pytest.raises(RunError, match=r"ZeroDivisionError.*fault of the program"):
         perform_in(tmp_path, simulation)
-    assert {path.name for path in tmp_path.iterdir()} == UNAUDITED
+    assert set(names_in(tmp_path)) == UNAUDITED
 
 
 def test_a_body_that_folds_as_it_settles_gets_a_warning_that_names_what_helps(caplog):

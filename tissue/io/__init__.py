@@ -9,4 +9,5 @@ In the order in which they are best read:
     vtk_legacy       VTK legacy, with vtk_cells
     vtu              VTK XML, with vtu_data and vtk_cells
     vtu_writer       write the state of a body as VTK XML
+    whole_file       files that appear only when they are whole
 """

@@ -13,6 +13,9 @@ from tissue.mesh.validation import MeshError
 MAX_SHOWN = 40
 """Characters that an error quotes at most."""
 
+PIECE = 1 << 22
+"""Text that is looked at at once [bytes]: it takes some ten times as much memory."""
+
 
 class ByteReader:
     """A file in memory, and how far it has been read."""
@@ -73,6 +76,24 @@ class ByteReader:
     def ints(self, end: int, what: str) -> IntArray:
         """Take every whole number written as text up to byte `end`."""
         return as_ints(self._numbers(end, int, what))
+
+    def words_on_lines(self, end: int) -> IntArray:
+        """Return how many words are on each line that has any, up to byte `end`."""
+        counts = []
+        start = self.at
+        while start < end:
+            stop = min(start + PIECE, end)
+            if stop < end:  # at the end of a line, of which there is one at last
+                line_end = self.data.find(b"\n", stop, end)
+                stop = end if line_end < 0 else line_end + 1
+            piece = np.frombuffer(self.data, np.uint8, stop - start, start)
+            is_word = piece > ord(" ")
+            begins = is_word & np.concatenate([[True], ~is_word[:-1]])
+            line_of = np.cumsum(piece == ord("\n"), dtype=np.int32)
+            counts.append(np.bincount(line_of[begins]))
+            start = stop
+        on_lines = np.concatenate([np.zeros(0, dtype=np.int64), *counts])
+        return on_lines[on_lines > 0]
 
     def expect(self, count: int, found: int, what: str, at: int) -> None:
         """Fail, at the line of byte `at`, unless as many things were found as there should be."""

@@ -23,7 +23,7 @@ class CellType(NamedTuple):
 def expect_tetrahedra(
     counts: Mapping[int, int], cell_types: Mapping[int, CellType], tetrahedron: int
 ) -> None:
-    """Raise an error unless there are tetrahedra and no other volumes; other cells are ignored.
+    """Raise an error unless there are tetrahedra and no other volumes.
 
     Args:
         counts: Number of cells of each type, by the format's number of the type.
@@ -52,6 +52,25 @@ def expect_tetrahedra(
             "Gmsh or fTetWild for example"
         )
     raise MeshError(f"there are no tetrahedra; found {found or 'no cells'}")
+
+
+def expect_ignorable(n_nodes: int, cell: str) -> None:
+    """Raise an error unless a cell that is no tetrahedron is a point, a line or a triangle.
+
+    A tetrahedron whose type is wrong has four nodes. It would be lost without a word.
+
+    Args:
+        n_nodes: How many nodes it has.
+        cell: What it is called in messages.
+
+    Raises:
+        MeshError: It has more than three nodes.
+    """
+    if n_nodes > 3:
+        raise MeshError(
+            f"{cell} has {n_nodes} nodes: beside tetrahedra there may be points, lines and "
+            "triangles only. If it is a tetrahedron its type is wrong; if not, leave it out"
+        )
 
 
 def uniform_records(

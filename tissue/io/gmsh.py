@@ -27,9 +27,11 @@ def read_gmsh(data: bytes) -> TetrahedralMesh:
         reader.fail(f"expected version, file type (0 or 1), data size; found {words}", at)
     version, file_type, data_size = words
     if version not in ("2", "2.0", "2.1", "2.2", "4.1"):
-        reader.fail(f"expected version 2.0 to 2.2 or 4.1, found {version}: save it as 4.1", at)
+        reader.fail(
+            f"expected version 2.0 to 2.2 or 4.1, found {shown(version)}: save it as 4.1", at
+        )
     if data_size != "8":
-        reader.fail(f"expected data size 8, found {data_size}", at)
+        reader.fail(f"expected data size 8, found {shown(data_size)}", at)
     byte_order = _byte_order(reader) if file_type == "1" else ""
     read = read_gmsh_4 if version == "4.1" else read_gmsh_2
     return read(reader, byte_order)

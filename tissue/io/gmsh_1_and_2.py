@@ -76,7 +76,10 @@ def _elements_as_text(
     """
     at = reader.at
     n_elements = count_in(reader, reader.line_with_text(), "elements", at)
-    flat = reader.ints(reader.find(pattern, end_name).start(), "whole numbers")
+    end = reader.find(pattern, end_name).start()
+    on_lines = reader.words_on_lines(end)
+    flat = reader.ints(end, "whole numbers")
+    reader.expect(n_elements, len(on_lines), "elements, one on each line", at)
     elements = Elements()
     start, n_read = 0, 0
     while n_read < n_elements:
@@ -92,7 +95,15 @@ def _elements_as_text(
         records = uniform_records(flat, start, stride, [1, at_size], n_elements - n_read)
         if not len(records):
             reader.fail(f"expected {n_elements} elements, found {n_read} and a part of one", at)
-        elements.add(number, records[:, stride - cell_type.n_nodes :])
+        wrong = np.flatnonzero(on_lines[n_read : n_read + len(records)] != stride)
+        if wrong.size:
+            k = n_read + int(wrong[0])
+            reader.fail(
+                f"element {k + 1} of {n_elements} ({cell_type.name}): expected {stride} numbers on "
+                f"its line, found {on_lines[k]}",
+                at,
+            )
+        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
         start, n_read = start + records.size, n_read + len(records)
     if start != len(flat):
         reader.fail(f"expected {n_elements} elements, found {len(flat) - start} numbers more", at)
@@ -128,7 +139,8 @@ def _elements_in_binary(reader: ByteReader, byte_order: str) -> Elements:
             )
         stride = 1 + n_tags + cell_type.n_nodes
         flat = reader.binary(n_here * stride, byte_order + "i4", f"numbers of {cell_type.name}")
-        elements.add(number, as_ints(flat).reshape(n_here, stride)[:, stride - cell_type.n_nodes :])
+        records = as_ints(flat).reshape(n_here, stride)
+        elements.add(number, records[:, 0], records[:, stride - cell_type.n_nodes :])
         n_read += n_here
     _expect_end(reader, "$EndElements")
     return elements

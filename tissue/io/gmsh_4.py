@@ -131,14 +131,19 @@ def _elements(section: _Section) -> Elements:
     elements = Elements()
     found = 0
     for _ in range(n_blocks):
-        _, _, number = section.ints(3, "numbers before a block of elements").tolist()
+        dimension, _, number = section.ints(3, "numbers before a block of elements").tolist()
         (n_here,) = _counts(section, 1, "elements in a block")
         cell_type = element_type(section.reader, number)
+        if dimension != cell_type.dimension:
+            section.reader.fail(
+                f"expected {cell_type.name} in a block of dimension {cell_type.dimension}, found "
+                f"one of dimension {dimension}"
+            )
         width = 1 + cell_type.n_nodes
         records = section.sizes(n_here * width, f"numbers of {cell_type.name}").reshape(
             n_here, width
         )
-        elements.add(number, records[:, 1:])
+        elements.add(number, records[:, 0], records[:, 1:])
         found += n_here
     section.end()
     if found != n_elements:

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import ByteReader
-from tissue.io.cell_types import CellType, expect_tetrahedra
+from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
@@ -48,27 +48,37 @@ _CELL_TYPES = {
 
 
 class Elements:
-    """The elements read so far: their number by type, and the nodes of the tetrahedra."""
+    """The elements read so far, by type: tag and nodes of each."""
 
     def __init__(self) -> None:
-        self._counts: dict[int, int] = {}
-        self._tetrahedra: list[IntArray] = []
+        self._rows: dict[int, list[IntArray]] = {}
 
-    def add(self, number: int, node_tags: IntArray) -> None:
-        """Add elements of one type, with the tags of their nodes, shape (n_elements, n_nodes)."""
-        if len(node_tags):
-            self._counts[number] = self._counts.get(number, 0) + len(node_tags)
-        if number == _TETRAHEDRON:
-            self._tetrahedra.append(node_tags)
+    def add(self, number: int, tags: IntArray, nodes: IntArray) -> None:
+        """Add elements of one type.
+
+        Args:
+            number: Gmsh's number of the type.
+            tags: Their tags, shape (n_elements,).
+            nodes: The tags of their nodes, shape (n_elements, n_nodes).
+        """
+        if len(nodes):
+            self._rows.setdefault(number, []).append(np.column_stack((tags, nodes)))
 
     def mesh(self, tags: IntArray, positions: FloatArray) -> TetrahedralMesh:
         """Return the tetrahedra between nodes with `tags`, shape (n_nodes,), at `positions`.
 
         Raises:
-            MeshError: There are no tetrahedra, a tag occurs twice, or no node has the tag.
+            MeshError: There are no tetrahedra, or cells that cannot be ignored beside them; a node
+                or one of these cells occurs twice, or no node has a tag that is named.
         """
-        expect_tetrahedra(self._counts, _CELL_TYPES, _TETRAHEDRON)
-        wanted = np.concatenate(self._tetrahedra)
+        rows = {number: np.concatenate(found) for number, found in self._rows.items()}
+        counts = {number: len(found) for number, found in rows.items()}
+        expect_tetrahedra(counts, _CELL_TYPES, _TETRAHEDRON)
+        wanted = rows.pop(_TETRAHEDRON)[:, 1:]
+        for number, ignored in sorted(rows.items()):
+            cell_type = _CELL_TYPES[number]
+            expect_ignorable(cell_type.n_nodes, f"an element, one of the {cell_type.name},")
+            _refuse_repeated_records(ignored, cell_type)
         order = np.argsort(tags, kind="stable")
         in_order = tags[order]
         twice = np.flatnonzero(in_order[1:] == in_order[:-1])
@@ -83,6 +93,17 @@ class Elements:
                 f"{wanted[missing][0]}, which is not among the {len(tags)} nodes of the file"
             )
         return TetrahedralMesh(positions, order[at])
+
+
+def _refuse_repeated_records(rows: IntArray, cell_type: CellType) -> None:
+    """Refuse elements of which two have the same tag and nodes: one is in the place of another."""
+    in_order = rows[np.lexsort(rows.T)]
+    twice = np.flatnonzero((in_order[1:] == in_order[:-1]).all(axis=1))
+    if twice.size:
+        raise MeshError(
+            f"element {in_order[twice[0], 0]}, one of the {cell_type.name}, occurs twice: another "
+            "is missing in its place"
+        )
 
 
 def element_type(reader: ByteReader, number: int, at: int | None = None) -> CellType:

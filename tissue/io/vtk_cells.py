@@ -3,7 +3,7 @@
 import numpy as np
 
 from tissue.core.array_types import IntArray
-from tissue.io.cell_types import CellType, expect_tetrahedra
+from tissue.io.cell_types import CellType, expect_ignorable, expect_tetrahedra
 from tissue.mesh.validation import MeshError
 
 _TETRAHEDRON = 10
@@ -53,7 +53,9 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
         flat: The nodes of all cells, one cell after another.
 
     Raises:
-        MeshError: There are no tetrahedra, there are other volumes, or a cell is not within `flat`.
+        MeshError: There are no tetrahedra, there are other volumes, a cell is not within `flat`,
+            its type disagrees with its number of nodes, or it has more than three nodes and is no
+            tetrahedron.
     """
     numbers, counts = np.unique(types, return_counts=True)
     expect_tetrahedra(
@@ -67,8 +69,25 @@ def tetrahedra_of(types: IntArray, starts: IntArray, sizes: IntArray, flat: IntA
             f"{len(flat)} entries"
         )
     is_tetrahedron = types == _TETRAHEDRON
-    wrong = np.flatnonzero(is_tetrahedron & (sizes != 4))
-    if wrong.size:
-        raise MeshError(f"cell {wrong[0]} is a tetrahedron with {sizes[wrong[0]]} nodes, not 4")
+    for number in numbers.tolist():
+        _check_sizes(number, np.flatnonzero(types == number), sizes)
     tetrahedra: IntArray = flat[starts[is_tetrahedron][:, None] + np.arange(4)]
     return tetrahedra
+
+
+def _check_sizes(number: int, cells: IntArray, sizes: IntArray) -> None:
+    """Check how many nodes the cells of one type have.
+
+    Raises:
+        MeshError: They do not have as many as their type, or too many to be ignored.
+    """
+    cell_type = _CELL_TYPES[number]
+    wrong = cells[sizes[cells] != cell_type.n_nodes] if cell_type.n_nodes else cells[:0]
+    if wrong.size:
+        raise MeshError(
+            f"cell {wrong[0]} is one of the {cell_type.name} and has {sizes[wrong[0]]} nodes, not "
+            f"{cell_type.n_nodes}"
+        )
+    if number != _TETRAHEDRON:
+        largest = cells[np.argmax(sizes[cells])]
+        expect_ignorable(int(sizes[largest]), f"cell {largest}, one of the {cell_type.name},")

@@ -121,6 +121,10 @@ class _Reader:
             return
         offsets = self._named_array("OFFSETS", n_first)
         flat = self._named_array("CONNECTIVITY", n_second)
+        if n_first and (offsets[0] != 0 or offsets[-1] != n_second):
+            reader.fail(
+                f"expected offsets from 0 to {n_second}, found {offsets[0]} to {offsets[-1]}", at
+            )
         self._cells = offsets[:-1], np.diff(offsets), flat
 
     def _walk(self, flat: IntArray, n_cells: int, at: int) -> tuple[IntArray, IntArray]:

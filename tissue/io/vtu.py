@@ -4,6 +4,7 @@ import re
 import xml.etree.ElementTree as ET
 
 import numpy as np
+import numpy.typing as npt
 
 from tissue.core.array_types import FloatArray, IntArray
 from tissue.io.byte_reader import as_floats, as_ints, shown
@@ -12,8 +13,15 @@ from tissue.io.vtu_data import Encoding, decoded
 from tissue.mesh.validation import MeshError
 from tissue.types import TetrahedralMesh
 
-MAX_RATIO = 1100
-"""Numbers per byte of the file at most: zlib compresses to 1/1032 at best."""
+MAX_RATIO = 100
+"""Bytes in memory per byte of the file at most. Grids, the meshes that compress best, have 8 with
+zlib and 19 with LZMA. A file made to fill the memory has 1000 and more."""
+
+MAX_BYTES = 2**31
+"""Bytes in memory at most, as many as the largest file has."""
+
+_NUMBER_BYTES = 8
+"""Size of a number once it is read [bytes], whatever it is in the file."""
 
 _APPENDED = re.compile(rb"<AppendedData\b[^>]*>\s*_")
 _APPENDED_END = b"</AppendedData"
@@ -29,6 +37,7 @@ def read_vtu(data: bytes) -> TetrahedralMesh:
     """
     xml, appended = _apart(data)
     root = _parsed(xml)
+    del xml
     kind = root.get("type", "")
     if root.tag != "VTKFile" or kind != "UnstructuredGrid":
         only = "only a surface, no tetrahedra: " if kind == "PolyData" else ""
@@ -58,7 +67,7 @@ def _parsed(xml: bytes) -> ET.Element:
     if b"<!DOCTYPE" in xml or b"<!ENTITY" in xml:
         raise MeshError("expected VTK's XML, found a document type declaration")
     try:
-        return ET.fromstring(xml)
+        return ET.fromstring(xml.decode("utf-8"))  # in another encoding it could hide one
     except (ET.ParseError, LookupError, ValueError) as error:
         raise MeshError(f"expected VTK's XML, found what is not XML ({error})") from None
 
@@ -87,7 +96,8 @@ class _Piece:
     def __init__(self, element: ET.Element, encoding: Encoding, n_bytes: int) -> None:
         self._element = element
         self._encoding = encoding
-        self._most = MAX_RATIO * n_bytes
+        self._most = min(MAX_RATIO * n_bytes, MAX_BYTES) // _NUMBER_BYTES
+        self._n_numbers = 0
 
     def mesh(self) -> TetrahedralMesh:
         n_nodes, n_cells = self._count("NumberOfPoints"), self._count("NumberOfCells")
@@ -109,13 +119,23 @@ class _Piece:
         return count
 
     def _floats(self, path: str, count: int) -> FloatArray:
-        return as_floats(decoded(self._array(path), self._encoding, count, path))
+        return as_floats(self._decoded(path, count))
 
     def _ints(self, path: str, count: int) -> IntArray:
-        values = decoded(self._array(path), self._encoding, count, path)
+        values = self._decoded(path, count)
         if values.dtype.kind not in "iu":
             raise MeshError(f"expected whole numbers in {path}, found {values.dtype}")
         return as_ints(values)
+
+    def _decoded(self, path: str, count: int) -> npt.NDArray[np.generic]:
+        """Return the `count` numbers of an array, if there is room for them."""
+        self._n_numbers += count
+        if not 0 <= count <= self._n_numbers <= self._most:
+            raise MeshError(
+                f"{path}: {count} numbers, with those before {self._n_numbers}; expected at most "
+                f"{self._most} from a file of this size. If it is a mesh, save it uncompressed"
+            )
+        return decoded(self._array(path), self._encoding, count, path)
 
     def _array(self, path: str) -> ET.Element:
         element = self._element.find(path)

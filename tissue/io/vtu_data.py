@@ -6,7 +6,7 @@ import lzma
 import re
 import xml.etree.ElementTree as ET
 import zlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -177,20 +177,24 @@ def _compressed(stream: _Stream, encoding: Encoding, n_bytes: int) -> bytes:
 
 
 def _unpacked(packed: bytes, size: int, compressor: str) -> bytes:
-    """Return the `size` bytes of one block; no more are unpacked, whatever it holds."""
+    """Return the `size` bytes of one block; one more is unpacked at most, whatever it holds."""
+    unpacker: Any
     try:
         if compressor == "vtkZLibDataCompressor":
-            plain = zlib.decompressobj().decompress(packed, max(size, 1))
+            unpacker = zlib.decompressobj()
         elif compressor == "vtkLZMADataCompressor":
             unpacker = lzma.LZMADecompressor(memlimit=LZMA_MEMORY)
-            plain = unpacker.decompress(packed, max(size, 1))
         else:
             raise MeshError(
                 "expected vtkZLibDataCompressor or vtkLZMADataCompressor, found "
                 f"{shown(compressor)}: save it with zlib or uncompressed"
             )
+        plain: bytes = unpacker.decompress(packed, size + 1)
     except (zlib.error, lzma.LZMAError, EOFError) as error:
         raise MeshError(f"expected compressed data, found an error in it ({error})") from None
     if len(plain) != size:
-        raise MeshError(f"expected {size} bytes in a compressed block, found {len(plain)}")
+        found = f"{len(plain)}" if len(plain) < size else "more"
+        raise MeshError(f"expected {size} bytes in a compressed block, found {found}")
+    if not unpacker.eof:  # the checksum is at the end
+        raise MeshError("expected a whole compressed block, found one without its end")
     return plain

@@ -5,11 +5,11 @@ import os
 import struct
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from tissue.io.whole_file import whole_file
 from tissue.mesh.pieces import piece_of_tetrahedra
 from tissue.types import Snapshot
 
@@ -30,15 +30,9 @@ def write_vtu(path: str | os.PathLike[str], snapshot: Snapshot) -> None:
     Raises:
         OSError: The file cannot be written.
     """
-    target = Path(path)
-    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        with unfinished.open("wb") as file:
-            for line in _lines(snapshot):
-                file.write(line.encode("ascii") + b"\n")
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with whole_file(path) as unfinished, unfinished.open("wb") as file:
+        for line in _lines(snapshot):
+            file.write(line.encode("ascii") + b"\n")
 
 
 def _lines(snapshot: Snapshot) -> Iterator[str]:

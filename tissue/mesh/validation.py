@@ -29,6 +29,10 @@ is 200 times as wide as high still has 4e-3.
 SLIVER_QUALITY = 1e-2
 """Quality below which a tetrahedron forces short time steps and poor cuts."""
 
+MOST_ODD = 0.05
+"""Share of tetrahedra that may have another orientation than the rest, as where parts of several
+sources were joined. Of more, it is unclear which are right."""
+
 N_NAMED = 5
 """Elements that an error names at most."""
 
@@ -51,13 +55,14 @@ class CheckedMesh(NamedTuple):
 def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     """Refuse a broken mesh, repair harmless faults, and warn of doubtful ones.
 
-    Repaired, with a warning: unused nodes (dropped), tetrahedra that are all inverted (reordered),
-    and nodes or edges at which tetrahedra meet that share no face there (the node is split).
+    Repaired, with a warning: unused nodes (dropped), inverted tetrahedra where they are all or at
+    most `MOST_ODD` of them (reordered), and nodes or edges at which tetrahedra meet that share no
+    face there (the node is split).
     Doubtful, with a warning: several pieces, slivers, a body over a metre. Warnings go to the
     logger "tissue" too.
 
-    A mesh in which only some tetrahedra are inverted is refused: mostly the body is folded over
-    itself, and to reorder the nodes of those tetrahedra would hide that.
+    A mesh in which tetrahedra are inverted because the body is folded over itself is refused: there
+    tetrahedra lie on the same side of the face between them.
 
     Args:
         mesh: The mesh as it comes; other integer and floating point types are converted.
@@ -66,8 +71,8 @@ def checked(mesh: TetrahedralMesh, name: str = "mesh") -> CheckedMesh:
     Raises:
         MeshError: No tetrahedra; an index out of range; NaN or infinity; a body larger than
             `MAX_EXTENT` or smaller than `MIN_EXTENT`; a tetrahedron that names a node twice,
-            occurs twice, is flat, or is inverted while others are not; a face with three
-            tetrahedra, or with two on the same side.
+            occurs twice, or is flat; more than `MOST_ODD` inverted while others are not; a face
+            with three tetrahedra, or with two on the same side.
     """
     try:
         result = _checked(mesh)
@@ -255,23 +260,29 @@ def _refuse_flat(positions: FloatArray, tetrahedra: IntArray, warnings: list[str
 
 
 def _turned_left(positions: FloatArray, tetrahedra: IntArray, warnings: list[str]) -> IntArray:
-    """Return the tetrahedra with positive volumes, if all have the same orientation."""
+    """Return the tetrahedra with positive volumes, if nearly all have the same orientation.
+
+    Where the body is folded over itself, a tetrahedron that is turned overlaps its neighbours, and
+    that is refused afterwards.
+    """
     inverted = signed_volumes(positions, tetrahedra) < 0.0
-    if inverted.all():
-        warnings.append(
-            f"all {len(tetrahedra)} tetrahedra were inverted (negative volumes): reordered nodes"
-        )
-        return tetrahedra[:, [0, 1, 3, 2]]
-    if inverted.any():
-        # Where most are inverted, the few others are named: they are the fault.
-        most = inverted.mean() > 0.5
-        odd = np.flatnonzero(inverted != most)
-        kind = "not inverted while the others are" if most else "inverted"
+    if not inverted.any():
+        return tetrahedra
+    # Where most are inverted, the few others are named: they are the fault.
+    most = inverted.mean() > 0.5
+    odd = np.flatnonzero(inverted != most)
+    kind = "not inverted while the others are" if most else "inverted"
+    named = f"{kind} tetrahedra: {_ids(odd)} ({len(odd)} of {len(tetrahedra)})"
+    if len(odd) > MOST_ODD * len(tetrahedra):
         raise MeshError(
-            f"{kind} tetrahedra: {_ids(odd)} ({len(odd)} of {len(tetrahedra)}). The body is folded "
-            "over itself there, or their nodes are in the wrong order"
+            f"{named}. The body is folded over itself there, or their nodes are in the wrong order"
         )
-    return tetrahedra
+    warnings.append(
+        f"{named}: reordered nodes"
+        if odd.size
+        else f"all {len(tetrahedra)} tetrahedra were inverted (negative volumes): reordered nodes"
+    )
+    return np.where(inverted[:, None], tetrahedra[:, [0, 1, 3, 2]], tetrahedra)
 
 
 def _refuse_wrong_faces(tetrahedra: IntArray, faces: SortedFaces) -> None:

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 
 from bridge.link import SceneView, TissueDescription
+from bridge.scene_names import WANTED_NAME, is_scene_name
 from bridge.tcp.messages.counts import check_counts
 from bridge.tcp.wire import MessageError
 from tissue import BladeShape, Material
@@ -70,6 +71,8 @@ def unpack_description(payload: bytes) -> TissueDescription:
         found = _description_decoder.decode(payload)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError(f"the tissue's description cannot be read: {error}") from error
+    if not is_scene_name(found.scene):
+        raise MessageError(f"the tissue's scene is {found.scene[:80]!r}; wanted {WANTED_NAME}")
     bounds = np.array(found.bounds)
     if not (np.isfinite(bounds).all() and (bounds[0] <= bounds[1]).all()):
         raise MessageError(

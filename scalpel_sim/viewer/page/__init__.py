@@ -10,6 +10,7 @@ import msgspec
 
 from scalpel_sim.errors import RunError
 from scalpel_sim.viewer.messages import Choices
+from scalpel_sim.viewer.page.policy import policy_of
 
 _HERE = Path(__file__).parent
 """Folder of the parts of the pages."""
@@ -23,6 +24,8 @@ _OF_ALL_PAGES = (
     "picture.js",
 )
 """Scripts that every page has first, in order."""
+_CHARSET = '<meta charset="utf-8">'
+_POLICY = '<meta http-equiv="Content-Security-Policy" content="{}">'
 _REQUIREMENT = "meshcat>=0.3.2,<0.4"
 """Versions of meshcat that have the bundle there, as `pyproject.toml` requires them."""
 
@@ -54,7 +57,14 @@ def live_page(
     scripts.append("run.js")
     if is_led:
         bars.insert(0, "hand")
-        scripts += ["coarseness.js", "hand_input.js", "gamepad.js", "instruments.js", "hand.js"]
+        scripts += [
+            "coarseness.js",
+            "depth.js",
+            "hand_input.js",
+            "gamepad.js",
+            "instruments.js",
+            "hand.js",
+        ]
     if choices is not None:
         panels.append("choices")
         scripts.append("choices.js")
@@ -81,7 +91,9 @@ def replay_page(title: str, caption: str, packets: str) -> str:
         RunError: meshcat's viewer was not found.
     """
     controls = _part("player.html")
-    return _page(title, caption, (*_OF_ALL_PAGES, "replay.js"), controls, packets)
+    page = _page(title, caption, (*_OF_ALL_PAGES, "replay.js"), controls, packets)
+    policy = policy_of(page, "data:")  # its packets, as it unpacks them
+    return page.replace(_CHARSET, f"{_CHARSET}\n{_POLICY.format(policy)}", 1)
 
 
 def _page(

@@ -24,6 +24,7 @@ class Hand {
         this.unshown = []; // stamps of inputs that no picture has shown yet [ms]
         this.lags = [];
         this.coarseness = new Coarseness(view);
+        this.depth = new Depth(view);
         view.onHand = (state) => this.show(state);
         run.onChange = () => this.onRunChange();
         run.onInterruption = () => this.forget();
@@ -189,7 +190,7 @@ class Hand {
         if (!this.run.leads) return "Another tab leads the blade.";
         if (this.isClutchOpen) return `Drags turn the view. Space: lead the ${noun} again.`;
         if (this.run.isPaused) return "Time stands still: press \"go on\", or K";
-        if (this.hasMoved) return "";
+        if (this.hasMoved) return this.depth.hint(this.tip);
         return `Press on the picture and drag: the ${noun} follows`;
     }
 }

@@ -138,6 +138,16 @@ def test_periods_without_a_pose_are_counted_by_the_stamps(served):
         assert client.measured().n_missed == 3
 
 
+def test_no_stamps_of_a_device_make_the_next_ones_replies_too_large(served):
+    _, address = served
+    with bare_device(address) as peer:
+        for number, stamp in enumerate([-1e308, 1e308, -1e308, 1e308, 0.0, 1e300], start=1):
+            peer.sendall(servo_frame(number, stamp))
+            assert read_one(peer).kind == MessageKind.SERVO
+    with device_once_free(address) as client:
+        assert client.measured().n_missed == 3 * (3_600_000 - 1)
+
+
 def device_once_free(address):
     """Return a client, as soon as the server has noticed that the last one has left."""
     until = time.monotonic() + PATIENCE

@@ -17,7 +17,6 @@ from bridge.tcp.messages.step import pack_step
 from bridge.tcp.messages.text import pack_error, unpack_error
 from bridge.tcp.peer import HANDSHAKE_BYTES
 from bridge.tcp.server import TissueServer
-from bridge.tcp.single_client import MAX_CONNECTIONS
 from bridge.tcp.wire import PROTOCOL_VERSION, MessageKind, pack_frame
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import (
@@ -179,23 +178,6 @@ def test_a_peer_that_disconnects_frees_its_place(server, sent, how):
     if how == "resets":
         peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     peer.close()
-    assert_serves(server)
-
-
-def test_silent_connections_do_not_keep_a_client_out(server):
-    with contextlib.ExitStack() as stack:
-        for _ in range(MAX_CONNECTIONS - 1):
-            stack.enter_context(connected(server.address))
-        assert_serves(server)
-
-
-def test_too_many_connections_are_refused(server):
-    with contextlib.ExitStack() as stack:
-        for _ in range(MAX_CONNECTIONS):
-            stack.enter_context(connected(server.address))
-        with connected(server.address) as one_more:
-            (frame,) = read_all(one_more)
-    assert "8 connections are open" in unpack_error(frame.payload)
     assert_serves(server)
 
 

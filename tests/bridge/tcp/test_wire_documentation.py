@@ -9,13 +9,27 @@ import numpy as np
 import pytest
 
 from bridge.device.messages import pack_state
+from bridge.scene_names import WANTED_NAME
 from bridge.tcp.address import parse_address
 from bridge.tcp.authentication import Authenticator, direction_keys
+from bridge.tcp.keepalive import IDLE_SECONDS, N_PROBES, PROBE_SECONDS
 from bridge.tcp.messages.geoms import MAX_GEOMS
 from bridge.tcp.messages.result import pack_result
 from bridge.tcp.messages.text import MAX_VIEWS
-from bridge.tcp.peer import FRAME_SECONDS, HANDSHAKE_BYTES, HANDSHAKE_SECONDS, SEND_SECONDS
-from bridge.tcp.single_client import MAX_CONNECTIONS
+from bridge.tcp.peer import (
+    FRAME_SECONDS,
+    HANDSHAKE_BYTES,
+    HANDSHAKE_SECONDS,
+    SEND_SECONDS,
+    SILENCE_SECONDS,
+)
+from bridge.tcp.request_limits import (
+    FARTHEST_IN_A_REQUEST,
+    LARGEST_SWEEP,
+    MOST_STEPS_ASKED,
+    MOST_WORK,
+)
+from bridge.tcp.single_client import MAX_STRANGERS
 from bridge.tcp.wire import LARGEST_FRAME, MORE, PROTOCOL_VERSION, MessageKind
 from tests.bridge.device.served_blade import STATE
 from tests.bridge.tcp.serve_block import block_tissue
@@ -87,7 +101,15 @@ def test_the_limits_are_those_of_the_server():
     assert f"until HELLO is done, {HANDSHAKE_BYTES} bytes" in WIRE
     assert f"complete after {FRAME_SECONDS:g} s, and a reply read after {SEND_SECONDS:g} s" in WIRE
     assert f"HELLO must be done {HANDSHAKE_SECONDS:g} s" in WIRE
-    assert f"At most {MAX_CONNECTIONS} connections" in WIRE
+    assert f"Beside the client's at most {MAX_STRANGERS} connections" in WIRE
+    assert f"at least every {SILENCE_SECONDS:g} s" in WIRE
+    gone = IDLE_SECONDS + N_PROBES * PROBE_SECONDS
+    assert f"has not answered the system for {gone} s" in WIRE
+    assert f"more than {FARTHEST_IN_A_REQUEST:g} times the mean node size" in WIRE
+    assert f"more than {LARGEST_SWEEP:,.0f} squares of the mean node size" in WIRE
+    assert f"more than {MOST_STEPS_ASKED:,} steps of the integrator" in WIRE
+    assert f"more than {MOST_WORK / 1e6:g} million" in WIRE
+    assert f"{WANTED_NAME}" in WIRE
     assert f"at most {MAX_GEOMS}." in WIRE and f"more than {MOST_INCREMENTS:,}, is refused" in WIRE
     assert f"a list of at most {MAX_VIEWS}\ncameras" in WIRE
 

@@ -4,9 +4,6 @@ import pty
 import re
 import signal
 import socket
-import subprocess
-import sys
-import time
 import urllib.request
 from pathlib import Path
 
@@ -16,6 +13,8 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.run_folder import ENERGY_PLOT, FRAMES_PER_FLUSH, RUN_FILES
+from tests.processes import start, wait_for_rows
+from tests.run_files import names_in
 from tissue import MATERIALS
 
 HEADER = "t,tip_x,tip_y,tip_z,heel_x,heel_y,heel_z\n"
@@ -286,7 +285,7 @@ def test_a_run_prints_the_table_of_the_paper_and_writes_every_file(files, capsys
         "path error",
     ):
         assert words in out
-    assert sorted(os.listdir("out/slab")) == sorted(RUN_FILES)
+    assert names_in("out/slab") == sorted(RUN_FILES)
     assert "\x1b" not in out + err  # neither colours nor a progress bar off a terminal
 
 
@@ -420,26 +419,7 @@ def test_help_and_version_are_no_errors(words, capsys):
     assert capsys.readouterr().err == ""
 
 
-def start(*words: str, stdin: int = subprocess.DEVNULL) -> subprocess.Popen[str]:
-    """Start the program in a process of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "scalpel_sim", *words],
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
-    )
-
-
-def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
-    """Wait until a run has written its first rows."""
-    while not (forces.exists() and forces.stat().st_size > 20_000):
-        assert program.poll() is None, program.communicate()
-        time.sleep(0.02)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     folder = tmp_path / "run"
     program = start("run", "grid2", "--seconds", "1000", "--out", str(folder))
@@ -454,7 +434,7 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == f"interrupted by {number.name}"
     assert summary["frames"] == len(read_forces(forces)) >= FRAMES_PER_FLUSH
-    assert sorted(path.name for path in folder.iterdir()) == sorted(RUN_FILES)
+    assert names_in(folder) == sorted(RUN_FILES)
 
 
 def test_a_killed_run_keeps_its_forces_and_its_first_mesh(tmp_path):
@@ -511,7 +491,7 @@ def test_view_shows_the_run_and_stays_until_it_is_interrupted(tmp_path):
     url = re.search(r"live at (http://127\.0\.0\.1:\d+/)", log).group(1)
     with urllib.request.urlopen(url, timeout=10) as page:
         assert "grid2: straight stroke" in page.read().decode()
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(UNAUDITED)
+    assert names_in(tmp_path) == sorted(UNAUDITED)
     program.send_signal(signal.SIGINT)
     out, _ = program.communicate(timeout=30)
     assert program.returncode == 0

@@ -1,5 +1,6 @@
 """A visitor leads a grasper and the blade in the live page: by gamepad, touch and controls."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -200,7 +201,7 @@ def test_the_right_stick_leads_in_depth_and_turns(view, tab):
 
 @pytest.mark.browser
 def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
-    context = browser.new_context(viewport=WINDOW, has_touch=True)
+    context = browser.new_context(viewport=WINDOW, has_touch=True, bypass_csp=True)
     tab = context.new_page()
     tab.set_default_timeout(TIMEOUT)
     tab.failures = []
@@ -230,3 +231,28 @@ def test_a_finger_drags_the_blade_in_the_plane_of_the_screen(view, browser):
     assert way @ away == pytest.approx(0.0, abs=1e-6)
     end(tab, view)
     context.close()
+
+
+@pytest.mark.browser
+def test_the_hint_says_how_far_the_body_is_in_depth(view, tab):
+    """The tip is thought to be on the line from the eye to the middle of the body."""
+    hint = tab.evaluate("""() => {
+        hand.hasMoved = true;
+        const { mesh } = hand.view.tissue.get("skin");
+        const middle = new THREE.Box3().setFromObject(mesh).getCenter(new THREE.Vector3());
+        const eye = hand.viewer.camera.getWorldPosition(new THREE.Vector3());
+        const away = middle.clone().sub(eye).normalize();
+        return [-0.07, -0.05, 0, 0.05].map((metres) => {
+            const { x, y, z } = middle.clone().addScaledVector(away, metres);
+            hand.tip = [x, -z, y];
+            hand.depth.lookedAt = -Infinity;
+            return hand.hint();
+        });
+    }""")
+    far, near = (
+        int(re.search(r"is (\d+) mm further away: .*Page Up", each)[1]) for each in hint[:2]
+    )
+    assert far - near == pytest.approx(20, abs=5)
+    assert 25 <= near <= 50
+    assert hint[2] == ""
+    assert re.search(r"is \d+ mm nearer to you: .*Page Down", hint[3])

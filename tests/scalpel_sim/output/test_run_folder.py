@@ -26,6 +26,7 @@ from scalpel_sim.output.run_folder import (
     summary_json,
 )
 from scalpel_sim.output.summary import RunFacts, Summary, summarise
+from tests.run_files import names_in
 from tissue import CutReport, Energies, MeshMeasures, Snapshot, block, pieces_of
 
 DT = 1e-3
@@ -126,7 +127,7 @@ def test_a_new_run_removes_the_files_of_the_last_one_and_no_others(tmp_path, plo
     for name in (SUMMARY, PLOT, "notes.txt"):
         (tmp_path / name).write_text("old")
     Outputs(tmp_path, plotter)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [FORCES, "notes.txt"]
+    assert names_in(tmp_path) == [FORCES, "notes.txt"]
 
 
 def test_a_path_that_is_a_file_is_wrong_use(tmp_path, plotter):

@@ -204,7 +204,8 @@ def test_the_hand_lets_go_when_the_viewer_is_killed(led_viewer):
 
 def test_no_other_page_shows_this_one_in_a_frame(led_viewer):
     with urllib.request.urlopen(led_viewer.url) as answer:
-        assert answer.headers["Content-Security-Policy"] == "frame-ancestors 'none'"
+        assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["X-Frame-Options"] == "DENY"
 
 
 def test_a_page_that_only_shows_has_no_token():

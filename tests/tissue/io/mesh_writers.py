@@ -4,8 +4,10 @@ Each file also has a point, a line and a triangle, as in the output of meshers.
 """
 
 import base64
+import lzma
 import struct
 import zlib
+from collections.abc import Callable
 
 import numpy as np
 
@@ -125,6 +127,8 @@ def vtu(
     header: str = "UInt64",
     is_compressed: bool = False,
     appended_is_raw: bool = True,
+    compress: Callable[[bytes], bytes] = zlib.compress,
+    block_size: int = 100,
 ) -> bytes:
     """Return a mesh in the VTK XML format, in any of its encodings of numbers.
 
@@ -133,9 +137,12 @@ def vtu(
         form: "ascii", "binary" or "appended".
         order: Byte order, "<" or ">".
         header: Type of the sizes in front of binary data.
-        is_compressed: Whether binary data is compressed by zlib.
+        is_compressed: Whether binary data is compressed.
         appended_is_raw: Whether appended data is raw, else base64.
+        compress: How: by zlib or, if it is `lzma.compress`, by LZMA.
+        block_size: What is compressed at once [bytes]; small, so that there are many blocks.
     """
+    pack = None if not is_compressed else (compress, block_size)
     cells = [(_VTK_KINDS[kind], [i - FIRST_TAG for i in c]) for kind, c in _cells(mesh)]
     appended = b""
 
@@ -147,10 +154,10 @@ def vtu(
         if form == "ascii":
             text = " ".join(repr(v) for v in np.ravel(values).tolist()).encode()
         elif form == "appended":
-            appended += _vtu_data(data, order, header, is_compressed, appended_is_raw)
+            appended += _vtu_data(data, order, header, pack, appended_is_raw)
             text = b""
         else:
-            text = _vtu_data(data, order, header, is_compressed, is_raw=False)
+            text = _vtu_data(data, order, header, pack, is_raw=False)
         components = b' NumberOfComponents="3"' if name == "Points" else b""
         return b'<DataArray type="%b" Name="%b"%b format="%b"%b>%b</DataArray>\n' % (
             *(dtype.encode(), name.encode(), components, form.encode(), offset),
@@ -163,7 +170,8 @@ def vtu(
     body += array("offsets", "Int64", np.cumsum([len(c) for _, c in cells]))
     body += array("types", "UInt8", [k for k, _ in cells]) + b"</Cells>\n</Piece>\n"
     endian = b"LittleEndian" if order == "<" else b"BigEndian"
-    compressor = b' compressor="vtkZLibDataCompressor"' if is_compressed else b""
+    name = b"LZMA" if compress is lzma.compress else b"ZLib"
+    compressor = b' compressor="vtk%bDataCompressor"' % name if is_compressed else b""
     if form == "appended":
         encoding = b"raw" if appended_is_raw else b"base64"
         appended = b'<AppendedData encoding="%b">_%b</AppendedData>\n' % (encoding, appended)
@@ -203,13 +211,19 @@ def _spaced(values: list[float]) -> str:
     return " ".join(repr(v) for v in values)
 
 
-def _vtu_data(data: bytes, order: str, header: str, is_compressed: bool, is_raw: bool) -> bytes:
+def _vtu_data(
+    data: bytes,
+    order: str,
+    header: str,
+    pack: tuple[Callable[[bytes], bytes], int] | None,
+    is_raw: bool,
+) -> bytes:
     code = "I" if header == "UInt32" else "Q"
-    if not is_compressed:
+    if pack is None:
         whole = struct.pack(order + code, len(data)) + data
         return whole if is_raw else base64.b64encode(whole)
-    size = 100  # small, so that there are many blocks
-    blocks = [zlib.compress(data[i : i + size]) for i in range(0, len(data), size)]
+    compress, size = pack
+    blocks = [compress(data[i : i + size]) for i in range(0, len(data), size)]
     numbers = [len(blocks), size, len(data) % size, *(len(b) for b in blocks)]
     parts = [struct.pack(f"{order}{len(numbers)}{code}", *numbers), b"".join(blocks)]
     return b"".join(parts if is_raw else [base64.b64encode(part) for part in parts])

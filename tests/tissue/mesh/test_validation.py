@@ -80,17 +80,38 @@ def test_tetrahedra_with_two_nodes_in_one_place_are_refused():
     expect_refusal(positions, tetrahedra, "flat tetrahedra, the worst: 0 ")
 
 
-def test_an_inverted_tetrahedron_among_others_is_refused_by_number():
+@pytest.mark.parametrize("odd", [[4], [4, 17]])
+def test_up_to_a_twentieth_of_inverted_tetrahedra_are_reoriented_with_a_warning(odd):
     positions, tetrahedra = sound_block()
-    tetrahedra[4] = tetrahedra[4, [1, 0, 2, 3]]
-    expect_refusal(positions, tetrahedra, r"inverted tetrahedra: 4 \(1 of 48\)")
+    tetrahedra[odd] = tetrahedra[odd][:, [1, 0, 2, 3]]
+    result = checked(TetrahedralMesh(positions, tetrahedra))
+    assert (signed_volumes(*result.mesh) > 0.0).all()
+    numbers = ", ".join(map(str, odd))
+    assert f"inverted tetrahedra: {numbers} ({len(odd)} of 48)" in result.warnings[0]
 
 
-def test_the_only_tetrahedron_that_is_not_inverted_is_refused_by_number():
+def test_the_only_tetrahedron_that_is_not_inverted_is_named():
     positions, tetrahedra = sound_block()
     tetrahedra[:4] = tetrahedra[:4, [1, 0, 2, 3]]
     tetrahedra[5:] = tetrahedra[5:, [1, 0, 2, 3]]
-    expect_refusal(positions, tetrahedra, "not inverted while the others are tetrahedra: 4 ")
+    result = checked(TetrahedralMesh(positions, tetrahedra))
+    assert (signed_volumes(*result.mesh) > 0.0).all()
+    assert "not inverted while the others are tetrahedra: 4 " in result.warnings[0]
+
+
+def test_more_than_a_twentieth_of_inverted_tetrahedra_are_refused_by_number():
+    positions, tetrahedra = sound_block()
+    tetrahedra[:3] = tetrahedra[:3, [1, 0, 2, 3]]
+    expect_refusal(positions, tetrahedra, r"inverted tetrahedra: 0, 1, 2 \(3 of 48\)")
+
+
+def test_a_tetrahedron_that_is_folded_over_its_neighbours_is_refused():
+    positions, tetrahedra = block((4, 4, 4), (0.04, 0.04, 0.04))
+    positions = positions.copy()
+    middle = np.flatnonzero((positions == 0.02).all(axis=1))[0]
+    positions[middle, 0] += 0.011  # past the face of the cell beside
+    assert 0.0 < (signed_volumes(positions, tetrahedra) < 0.0).mean() < 0.05
+    expect_refusal(positions, tetrahedra, "overlap: both lie on the same side")
 
 
 def test_a_mesh_of_inverted_tetrahedra_is_reoriented_with_a_warning():

@@ -58,7 +58,7 @@ def test_the_longest_error_fits():
 @pytest.mark.parametrize("density", [b"-1000.0", b"null", b"1e999", b'"heavy"'])
 def test_a_description_of_an_impossible_material_is_refused(density):
     bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    packed = pack_description(TissueDescription("", Material(density=1000.0), bounds, 1, 4))
+    packed = pack_description(TissueDescription("organ", Material(density=1000.0), bounds, 1, 4))
     assert unpack_description(packed)
     with pytest.raises(MessageError, match=r"density|out of range"):
         unpack_description(packed.replace(b'"density":1000.0', b'"density":' + density))
@@ -70,7 +70,7 @@ def test_a_description_of_an_impossible_material_is_refused(density):
 def test_a_description_of_an_impossible_prony_series_is_refused(series):
     bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
     material = Material(law="neo_hookean", prony=((0.3, 0.1),))
-    packed = pack_description(TissueDescription("", material, bounds, 1, 4))
+    packed = pack_description(TissueDescription("organ", material, bounds, 1, 4))
     assert unpack_description(packed).material == material
     with pytest.raises(MessageError, match=r"prony|\$\.material"):
         unpack_description(packed.replace(b'"prony":[[0.3,0.1]]', b'"prony":' + series))
@@ -78,7 +78,7 @@ def test_a_description_of_an_impossible_prony_series_is_refused(series):
 
 def described(*views):
     bounds = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    return pack_description(TissueDescription("", Material(), bounds, 1, 4, views=views))
+    return pack_description(TissueDescription("organ", Material(), bounds, 1, 4, views=views))
 
 
 def test_as_many_views_as_there_may_be_fit():

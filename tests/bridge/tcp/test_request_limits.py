@@ -1,0 +1,98 @@
+"""A request that would take too long is refused, with what is allowed, before anything moves."""
+
+import contextlib
+import re
+import time
+
+import numpy as np
+import pytest
+
+from bridge import FrameHold, FramePose, LinkError
+from tests.bridge.bits import bits
+from tests.bridge.tcp.bare_sockets import DT, link_once_free
+from tissue import BladeSweep
+
+NODE_SIZE = 5.609e-3
+FARTHEST = 250.0 * NODE_SIZE
+
+
+@pytest.fixture
+def link(server):
+    with contextlib.closing(link_once_free(server.address)) as link:
+        yield link
+
+
+def expect_refusal(link, message, *step):
+    """Expect that a step is refused at once, and that nothing has moved."""
+    before, begun = bits(link.snapshot()), time.monotonic()
+    with pytest.raises(LinkError, match=message):
+        link.step(*step)
+    assert time.monotonic() - begun < 1.0
+    assert bits(link.snapshot()) == before
+
+
+def test_a_blade_that_moves_a_kilometre_in_a_step_is_refused(link, upright):
+    far, near = upright(0.009, -500.0), upright(0.009, 0.01)
+    match = r"the tip of the blade moves by 500 m in one step; at most 1\.4 m are allowed"
+    expect_refusal(link, match, BladeSweep(far, near), DT)
+
+
+def test_a_blade_that_turns_its_heel_too_far_is_refused(link, upright):
+    after = upright(0.009, 0.01)
+    before = after._replace(heel=after.heel + np.array([0.0, 0.0, 2.0]))
+    expect_refusal(link, "the heel of the blade moves by 2 m", BladeSweep(before, after), DT)
+
+
+def test_a_long_blade_that_moves_far_is_refused(link, upright):
+    after = upright(0.009, 0.01)
+    long = after._replace(heel=after.heel + np.array([0.0, 0.0, 1.0]))
+    match = "an edge of 1.03 m moves by 1 m in one step; .* times travel at most 0.0787 m2, 2500"
+    expect_refusal(link, match, BladeSweep(after, long), DT)
+    longer = after._replace(heel=after.heel + np.array([0.0, 0.0, 20.0]))
+    expect_refusal(link, "the length is at most 14 m", BladeSweep(longer, longer), DT)
+
+
+def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
+    sweep = BladeSweep(upright(0.009, 0.01 - 0.99 * FARTHEST), upright(0.009, 0.01))
+    assert link.step(sweep, DT).cut_area > 0.0
+
+
+def test_a_frame_that_is_led_too_far_is_refused(link):
+    link.attach(FrameHold("top", 100.0))
+    at = np.array([0.01, 0.01, 0.02])
+    near = [FramePose(at, np.eye(3))]
+    link.step(None, DT, near)
+    far = at + np.array([900.0, 0.0, 0.0])
+    match = "frame 0 moves by 900 m in one step; at most"
+    expect_refusal(link, match, None, DT, [FramePose(far, np.eye(3))])
+    assert link.step(None, DT, near).n_tetrahedra == 72
+
+
+def test_a_step_of_more_integrator_steps_than_are_allowed_is_refused(monkeypatch):
+    from bridge.tcp import request_limits
+    from tests.bridge.tcp.test_places import server_in_a_thread
+
+    monkeypatch.setattr(request_limits, "MOST_WORK", 0.0)
+    monkeypatch.setattr(request_limits, "MOST_STEPS_ASKED", 100)
+    with (
+        server_in_a_thread() as server,
+        contextlib.closing(link_once_free(server.address)) as link,
+    ):
+        with pytest.raises(LinkError, match="steps of the integrator; at most") as refused:
+            link.step(None, 1.0)
+        longest = float(re.search(r"at most ([0-9.e-]+) s are allowed", str(refused.value))[1])
+        assert 0.05 < longest < 0.5
+        assert link.step(None, 0.99 * longest).n_substeps <= 100
+
+
+def test_a_body_of_many_tetrahedra_may_take_a_thousand_steps_at_least():
+    from bridge.tcp.request_limits import MOST_STEPS_ASKED, RequestLimits
+    from bridge.tcp.wire import MessageError
+    from tests.bridge.tcp.serve_block import block_tissue
+
+    tissue = block_tissue()
+    longest = MOST_STEPS_ASKED * tissue.cut_report().initial.time_step
+    limits = RequestLimits(tissue)
+    limits.check_step(None, 0.99 * longest, 10**9)
+    with pytest.raises(MessageError):
+        limits.check_step(None, 1.01 * longest, 10**9)

@@ -1,0 +1,36 @@
+"""The program in a process of its own."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from time import sleep
+
+PROGRAM = (sys.executable, "-m", "scalpel_sim")
+
+
+def environment() -> dict[str, str]:
+    """Return an environment in which Python finds what this process finds."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+
+
+def start(
+    *words: str, stdin: int = subprocess.DEVNULL, program: Sequence[str] = PROGRAM
+) -> subprocess.Popen[str]:
+    """Start `scalpel-sim` with these words; its output is read by the caller."""
+    return subprocess.Popen(
+        [*program, *words],
+        stdin=stdin,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+
+
+def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
+    """Wait until a run has written its first rows."""
+    while not (forces.exists() and forces.stat().st_size > 20_000):
+        assert program.poll() is None, program.communicate()
+        sleep(0.02)

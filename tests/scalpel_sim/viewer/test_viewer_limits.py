@@ -1,0 +1,122 @@
+"""How many pages and connections the live page's server has, and for how long it waits for one."""
+
+import socket
+import time
+
+import numpy as np
+import pytest
+
+from scalpel_sim import Viewer
+from scalpel_sim.viewer import viewer as viewer_module
+from scalpel_sim.viewer.limited_server import MOST_CONNECTIONS
+from scalpel_sim.viewer.server import MOST_PAGES
+from tests.long.viewer_faults import FaultyBrowser, masked_frame
+from tests.scalpel_sim.little_arm import FRAME, little_arm
+from tests.scalpel_sim.viewer.test_viewer import Run
+
+PATIENCE = 20.0
+CLOSE = 0x88
+"""First byte of the frame by which a web socket is closed."""
+
+
+@pytest.fixture
+def viewer():
+    with Viewer(little_arm()[0], frame=FRAME) as viewer:
+        yield viewer
+
+
+@pytest.fixture
+def opened(viewer):
+    run = Run(viewer)
+    browser = FaultyBrowser(viewer, run.show_pictures, np.random.default_rng(0))
+    yield browser
+    browser.close()
+
+
+def received(page, n=1 << 20):
+    """Return what comes until nothing comes for a while, or the other side closes."""
+    page.settimeout(0.5)
+    found = b""
+    try:
+        while len(found) < n and (data := page.recv(1 << 16)):
+            found += data
+    except TimeoutError:
+        pass
+    except ConnectionResetError:
+        found += b"reset"
+    return found
+
+
+def is_closed(connection):
+    """Return whether the other side closes a connection, on which it had nothing to send."""
+    connection.settimeout(1.0)
+    try:
+        return connection.recv(1) == b""
+    except ConnectionResetError:
+        return True
+    except TimeoutError:
+        return False
+
+
+def test_connections_beyond_the_limit_are_closed_and_free_their_places(viewer, opened):
+    idle = [opened._connected() for _ in range(MOST_CONNECTIONS)]
+    time.sleep(0.5)
+    assert is_closed(opened._connected())
+    assert not is_closed(idle[0])
+    for each in idle:
+        each.close()
+    time.sleep(0.5)
+    assert b"101 Switching Protocols" in received(opened.open_page())
+
+
+def test_pages_beyond_the_limit_are_closed_and_free_their_places(viewer, opened):
+    pages = [opened.open_page() for _ in range(MOST_PAGES)]
+    assert b"101 Switching Protocols" in received(pages[-1])
+    _, _, frame = received(opened.open_page()).partition(b"\r\n\r\n")
+    assert frame[0] == CLOSE and b"16 pages are open" in frame
+    pages[0].close()
+    time.sleep(0.5)
+    _, _, frame = received(opened.open_page()).partition(b"\r\n\r\n")
+    assert frame == b""  # nothing to show yet
+
+
+def test_a_page_that_says_it_has_drawn_and_reads_nothing_is_closed(viewer, opened):
+    page = opened.open_page()
+    page.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    deadline = time.monotonic() + 3.0 * PATIENCE
+    with pytest.raises(ConnectionError):
+        while time.monotonic() < deadline:
+            opened._show(1)
+            page.sendall(masked_frame(b"drawn"))
+            time.sleep(0.01)
+    assert viewer.is_running
+
+
+def test_a_page_whose_browser_does_not_answer_is_closed(monkeypatch):
+    sooner = "from scalpel_sim.viewer import server; server.SECONDS_TO_ANSWER = 0.5; "
+    monkeypatch.setattr(viewer_module, "_PROGRAM", sooner + viewer_module._PROGRAM)
+    with Viewer(little_arm()[0], frame=FRAME) as viewer:
+        browser = FaultyBrowser(viewer, lambda n: None, np.random.default_rng(0))
+        page = browser.open_page()
+        begun = time.monotonic()
+        page.settimeout(PATIENCE)
+        while page.recv(1 << 16):
+            pass
+        assert 0.4 < time.monotonic() - begun < 0.5 * PATIENCE
+        browser.close()
+
+
+def test_too_long_a_message_closes_its_page(viewer, opened):
+    page = opened.open_page()
+    long = bytes([0x81, 0xFF]) + (1 << 20).to_bytes(8, "big") + bytes(4) + bytes(1 << 20)
+    with pytest.raises(ConnectionError):
+        page.sendall(long)
+        while page.recv(1 << 16):
+            pass
+        raise ConnectionResetError  # it was closed in good order
+    assert viewer.is_running
+
+
+def test_the_process_of_a_page_that_cannot_be_served_ends_without_a_word(viewer, capfd):
+    FaultyBrowser(viewer, lambda n: None, np.random.default_rng(0)).ask_for_the_port()
+    assert capfd.readouterr().err == ""

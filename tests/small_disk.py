@@ -1,0 +1,52 @@
+"""A disk of a few megabytes, in memory, which a run can fill: a namespace of its own mounts it."""
+
+import functools
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.processes import environment
+
+NAMESPACE = ("unshare", "--map-root-user", "--mount", "sh", "-c")
+
+
+@functools.cache
+def small_disks_are_allowed() -> bool:
+    """Return whether the system lets this process mount one."""
+    try:
+        done = subprocess.run(
+            [*NAMESPACE, "mount -t tmpfs none /mnt"], capture_output=True, timeout=30
+        )
+    except OSError:
+        return False
+    return done.returncode == 0
+
+
+def run_on_a_small_disk(
+    *words: str, megabytes: float, copy_to: Path, filled_after: float | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run `scalpel-sim` with its folder on a small disk, and copy what it left to a folder.
+
+    Args:
+        words: What follows `scalpel-sim`, without --out.
+        megabytes: Size of the disk.
+        copy_to: Where the files go afterwards.
+        filled_after: When another program fills the disk [s]; None: never.
+    """
+    run = shlex.join([sys.executable, "-m", "scalpel_sim", *words, "--out", "/mnt/run"])
+    fill = "" if filled_after is None else (
+        f"(sleep {filled_after}; dd if=/dev/zero of=/mnt/filler bs=4k 2>/dev/null) &"
+    )  # fmt: skip
+    script = f"""
+        mount -t tmpfs -o size={int(megabytes * 1e6)} none /mnt || exit 99
+        {fill}
+        {run}
+        code=$?
+        wait
+        test ! -d /mnt/run || cp -a /mnt/run/. {shlex.quote(str(copy_to))}
+        exit $code
+    """
+    return subprocess.run(
+        [*NAMESPACE, script], capture_output=True, text=True, env=environment(), timeout=300
+    )

@@ -1,0 +1,43 @@
+"""Files that appear under their name only when they are whole."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+UNFINISHED = ".part"
+"""Ending of a file that is still being written; a process that is killed leaves it."""
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Yield a name beside `path` to write a file at, which then replaces the one at `path`.
+
+    Whoever opens `path` finds the old file or the new one, whatever ends the process, and after a
+    loss of power too. An error leaves the old file, and nothing beside it.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    unfinished = target.with_name(f".{target.name}.{os.getpid()}{UNFINISHED}")
+    try:
+        yield unfinished
+        with unfinished.open("rb+") as file:
+            os.fsync(file.fileno())
+        unfinished.replace(target)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def remove_unfinished(path: str | os.PathLike[str]) -> None:
+    """Remove what processes that were killed have left beside `path`.
+
+    Raises:
+        OSError: It cannot be removed.
+    """
+    target = Path(path)
+    start = f".{target.name}."
+    for beside in target.parent.iterdir():
+        if beside.name.startswith(start) and beside.name.endswith(UNFINISHED):
+            beside.unlink(missing_ok=True)
