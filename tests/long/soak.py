@@ -4,8 +4,6 @@ It is divided into lives of a body, which is then made anew: with a blade withou
 hand that leads the arm, and with an arm whose tissue is in another process, in turn.
 """
 
-import ctypes
-import gc
 import itertools
 import os
 import signal
@@ -27,8 +25,10 @@ from scalpel_sim.hands.commands import Engage, Move, Turn
 from scalpel_sim.hands.live_hand import LiveHand
 from scalpel_sim.scene_body import make_tissue
 from scalpel_sim.viewer.pictures import into_viewer
-from tests.child import ROOT, answer
+from tests.long.child import memory_of_this_process
 from tissue import BladeSweep, Energies, FloatArray, Tissue, block
+
+ROOT = Path(__file__).parents[2]
 
 SCENE = replace(
     SCENES["grid2"], mesh=partial(block, (3, 4, 3), (0.04, 0.04, 0.04)), floor=-0.02, audit=True
@@ -87,8 +87,7 @@ def run(seed: int, seconds: float, life: float = LIFE) -> dict[str, Any]:
         del first
         for i in range(round(seconds / life)):
             lives.append(kinds[i % len(kinds)](random, life, viewer))
-            give_back_memory()
-            memory.append(resident(os.getpid()))
+            memory.append(memory_of_this_process())
             page_memory.append(resident(viewer._process.pid))
             print(i, *lives[-1], memory[-1], page_memory[-1], file=sys.stderr, flush=True)
         assert viewer.is_running
@@ -242,17 +241,7 @@ def tabs_opened(tabs: subprocess.Popen[str]) -> int:
     return int(tabs.communicate("end\n")[0])
 
 
-def give_back_memory() -> None:
-    """Give memory that is not in use back to the system, or what is left varies with its holes."""
-    gc.collect()
-    ctypes.CDLL(None).malloc_trim(0)
-
-
 def resident(pid: int) -> int:
     """Return the memory of a process that is in use [bytes]."""
     pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")
-
-
-if __name__ == "__main__":
-    answer(run)

@@ -1,9 +1,10 @@
 """An hour of simulated time: memory stays flat, the account closes, nothing drifts at rest."""
 
-import pytest
+import math
+from contextlib import closing
 
 from tests.battery import battery
-from tests.child import Child
+from tests.long.child import Child
 from tests.long.soak import LIFE, Life
 
 HOUR = 3600.0
@@ -25,17 +26,13 @@ DRIFT = 1e-4
 """Farthest that a node may drift while the body is at rest [m], a hundredth of an element."""
 
 
-@pytest.fixture
-def soak():
-    child = Child("tests.long.soak", LIMIT)
-    yield child
-    child.close()
-
-
 @battery(n_per_change=1, n_long=1)
-def test_nothing_grows_or_drifts_and_the_account_closes(soak, tally, request, case):
-    seconds, life = (HOUR, LIFE) if request.config.getoption("long") else (SHORT, SHORT_LIFE)
-    reply = soak.ask(seed=case, seconds=seconds, life=life)
+def test_nothing_grows_or_drifts_and_the_account_closes(tally, request, case):
+    times = (HOUR, LIFE) if request.config.getoption("long") else (SHORT, SHORT_LIFE)
+    # The limits that it takes are its own: it starts processes, which have as much room.
+    limits = {"longest": LIMIT, "patience": LIMIT, "growth": math.inf, "room": None}
+    with closing(Child("tests.long.soak", "run", *times, **limits)) as soak:
+        reply = soak.run(case)
     lives = [Life(*row) for row in reply["lives"]]
     tally["frames"] += sum(life.frames for life in lives)
     tally["lives"] += len(lives)
