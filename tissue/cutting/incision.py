@@ -88,11 +88,15 @@ class Incision:
     def n_increments(self, travel: float) -> int:
         """Return in how many increments the edge moves that far [m], little in each.
 
+        It is 1 for a way that is not finite: a blade that goes it is refused anyway.
+
         Raises:
             ValueError: there are more than `MOST_EDGE_INCREMENTS`.
         """
         n = travel / (INCREMENT * self._node_size)
-        if not n <= MOST_EDGE_INCREMENTS:
+        if not math.isfinite(n):
+            return 1
+        if n > MOST_EDGE_INCREMENTS:
             most = MOST_EDGE_INCREMENTS * INCREMENT * self._node_size
             raise ValueError(
                 f"the edge of the blade moves {travel:.3g} m in one step; that may be {most:.3g} m "

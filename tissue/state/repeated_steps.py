@@ -24,9 +24,8 @@ from tissue.integrators.unstable import REMEDY, UnstableError
 from tissue.loads.step_inputs import StepInputs, give_inputs, inputs_of
 from tissue.mesh.body import Body
 from tissue.state.saved_body import SavedBody
-from tissue.state.step_log import StepLog
+from tissue.state.step_log import StepLog, StepState
 from tissue.state.step_watch import StepWatch
-from tissue.state.tissue_state import TissueState
 from tissue.types import StepResult, TissueError
 
 MOST_REPEATS = 3
@@ -107,7 +106,7 @@ class RepeatedSteps(SavedBody):
             try:
                 return change()
             except NoRoomError as error:
-                state.load_into(self, self._identity)
+                state.restore(self)
                 self._make_more_room(error.lacking)
 
     @abstractmethod
@@ -159,7 +158,7 @@ class RepeatedSteps(SavedBody):
                 self._save_step()
                 return result
             fault, worst = fault_again, _worst_nodes(self._body)
-            state.load_into(self, self._identity)
+            state.restore(self)
         raise self._stop(fault, worst)
 
     def _go_back(self, inputs: StepInputs) -> None:
@@ -167,14 +166,14 @@ class RepeatedSteps(SavedBody):
         log = self._step_log
         assert log.state is not None
         self._is_changed = True  # until it is saved: this can be interrupted
-        log.state.load_into(self, self._identity)
+        log.state.restore(self)
         for each in log.inputs:
             give_inputs(each, self._loads, self._attachments, self._system)
             self._advance(each.sweep, each.dt)
         give_inputs(inputs, self._loads, self._attachments, self._system)
 
-    def _state_now(self) -> TissueState:
-        return TissueState.of(self, self._identity, self._step_log.spares)
+    def _state_now(self) -> StepState:
+        return StepState(self, self._step_log.spares)
 
     def _save_step(self) -> None:
         """Save the state, from which on steps are logged."""
