@@ -9,6 +9,7 @@ from typing import Any
 
 from msgspec import structs
 
+from bridge import LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
@@ -41,6 +42,9 @@ REST_AFTER_STROKE = 0.3
 
 ENDED_IN_PAGE = "ended in the page"
 """The status of a run of a script that somebody has ended in the live page."""
+
+LONGEST_WAIT = 2.0
+"""How long a run that is to end waits for a tissue in another process [s]."""
 
 MANY_SUBSTEPS = 200
 """Runge-Kutta steps in a frame above which there is a warning. The scenes take 1 to 20."""
@@ -229,7 +233,14 @@ def _run_frames(
             return stop.reason is not None or _has_rested(now, hand)
         return stop.reason is not None or (controls is not None and controls.has_ended)
 
+    def give_up() -> None:
+        if stop.seconds > LONGEST_WAIT:
+            raise LinkError(f"{stop.reason}, and the tissue, in another process, does not answer")
+
+    link = simulation.link
     try:
+        if isinstance(link, TcpLink):
+            link.while_waiting = give_up
         obey()
         if stop.reason is None:
             if checkpoints.are_due:
@@ -238,6 +249,8 @@ def _run_frames(
         if stop.reason is not None:
             write_rows()
             checkpoints.write_last()
+        if isinstance(link, TcpLink):  # what it answers for the last files may be long
+            link.while_waiting = lambda: None
     except Exception as error:
         return error
     except KeyboardInterrupt:  # a frame that hangs, as where the tissue is elsewhere

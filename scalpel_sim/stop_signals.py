@@ -58,12 +58,16 @@ class StopSignals:
             signal.signal(number, handler)
         self._before.clear()
 
+    @property
+    def seconds(self) -> float:
+        """Time since the first signal [s]; 0 before it."""
+        return 0.0 if self.reason is None else time.monotonic() - self._noted_at
+
     def _note(self, number: int, frame: FrameType | None) -> None:
         now = time.monotonic()
         if self.reason is None:
             self.reason, self._noted_at = interruption(number), now
         elif now - self._noted_at > SAME_WISH:
-            self._noted_at = now
             raise SignalInterrupt(interruption(number))
 
 

@@ -132,3 +132,22 @@ def test_what_a_hand_did_is_kept_when_the_disk_takes_it_later(tmp_path):
     rows = (tmp_path / STROKE).read_text().splitlines()[1:]
     assert [float(row.split(",")[0]) for row in rows] == list(range(100))
     assert os.stat(tmp_path / STROKE).st_size > 1000
+
+
+def test_ctrl_c_ends_a_run_whose_tissue_elsewhere_does_not_answer(tmp_path):
+    server = start("serve", "grid2", "--port", "0")
+    try:
+        address = re.search(r"127\.0\.0\.1:\d+", server.stdout.readline()).group()
+        program = start("run", "--connect", address, *LONG, "--out", str(tmp_path))
+        wait_for_rows(program, tmp_path / "forces.csv")
+        server.send_signal(signal.SIGSTOP)
+        time.sleep(0.5)
+        program.send_signal(signal.SIGINT)
+        _, err = program.communicate(timeout=30)
+    finally:
+        server.kill()
+        server.communicate()
+    assert program.returncode == 1
+    assert re.search("interrupted by SIGINT.*does not answer; .*, but not final.vtu", err)
+    assert {"summary.json", "forces.csv", "force.png", "replay.html"} <= set(names_in(tmp_path))
+    assert not broken_files(tmp_path)

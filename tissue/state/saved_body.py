@@ -21,15 +21,20 @@ class SavedBody(DeformedBody):
         """Return the state between two steps: what follows depends on it alone.
 
         It costs less than a step. The same steps after `load_state` give the same bits.
+
+        Raises:
+            TissueError: the body has stopped (`step`).
         """
+        self._expect_moving()
         return TissueState.of(self, self._identity, self._spares)
 
     def load_state(self, state: TissueState, around: Around | None = None) -> None:
         """Put the body to a state, its own or that of a tissue made alike, as often as wanted.
 
-        Loads, attachments and geoms are again those of then. In the tissue that was saved they are
-        the same objects; in another one those with the same number, in the order in which they were
-        made, and where there are none, new ones. What was made later does not act any more.
+        A body that has stopped goes on. Loads, attachments and geoms are again those of then. In
+        the tissue that was saved they are the same objects; in another one those with the same
+        number, in the order in which they were made, and where there are none, new ones. What was
+        made later does not act any more.
 
         Args:
             state: The state.
@@ -41,6 +46,7 @@ class SavedBody(DeformedBody):
         """
         before = self._attachments.all
         state.load_into(self, self._identity, around)
+        self._stopped, self._is_changed = None, True
         for attachment in before:
             if attachment not in self._attachments.all:
                 attachment.is_released = True

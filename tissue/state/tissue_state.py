@@ -49,7 +49,11 @@ RULES = StateRules(
         "StellarScheme._cut": _none,
         "BodyQueries._chunks": _none,
     },
-    own=frozenset({"GlobalStepper._threads", "SavedBody._spares"}),
+    own=frozenset(
+        {"GlobalStepper._threads", "SavedBody._spares", "DrivenBody._stopped"}
+        | {"DrivenBody._is_changed", "RepeatedSteps._watch", "RepeatedSteps._step_log"}
+        | {"RepeatedSteps._n_repeated"}
+    ),
     structs=STRUCTS,
     made={
         kind.__name__: kind
