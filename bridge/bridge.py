@@ -13,7 +13,7 @@ from bridge.arithmetic import PLAIN, Six, compiled_arithmetic
 from bridge.collision.broad_phase import BroadPhase
 from bridge.collision.fixtures import Fixture
 from bridge.counters import Counters
-from bridge.coupling.coupling import Coupling, CouplingError
+from bridge.coupling.coupling import Coupling, CouplingError, expect_plausible_motion
 from bridge.coupling.impulse import ImpulseCompensation
 from bridge.coupling.leading import Leading, PathPart
 from bridge.coupling.led_bodies import LedBodies, loads_over
@@ -131,7 +131,8 @@ class Bridge(Leading):
 
         Raises:
             ValueError: the segment is not finite or has no plane, or `dt` is not positive.
-            CouplingError: the tissue has diverged. Set the wrench on the arm to zero: it is stale.
+            CouplingError: the tissue has diverged, or the blade moves as no hand moves it
+                (`expect_plausible_motion`). Set the wrench on the arm to zero: it is stale.
             LinkError: the tissue is in another process and did not answer. Set the wrench on the
                 arm to zero: it is stale.
         """
@@ -141,6 +142,7 @@ class Bridge(Leading):
         arm = checked_pose(self._frame.segment_to_tissue(segment), segment, arithmetic)
         before = arm if before is None else before
         arm_motion = arithmetic.motion.call(before.tip, before.axes, arm.tip, arm.axes)
+        expect_plausible_motion(arm_motion, dt)
         self._arm = arm
         self._n_frames += 1
         if self._is_direct and not self._path:

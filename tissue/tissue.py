@@ -1,4 +1,4 @@
-"""A tetrahedral body that a blade can cut: `Tissue.step` lists the stages of a step."""
+"""A tetrahedral body that a blade can cut: `Tissue._advance` lists the stages of a step."""
 
 from collections.abc import Sequence
 from time import perf_counter
@@ -53,7 +53,7 @@ from tissue.mesh.star import Visits
 from tissue.mesh.validation import expect_sound
 from tissue.mesh.workspace import room_for_a_pass
 from tissue.solver_settings import SolverSettings
-from tissue.state.saved_body import SavedBody
+from tissue.state.repeated_steps import RepeatedSteps
 from tissue.types import (
     SchemeStatistics,
     StageTimes,
@@ -65,7 +65,7 @@ NOWHERE = Edge(*(Vec3(*row) for row in ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 
 """The edge of no blade."""
 
 
-class Tissue(SavedBody):
+class Tissue(RepeatedSteps):
     """A soft body of tetrahedra: masses at nodes, a material between them, a blade that cuts it.
 
     Args:
@@ -145,26 +145,17 @@ class Tissue(SavedBody):
         self._audit.begin(self._system, NOWHERE)
         self._begin_state()
 
-    def step(self, sweep: BladeSweep | None, dt: float) -> StepResult:
-        """Advance the body by `dt` [s] while the blade does `sweep`.
-
-        Args:
-            sweep: Motion of the cutting edge, or None where no blade is near.
-            dt: Length of the step [s]. It is divided as stability and the speed of the blade need.
-
-        Raises:
-            ValueError: the blade has no length, or one that does not fit the mesh; or a number is
-                not finite.
-            TissueError: the motion of the tissue became unstable.
-        """
+    def _advance(self, sweep: BladeSweep | None, dt: float) -> StepResult:
+        """Do the stages of `step`."""
         has_blade = sweep is not None
         edge = NOWHERE if sweep is None else edge_of(sweep)
         dt = checked_time_step(dt)
         interaction, incision = self._system.interaction, self._incision
+        travel = edge.travel if has_blade else 0.0
+        n = incision.n_increments(travel)
         self._begin_step(sweep, edge, dt)
         self._begin_hold(dt)
-        travel = edge.travel if has_blade else 0.0
-        n = max(incision.n_increments(travel), self._system.geoms.n_increments)
+        n = max(n, self._system.geoms.n_increments) * self._global_stepper.refinement
         n_substeps = 0
         collision = topology = relaxation = 0.0  # wall times
         now = perf_counter()
@@ -213,6 +204,11 @@ class Tissue(SavedBody):
             ValueError: an array has another shape, is not finite, or an edge faces along itself.
         """
         rows, directions = checked_edges(edges, forward)
+        self._begin_change()
+        return self._with_room(lambda: self._cut_along(rows, directions))
+
+    def _cut_along(self, rows: FloatArray, directions: FloatArray) -> float:
+        """Cut along a surface that was checked; return the area cut [m2]."""
         self._end_incision()
         incision, blade_path = self._incision, self._incision.path
         before = incision.cut_area
@@ -232,7 +228,8 @@ class Tissue(SavedBody):
             TissueError: nothing holds the body, or a piece of it, against its weight and its loads,
                 or its motion became unstable. It is then where it was.
         """
-        self._take_edge(None)
+        self._begin_change()
+        self._with_room(lambda: self._take_edge(None))
         system = self._system
         self._loads.spread(system.body, system.stages.loads)
         self._attachments.stop(system.body)
@@ -375,9 +372,13 @@ class Tissue(SavedBody):
     def _after_cut(self) -> None:
         self._audit.after_cut(self._system, *self._edge_now)
 
+    def _make_more_room(self, lacking: int) -> None:
+        self._incision.scheme.make_room(lacking)
+        self._make_room()
+
     def _make_room(self) -> None:
         """Make room for the next pass of a cut: arrays double when they are nearly full."""
-        room = room_for_a_pass(self._system.body)
+        room = room_for_a_pass(self._system.body, self._incision.scheme.doubled_nodes)
         if room is not None:
             self._system.grow(*room)
             self._incision.scheme.grow(*room)

@@ -20,6 +20,13 @@ still be the hardest push of the device, so it is replaced by zero."""
 MAX_PLAUSIBLE_TORQUE = 1e2
 """Largest plausible torque [N m]: that force at a lever of 0.1 m, the length of a scalpel."""
 
+MAX_PLAUSIBLE_SPEED = 100.0
+"""Largest plausible speed of the tip of a blade [m/s]: ten times that of a hand. Faster, the arm
+was put elsewhere or diverges, and the blade would pass through the tissue in a frame."""
+
+MAX_PLAUSIBLE_TURN = 0.5 * math.pi
+"""Largest plausible turn of a blade in a frame [rad]: beyond, the way it took is a guess."""
+
 MAX_IMPLAUSIBLE_FRAMES = 10
 """Frames in a row with an implausible wrench after which the run stops: 10 ms at 1 kHz. A single
 one may be a node that the blade has flicked and that comes to rest."""
@@ -29,7 +36,10 @@ _AT_REST = Travel((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0)
 
 
 class CouplingError(RuntimeError):
-    """The tissue's wrench cannot be applied to an arm; the caller must set the arm's to zero."""
+    """The tissue's wrench cannot be applied to an arm, or no hand moves a blade as it moved.
+
+    The caller must set the arm's wrench to zero.
+    """
 
 
 class Coupling:
@@ -176,3 +186,24 @@ class Coupling:
         self.n_slew_limited += 1
         before = np.array(self._felt)
         return six(before + factor_to_limit(reach, change) * (np.array(wrench) - before))
+
+
+def expect_plausible_motion(motion: Six, dt: float) -> None:
+    """Refuse a blade that no hand moves so.
+
+    Args:
+        motion: Translation of its tip [m] and its rotation vector [rad] in a frame.
+        dt: Length of the frame [s].
+
+    Raises:
+        CouplingError: it moved faster than `MAX_PLAUSIBLE_SPEED`, or turned by more than
+            `MAX_PLAUSIBLE_TURN`.
+    """
+    x, y, z, u, v, w = motion
+    way, turn = math.hypot(x, y, z), math.hypot(u, v, w)
+    if way > MAX_PLAUSIBLE_SPEED * dt or turn > MAX_PLAUSIBLE_TURN:
+        raise CouplingError(
+            f"the tip of the blade moved by {way:.3g} m, and the blade turned by {turn:.3g} rad, "
+            f"in {dt:g} s; up to {MAX_PLAUSIBLE_SPEED:g} m/s and {MAX_PLAUSIBLE_TURN:.3g} rad are "
+            "taken. Lead the arm there, or make another Bridge where it is put elsewhere"
+        )

@@ -1,7 +1,9 @@
 """An arm of MuJoCo whose blade a virtual hand leads: what every arm of a run has."""
 
 import math
+import operator
 from collections.abc import Sequence
+from typing import NoReturn
 
 import mujoco
 import numpy as np
@@ -14,6 +16,10 @@ from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.mujoco_warnings import route_warnings
 from scalpel_sim.arm.standing import Standing
 from tissue import FloatArray
+
+LARGEST_JOINT_STEP = 0.5
+"""By how much a joint may turn in a step [rad], or slide [m]: at 1 kHz five times as fast as a hand
+turns one, at 10 m/s on a lever of 0.1 m. Beyond, it was pushed or its state was set."""
 
 
 class ArmError(RuntimeError):
@@ -81,6 +87,9 @@ class LedArm:
         # Views of MuJoCo's arrays: they stay valid for the life of `data`.
         self._qpos, self._qvel = self.data.qpos, self.data.qvel
         self._n_warnings = self.data.warning.number
+        self._dt: float = self.model.opt.timestep
+        self._angles: list[float] | None = None
+        """Angles at the last check; None: there was none since the arm was put elsewhere."""
 
     @property
     def time(self) -> float:
@@ -109,6 +118,7 @@ class LedArm:
                 f"{low[i]:.3f} to {high[i]:.3f}"
             )
         mujoco.mj_resetData(self.model, self.data)
+        self._angles = None
         self.data.qpos[:] = np.concatenate([angles, *(other.qpos for other in self.others)])
         mujoco.mj_kinematics(self.model, self.data)
         self.hand.hold(self.blade.segment())
@@ -136,17 +146,42 @@ class LedArm:
         MuJoCo's own answer, a silent reset to the start, is switched off in the model.
 
         Raises:
-            ArmError: a joint's angle or speed is not finite, or MuJoCo has warned.
+            ArmError: a joint's angle or speed is not finite, it turns by more than
+                `LARGEST_JOINT_STEP` in a step, or MuJoCo has warned.
         """
         data = self.data
+        angles, speeds = self._qpos.tolist(), self._qvel.tolist()
         # A sum is finite only if all its parts are, and costs less than asking each.
-        if not math.isfinite(sum(self._qpos.tolist()) + sum(self._qvel.tolist())):
+        if not math.isfinite(sum(angles) + sum(speeds)):
             bad = ~(np.isfinite(data.qpos) & np.isfinite(data.qvel))
             names = ", ".join(np.array(self.joints)[bad]) or "all, by overflow"
             raise ArmError(
                 f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
             )
+        before, self._angles = self._angles or angles, angles
+        if max(map(abs, speeds), default=0.0) * self._dt > LARGEST_JOINT_STEP:
+            self._refuse_motion(self._dt * data.qvel, self.model.dof_jntid)
+        if max(map(abs, map(operator.sub, angles, before)), default=0.0) > LARGEST_JOINT_STEP:
+            joints = np.repeat(
+                np.arange(self.model.njnt), np.diff(self.model.jnt_qposadr, append=self.model.nq)
+            )
+            self._refuse_motion(np.subtract(angles, before), joints)
         if any(self._n_warnings.tolist()):
             kind = mujoco.mjtWarning(int(np.argmax(self._n_warnings)))
             text = mujoco.mju_warningText(kind, int(data.warning.lastinfo[kind]))
             raise ArmError(f"at t = {data.time:.4f} s MuJoCo warned: {text}")
+
+    def _refuse_motion(self, ways: FloatArray, joints: FloatArray) -> NoReturn:
+        """Raise the error of a joint that moves too far in a step.
+
+        Args:
+            ways: How far each number of the state moves in it.
+            joints: The joint of each.
+        """
+        i = int(np.argmax(np.abs(ways)))
+        raise ArmError(
+            f"at t = {self.data.time:.4f} s joint '{self.joints[joints[i]]}' moves by "
+            f"{ways[i]:.3g} rad, or m, in a step of {self._dt:g} s; at most "
+            f"{LARGEST_JOINT_STEP:g} makes sense. Something pushed the arm, or set its "
+            "state: `reset` puts it elsewhere"
+        )

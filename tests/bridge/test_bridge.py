@@ -205,7 +205,7 @@ def test_the_fixtures_that_the_blade_touches_are_named_in_the_world(block_tissue
     bridge = Bridge(InProcessLink(block_tissue()), frame, fixtures=[table])
     bridge.step(upright(0.01, -0.1, 0.2), DT)
     assert bridge.touching == ()
-    bridge.step(upright(0.01, -0.1, 0.0), DT)
+    bridge.step(upright(0.01, -0.1, 0.0), 10.0 * DT)
     assert bridge.touching == ("table",)
 
 

@@ -272,3 +272,14 @@ print(tissue.snapshot().velocities[:, 2].max())
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     assert float(done.stdout) == pytest.approx(-9.81e-3, rel=1e-2)
+
+
+def test_a_blade_that_moves_too_far_in_a_step_is_refused_before_it_does_anything():
+    tissue = Tissue(block((2, 2, 2), (0.02, 0.02, 0.02)))
+    near = BladeSegment(np.array([0.01, -0.01, 0.03]), np.array([0.01, -0.01, 0.0]), np.eye(3)[1])
+    way = 1e3 * np.eye(3)[1]
+    far = near._replace(tip=near.tip + way, heel=near.heel + way)
+    before = tissue.snapshot()
+    with pytest.raises(ValueError, match=r"moves 1e\+03 m in one step; that may be \d+"):
+        tissue.step(BladeSweep(near, far), 1e-3)
+    assert all(map(np.array_equal, before, tissue.snapshot()))

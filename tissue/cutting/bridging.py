@@ -12,6 +12,7 @@ from tissue.cutting.blade_path import Path, Plane, is_unswept, nearest_on_edge, 
 from tissue.cutting.cut_surface import note_side, on_sheet, side_of
 from tissue.cutting.snapping import insert_crossing, snap_distance
 from tissue.cutting.workspace import Cut, flag
+from tissue.mesh.changes import LISTS
 
 
 @kernel
@@ -43,14 +44,15 @@ def remember_active(cut: Cut) -> None:
     """Keep the tetrahedra that are active or changed now, for the next `resolve_bridges`."""
     scratch, change = cut.scratch, cut.change
     n = 0
+    if scratch.n_active + change.n_dirty > len(scratch.previous):
+        change.lacks_room = LISTS
+        return
     for i in range(scratch.n_active):
-        if n < len(scratch.previous):
-            scratch.previous[n] = scratch.active[i]
-            n += 1
+        scratch.previous[n] = scratch.active[i]
+        n += 1
     for i in range(change.n_dirty):
-        if n < len(scratch.previous):
-            scratch.previous[n] = change.dirty[i]
-            n += 1
+        scratch.previous[n] = change.dirty[i]
+        n += 1
     scratch.n_previous = n
 
 

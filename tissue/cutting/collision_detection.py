@@ -22,6 +22,7 @@ from tissue.cutting.workspace import Cut
 from tissue.geometry.aabb import Aabb, overlap, segment_box, tetrahedron_box
 from tissue.geometry.exact_predicates import lattice_point, orient3d, pierces
 from tissue.mesh.body import CUT, behind, n_behind
+from tissue.mesh.changes import LISTS
 
 
 @kernel
@@ -65,7 +66,10 @@ def _visit(cut: Cut, t: int, epoch: int, is_seed: bool) -> None:
     """Add tetrahedron `t` to the active ones if it may touch the swept edge or holds a sample."""
     scratch, visits = cut.scratch, cut.visits
     n = scratch.n_active
-    if visits.tetrahedra[t] == epoch or n == len(scratch.active):
+    if visits.tetrahedra[t] == epoch:
+        return
+    if n == len(scratch.active):
+        cut.change.lacks_room = LISTS
         return
     visits.tetrahedra[t] = epoch
     if _note_segments(cut, t, n) or is_seed:
@@ -107,14 +111,18 @@ def _visit_star(cut: Cut, node: int, epoch: int) -> None:
         _visit(cut, t, epoch, False)
         for f in range(4):
             link = body.links[t, f]
-            if body.tetrahedra[t, f] != node and link >= 0 and n < len(around):
+            if body.tetrahedra[t, f] != node and link >= 0:
                 other = link // 4
                 seen = False
                 for j in range(n):
                     seen = seen or around[j] == other
-                if not seen:
-                    around[n] = other
-                    n += 1
+                if seen:
+                    continue
+                if n == len(around):
+                    cut.visits.is_full = 1
+                    return
+                around[n] = other
+                n += 1
 
 
 @kernel
@@ -175,9 +183,12 @@ def _swept_box(path: Path, k: int) -> Aabb:
 def find_crossings(cut: Cut) -> None:
     """Find the edges of active tetrahedra that the swept edge crosses, each tested once."""
     body, scratch = cut.body, cut.scratch
+    scratch.n_crossings = 0
+    if 2 * 6 * scratch.n_active > len(scratch.tested.item):
+        cut.change.lacks_room = LISTS
+        return
     clear_table(scratch.tested)
     mask = _mask_for(scratch.tested, 6 * scratch.n_active)
-    scratch.n_crossings = 0
     for i in range(scratch.n_active):
         if scratch.segments[i, 0] < 0:
             continue
@@ -225,7 +236,10 @@ def _cross_edge(cut: Cut, a: int, b: int, first: int, last: int) -> None:
             continue
         at = _crossing_of_quad(path, cut, a, b, k)
         n = scratch.n_crossings
-        if at >= 0.0 and n < len(scratch.crossing):
+        if at >= 0.0:
+            if n == len(scratch.crossing):
+                cut.change.lacks_room = LISTS
+                return
             scratch.crossing[n, 0] = a
             scratch.crossing[n, 1] = b
             scratch.crossing[n, 2] = k

@@ -13,8 +13,8 @@ from tissue.cutting.minimum_cut import FlowGraph, clear_lips, minimum_cut, put_o
 from tissue.cutting.separation import open_faces, small_piece
 from tissue.cutting.workspace import Cut
 from tissue.mesh.body import CUT
+from tissue.mesh.changes import LISTS
 from tissue.mesh.star import star
-from tissue.mesh.workspace import PASS_NODES
 
 MOST_FINISHED = 0.15
 """Area of the bridges that are finished, as a share of the sheet, at most. Of a stroke that ends
@@ -24,9 +24,6 @@ MOST_PASSED = 0.25
 """The same, of an edge that has left all tissue ahead and of which neither end was ever in it. It
 has passed through all tissue there was: no bridge is one that it left. Where a thin wall folds,
 and breaks away from the edge at once, what no sample saw was up to 18 %."""
-
-MOST_FACES = PASS_NODES
-"""Faces of the bridges that are finished, at most: the pass has room for their nodes."""
 
 MOST_TRIES = 16
 """Minimum cuts that are looked for, where all but the last would part a crumb."""
@@ -88,8 +85,9 @@ def _cut_links(cut: Cut, graph: FlowGraph) -> bool:
             link = body.links[t, f]
             if link < 0 or visits.tetrahedra[link // 4] == visits.epoch:
                 continue
-            if change.n_faces == MOST_FACES:
+            if change.n_faces == len(change.faces):
                 _restore_links(cut)
+                change.lacks_room = LISTS
                 return False
             row = change.n_faces
             change.n_faces += 1

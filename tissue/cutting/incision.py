@@ -7,11 +7,16 @@ from typing import NamedTuple
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.scheme import Scheme
 from tissue.mesh.body import Body
-from tissue.mesh.star import Visits
+from tissue.mesh.star import LARGEST_STAR, Visits
+from tissue.types import TissueError
 
 INCREMENT = 0.25
 """Share of the mean node size by which the edge moves between two cuts at most. Coarser steps on
 steep curves leave tetrahedra that bridge the cut."""
+
+MOST_EDGE_INCREMENTS = 10_000
+"""Increments of a step at most: half a minute of wall time in an organ, for a way of some meters.
+More is taken for a mistake, which would keep a process for hours."""
 
 RESTING_SPEED = 0.2
 """Mean node sizes per second below which the edge counts as at rest."""
@@ -19,6 +24,20 @@ RESTING_SPEED = 0.2
 RESTING_TIME = 0.02
 """How long it is so before the cut opens up to the edge [s]. A trembling hand stands still for an
 instant at each turn; to lay a crack front there each time would shred the mesh."""
+
+
+class NoRoomError(Exception):
+    """A list of a cut was full, so that what was done is of no use.
+
+    Go back to where the step began, call `Scheme.make_room`, and do it again.
+
+    Args:
+        lacking: What lacks room: `LISTS` or `NODES` of `tissue.mesh.changes`.
+    """
+
+    def __init__(self, lacking: int) -> None:
+        super().__init__("no room in a cut")
+        self.lacking = lacking
 
 
 class CutHooks(NamedTuple):
@@ -67,8 +86,24 @@ class Incision:
         return self.scheme.change.finished_area
 
     def n_increments(self, travel: float) -> int:
-        """Return in how many increments the edge moves that far [m], little in each."""
-        return max(1, math.ceil(travel / (INCREMENT * self._node_size)))
+        """Return in how many increments the edge moves that far [m], little in each.
+
+        It is 1 for a way that is not finite: a blade that goes it is refused anyway.
+
+        Raises:
+            ValueError: there are more than `MOST_EDGE_INCREMENTS`.
+        """
+        n = travel / (INCREMENT * self._node_size)
+        if not math.isfinite(n):
+            return 1
+        if n > MOST_EDGE_INCREMENTS:
+            most = MOST_EDGE_INCREMENTS * INCREMENT * self._node_size
+            raise ValueError(
+                f"the edge of the blade moves {travel:.3g} m in one step; that may be {most:.3g} m "
+                "in this mesh. Take shorter steps, or begin with `None` where the blade is put "
+                "elsewhere"
+            )
+        return max(1, math.ceil(n))
 
     def take_edge(self, n_samples: int) -> None:
         """Prepare for an edge of that many samples."""
@@ -82,7 +117,7 @@ class Incision:
         if not self.has_begun or travel == 0.0:
             return False
         self._is_open = False
-        self.scheme.detect(body, visits, self.path)
+        self._detect(body, visits)
         return True
 
     def cut(self, hooks: CutHooks) -> None:
@@ -91,7 +126,7 @@ class Incision:
 
     def open_to_edge(self, hooks: CutHooks) -> None:
         """Cut up to the edge itself, which rests or leaves the way that it came."""
-        self.scheme.detect(*hooks.mesh(), self.path)
+        self._detect(*hooks.mesh())
         self._cut_in_passes(self.scheme.cut_to_edge, hooks)
         self._is_open = True
 
@@ -128,10 +163,38 @@ class Incision:
         """Cut; where room runs out, make some and cut on."""
         hooks.before_cut()
         while True:
-            one_pass(*hooks.mesh(), self.path)
+            body, visits = hooks.mesh()
+            one_pass(body, visits, self.path)
+            self._expect_room(visits)
             is_full = bool(self.scheme.change.is_full)
             hooks.after_pass()
             if not is_full:
                 break
-            self.scheme.detect(*hooks.mesh(), self.path)
+            self._detect(*hooks.mesh())
         hooks.after_cut()
+
+    def _detect(self, body: Body, visits: Visits) -> None:
+        """Find the active tetrahedra and the edges that were crossed.
+
+        Raises:
+            NoRoomError: there are more than there is room for.
+        """
+        self.scheme.detect(body, visits, self.path)
+        self._expect_room(visits)
+
+    def _expect_room(self, visits: Visits) -> None:
+        """Refuse what is not complete.
+
+        Raises:
+            NoRoomError: a list was full.
+            TissueError: more tetrahedra are around a node than any list has room for.
+        """
+        if self.scheme.change.lacks_room:
+            raise NoRoomError(int(self.scheme.change.lacks_room))
+        if visits.is_full:
+            visits.is_full = 0
+            raise TissueError(
+                f"a node has more than {LARGEST_STAR} tetrahedra around it, which is more than a "
+                "cut can divide. Use a mesh without such nodes, or a larger guard "
+                "(`CutSettings.guard`)"
+            )

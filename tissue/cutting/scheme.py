@@ -66,6 +66,15 @@ class Scheme(Protocol):
         """Return counts of what was done so far; None where the scheme keeps none."""
         ...
 
+    @property
+    def doubled_nodes(self) -> int:
+        """For how many times as many doubled nodes as usual a pass is to have room."""
+        ...
+
+    def make_room(self, lacking: int) -> None:
+        """Make twice the room for what lacked it: `LISTS`, or `NODES` by `doubled_nodes`."""
+        ...
+
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""
         ...

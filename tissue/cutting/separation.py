@@ -18,7 +18,7 @@ from tissue.cutting.cut_surface import (
 from tissue.cutting.workspace import Cut
 from tissue.geometry.tetrahedron import face_area, tetrahedron_volume
 from tissue.mesh.body import CUT, Body, local_index
-from tissue.mesh.changes import note_dirty
+from tissue.mesh.changes import LISTS, NODES, note_dirty
 from tissue.mesh.star import star
 
 CRUMB_TETRAHEDRA = 16
@@ -99,7 +99,7 @@ def _mark_faces_of(cut: Cut, t: int) -> None:
         if _n_links(body, t) == 1 or _n_links(body, other) == 1:
             continue  # a tetrahedron keeps its last link: alone it would be a crumb
         if change.n_faces == len(change.faces):
-            change.is_full = 1
+            change.lacks_room = LISTS
             return
         decide_side(sheet, t, side)
         decide_side(sheet, other, other_side)
@@ -311,6 +311,9 @@ def _detach(cut: Cut, node: int, t: int) -> None:
     body, scratch, change, visits = cut.body, cut.scratch, cut.change, cut.visits
     star(body, visits, node, body.node_tetrahedron[node], scratch.around)
     if visits.tetrahedra[t] == visits.epoch:
+        return
+    if body.n_nodes == len(body.rest):
+        change.lacks_room = NODES
         return
     n = star(body, visits, node, t, scratch.around)
     copy = _copy_node(cut, node)

@@ -14,9 +14,14 @@ from tissue.cutting.cut_pass import ALONG_PATH, TO_EDGE, TO_THE_END, cut_in_a_pa
 from tissue.cutting.cut_surface import begin_sheet, grown_sheet, new_sheet
 from tissue.cutting.finishing import finish_sheet
 from tissue.cutting.minimum_cut import new_flow_graph
-from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
+from tissue.cutting.workspace import (
+    Cut,
+    SnapLimits,
+    new_cut_scratch,
+    scratch_with_twice_the_room,
+)
 from tissue.mesh.body import Body
-from tissue.mesh.changes import clear_changes, new_change
+from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the_room
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
@@ -36,6 +41,7 @@ class StellarScheme:
 
     def __init__(self, limits: SnapLimits, n_nodes: int, n_tetrahedra: int) -> None:
         self.change = new_change()
+        self.doubled_nodes = 1
         self._limits = limits
         self._sheet = new_sheet(n_nodes, n_tetrahedra)
         self._scratch = new_cut_scratch(n_tetrahedra)
@@ -77,6 +83,15 @@ class StellarScheme:
         begin_sheet(self._sheet)
         self._area_before = self.change.area
         self._scratch.n_previous = 0
+
+    def make_room(self, lacking: int) -> None:
+        """Make twice the room for what lacked it."""
+        if lacking == NODES:
+            self.doubled_nodes *= 2
+            return
+        self.change = with_twice_the_room(self.change)
+        self._scratch = scratch_with_twice_the_room(self._scratch)
+        self._cut = None
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""

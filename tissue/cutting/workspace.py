@@ -9,15 +9,15 @@ from tissue.core.structs import Arrays, IntCell
 from tissue.core.vec3 import dot, sub, vec3
 from tissue.cutting.blade_path import Path, plane_near
 from tissue.cutting.cut_surface import CutSheet, on_sheet, put_on_sheet
-from tissue.mesh.body import Body
-from tissue.mesh.changes import CHANGES, Change
+from tissue.mesh.body import Body, grown
+from tissue.mesh.changes import CHANGES, LISTS, Change
 from tissue.mesh.star import LARGEST_STAR, Visits
 
 CROSSINGS = 1 << 12
-"""Crossed edges that one pass can note."""
+"""Crossed edges that one pass can note at first; see `CHANGES`."""
 
 HASH_SLOTS = 1 << 15
-"""Slots of the table of edges tested; twice the number that one pass can test."""
+"""Slots of the table of edges tested at first; twice the number that one pass can test."""
 
 
 class SnapLimits(Arrays):
@@ -41,13 +41,13 @@ class CutScratch(Arrays):
     """Scratch of a cut step."""
 
     active: IntArray
-    """Active tetrahedra, which the swept edge passes through; shape (CHANGES,)."""
+    """Active tetrahedra, which the swept edge passes through; shape (room,)."""
     segments: IntArray
-    """First and last segment of the edge near each active tetrahedron, shape (CHANGES, 2)."""
+    """First and last segment of the edge near each active tetrahedron, shape (room, 2)."""
     n_active: IntCell
     """Number of active tetrahedra."""
     previous: IntArray
-    """Tetrahedra that were active or changed in the step before, shape (2 * CHANGES,)."""
+    """Tetrahedra that were active or changed in the step before, shape (2 * room,)."""
     n_previous: IntCell
     """Number of tetrahedra in `previous`."""
     around: IntArray
@@ -63,12 +63,12 @@ class CutScratch(Arrays):
     place: IntArray
     """Index in `parents` of each tetrahedron that is split, shape (tetrahedron capacity,)."""
     crossing: IntArray
-    """Two nodes of each crossed edge and the segment that crossed it, shape (CROSSINGS, 3)."""
+    """Two nodes of each crossed edge and the segment that crossed it, shape (n_room, 3)."""
     crossing_at: FloatArray
     """Fraction along each crossed edge, from its first node, and the rank by which crossings are
-    sorted: how far the fraction is from 1/2; shape (CROSSINGS, 2)."""
+    sorted: how far the fraction is from 1/2; shape (n_room, 2)."""
     order: IntArray
-    """Order in which crossings are handled, shape (CROSSINGS,)."""
+    """Order in which crossings are handled, shape (n_room,)."""
     n_crossings: IntCell
     """Number of crossed edges."""
     tested: HashTable
@@ -109,6 +109,16 @@ def new_cut_scratch(n_tetrahedra: int) -> CutScratch:
     )
 
 
+def scratch_with_twice_the_room(scratch: CutScratch) -> CutScratch:
+    """Return scratch with twice the room in its lists, and the same in them."""
+    lists = ("active", "segments", "previous", "crossing", "crossing_at", "order")
+    larger = {name: getattr(scratch, name) for name in lists}
+    return scratch.replaced(
+        tested=new_hash_table(2 * len(scratch.tested.item)),
+        **{name: grown(array, 2 * len(array)) for name, array in larger.items()},
+    )
+
+
 @kernel
 def flag(cut: Cut, node: int) -> None:
     """Put `node` on the sheet, and list it in `change.flagged`."""
@@ -120,6 +130,8 @@ def flag(cut: Cut, node: int) -> None:
         put_on_sheet(sheet, node, offset)
         cut.body.off_path[node] = max(cut.body.off_path[node], offset)
     change = cut.change
-    if change.n_flagged < len(change.flagged):
-        change.flagged[change.n_flagged] = node
-        change.n_flagged += 1
+    if change.n_flagged == len(change.flagged):
+        change.lacks_room = LISTS
+        return
+    change.flagged[change.n_flagged] = node
+    change.n_flagged += 1

@@ -17,9 +17,9 @@ from tissue.elasticity.strained_frequency import StepLimit
 from tissue.integrators.global_stepper import GlobalStepper
 from tissue.integrators.runge_kutta import accelerations
 from tissue.integrators.stability import stable_step
-from tissue.integrators.staged_relaxation import not_finite
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
+from tissue.integrators.unstable import not_finite
 from tissue.types import TissueError
 
 SETTLED = 1e-4 * 9.81

@@ -20,7 +20,7 @@ from tissue.integrators.relaxation import (
 )
 from tissue.integrators.rest import TIME_TO_REST
 from tissue.integrators.stability import NYSTROEM, STAGE_DAMPED, VERLET
-from tissue.integrators.staged_relaxation import not_finite, relax_in_stages
+from tissue.integrators.staged_relaxation import relax_in_stages
 from tissue.integrators.step_choice import (
     StepChoice,
     begin_increment,
@@ -39,9 +39,9 @@ from tissue.integrators.substeps import (
 )
 from tissue.integrators.system import System
 from tissue.integrators.threaded import Threads
+from tissue.integrators.unstable import UnstableError, not_finite
 from tissue.material import Law
 from tissue.mesh.body import Body
-from tissue.types import TissueError
 
 _ROOM = SameTypes(room_for_contact)
 
@@ -86,6 +86,9 @@ class GlobalStepper:
 
     moved = None
     moving = None
+    refinement = 1
+    """Into how many times as many increments, and these into how many times as many steps, a time
+    step is divided: 1, but where one is repeated."""
 
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
@@ -161,6 +164,7 @@ class GlobalStepper:
         if choice is None or len(choice.no_frequency) != n_nodes:
             where = (system.node_size, system.surroundings, n_nodes)
             self._choice = choice = new_step_choice(self.method.limit, *where)
+        choice.refinement = self.refinement
         choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
         return choice
 
@@ -214,11 +218,10 @@ def expect_stable(choice: StepChoice) -> None:
     """Refuse motion that became unstable.
 
     Raises:
-        TissueError: it takes more than `MOST_STEPS` times as many steps as a body at rest.
+        UnstableError: it takes more than `MOST_STEPS` times as many steps as a body at rest.
     """
     if choice.is_unstable:
-        raise TissueError(
-            f"the motion of the tissue became unstable: it would take {choice.asked:.2g} steps of "
-            f"the integrator to go on, where tissue at rest takes {math.ceil(choice.at_rest)}. Use "
-            "a shorter time step, or a material that is softer or heavier"
+        raise UnstableError(
+            f"it would take {choice.asked:.2g} steps of the integrator to go on, where tissue at "
+            f"rest takes {math.ceil(choice.at_rest)}"
         )

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 from tissue.blade.blade_context import BladeContext
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import System
+from tissue.integrators.unstable import not_finite
 from tissue.mesh.bounding_boxes import widen_bounds, write_bounds
-from tissue.types import TissueError
 
 if TYPE_CHECKING:
     from tissue.integrators.integrator import Integrator
@@ -53,11 +53,3 @@ def _update_bounds(integrator: "Integrator", system: System, blade: BladeContext
     if moving is None or 2 * moving[1] > body.n_nodes:
         return write_bounds(body, blade.bounds)
     return widen_bounds(body, *moving, blade.bounds)
-
-
-def not_finite() -> TissueError:
-    """Return the error that tells that a position is not a finite number."""
-    return TissueError(
-        "the motion of the tissue became unstable: the position of a node is not a finite number. "
-        "Use a shorter time step, or a material that is softer or heavier"
-    )

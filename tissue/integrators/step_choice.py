@@ -81,6 +81,8 @@ class StepChoice(Arrays):
     """Steps of the increment taken so far."""
     n_steps: IntCell
     """Steps of the part that is taken next."""
+    refinement: IntCell
+    """How many times as many steps are taken as motion and stability ask for."""
     is_at_rest: IntCell
     """1 while the body is not moved, as it has been calm and nothing touches it, else 0."""
     is_unstable: IntCell
@@ -135,6 +137,7 @@ def new_step_choice(
         method=method,
         done=0,
         n_steps=0,
+        refinement=1,
         is_at_rest=0,
         is_unstable=0,
         dt=0.0,
@@ -261,7 +264,7 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
     if not choice.asked <= MOST_STEPS * choice.at_rest:
         choice.is_unstable = 1
         return False
-    n = max(1, math.ceil(choice.asked))
+    n = max(1, math.ceil(choice.refinement * choice.asked))
     now, interval = damping_rate(elastic, surroundings), LONGEST_INTERVAL * span / n
     # The Nystroem method follows slivers, too: where a tip pierces gel its account of the energy
     # would be three times as far off if not.

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -106,6 +107,15 @@ class Attachment:
     def follow(self, path: FramePath) -> None:
         """Have the frame led along a path from now on, without turning, in place of `move`."""
         self._path, self._seconds, self._start = path, 0.0, self._end[1].copy()
+
+    @property
+    def way(self) -> tuple[Any, ...]:
+        """Where the frame goes in the next step, by `move` or `follow`; none of it is written."""
+        return self._end, self._path, self._seconds, self._start
+
+    @way.setter
+    def way(self, way: tuple[Any, ...]) -> None:
+        self._end, self._path, self._seconds, self._start = way
 
     def advance(self, dt: float) -> None:
         """Go on along the path, if there is one, by `dt` [s]; at its end let go, if it says so."""

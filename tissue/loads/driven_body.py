@@ -24,7 +24,7 @@ from tissue.loads.material_points import MaterialPoints, points_of, region_mask
 from tissue.mesh.body import Body
 from tissue.mesh.body_queries import BodyQueries
 from tissue.solver_settings import SolverSettings
-from tissue.types import Chunks
+from tissue.types import Chunks, TissueError
 
 HOLDS = "nodes are supports where `Tissue(fixed=...)` says so"
 
@@ -37,6 +37,10 @@ class DrivenBody(BodyQueries):
     _attachments: AttachmentList
     _global_stepper: GlobalStepper
     solver: SolverSettings
+    _is_changed = True
+    """Whether it was changed by other than a step since a step was saved."""
+    _stopped: TissueError | None = None
+    """Why it has stopped; None: it has not."""
 
     @property
     def _body(self) -> Body:
@@ -74,6 +78,7 @@ class DrivenBody(BodyQueries):
             ValueError: no point is there, one is outside the body, or the force has another shape
                 or is not finite.
         """
+        self._begin_change()
         points = where if isinstance(where, MaterialPoints) else self.material_points(where)
         load = Load(points, force)
         self._loads.add(load)
@@ -167,6 +172,7 @@ class DrivenBody(BodyQueries):
         return ligament
 
     def _add(self, attachment: Attachment) -> None:
+        self._begin_change()
         self._attachments.add(attachment, self._body)
         self._take_attachments()
         self._system.interaction.make_room_for_strands(self._attachments.n_strands)
@@ -194,6 +200,7 @@ class DrivenBody(BodyQueries):
                 `hierarchical`, which knows no geoms.
         """
         self._expect_all_nodes_move("tissue does not touch geoms")
+        self._begin_change()
         system = self._system
         contact = GeomContact(geoms, system.body, system.node_size, origins, rotations)
         system.geoms = contact
@@ -218,6 +225,7 @@ class DrivenBody(BodyQueries):
         Raises:
             ValueError: it does not act on this tissue, or was released before.
         """
+        self._begin_change()
         if isinstance(held, Load):
             self._loads.remove(held, self._system.stages.loads)
         else:
@@ -241,6 +249,7 @@ class DrivenBody(BodyQueries):
                 or is not finite, or the relaxation is `hierarchical`, which moves no fixed node.
         """
         self._expect_all_nodes_move("supports do not move")
+        self._expect_moving()
         system, body = self._system, self._body
         nodes = self._supports_at(where)
         array = np.array(velocity, dtype=np.float64)
@@ -264,6 +273,27 @@ class DrivenBody(BodyQueries):
         out = room_for_points(len(system.body.rest))
         write_support_forces(system.context, out)
         return out[:n].copy()
+
+    def _begin_change(self) -> None:
+        """Note that it is changed by other than a step.
+
+        Raises:
+            TissueError: it has stopped.
+        """
+        self._expect_moving()
+        self._is_changed = True
+
+    def _expect_moving(self) -> None:
+        """Refuse what changes a body that has stopped.
+
+        Raises:
+            TissueError: it has.
+        """
+        if self._stopped is not None:
+            raise TissueError(
+                f"the tissue has stopped, and takes no step or change until a state is loaded "
+                f"(`load_state`). Why it stopped: {self._stopped}"
+            )
 
     def _expect_all_nodes_move(self, what: str) -> None:
         """Refuse the relaxation that moves nodes level by level."""

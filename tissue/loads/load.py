@@ -63,6 +63,16 @@ class Loads:
         """Whether there are any."""
         return bool(self._loads)
 
+    @property
+    def forces(self) -> tuple[FloatArray, ...]:
+        """The forces of each load on its points [N], in their order."""
+        return tuple(load.forces for load in self._loads)
+
+    @forces.setter
+    def forces(self, forces: tuple[FloatArray, ...]) -> None:
+        for load, each in zip(self._loads, forces, strict=True):
+            load.forces = each
+
     def add(self, load: Load) -> None:
         """Let a load act."""
         load.number = self._n_added

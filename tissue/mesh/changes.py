@@ -1,5 +1,7 @@
 """What a cut step changed in a mesh: nodes put on the sheet, tetrahedra changed, faces cut."""
 
+from typing import Final
+
 import numpy as np
 
 from tissue.core.array_types import FloatArray, IntArray
@@ -9,21 +11,28 @@ from tissue.mesh.body import Body
 from tissue.mesh.star import Visits
 
 CHANGES = 1 << 15
-"""Changes that one pass of a cut step can note; `PASS_NODES` of cutting keeps within it."""
+"""Changes that one pass of a cut step can note at first; `PASS_NODES` of cutting keeps within it in
+meshes of ordinary stars. Where it does not suffice there is more room, and the step is repeated."""
+
+
+LISTS: Final = 1
+"""What lacks room: the lists of a pass."""
+NODES: Final = 2
+"""What lacks room: the arrays of the body, for nodes that are doubled."""
 
 
 class Change(Arrays):
     """What one pass of a cut step changed."""
 
     flagged: IntArray
-    """Nodes that came to lie on the sheet, shape (CHANGES,)."""
+    """Nodes that came to lie on the sheet, shape (room,)."""
     dirty: IntArray
-    """Tetrahedra that were split or got another node, with repeats; shape (CHANGES,)."""
+    """Tetrahedra that were split or got another node, with repeats; shape (room,)."""
     faces: IntArray
-    """Faces cut, each as tetrahedron, local face, tetrahedron, local face; shape (CHANGES, 4)."""
+    """Faces cut, each as tetrahedron, local face, tetrahedron, local face; shape (room, 4)."""
     children: IntArray
     """Tetrahedra that were appended, and the tetrahedron that each is a part of: in order, so that
-    a parent stands before its children; shape (CHANGES, 2)."""
+    a parent stands before its children; shape (room, 2)."""
     n_flagged: IntCell
     """Number of entries in `flagged`."""
     n_dirty: IntCell
@@ -33,7 +42,10 @@ class Change(Arrays):
     n_children: IntCell
     """Number of entries in `children`."""
     is_full: IntCell
-    """1 if the pass stopped for want of room, else 0."""
+    """1 if the pass stopped for want of room in the body, to go on after some is made; else 0."""
+    lacks_room: IntCell
+    """LISTS or NODES where there was no room, and something is missing; else 0. What was done is of
+    no use then: it is done again from where the step began, with more room."""
     lost_spin: FloatArray
     """Angular momentum that the masses at nodes lost by splits, over the density [m5/s], shape
     (3,)."""
@@ -47,19 +59,32 @@ class Change(Arrays):
 def new_change() -> Change:
     """Return an empty list of changes."""
     return Change(
-        flagged=np.zeros(CHANGES, np.int64),
-        dirty=np.zeros(CHANGES, np.int64),
-        faces=np.zeros((CHANGES, 4), np.int64),
-        children=np.zeros((CHANGES, 2), np.int64),
+        **_lists(CHANGES),
         n_flagged=0,
         n_dirty=0,
         n_faces=0,
         n_children=0,
         is_full=0,
+        lacks_room=0,
         lost_spin=np.zeros(3),
         area=0.0,
         finished_area=0.0,
     )
+
+
+def with_twice_the_room(change: Change) -> Change:
+    """Return an empty list of changes with twice the room, and the same sums."""
+    empty = {name: 0 for name in ("n_flagged", "n_dirty", "n_faces", "n_children", "is_full")}
+    return change.replaced(**_lists(2 * len(change.dirty)), **empty, lacks_room=0)
+
+
+def _lists(room: int) -> dict[str, IntArray]:
+    return {
+        "flagged": np.zeros(room, np.int64),
+        "dirty": np.zeros(room, np.int64),
+        "faces": np.zeros((room, 4), np.int64),
+        "children": np.zeros((room, 2), np.int64),
+    }
 
 
 @kernel
@@ -75,18 +100,22 @@ def clear_changes(change: Change) -> None:
 @kernel
 def note_dirty(change: Change, t: int) -> None:
     """Note that tetrahedron `t` was changed."""
-    if change.n_dirty < len(change.dirty):
-        change.dirty[change.n_dirty] = t
-        change.n_dirty += 1
+    if change.n_dirty == len(change.dirty):
+        change.lacks_room = LISTS
+        return
+    change.dirty[change.n_dirty] = t
+    change.n_dirty += 1
 
 
 @kernel
 def note_child(change: Change, child: int, parent: int) -> None:
     """Note that tetrahedron `child`, which was appended, is a part of `parent`."""
-    if change.n_children < len(change.children):
-        change.children[change.n_children, 0] = child
-        change.children[change.n_children, 1] = parent
-        change.n_children += 1
+    if change.n_children == len(change.children):
+        change.lacks_room = LISTS
+        return
+    change.children[change.n_children, 0] = child
+    change.children[change.n_children, 1] = parent
+    change.n_children += 1
 
 
 @kernel

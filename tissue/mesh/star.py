@@ -18,6 +18,8 @@ class Visits(Arrays):
 
     epoch: IntCell
     """Number of the current search."""
+    is_full: IntCell
+    """1 if there were more than `LARGEST_STAR` tetrahedra around a node, else 0."""
     tetrahedra: IntArray
     """Search that visited each tetrahedron last, shape (capacity,)."""
     nodes: IntArray
@@ -30,6 +32,7 @@ def no_visits(n_nodes: int, n_tetrahedra: int) -> Visits:
     """Return visits for that many nodes and tetrahedra."""
     return Visits(
         epoch=0,
+        is_full=0,
         tetrahedra=np.zeros(n_tetrahedra, np.int64),
         nodes=np.zeros(n_nodes, np.int64),
         place=np.zeros(n_nodes, np.int64),
@@ -68,7 +71,10 @@ def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> in
             if link < 0:
                 continue
             other = link // 4
-            if visits.tetrahedra[other] != epoch and n < LARGEST_STAR:
+            if visits.tetrahedra[other] != epoch:
+                if n == LARGEST_STAR:
+                    visits.is_full = 1
+                    return n
                 visits.tetrahedra[other] = epoch
                 out[n] = other
                 n += 1
@@ -78,6 +84,8 @@ def star(body: Body, visits: Visits, node: int, start: int, out: IntArray) -> in
 @kernel
 def _listed(body: Body, visits: Visits, node: int, out: IntArray) -> int:
     n = listed_tetrahedra(body.hanging, node, out, LARGEST_STAR)
+    if n == LARGEST_STAR:
+        visits.is_full = 1
     for i in range(n):
         visits.tetrahedra[out[i]] = visits.epoch
     return n

@@ -8,6 +8,7 @@ import numpy as np
 
 from tissue.core.array_types import BoolArray, FloatArray, IntArray
 from tissue.geometry.connected_components import components
+from tissue.mesh.crowded_nodes import crowding_of
 from tissue.mesh.faces import OUTWARD, SortedFaces, sorted_faces
 from tissue.types import TetrahedralMesh
 
@@ -115,6 +116,8 @@ def _checked(mesh: TetrahedralMesh) -> CheckedMesh:
     positions, tetrahedra, origin = _without_unused(positions, tetrahedra, warnings)
     _refuse_wrong_extent(positions, warnings)
     _refuse_repeated(tetrahedra)
+    if crowding := crowding_of(tetrahedra):
+        raise MeshError(crowding)
     _refuse_flat(positions, tetrahedra, warnings)
     tetrahedra = _turned_left(positions, tetrahedra, warnings)
     faces = sorted_faces(tetrahedra)

@@ -9,8 +9,10 @@ from bridge import CouplingError
 from bridge.coupling.coupling import (
     MAX_IMPLAUSIBLE_FRAMES,
     MAX_PLAUSIBLE_FORCE,
+    MAX_PLAUSIBLE_SPEED,
     Coupling,
     DeviceLimits,
+    expect_plausible_motion,
 )
 from bridge.coupling.passivity import Travel
 from bridge.poses import six
@@ -202,3 +204,12 @@ def test_after_an_implausible_wrench_the_force_returns_along_a_ramp():
     coupling.render(wrench((1e6, 0.0, 0.0)), 1e-3)
     felt = [coupling.render(wrench((1.0, 0.0, 0.0)), 1e-3).force[0] for _ in range(110)]
     assert felt[0] == pytest.approx(0.02) and felt[49] == pytest.approx(0.51) and felt[-1] == 1.0
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-2])
+def test_a_blade_that_no_hand_moves_so_is_refused(dt):
+    way = 0.999 * MAX_PLAUSIBLE_SPEED * dt
+    expect_plausible_motion((0.6 * way, 0.8 * way, 0.0, 0.9, 0.9, 0.9), dt)
+    for motion in ((0.7 * way, 0.8 * way, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)):
+        with pytest.raises(CouplingError, match="Lead the arm there, or make another Bridge"):
+            expect_plausible_motion(motion, dt)

@@ -106,6 +106,22 @@ def test_a_state_that_is_not_finite_stops_the_run_and_never_resets_silently():
         arm.check()
 
 
+@pytest.mark.parametrize(
+    "where, value", [("qvel", 1e3), ("qvel", 1e9), ("qpos", 1e3), ("qpos", -1e9), ("qvel", 501.0)]
+)
+def test_a_joint_that_no_hand_moves_so_is_named(where, value):
+    arm = Arm("touch")
+    for _ in range(10):
+        arm.step1()
+        arm.step2()
+        arm.check()
+    getattr(arm.data, where)[1] = value
+    with pytest.raises(ArmError, match=r"t = 0.0100 s joint 'shoulder' moves by .* rad, or m"):
+        arm.check()
+    arm.reset(arm.model.key("home").qpos)  # it may be put elsewhere on purpose
+    arm.check()
+
+
 @pytest.mark.parametrize("force", [np.nan, 1e12])
 def test_a_force_that_bypasses_the_blade_is_detected_within_the_step(force, caplog):
     arm = Arm("touch")

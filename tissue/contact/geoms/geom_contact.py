@@ -187,7 +187,19 @@ class GeomContact:
         arrays.way[:] = arrays.turn[:] = 0.0
         place_geoms(arrays, 1.0)
 
-    def consider(self, are_near: BoolArray) -> None:
+    @property
+    def way(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Where the geoms go in the next step, and which may be touched; none of it is written."""
+        return self._origins, self._rotations, self.arrays.geoms.is_near.copy()
+
+    @way.setter
+    def way(self, way: tuple[FloatArray, FloatArray, IntArray]) -> None:
+        origins, rotations, are_near = way
+        if origins is not self._origins or rotations is not self._rotations:
+            self.move(origins, rotations)
+        self.consider(are_near)
+
+    def consider(self, are_near: BoolArray | IntArray) -> None:
         """Say which geoms the tissue may touch in the next steps, by a broad phase; shape (n,)."""
         flags = self.arrays.geoms.is_near
         if (flags != are_near).any():

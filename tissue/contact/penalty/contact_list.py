@@ -121,8 +121,8 @@ def floor_changes(search: SearchState, body: Body) -> bool:
 def list_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> None:
     """Seek the contacts of nodes that are due, and list all.
 
-    Room: DIRECTIONS for each node of a face, one for each node that may be on the floor, and one
-    for each pair of ridges that touch.
+    Room: DIRECTIONS for each node of a face, one for each node that may be on the floor, one for
+    each pair of ridges that touch, and one for each contact of the last list.
     """
     pairs, now = search.pairs, search.n_listings + 1
     to, n = len(forces.push) // 2 - forces.first, 0
@@ -159,14 +159,14 @@ def _list_fading_contacts(
     """List, behind the `n` others, what pressed in the last list and is no longer found.
 
     A node that has been pushed out on another side, or slid off a face, would snap back if the
-    force that holds it ended at once. Where there is no room the force does end.
+    force that holds it ended at once.
     """
     first, end = forces.first, forces.first + forces.n_contacts
-    room, n_fading = len(forces.push) // 2 - n, 0
+    n_fading = 0
     for c in range(first, end):
         if c >= end - forces.n_fading:
             _hand_to_node(search, forces, body, c)
-        if forces.push[c] > 0.0 and n_fading < room:
+        if forces.push[c] > 0.0:
             copy_contact(forces, c, to + n + n_fading)
             n_fading += 1
     forces.n_contacts, forces.n_fading = n + n_fading, n_fading

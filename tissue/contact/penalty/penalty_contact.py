@@ -290,7 +290,8 @@ class PenaltyContact:
         search, first = self._search, self.forces.first
         on_floor = body.n_nodes if np.isfinite(search.floor) else 0
         ridges = search.ridge_pairs
-        capacity = 2 * (DIRECTIONS * search.pairs.n_nodes + on_floor + ridges.n_touching)
+        n_new = DIRECTIONS * search.pairs.n_nodes + on_floor + ridges.n_touching
+        capacity = 2 * (n_new + self.forces.n_contacts)
         self.forces = grown_penalty_forces(self.forces, capacity)
         search.contact[:] -= first
         search.floor_contact[:] -= first

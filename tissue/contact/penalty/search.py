@@ -81,7 +81,7 @@ def search_contacts(
     if find_touching_ridges(search, forces, body) or n_due > 0 or floor_changes(search, body):
         search.is_listing_due = 1
     if search.is_listing_due == 1:
-        if _most_contacts(search, body) > len(forces.push) // 2:
+        if _most_contacts(search, forces, body) > len(forces.push) // 2:
             return NO_ROOM_FOR_CONTACTS
         list_contacts(search, forces, body)
         limit_stiffness(search.limits, highest, room)
@@ -121,7 +121,8 @@ def _renew_normals(search: SearchState, body: Body) -> None:
 
 
 @kernel
-def _most_contacts(search: SearchState, body: Body) -> int:
-    """Return how many contacts there may be at most."""
+def _most_contacts(search: SearchState, forces: PenaltyForces, body: Body) -> int:
+    """Return how many contacts there may be at most: new ones, and those that fade."""
     on_floor = 0 if search.floor == -math.inf else body.n_nodes
-    return int(DIRECTIONS * search.pairs.n_nodes + on_floor + search.ridge_pairs.n_touching)
+    n_new = DIRECTIONS * search.pairs.n_nodes + on_floor + search.ridge_pairs.n_touching
+    return int(n_new + forces.n_contacts)

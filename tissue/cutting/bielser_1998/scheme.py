@@ -25,9 +25,14 @@ from tissue.cutting.blade_path import Path
 from tissue.cutting.bridging import remember_active
 from tissue.cutting.collision_detection import detect_collisions
 from tissue.cutting.cut_surface import grown_sheet, new_sheet
-from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
+from tissue.cutting.workspace import (
+    Cut,
+    SnapLimits,
+    new_cut_scratch,
+    scratch_with_twice_the_room,
+)
 from tissue.mesh.body import Body
-from tissue.mesh.changes import clear_changes, new_change
+from tissue.mesh.changes import NODES, clear_changes, new_change, with_twice_the_room
 from tissue.mesh.star import Visits
 from tissue.types import SchemeStatistics
 
@@ -54,6 +59,7 @@ class PaperScheme:
 
     def __init__(self, body: Body, density: float, node_size: float) -> None:
         self.change = new_change()
+        self.doubled_nodes = 1
         self._density = density
         self._reach = _REACH * node_size
         self._records = records_of(body)
@@ -114,6 +120,14 @@ class PaperScheme:
         """Forget the incision. Its edges stay cut: each tetrahedron is processed once."""
         self._records.incision += 1
         self._scratch.n_previous = 0
+
+    def make_room(self, lacking: int) -> None:
+        """Make twice the room for what lacked it."""
+        if lacking == NODES:
+            self.doubled_nodes *= 2
+            return
+        self.change = with_twice_the_room(self.change)
+        self._scratch = scratch_with_twice_the_room(self._scratch)
 
     def grow(self, n_nodes: int, n_tetrahedra: int) -> None:
         """Make room for that many nodes and tetrahedra."""

@@ -1,0 +1,73 @@
+"""`StepInputs`: what acts on a body in one step from outside, so that the step can be repeated."""
+
+from typing import Any, NamedTuple
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.three_vectors import BladeSweep
+from tissue.integrators.system import System
+from tissue.loads.attachment_list import AttachmentList
+from tissue.loads.load import Loads
+
+
+class StepInputs(NamedTuple):
+    """What a step begins with that is not in the body: references to what is never written."""
+
+    sweep: BladeSweep | None
+    """Motion of the blade."""
+    dt: float
+    """Length of the step [s]."""
+    forces: tuple[FloatArray, ...]
+    """Forces of the loads on their points [N]."""
+    frames: tuple[tuple[Any, ...], ...]
+    """Where the frames of attachments go."""
+    geoms: tuple[FloatArray, FloatArray, IntArray] | None
+    """Where geoms go, and which of them may be touched; None where there are none."""
+    supports: FloatArray | None
+    """Velocities of the fixed nodes [m/s]; None where all stand still."""
+
+
+def inputs_of(
+    sweep: BladeSweep | None,
+    dt: float,
+    loads: Loads,
+    attachments: AttachmentList,
+    system: System,
+) -> StepInputs:
+    """Return what acts on a body in the next step.
+
+    Args:
+        sweep: Motion of the blade.
+        dt: Length of the step [s].
+        loads: Those of the body.
+        attachments: Those of the body.
+        system: The body, geoms and supports.
+    """
+    geoms, supports = system.geoms, None
+    if system.supports.is_moving:
+        body = system.body
+        supports = body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]]
+    return StepInputs(
+        sweep,
+        dt,
+        loads.forces,
+        tuple(each.way for each in attachments.all),
+        geoms.way if geoms.geoms else None,
+        supports,
+    )
+
+
+def give_inputs(
+    inputs: StepInputs, loads: Loads, attachments: AttachmentList, system: System
+) -> None:
+    """Give a body what acts on it in a step, as `inputs_of` found it."""
+    loads.forces = inputs.forces
+    for each, way in zip(attachments.all, inputs.frames, strict=True):
+        each.way = way
+    if inputs.geoms is not None:
+        system.geoms.way = inputs.geoms
+    is_moving = inputs.supports is not None
+    if is_moving or system.supports.is_moving:
+        body = system.body
+        fixed = body.fixed[: body.n_nodes]
+        body.velocities[: body.n_nodes][fixed] = inputs.supports if is_moving else 0.0
+    system.supports.is_moving = int(is_moving)
