@@ -17,6 +17,7 @@ from .coupling.led_grip import LedGrip as LedGrip
 from .coupling.limits import DeviceLimits as DeviceLimits
 from .coupling.local_model import MAX_FRAMES_PER_ANSWER as MAX_FRAMES_PER_ANSWER
 from .coupling.passivity import PassivityCounters as PassivityCounters
+from .coupling.virtual_coupling import Proxy as Proxy
 from .coupling.virtual_coupling import VirtualCoupling as VirtualCoupling
 from .device.client import DeviceClient as DeviceClient
 from .device.server import DEFAULT_DEVICE_PORT as DEFAULT_DEVICE_PORT
@@ -78,6 +79,7 @@ __all__ = [
     "MAX_PLAUSIBLE_FORCE",
     "MAX_PLAUSIBLE_TORQUE",
     "PassivityCounters",
+    "Proxy",
     "SIZES_PER_SHAPE",
     "SceneView",
     "TcpLink",

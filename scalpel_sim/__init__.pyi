@@ -10,6 +10,7 @@ from .scene_parts.scene import Scene as Scene
 from .scenes import SCENES as SCENES
 from .scenes import read_scene as read_scene
 from .simulation import Simulation as Simulation
+from .state.simulation_state import SimulationState as SimulationState
 from .tables.grasper import GrasperTable as GrasperTable
 from .tables.grasper import WaypointTable as WaypointTable
 from .tables.stroke import StrokeTable as StrokeTable
@@ -25,6 +26,7 @@ __all__ = [
     "SCENES",
     "Scene",
     "Simulation",
+    "SimulationState",
     "StrokeTable",
     "Viewer",
     "WaypointTable",

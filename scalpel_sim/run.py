@@ -13,9 +13,10 @@ from bridge import LinkError, TcpLink
 from scalpel_sim.errors import Interrupted, RunError, one_line
 from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
+from scalpel_sim.output.resumption import RepeatedFrames
+from scalpel_sim.output.run_checkpoints import RunCheckpoints
 from scalpel_sim.output.run_end import Attempts, EndedRun, write_end, write_led
 from scalpel_sim.output.run_folder import (
-    FRAMES_PER_FLUSH,
     INITIAL,
     SCENE,
     STROKE,
@@ -81,12 +82,20 @@ def perform(
         Interrupted: the user or the system ended the run.
         RunError: the run failed, or a file could not be written. The other files are.
     """
+    checkpoint = None if outputs.resumption is None else outputs.resumption.checkpoint
+    if checkpoint is not None:
+        settings = checkpoint.head.settings
     seconds = run_time(simulation, seconds)
     hand = None if controls is None else controls.hand
-    replay = ReplayWriter(
-        simulation.arm.model, title=simulation.title, frame=simulation.frame, views=views
-    )
-    with outputs, StopSignals() as stop:
+    simulation.recording.keep_in(outputs.folder)
+    with outputs, StopSignals() as stop, outputs.replay_log() as log:
+        replay = ReplayWriter(
+            simulation.arm.model,
+            title=simulation.title,
+            frame=simulation.frame,
+            views=views,
+            log=log,
+        )
         body, title = simulation.link.describe(), simulation.title  # the link may be lost
         at_first = simulation.link.snapshot()
         if hand is not None:
@@ -95,10 +104,16 @@ def perform(
         # What graspers move is elsewhere when the blade comes.
         asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
         simulation.pictures.append(into_replay(replay))
-        if controls is not None:
-            controls.history.begin(outputs, replay)
         _warn_if_slow(simulation)
-        failure = _run_frames(simulation, outputs, seconds, every_frame, controls, stop)
+        until = None if hand is not None else seconds
+        with RunCheckpoints(outputs, simulation, replay, settings, until) as checkpoints:
+            if outputs.resumption is not None:
+                outputs.resumption.load_into(simulation)
+            if controls is not None:
+                controls.history.begin(checkpoints, outputs, replay)
+            failure = _run_frames(
+                simulation, outputs, seconds, every_frame, controls, stop, checkpoints
+            )
         stopped = stop.reason
         status = _status_of(stopped, failure, controls)
         summary, attempts = write_end(
@@ -115,6 +130,9 @@ def perform(
                 failure,
             )
         )
+        is_done = status in (COMPLETE, ENDED_IN_PAGE) and not attempts.unwritten
+        if is_done or not checkpoints.are_there:
+            outputs.remove_passing_files()
     _raise_what_ended_it(stop, stopped, simulation.time, failure, attempts, outputs.folder)
     return summary
 
@@ -174,18 +192,40 @@ def _run_frames(
     every_frame: Callable[[Simulation], None] | None,
     controls: RunControls | None,
     stop: StopSignals,
+    checkpoints: RunCheckpoints,
 ) -> Exception | None:
-    """Do the frames, and return the error that ended them early."""
+    """Do the frames, and return the error that ended them early.
+
+    Args:
+        simulation: At its start, or where it goes on.
+        outputs: The folder of the files.
+        seconds: How long to simulate [s].
+        every_frame: See `perform`, as the next.
+        controls: What a page asks.
+        stop: The signals.
+        checkpoints: Those of the run.
+    """
     hand = None if controls is None else controls.hand
+    resumption = outputs.resumption
+    repeated = None if resumption is None else RepeatedFrames(resumption, outputs.folder)
 
     def obey() -> None:
         while controls is not None and controls.obey() and stop.reason is None:
             pass
 
+    def write_rows() -> None:
+        if hand is not None:
+            write_led(outputs, hand)  # first: from it the rows can be made again
+        outputs.write_forces(simulation.recording, all_rows=True)
+
     def after_frame(now: Simulation) -> bool:
-        outputs.write_forces(now.recording)
-        if hand is not None and len(now.recording) % FRAMES_PER_FLUSH == 0:
-            write_led(outputs, hand)
+        if repeated is not None:
+            repeated.check(now.recording)
+        is_due = checkpoints.are_due
+        if is_due or outputs.are_rows_due(now.recording):
+            write_rows()
+        if is_due:
+            checkpoints.write()
         if every_frame is not None:
             every_frame(now)
         obey()
@@ -203,7 +243,12 @@ def _run_frames(
             link.while_waiting = give_up
         obey()
         if stop.reason is None:
+            if checkpoints.are_due:
+                checkpoints.write()
             simulation.run(seconds, after_frame)
+        if stop.reason is not None:
+            write_rows()
+            checkpoints.write_last()
         if isinstance(link, TcpLink):  # what it answers for the last files may be long
             link.while_waiting = lambda: None
     except Exception as error:

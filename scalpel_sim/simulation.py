@@ -87,6 +87,12 @@ class Simulation:
             coupling=coupling,
             passivity=passivity,
         )
+        self.coupled = {
+            "tissue_every": repr(tissue_every),
+            "coupling": repr(coupling),
+            "passivity": repr(passivity),
+        }
+        """How arm and tissue are coupled, as text."""
         self.wrench = NO_WRENCH
         """Wrench on the blade in the last frame, world frame."""
         self.touching = CollisionMonitor(arm, fixtures)

@@ -53,6 +53,7 @@ from .shapes.cylinder import cylinder as cylinder
 from .shapes.lattice_block import lattice_block as lattice_block
 from .shapes.liver_lobe import liver_lobe as liver_lobe
 from .solver_settings import SolverSettings as SolverSettings
+from .state.tissue_state import Around as Around
 from .state.tissue_state import TissueState as TissueState
 from .tissue import Tissue as Tissue
 from .types import CUT_COLOUR as CUT_COLOUR
@@ -72,6 +73,7 @@ from .types import TetrahedralMesh as TetrahedralMesh
 from .types import TissueError as TissueError
 
 __all__ = [
+    "Around",
     "BladeSegment",
     "BladeShape",
     "BladeSweep",

@@ -1,7 +1,7 @@
 """A body of a MuJoCo model that holds tissue: its pose leads an attachment, which pulls on it."""
 
 import math
-from collections.abc import Callable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,6 +16,19 @@ from tissue import Attachment, FloatArray, Tissue, Wrench
 
 class GripError(ValueError):
     """The model has no such body, or was handed a wrench that no tissue can exert."""
+
+
+class _BodyViews(NamedTuple):
+    """Views of MuJoCo's arrays for one body: they stay valid for the life of its data."""
+
+    position: FloatArray
+    """Its origin [m], shape (3,)."""
+    axes: FloatArray
+    """Its axes as columns, shape (3, 3)."""
+    centre_of_mass: FloatArray
+    """[m], shape (3,)."""
+    applied: FloatArray
+    """Force [N] and torque [N m] that are applied to it, shape (6,)."""
 
 
 class Grip:
@@ -53,24 +66,28 @@ class Grip:
         breaks_at: float = math.inf,
     ) -> None:
         body_id = body_number(data.model, body, GripError)
+        self._data, self._body, self._tissue = data, body_id, tissue
         self._frame = frame = frame_of(tissue, frame)
-        # Views of MuJoCo's arrays: they stay valid for the life of `data`.
-        self._position = data.xpos[body_id]
-        self._axes = data.xmat[body_id].reshape(3, 3)
-        self._centre_of_mass = data.xipos[body_id]
-        self._applied = data.xfrc_applied[body_id]
+        self._views: _BodyViews | None = None
         self._of_grip: FloatArray = np.zeros(6)
-        self._axes_at_first = self._axes.copy()
-        origin = frame.points_to_tissue(self._position).tolist()
+        self._axes_at_first = self._of_body().axes.copy()
+        origin = frame.points_to_tissue(self._of_body().position).tolist()
         numbers = {"stiffness": stiffness, "damping": damping, "breaks_at": breaks_at}
         self.attachment: Attachment | LedGrip
         """The hold, in the frame of the tissue."""
-        if isinstance(tissue, Bridge):
-            self.attachment = grip = tissue.attach(where, **numbers, origin=origin)
-            self._let_go: Callable[[], None] = lambda: tissue.release(grip)
-        else:
-            self.attachment = attachment = tissue.attach(where, **numbers, origin=origin)
-            self._let_go = lambda: tissue.release(attachment)
+        self.attachment = tissue.attach(where, **numbers, origin=origin)
+
+    def _of_body(self) -> "_BodyViews":
+        """Return what MuJoCo knows of the body."""
+        if self._views is None:
+            data, body = self._data, self._body
+            self._views = _BodyViews(
+                data.xpos[body],
+                data.xmat[body].reshape(3, 3),
+                data.xipos[body],
+                data.xfrc_applied[body],
+            )
+        return self._views
 
     @property
     def n_points(self) -> int:
@@ -87,10 +104,10 @@ class Grip:
 
     def follow(self) -> None:
         """Lead the hold to where the body is, at an even speed in the next step."""
-        frame = self._frame
-        turned = self._axes @ self._axes_at_first.T  # in the world
+        frame, body = self._frame, self._of_body()
+        turned = body.axes @ self._axes_at_first.T  # in the world
         rotation = frame.rotation.T @ turned @ frame.rotation
-        self.attachment.move(frame.points_to_tissue(self._position), rotation)
+        self.attachment.move(frame.points_to_tissue(body.position), rotation)
 
     def apply(self) -> None:
         """Apply the wrench of the last step to the body, beside what others apply to it.
@@ -99,15 +116,16 @@ class Grip:
             GripError: the wrench is not finite, or too large; see `body_wrench`. The one of the
                 call before stays applied.
         """
+        body = self._of_body()
         try:  # zero after the step in which it let go
-            now = np.array(about_centre_of_mass(self.wrench, self._centre_of_mass))
+            now = np.array(about_centre_of_mass(self.wrench, body.centre_of_mass))
         except ValueError as error:
             raise GripError(f"the hold: {error}") from error
-        self._applied += now - self._of_grip
+        body.applied[:] += now - self._of_grip
         self._of_grip = now
 
     def release(self) -> None:
         """Let go."""
         if self.n_points:
-            self._let_go()
+            self._tissue.release(self.attachment)  # type: ignore[arg-type]  # it is of this one
         self.apply()

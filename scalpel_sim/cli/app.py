@@ -19,8 +19,8 @@ from scalpel_sim.cli.options import (
     ClientOptions,
     DeviceOptions,
     Flag,
-    OutputOptions,
     PrintOptions,
+    RunOutputOptions,
     SceneName,
     TissueOptions,
 )
@@ -63,7 +63,7 @@ def _run(
     client: ClientOptions = ClientOptions(),
     hand: Annotated[Literal["script", "device"], Parameter(group=DEVICE)] = "script",
     device: DeviceOptions = DeviceOptions(),
-    output: OutputOptions = OutputOptions(),
+    output: RunOutputOptions = RunOutputOptions(),
     printing: PrintOptions = PrintOptions(),
 ) -> None:
     """Cut a body with the arm, print a table, and write files to a folder.
@@ -76,6 +76,7 @@ def _run(
     scalpel-sim run organ --material liver --blade-thickness 0.001 --out out/liver
     scalpel-sim run --mesh organ.msh --scale 0.001 --fix bottom --material mine.toml
     scalpel-sim run --hand device --listen 127.0.0.1:8767
+    scalpel-sim run --resume out/organ
     ```
 
     Args:
@@ -85,11 +86,21 @@ def _run(
     """
     with log_to_stderr(printing), Plotter() as plotter:  # it loads while the run is prepared
         from scalpel_sim.cli.device_run import check_device_options, device_run, perform_device
+        from scalpel_sim.cli.resumed_run import perform_resumed
         from scalpel_sim.cli.run_setup import RunOptions, prepared_run
         from scalpel_sim.cli.scripted_run import perform_script
 
         options = RunOptions(tissue, arm, client, output, printing)
         is_led = hand == "device"
+        if output.resume is not None:
+            if scene is not None or is_led:
+                raise UsageError(
+                    "--resume goes on with the run in its folder; omit the scene and --hand"
+                )
+            check_device_options(device, is_led=False)
+            summary, resumed = perform_resumed(output.resume, options, plotter)
+            print_report(summary, resumed.folder, output.export, printing)
+            return
         check_device_options(device, is_led=is_led)
         relaxation = "verlet" if is_led else None
         with prepared_run(

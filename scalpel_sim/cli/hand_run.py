@@ -28,7 +28,13 @@ def perform_by_hand(
     controls.pace.go_on()
     return perform(
         simulation,
-        Outputs(prepared.folder, plotter, simulation.recording.columns, options.output.export),
+        Outputs(
+            prepared.folder,
+            plotter,
+            simulation.recording.columns,
+            options.output.export,
+            prepared.checkpoint_seconds,
+        ),
         scene=prepared.scene if options.client.connect is None else None,
         views=prepared.scene.views,
         settings=prepared.settings | {"stroke": simulation.stroke.name},

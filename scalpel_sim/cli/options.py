@@ -243,6 +243,20 @@ class OutputOptions:
     export: Annotated[tuple[Path, ...], Parameter(negative="", show_default=False)] = ()
     """Write the body's surface after the run to this file too: .glb, .obj (pieces and cut faces by
     name), .ply (marked on each face) or .stl (triangles alone). May be given several times."""
+    checkpoint: float | None = None
+    """Every so many seconds of simulated time the whole run is written to its folder, so that one
+    that was killed can go on (run --resume); 0: never [default: 1]."""
+
+
+@Parameter(name="*", group=OUTPUT)
+@dataclass(frozen=True)
+class RunOutputOptions(OutputOptions):
+    """The files that a run writes, or has written."""
+
+    resume: Path | None = None
+    """Go on with the run that was interrupted, or killed, while it wrote to this folder, to the
+    same bits. What is asked for is in the folder: give no other options than --export,
+    --checkpoint, and what is printed."""
 
 
 @Parameter(name="*", group=OUTPUT)

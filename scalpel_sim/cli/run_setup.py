@@ -2,6 +2,7 @@
 
 import gc
 import logging
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -20,6 +21,7 @@ from scalpel_sim.cli.options import (
 )
 from scalpel_sim.cli.scene_options import chosen_scene, scene_in_file
 from scalpel_sim.errors import Interrupted, UsageError
+from scalpel_sim.output.checkpoints import CHECKPOINT_SECONDS
 from scalpel_sim.output.export import check_exports
 from scalpel_sim.output.run_folder import check_folder
 from scalpel_sim.preparation import prepare
@@ -72,6 +74,8 @@ class PreparedRun(NamedTuple):
     folder: Path
     settings: dict[str, Any]
     """What the command line and the scene resolved to."""
+    checkpoint_seconds: float
+    """Simulated time between two checkpoints [s]; 0: there are none."""
 
 
 @contextmanager
@@ -106,7 +110,8 @@ def prepared_run(
         raise Interrupted(f"{error} before the run began; no file was written") from error
     try:
         settings |= {"arm": simulation.arm.name}
-        yield PreparedRun(simulation, scene, _folder(options.output, scene), settings)
+        folder, every = _folder(options.output, scene), _checkpoint_seconds(options)
+        yield PreparedRun(simulation, scene, folder, settings, every)
     finally:
         link.close()
 
@@ -124,6 +129,7 @@ def _prepared(
     if client.key is not None and client.connect is None:
         raise UsageError("--key is for a tissue elsewhere; add --connect HOST:PORT, or omit it")
     check_exports(options.output.export)
+    _checkpoint_seconds(options)
     if client.connect is None:
         link, scene, settings = _tissue_here(name, options, audits, relaxation)
     else:
@@ -243,6 +249,25 @@ def _changes_of_scene(arm: ArmOptions) -> dict[str, Any]:
             "seconds",
         )
     }
+
+
+def _checkpoint_seconds(options: RunOptions) -> float:
+    """Return the simulated time between two checkpoints [s]; 0: there are none.
+
+    Raises:
+        UsageError: it is no time, or the tissue is elsewhere.
+    """
+    asked, is_here = options.output.checkpoint, options.client.connect is None
+    if asked is None:
+        return CHECKPOINT_SECONDS if is_here else 0.0
+    if not (math.isfinite(asked) and asked >= 0.0):
+        raise UsageError(f"--checkpoint is {asked}; it must be a time [s], or 0 for none")
+    if asked > 0.0 and not is_here:
+        raise UsageError(
+            "--checkpoint is for a tissue in this process, and --connect has it elsewhere; omit "
+            "one of them"
+        )
+    return asked
 
 
 def _folder(output: OutputOptions, scene: Scene) -> Path:

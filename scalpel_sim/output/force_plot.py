@@ -90,7 +90,7 @@ def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
             color=LIMITED, alpha=0.12, lw=0.0, label="the device limits it",
         )  # fmt: skip
     for i, name in enumerate(recording.hands):
-        of_hand = np.linalg.norm(recording.vector(f"{name}_force"), axis=1)
+        of_hand = recording.sizes(f"{name}_force")
         colour = HAND_COLOURS[i % len(HAND_COLOURS)]
         axes.plot(time, of_hand, color=colour, lw=1.3, ls="--", label=name)
     axes.set_ylabel("force on the arm [N]")
@@ -100,10 +100,10 @@ def _plot_felt(axes: Axes, time: np.ndarray, recording: Recording) -> None:
 def _plot_parts(axes: Axes, time: np.ndarray, recording: Recording) -> None:
     """Draw the parts of the force on the blade."""
     for name, label, colour in PARTS:
-        size = np.linalg.norm(recording.vector(name), axis=1)
+        size = recording.sizes(name)
         axes.plot(time, size, color=colour, lw=1.2, label=label)
     for i in range(min(recording.n_held, len(HELD))):
-        size = np.linalg.norm(recording.vector(f"held_{i}"), axis=1)
+        size = recording.sizes(f"held_{i}")
         axes.plot(time, size, color=HELD[i], lw=1.0, ls="--", label=f"attachment {i + 1}")
     axes.set_ylabel("of which [N]" if recording.n_held == 0 else "of which; held [N]")
     axes.set_ylim(bottom=0.0)

@@ -11,18 +11,22 @@ class GrowingFile:
     Args:
         path: The file; one that is there is replaced.
         head: Its first line [bytes], which stays when the file is cut back.
+        n_kept: How much is kept of a file that is there [bytes]; 0: it is replaced.
 
     Raises:
         OSError: the system refuses.
     """
 
-    def __init__(self, path: Path, head: bytes) -> None:
+    def __init__(self, path: Path, head: bytes, n_kept: int = 0) -> None:
         self.path = path
-        self._file = path.open("wb", buffering=0)
-        self._length = 0  # of the whole rows that are on disk
+        self._file = path.open("r+b" if n_kept else "wb", buffering=0)
+        self._length = n_kept  # of the whole rows that are on disk
         self._pending = b""
         self._n_head = len(head)
-        self.append(head)
+        if n_kept:
+            self._cut(n_kept)
+        else:
+            self.append(head)
 
     @property
     def length(self) -> int:

@@ -1,12 +1,13 @@
 """What happened in each frame, as one table of numbers."""
 
 import re
-import struct
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
+from scalpel_sim.output.row_store import RowStore
 from tissue import Energies, FloatArray
 
 ACCOUNT = (*(f"{term}_j" for term in Energies._fields[1:]), "residual_j")
@@ -18,6 +19,9 @@ N_OF_ACCOUNT = len(ACCOUNT)
 def _vector(name: str, unit: str) -> tuple[str, ...]:
     return tuple(f"{name}_{axis}_{unit}" for axis in "xyz")
 
+
+WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
+"""Columns that differ from run to run: what frames took."""
 
 COLUMNS = (
     "time_s",
@@ -36,12 +40,7 @@ COLUMNS = (
     "anchored_length_m",
     "work_of_blade_j",
     *ACCOUNT,
-    "cd_s",
-    "gc_s",
-    "rx_s",
-    "rd_s",
-    "frame_s",
-    "recording_s",
+    *WALL_TIMES,
 )
 """Names and units. Vectors are in the world frame. `force` and `torque` are what the arm feels,
 averaged over the frame, the torque about the tip; `tissue_force` and `tissue_torque` are what the
@@ -76,57 +75,85 @@ def _n_held(columns: Sequence[str]) -> int:
     return sum(re.fullmatch(r"held_\d+_x_n", name) is not None for name in columns)
 
 
-FRAMES_AT_FIRST = 1024
+_LINES_PER_READ = 1024
+"""Lines of `forces.csv` that are read together: some megabytes of text."""
 
 
 class Recording:
-    """Rows of `COLUMNS`, one per frame. Grows by doubling, so that a frame allocates nothing.
+    """Rows of `COLUMNS`, one per frame. Some seconds are in memory; see `RowStore`.
 
     Args:
-        n_frames: Room at first.
         others: Further columns: see `held_columns` and `columns_of_hand`, in this order.
     """
 
-    def __init__(self, n_frames: int = FRAMES_AT_FIRST, others: Sequence[str] = ()) -> None:
+    def __init__(self, others: Sequence[str] = ()) -> None:
         self.columns = (*COLUMNS, *others)
         """Names and units of all columns."""
         self.n_held = _n_held(self.columns)
         """Number of attachments."""
-        self._row = struct.Struct(f"{len(self.columns)}d")
-        self._n = 0
-        self._take_rows(np.zeros((max(n_frames, 1), len(self.columns))))
-
-    def _take_rows(self, rows: FloatArray) -> None:
-        self._rows, self._memory = rows, rows.data.cast("B")
+        self._store = RowStore(len(self.columns))
+        self.append = self._store.append
+        """Add one frame: a number for each of `columns`."""
+        self.cut_back = self._store.cut_back
+        """Forget all frames but the first so many, of which there are as many."""
+        self.since = self._store.since
+        """Return the frames after the first so many. A view, until the next frame."""
 
     def __len__(self) -> int:
-        return self._n
+        return len(self._store)
+
+    def keep_in(self, folder: Path) -> None:
+        """Have the file of what memory does not hold made in a folder, if there is none yet."""
+        self._store.folder = folder
 
     @property
     def rows(self) -> FloatArray:
-        """All frames so far, shape (n_frames, n_columns). A view."""
-        return self._rows[: self._n]
+        """All frames so far, shape (n_frames, n_columns). A view.
 
-    def append(self, row: Sequence[float]) -> None:
-        """Add one frame: a number for each of `columns`."""
-        if self._n == len(self._rows):
-            self._take_rows(np.concatenate([self._rows, np.zeros_like(self._rows)]))
-        # For NumPy to look at fifty numbers of a list takes three times as long.
-        self._row.pack_into(self._memory, self._n * self._row.size, *row)
-        self._n += 1
+        Raises:
+            RunError: there are more than memory holds, and the disk is full.
+        """
+        return self._store.rows()
 
-    def cut_back(self, n_frames: int) -> None:
-        """Forget all frames but the first `n_frames`, of which there are as many."""
-        self._n = n_frames
+    def rows_from(self, first: int) -> Iterator[FloatArray]:
+        """Yield the frames after so many, one by one: a view, until the next."""
+        for part in self._store.parts(first):
+            yield from part
 
     def column(self, name: str) -> FloatArray:
-        """Return one column, shape (n_frames,). A view."""
-        return self.rows[:, self.columns.index(name)]
+        """Return one column, shape (n_frames,). A view where memory holds all frames."""
+        return self._columns(slice(self.columns.index(name), self.columns.index(name) + 1))[:, 0]
 
     def vector(self, name: str) -> FloatArray:
-        """Return the three columns of a vector such as `tip`, shape (n_frames, 3). A view."""
+        """Return the three columns of a vector such as `tip`, shape (n_frames, 3), alike."""
+        return self._columns(self._place_of(name))
+
+    def sizes(self, name: str) -> FloatArray:
+        """Return the magnitude of a vector such as `force` in each frame, shape (n_frames,)."""
+        place = self._place_of(name)
+        sizes = [np.linalg.norm(part[:, place], axis=1) for part in self._store.parts()]
+        return np.concatenate([np.zeros(0), *sizes])
+
+    def at_end(self, name: str) -> float:
+        """Return a number of the last frame; 0 where there is none."""
+        last = self.since(max(0, len(self) - 1))
+        return float(last[-1, self.columns.index(name)]) if len(last) else 0.0
+
+    def _place_of(self, name: str) -> slice:
+        """Return which columns a vector has."""
         first = next(i for i, each in enumerate(self.columns) if each.startswith(f"{name}_x_"))
-        return self.rows[:, first : first + 3]
+        return slice(first, first + 3)
+
+    def _columns(self, place: slice) -> FloatArray:
+        """Return some columns."""
+        if self._store.are_in_memory:
+            return self.rows[:, place]
+        found = np.empty((len(self), place.stop - place.start))
+        done = 0
+        for part in self._store.parts():
+            found[done : done + len(part)] = part[:, place]
+            done += len(part)
+        return found
 
     @property
     def hands(self) -> tuple[str, ...]:
@@ -140,7 +167,7 @@ class Recording:
     @property
     def is_audited(self) -> bool:
         """Whether the energy account was kept."""
-        return len(self) > 0 and bool(np.isfinite(self.column("residual_j")[-1]))
+        return len(self) > 0 and bool(np.isfinite(self.at_end("residual_j")))
 
 
 def read_forces(path: Path) -> Recording:
@@ -162,9 +189,9 @@ def read_forces(path: Path) -> Recording:
             raise ValueError(
                 f"{path}: the first line is '{header[:200]}'; it must be the columns of a run"
             )
-        lines = [line for line in file if line.endswith("\n")]
-    rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, len(columns)))
-    recording = Recording(len(rows), others)
-    for row in rows:
-        recording.append(row)
+        recording = Recording(others)
+        while lines := list(islice(file, _LINES_PER_READ)):
+            if whole := [line for line in lines if line.endswith("\n")]:
+                for row in np.loadtxt(whole, delimiter=",", ndmin=2):
+                    recording.append(row)
     return recording

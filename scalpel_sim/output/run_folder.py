@@ -8,12 +8,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, TypeVar, cast
 
 import msgspec
 import numpy as np
 
 from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.checkpoints import CHECKPOINT_FILES
 from scalpel_sim.output.disk_reserve import DiskReserve
 from scalpel_sim.output.folder_lock import FolderLock
 from scalpel_sim.output.growing_file import GrowingFile
@@ -22,8 +23,12 @@ from scalpel_sim.output.recording import COLUMNS, Recording
 from scalpel_sim.output.summary import Summary
 from scalpel_sim.strokes.recorded_grasp import GRASP_COLUMNS
 from scalpel_sim.strokes.stroke import LED_COLUMNS
+from scalpel_sim.viewer.frame_log import FrameLog
 from scalpel_sim.viewer.replay import ReplayWriter
 from tissue import FloatArray, Snapshot, remove_unfinished, whole_file, write_vtu
+
+if TYPE_CHECKING:
+    from scalpel_sim.output.resumption import Resumption
 
 T = TypeVar("T")
 
@@ -40,6 +45,12 @@ STROKE = "stroke.csv"
 the very ones that are done again."""
 RUN_FILES = (SCENE, SUMMARY, FORCES, PLOT, ENERGY_PLOT, INITIAL, FINAL, REPLAY)
 """Names of all files that a run can write, beside `STROKE`."""
+
+REPLAY_FRAMES = "replay.part"
+"""The frames of the replay, while the run goes on."""
+
+PASSING_FILES = (*CHECKPOINT_FILES, REPLAY_FRAMES)
+"""Names of files that are there until a run is complete."""
 
 FRAMES_PER_FLUSH = 25
 """Number of rows of `forces.csv` that are written together, which takes 0.1 ms: a kill loses a
@@ -82,6 +93,8 @@ class Outputs:
         plotter: Draws the plots. The caller closes it.
         columns: Columns of `forces.csv`.
         exports: Files beside the folder for the body's surface after the run; see `export`.
+        checkpoint_seconds: Simulated time between two checkpoints [s]; 0: there are none.
+        resumption: What is there of the run, if it goes on from there: then those files stay.
 
     Raises:
         UsageError: the path is a file, or lies below one.
@@ -94,20 +107,26 @@ class Outputs:
         plotter: Plotter,
         columns: Sequence[str] = COLUMNS,
         exports: Sequence[Path] = (),
+        checkpoint_seconds: float = 0.0,
+        resumption: "Resumption | None" = None,
     ) -> None:
         self.folder, self.exports = folder, tuple(exports)
+        self.checkpoint_seconds, self.resumption = checkpoint_seconds, resumption
         self._plotter = plotter
         make_folder(folder)
         self._lock = _naming_path(folder, FolderLock)
         self._reserve: DiskReserve | None = None
         try:
-            for name in RUN_FILES:
-                _naming_path(folder / name, _remove)
-            self._forces = self._growing(FORCES, columns)
+            kept = () if resumption is None else (SCENE, FORCES, *PASSING_FILES)
+            for name in (*PASSING_FILES, *RUN_FILES):
+                if name not in kept:
+                    _naming_path(folder / name, _remove)
+            n_kept = 0 if resumption is None else resumption.n_bytes
+            self._forces = self._growing(FORCES, columns, n_kept)
         except BaseException:
             self._lock.release()
             raise
-        self._n_written = 0
+        self._n_written = 0 if resumption is None else len(resumption.recorded)
         self._led: dict[str, GrowingFile] = {}
 
     def path(self, name: str) -> Path:
@@ -142,15 +161,19 @@ class Outputs:
         """Write the body as `initial.vtu` or `final.vtu`."""
         _naming_path(self.path(name), lambda path: write_vtu(path, snapshot))
 
+    def are_rows_due(self, recording: Recording) -> bool:
+        """Return whether the recording has so many new rows that they are to be written."""
+        return len(recording) - self._n_written >= FRAMES_PER_FLUSH
+
     def write_forces(self, recording: Recording, *, all_rows: bool = False) -> None:
         """Add the recording's new rows to `forces.csv`, once there are enough of them.
 
         Numbers are written so that reading them gives the same bits.
         """
-        n_new = len(recording) - self._n_written
-        if n_new < (1 if all_rows else FRAMES_PER_FLUSH):
+        has_new = len(recording) > self._n_written
+        if not (self.are_rows_due(recording) or (all_rows and has_new)):
             return
-        rows = _csv(recording.rows[self._n_written :])
+        rows = _csv(recording.since(self._n_written))
         self._n_written = len(recording)
         _append(self._forces, rows)
 
@@ -202,6 +225,16 @@ class Outputs:
         """Wait until the plots are drawn."""
         self._plotter.finish()
 
+    def replay_log(self) -> FrameLog:
+        """Return the file of the replay's frames; those of a run that goes on are in it."""
+        n_bytes = 0 if self.resumption is None else self.resumption.replay
+        return _naming_path(self.path(REPLAY_FRAMES), lambda path: FrameLog(path, n_bytes))
+
+    def remove_passing_files(self) -> None:
+        """Remove what only a run needs that goes on."""
+        for name in PASSING_FILES:
+            _naming_path(self.path(name), _remove)
+
     def write_replay(self, replay: ReplayWriter) -> None:
         """Write `replay.html`."""
         self._write_whole(REPLAY, replay.write)
@@ -231,10 +264,10 @@ class Outputs:
     ) -> None:
         self.close()
 
-    def _growing(self, name: str, columns: Sequence[str]) -> GrowingFile:
-        """Begin a file that grows."""
+    def _growing(self, name: str, columns: Sequence[str], n_kept: int = 0) -> GrowingFile:
+        """Begin a file that grows, or go on with so many of its bytes."""
         head = (",".join(columns) + "\n").encode("ascii")
-        return _naming_path(self.path(name), lambda path: GrowingFile(path, head))
+        return _naming_path(self.path(name), lambda path: GrowingFile(path, head, n_kept))
 
     def _write_whole(self, name: str, write: Callable[[Path], object]) -> None:
         """Write a file that appears when it is whole."""

@@ -111,12 +111,12 @@ class RunFacts(NamedTuple):
 def summarise(recording: Recording, facts: RunFacts) -> Summary:
     """Return the summary of a run."""
     n = len(recording)
-    force = np.linalg.norm(recording.vector("force"), axis=1)
+    force = recording.sizes("force")
     felt = force[force > 0.0]
     frame_times = recording.column("frame_s")
     median, slow = np.percentile(frame_times, (50, 99)) if n else (np.inf, np.inf)
     energies = final_energies(recording)
-    work = float(recording.column("work_of_blade_j")[-1]) if n else 0.0
+    work = recording.at_end("work_of_blade_j")
     return Summary(
         scene=facts.scene,
         status=facts.status,
@@ -131,9 +131,9 @@ def summarise(recording: Recording, facts: RunFacts) -> Summary:
         pieces=None if facts.pieces is None else len(facts.pieces),
         each_piece=[_as_numbers(piece) for piece in facts.pieces or ()],
         quality=None if facts.quality is None else quality_figures(facts.quality),
-        cut_area_m2=float(recording.column("cut_area_m2")[-1]) if n else 0.0,
+        cut_area_m2=recording.at_end("cut_area_m2"),
         asked_area_m2=facts.asked_area,
-        finished_area_m2=float(recording.column("finished_area_m2")[-1]) if n else 0.0,
+        finished_area_m2=recording.at_end("finished_area_m2"),
         cut_area_paid_m2=_area_paid_for(energies, facts.settings.get("material", {})),
         force_peak_n=float(force.max(initial=0.0)),
         force_mean_n=float(felt.mean()) if len(felt) else 0.0,
@@ -164,9 +164,7 @@ def _residual_of_work(
 
 def hand_figures(recording: Recording, name: str) -> dict[str, Any]:
     """Return what a grasper felt: peak force and torque, and how many points it held at most."""
-    force, torque = (
-        np.linalg.norm(recording.vector(f"{name}_{what}"), axis=1) for what in ("force", "torque")
-    )
+    force, torque = (recording.sizes(f"{name}_{what}") for what in ("force", "torque"))
     points = recording.column(f"{name}_points")
     return {
         "name": name,
@@ -182,7 +180,7 @@ def _attachments(recording: Recording, facts: RunFacts) -> list[dict[str, Any]]:
     tables = facts.settings.get("attachments", [])
     found = []
     for i in range(recording.n_held):
-        sizes = np.linalg.norm(recording.vector(f"held_{i}"), axis=1)
+        sizes = recording.sizes(f"held_{i}")
         found.append(
             {
                 "where": tables[i]["where"] if i < len(tables) else "",
@@ -243,7 +241,7 @@ def final_energies(recording: Recording) -> dict[str, float] | None:
     if not recording.is_audited:
         return None
     names = ("work_of_blade_j", *ACCOUNT)
-    return {name.removesuffix("_j"): float(recording.column(name)[-1]) for name in names}
+    return {name.removesuffix("_j"): recording.at_end(name) for name in names}
 
 
 def shares(recording: Recording, wall_seconds: float) -> dict[str, float]:

@@ -75,7 +75,8 @@ class GraspMotion:
         self.pads = min(openings), max(openings)
         """Smallest and largest distance of the pads in it [m]; of one that rests until it is led,
         those of its script."""
-        self._waypoints = waypoints
+        self.waypoints = tuple(waypoints)
+        """Where it is when; see `Waypoint`."""
         self._times = [waypoint.time for waypoint in waypoints]
         self._poses = [_pose(waypoint, name) for waypoint in waypoints]
 
@@ -88,8 +89,8 @@ class GraspMotion:
         """Return the distance between the pads at time `t` [s], in m."""
         i = bisect_right(self._times, t)
         if i == 0 or i == len(self._times):
-            return self._waypoints[min(i, len(self._times) - 1)].opening
-        before, after = self._waypoints[i - 1], self._waypoints[i]
+            return self.waypoints[min(i, len(self._times) - 1)].opening
+        before, after = self.waypoints[i - 1], self.waypoints[i]
         share = (t - before.time) / (after.time - before.time)
         share = share if self.is_led else least_jerk(share)
         return before.opening + share * (after.opening - before.opening)

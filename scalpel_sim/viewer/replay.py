@@ -2,7 +2,7 @@
 
 import base64
 import gzip
-import math
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +10,9 @@ from typing import NamedTuple
 import mujoco
 
 from bridge import TissueFrame
+from scalpel_sim.errors import RunError
 from scalpel_sim.tables.view import ViewTable
+from scalpel_sim.viewer.frame_log import FrameLog, LoggedFrame
 from scalpel_sim.viewer.messages import NO_VALUES, SceneState
 from scalpel_sim.viewer.model_shapes import shapes_of
 from scalpel_sim.viewer.page import replay_page
@@ -36,6 +38,10 @@ _CAPTION = (
 """Text below the heading of a replay."""
 
 
+_PLACE = "<!-- the packets of the run -->"
+"""Stands in the page for what is written one frame after the other."""
+
+
 class _Frame(NamedTuple):
     """One frame of the replay."""
 
@@ -46,7 +52,7 @@ class _Frame(NamedTuple):
 
 
 class ReplayWriter:
-    """Keeps frames of a run and writes them as one page.
+    """Keeps frames of a run in a file, and writes them as one page.
 
     Bodies with many triangles get fewer frames per second, so that the file stays small: when the
     frames take too much space, every second one is dropped, and from then on half as many are kept.
@@ -60,6 +66,7 @@ class ReplayWriter:
         frame: TissueFrame | None = None,
         wireframe: bool = False,
         views: Sequence[ViewTable] = (),
+        log: FrameLog | None = None,
     ) -> None:
         """Prepare a replay.
 
@@ -69,15 +76,18 @@ class ReplayWriter:
             frame: Pose of the tissue frame in the world; by default they coincide.
             wireframe: Whether the edges of the tissue's triangles are drawn at the start.
             views: Cameras that the page offers, as a scene has them; it begins with the first.
+            log: Holds its frames, and those of the run so far; None: a temporary file does.
         """
         self._model = model
         self._title = title
         self._tissue_frame = frame
         self._wireframe = wireframe
         self._views = tuple(views)
-        self._frames: list[_Frame] = []
-        self._interval = 1.0 / FRAMES_PER_SECOND
+        self._log = FrameLog() if log is None else log
         self._last: _Frame | None = None
+        self._frames: list[LoggedFrame] = []
+        self._interval = 1.0 / FRAMES_PER_SECOND
+        self._read_log()
 
     def is_due(self, time: float) -> bool:
         """Return whether a frame at this simulated time [s] would be kept.
@@ -102,26 +112,47 @@ class ReplayWriter:
             body_poses: Poses of all bodies of the model, see `model_shapes.body_poses`.
             readings: Numbers to show beside the picture.
             values: Quantities at the vertices of the surface, which the page offers as colours.
+
+        Raises:
+            RunError: the file of the frames cannot be written.
         """
         frame = _Frame(time, SceneState(surface, body_poses, readings, values=values))
         if not self.is_due(time):
             self._last = frame
             return
         self._last = None
+        try:
+            self._keep(self._log.add(*frame))
+        except OSError as error:
+            where = self._log.path or tempfile.gettempdir()
+            raise RunError(
+                f"{where}: the frames of the replay cannot be written there "
+                f"({error.strerror or error}); make room"
+            ) from error
+
+    def _keep(self, frame: LoggedFrame) -> None:
+        """Keep a frame, and fewer of all where they take too much space."""
         self._frames.append(frame)
-        n_triangles = sum(len(frame.state.surface.triangles) for frame in self._frames)
+        n_triangles = sum(frame.n_triangles for frame in self._frames)
         if n_triangles * BYTES_PER_TRIANGLE > FILE_LIMIT and len(self._frames) > 2:
             self._frames = self._frames[::2]
             self._interval *= 2.0
 
-    def mark(self) -> float:
-        """Return the simulated time of the last frame [s]."""
-        return self._frames[-1].time if self._frames else -math.inf
+    def _read_log(self) -> None:
+        """Keep of the frames in the file those that were kept when the last of them came."""
+        self._frames, self._interval = [], 1.0 / FRAMES_PER_SECOND
+        for frame in self._log.frames():
+            self._keep(frame)
 
-    def cut_back(self, mark: float) -> None:
+    def mark(self) -> int:
+        """Return how far the file of the frames has got [bytes]."""
+        return self._log.n_bytes
+
+    def cut_back(self, mark: int) -> None:
         """Forget the frames that were added after a mark."""
-        self._frames = [frame for frame in self._frames if frame.time <= mark]
+        self._log.cut_back(mark)
         self._last = None
+        self._read_log()
 
     def write(self, path: Path) -> None:
         """Write the page.
@@ -131,25 +162,33 @@ class ReplayWriter:
             RunError: meshcat's viewer was not found.
             OSError: the file cannot be written.
         """
-        frames = [*self._frames, *([self._last] if self._last is not None else [])]
-        if not frames:
+        if not (self._frames or self._last):
             raise ValueError("the replay has no frames: add at least one before writing it")
-        path.write_text(
-            replay_page(self._title, _CAPTION, "\n".join(self._elements(frames))), encoding="utf-8"
-        )
+        head, tail = replay_page(self._title, _CAPTION, _PLACE).split(_PLACE)
+        with path.open("w", encoding="utf-8") as file:
+            file.write(head)
+            for i, element in enumerate(self._elements()):
+                file.write(element if i == 0 else f"\n{element}")
+            file.write(tail)
 
-    def _elements(self, frames: list[_Frame]) -> Iterator[str]:
+    def _all(self) -> Iterator[_Frame]:
+        """Yield all frames, of which one is in memory."""
+        for frame in self._frames:
+            yield _Frame(frame.time, self._log.read(frame))
+        if self._last is not None:
+            yield self._last
+
+    def _elements(self) -> Iterator[str]:
         """Yield the script elements that hold the run: the opening packet, then the frames."""
         # The shapes are made here and not at the start, which loading trimesh would delay by 0.3 s.
         shapes = shapes_of(self._model)
         packets = ScenePackets(
             shapes, self._tissue_frame, wireframe=self._wireframe, views=self._views
         )
-        first = frames[0].state
-        opening = packets.opening(first.surface, first.body_poses)
-        yield _script(opening, frames[0].time)
-        for frame in frames:
-            yield _script(packets.frame(*frame.state), frame.time)
+        for i, (time, state) in enumerate(self._all()):
+            if i == 0:
+                yield _script(packets.opening(state.surface, state.body_poses), time)
+            yield _script(packets.frame(*state), time)
 
 
 def _script(packet: bytes, time: float) -> str:

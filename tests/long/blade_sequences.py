@@ -5,7 +5,6 @@ from typing import Any
 import numpy as np
 
 from tests import bodies, incisions, soundness
-from tests.child import answer
 from tests.long.cut_sequences import BODIES, Cut, Draw, body, drawn, kinds_of
 from tests.strokes import DT, Stroke, pose, sweeps
 from tissue import BladeSegment, BladeShape, Tissue
@@ -95,7 +94,3 @@ def run(case: int) -> dict[str, Any]:
             named = [f"in {name} after stroke {i}, {kind}: {fault}" for fault in found]
             return {"faults": named, "n_strokes": i + 1}
     return {"faults": [], "n_strokes": len(earlier)}
-
-
-if __name__ == "__main__":
-    answer(run)

@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import faulthandler
 import gc
 import importlib
 import itertools
@@ -13,7 +14,7 @@ import time
 import traceback
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 HANG = 2.0
 """Processor time that a file or a frame may take at most [s]."""
@@ -47,6 +48,8 @@ class Outcome(NamedTuple):
     """Processor time [s]."""
     memory: int
     """Memory that the child had in use when it was last looked at [byte]."""
+    answer: Any
+    """What the function returned."""
 
 
 class Child:
@@ -57,7 +60,9 @@ class Child:
         function: Name of the function.
         arguments: Arguments after the number of the case.
         longest: Processor time that a case may take at most [s].
+        patience: Wall time after which a case that has not come back is ended [s].
         growth: Growth of memory that is allowed [byte].
+        room: Address space that it may take beyond what it has at the start [byte]; None for any.
     """
 
     def __init__(
@@ -66,20 +71,27 @@ class Child:
         function: str,
         *arguments: object,
         longest: float = HANG,
-        growth: int = GROWTH_ALLOWED,
+        patience: float = PATIENCE,
+        growth: float = GROWTH_ALLOWED,
+        room: int | None = ROOM,
     ) -> None:
-        self._call = (module, function, arguments)
-        self._longest, self._growth = longest, growth
+        self._call = (room, module, function, arguments)
+        self._longest, self._growth, self._patience = longest, growth, patience
         self._process: multiprocessing.process.BaseProcess | None = None
 
-    def run(self, case: int) -> None:
-        """Run a case; fail if it fails, takes too long, takes memory, or ends the process."""
+    def run(self, case: int) -> Any:
+        """Run a case and return its answer.
+
+        Raises:
+            AssertionError: it failed, took too long, took memory, or ended the process.
+        """
         outcome = self._outcome(case)
         assert not outcome.failure, outcome.failure
         assert outcome.seconds < self._longest, f"case {case} took {outcome.seconds:.1f} s"
         self._memory = self._memory or outcome.memory
         growth = outcome.memory - self._memory
         assert growth < self._growth, f"the memory of this process has grown by {growth} bytes"
+        return outcome.answer
 
     def close(self) -> None:
         """End the process."""
@@ -94,9 +106,9 @@ class Child:
             self._start()
         try:
             self._pipe.send(case)
-            if not self._pipe.poll(PATIENCE):
+            if not self._pipe.poll(self._patience):
                 self.close()
-                raise AssertionError(f"case {case} did not come back within {PATIENCE:g} s")
+                raise AssertionError(f"case {case} did not come back within {self._patience:g} s")
             return self._pipe.recv()
         except (EOFError, ConnectionError) as error:
             process = self._process
@@ -113,29 +125,37 @@ class Child:
         self._memory = 0
 
 
-def _serve(pipe: Connection, module: str, function: str, arguments: tuple[object, ...]) -> None:
+def _serve(
+    pipe: Connection,
+    room: int | None,
+    module: str,
+    function: str,
+    arguments: tuple[object, ...],
+) -> None:
     """Run the cases that come through a pipe until it is closed."""
+    faulthandler.enable()
     call = getattr(importlib.import_module(module), function)
-    _limit_memory()
+    if room is not None:
+        _limit_memory(room)
     memory = 0
     with contextlib.suppress(EOFError):
         for n in itertools.count():
             case = pipe.recv()
-            failure, begun = "", time.process_time()
+            failure, answer, begun = "", None, time.process_time()
             try:
-                call(case, *arguments)
+                answer = call(case, *arguments)
             except BaseException:
                 failure = traceback.format_exc()
             seconds = time.process_time() - begun
             if n % N_FIRST == N_FIRST - 1:
                 memory = memory_of_this_process()
-            pipe.send(Outcome(failure, seconds, memory))
+            pipe.send(Outcome(failure, seconds, memory, answer))
 
 
-def _limit_memory() -> None:
+def _limit_memory(room: int) -> None:
     if sys.platform == "linux":
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        most = pages * os.sysconf("SC_PAGE_SIZE") + ROOM
+        most = pages * os.sysconf("SC_PAGE_SIZE") + room
         resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 

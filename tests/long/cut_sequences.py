@@ -89,6 +89,9 @@ class Draw(NamedTuple):
 MARGIN = 0.1
 """How far an edge that passes the whole body reaches beyond it [half diagonals]."""
 
+SHORTEST = 0.15
+"""Length of the shortest edge of a slit [half diagonals]."""
+
 
 def extent(draw: Draw, through: FloatArray, along: FloatArray) -> FloatArray:
     """Return from where to where the body reaches along a direction from a point, with a margin.
@@ -132,7 +135,8 @@ def slit(draw: Draw) -> Cut:
     """Return a cut that stops inside the body, its tip inside too."""
     through, turn = draw.point(), draw.turn()
     path, edge = (extent(draw, through, turn[:, k]) for k in (0, 1))
-    path[1], edge[0] = draw.random.uniform(-0.3, 0.3, 2)
+    path[1] = draw.random.uniform(path[0] + MARGIN, path[1])
+    edge[0] = draw.random.uniform(edge[0], edge[1] - SHORTEST)
     return draw.surface(turn, through, Shape(path, *edge))
 
 

@@ -212,7 +212,7 @@ def _beside_a_client(kind: str, random: np.random.Generator) -> None:
         hello = pack_frame(MessageKind.HELLO, 0, nonce)
         step = pack_frame(MessageKind.STEP, 1, requests[i])
         stream = (hello, hello + step, hello + hello)[random.integers(3)]
-        stranger.send(_damaged_bytes(stream, random))
+        stranger.send(damaged_bytes(stream, random))
         for frame in stranger.frames():
             assert frame.kind in (MessageKind.ERROR, MessageKind.CHALLENGE), frame
             if frame.kind == MessageKind.ERROR:
@@ -231,7 +231,7 @@ def _as_client(random: np.random.Generator) -> None:
             client = _new_client(random)
         if random.random() < 0.03:
             request = pack_frame(MessageKind.STEP, client.sequence, reference()[0][i])
-            client.send(_damaged_bytes(request, random))
+            client.send(damaged_bytes(request, random))
             client.sequence += 1
             frames = client.frames()
         else:
@@ -335,9 +335,7 @@ def _as_device(random: np.random.Generator) -> None:
         if choice < 0.7:
             frames = device.ask(MessageKind.SERVO, _damaged_numbers(good, random))
         elif choice < 0.9:
-            device.send(
-                _damaged_bytes(pack_frame(MessageKind.SERVO, device.sequence, good), random)
-            )
+            device.send(damaged_bytes(pack_frame(MessageKind.SERVO, device.sequence, good), random))
             device.sequence += 1
             frames = device.frames()
         else:
@@ -359,7 +357,7 @@ def _as_device(random: np.random.Generator) -> None:
 # ---- damage --------------------------------------------------------------------------------------
 
 
-def _damaged_bytes(stream: bytes, random: np.random.Generator) -> bytes:
+def damaged_bytes(stream: bytes, random: np.random.Generator) -> bytes:
     """Return a stream with some bytes changed, and sometimes a part omitted or repeated."""
     changed = bytearray(stream)
     for at in random.integers(0, len(changed), random.integers(1, 5)):
@@ -399,7 +397,7 @@ def _damaged_text(content: object, random: np.random.Generator) -> bytes:
     for _ in range(random.integers(1, 4)):
         values = [i for i, letter in enumerate(text) if letter in ":,["]
         if not values or random.random() < 0.3:
-            return _damaged_bytes(text.encode(), random)
+            return damaged_bytes(text.encode(), random)
         start = int(random.choice(values)) + 1
         end = start
         while end < len(text) and text[end] not in ",]}":

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tests import soundness
-from tests.child import answer
 from tests.exact_pieces import ExactPieces, Parts, divided
 from tests.long.cut_sequences import BODIES, Cut, Draw, body, drawn, kinds_of
 from tissue import CutSettings, FloatArray, Snapshot, Tissue
@@ -41,6 +40,8 @@ MOVED = (
     Variant(widened=-1.0, crumb=2.0),
     Variant(aside=1),
     Variant(aside=2),
+    Variant(widened=1.0, crumb=0.5, aside=3),
+    Variant(widened=-1.0, crumb=2.0, aside=4),
 )
 
 
@@ -144,7 +145,3 @@ def _longer(rows: FloatArray, by: float) -> FloatArray:
         length = np.linalg.norm(outward, axis=1, keepdims=True)
         longer[:, end] += np.maximum(by, -0.49 * length) * outward / length
     return longer
-
-
-if __name__ == "__main__":
-    answer(run)

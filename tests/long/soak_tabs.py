@@ -1,10 +1,11 @@
 """Opens and closes tabs of a page at random until standard input ends; prints how many."""
 
 import asyncio
+import contextlib
 import random
 import sys
 
-from tornado.websocket import WebSocketClientConnection, websocket_connect
+from tornado.websocket import WebSocketClientConnection, WebSocketClosedError, websocket_connect
 
 MOST_TABS = 10
 """Tabs that are open at once."""
@@ -41,7 +42,8 @@ async def opened(url: str, reads: bool) -> WebSocketClientConnection:
 
     def drawn(message: str | bytes | None) -> None:
         if reads and message is not None:
-            tab.write_message(DRAWN)
+            with contextlib.suppress(WebSocketClosedError):
+                tab.write_message(DRAWN)
 
     address = url.replace("http", "ws") + "frames"
     tab = await websocket_connect(address, on_message_callback=drawn)

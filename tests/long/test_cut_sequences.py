@@ -1,39 +1,46 @@
 """Sequences of 5 to 50 random cuts leave a sound body, by a blade and by `Tissue.incise`."""
 
+import math
+
 import pytest
 
 from tests.battery import Disagreement, battery
-from tests.child import Child
+from tests.long.child import Child
 
-LIMIT = 600.0
-"""Longest time of a sequence [s]; most take some seconds, on a machine that has other work too."""
+LONGEST, PATIENCE = 120.0, 900.0
+"""Longest processor time, and wall time, of a sequence [s]; most take some seconds."""
+
+
+def sequences(module):
+    """Return a process that makes the sequences of a module; caches of bodies fill its memory."""
+    return Child(module, "run", longest=LONGEST, patience=PATIENCE, growth=math.inf)
 
 
 @pytest.fixture(scope="module")
 def blade():
-    child = Child("tests.long.blade_sequences", LIMIT)
+    child = sequences("tests.long.blade_sequences")
     yield child
     child.close()
 
 
 @pytest.fixture(scope="module")
 def knife():
-    child = Child("tests.long.incision_sequences", LIMIT)
+    child = sequences("tests.long.incision_sequences")
     yield child
     child.close()
 
 
-@battery(n_per_change=4, n_long=5_000)
+@battery(n_per_change=3, n_long=5_000)
 def test_strokes_of_a_blade_leave_a_sound_body(blade, tally, case):
-    reply = blade.ask(case=case)
+    reply = blade.run(case)
     assert reply["faults"] == []
     tally["strokes"] += reply["n_strokes"]
 
 
-@battery(n_per_change=6, n_long=5_000, disagreements=0.01)
+@battery(n_per_change=4, n_long=5_000, disagreements=0.01)
 def test_incisions_leave_a_sound_body_in_the_pieces_of_an_exact_cut(knife, tally, case):
     """Or in a number that the same cuts leave where each is moved by the path error."""
-    reply = knife.ask(case=case)
+    reply = knife.run(case)
     assert reply["faults"] == []
     pieces, exact = reply["pieces"], reply["exact"]
     is_as_exact, is_sure = pieces == exact[0], len(set(exact)) == 1

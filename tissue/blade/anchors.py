@@ -62,6 +62,9 @@ class Anchors(Arrays):
     """Whether the anchor is at the skin, which the edge has yet to break; shape (n,)."""
     is_new: BoolArray
     """Whether the anchor was set since the path was traced last; shape (n,)."""
+    pulls: BoolArray
+    """Whether the energy of the anchor is in the account: the edge was not behind it where slip was
+    applied last, or where the anchor was set; shape (n,)."""
     speed: FloatArray
     """Forward speed of the sample of the edge in this step [m/s], shape (n,). It decides the
     toughness. With the speed of the anchor itself, from one short step to the next, the anchor
@@ -118,6 +121,7 @@ def new_anchors(n: int, edge_length: float, stiffness: float) -> Anchors:
         slipped=np.zeros(n, dtype=np.bool_),
         at_skin=np.zeros(n, dtype=np.bool_),
         is_new=np.zeros(n, dtype=np.bool_),
+        pulls=np.zeros(n, dtype=np.bool_),
         speed=np.zeros(n),
         rest_share=np.ones(n),
         rest_area=np.zeros((n, 3)),

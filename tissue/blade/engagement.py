@@ -133,7 +133,9 @@ def anchor_beside(
             join_wall(anchors.walls, k, beside)
             anchors.rest_share[k] = anchors.rest_share[beside]
             store(anchors.rest_area, k, vec3(anchors.rest_area, beside))
-            blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
+            anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
+            if anchors.pulls[k]:
+                blade.totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
 
 
 @kernel
@@ -237,6 +239,7 @@ def _begin_anchor(anchors: Anchors, body: Body, k: int, t: int, p: Vec3, at_skin
     set_anchor(anchors, body, k, t, p)
     anchors.slipped[k] = False
     anchors.is_new[k] = True
+    anchors.pulls[k] = True
     anchors.rest_share[k] = 1.0
     store(anchors.rest_area, k, Vec3(0.0, 0.0, 0.0))
     anchors.at_skin[k] = at_skin

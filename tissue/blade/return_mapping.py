@@ -181,8 +181,10 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
         a = anchor_position(anchors, body, body.positions, k)
         stretch = sub(sample_point(pose, k, n), a)
         if dot(stretch, pose.forward) < 0.0:
-            if anchors.state[k] == ANCHORED:
-                totals.released += 0.5 * anchors.stiffness[k] * dot(stretch, stretch)
+            if anchors.pulls[k]:  # what remained as its pull in the plane of the blade fell to zero
+                beside = dot(stretch, pose.normal)
+                totals.released += 0.5 * anchors.stiffness[k] * beside * beside
+                anchors.pulls[k] = False
             is_far = abs(dot(stretch, pose.normal)) > blade.reach
             anchors.state[k] = FREE if is_far else RETRACTED
             continue
@@ -190,8 +192,10 @@ def slip_anchors(blade: BladeState, body: Body, visits: Visits, pose: BladePose)
             if abs(dot(stretch, pose.along)) > blade.reach:  # the blade came back elsewhere
                 anchors.state[k] = FREE
                 continue
-            totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
             anchors.state[k] = ANCHORED
+        if not anchors.pulls[k]:
+            totals.released -= stored_energy(anchors, k, stretch, pose, blade.toughness)
+            anchors.pulls[k] = True
         _slip_anchor(blade, body, visits, k, a, stretch, pose)
 
 
@@ -236,6 +240,7 @@ def _slip_anchor(
         anchors.cut[k] += share * surplus * across
         totals.work_of_cutting += spent
         totals.released += before - spent
+        anchors.pulls[k] = False
         return
     # Where the tissue is very distorted an anchor slips less far than asked.
     slipped = sub(anchor_position(anchors, body, body.positions, k), a)
@@ -245,6 +250,7 @@ def _slip_anchor(
         anchors.tetrahedron[k] = t
         anchors.state[k] = LEFT
         totals.released += before
+        anchors.pulls[k] = False
         return
     area = across * dot(slipped, in_plane) / distance
     cost = held_toughness(anchors, k, law) * area
@@ -256,7 +262,11 @@ def _slip_anchor(
     way = sub(vec3(anchors.rest, k), rest)
     update_rest_share(anchors, k, way, slipped, pose, blade.reach)
     at = anchor_position(anchors, body, body.positions, k)
-    totals.released += left - stored_energy(anchors, k, sub(add(a, stretch), at), pose, law)
+    stretch = sub(add(a, stretch), at)
+    anchors.pulls[k] = dot(stretch, pose.forward) >= 0.0
+    totals.released += left
+    if anchors.pulls[k]:
+        totals.released -= stored_energy(anchors, k, stretch, pose, law)
 
 
 @kernel

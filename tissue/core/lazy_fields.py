@@ -53,6 +53,12 @@ def lazy_fields(**makers: Callable[[Any], Any]) -> Callable[[_C], _C]:
     return decorate
 
 
+def plain_class(kind: type) -> type:
+    """Return the named tuple of which a class makes fields when they are asked for, or itself."""
+    is_lazy = any(isinstance(each, _LazyField) for each in vars(kind).values())
+    return kind.__mro__[1] if is_lazy else kind
+
+
 _OF_TUPLES = (
     *(f"__{name}__" for name in ("eq", "ne", "lt", "le", "gt", "ge", "hash", "add", "mul", "rmul")),
     *("__getitem__", "__contains__", "count", "index"),

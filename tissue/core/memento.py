@@ -31,10 +31,24 @@ class StateRules(NamedTuple):
     """Attributes that are made again from others, and what they are until then."""
     own: frozenset[str] = frozenset()
     """Attributes that are no state: an object keeps its own."""
+    unwritten: frozenset[str] = frozenset()
+    """Attributes that are not in the plain form: an object that is put to it keeps its own."""
     structs: StructRules = StructRules()
     """What of the memory of structs is state."""
     made: Mapping[str, type] = MappingProxyType({})
     """Classes of objects that are made where a state from elsewhere has more of them, by name."""
+
+    def with_others(self, others: "StateRules") -> "StateRules":
+        """Return rules for a tree of which other rules hold for a part."""
+        return StateRules(
+            self.packages | others.packages,
+            self.kept | others.kept,
+            {**self.derived, **others.derived},
+            self.own | others.own,
+            self.unwritten | others.unwritten,
+            self.structs if others.structs == StructRules() else others.structs,
+            {**self.made, **others.made},
+        )
 
 
 class Spares:

@@ -1,12 +1,13 @@
 """Puts a tree of objects to a memento in plain form, which another process may have written."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from tissue.core.lazy_fields import plain_class
 from tissue.core.memento import StateRules
-from tissue.core.memento_writing import LENGTHS, PACKED, TAILS
+from tissue.core.memento_writing import LENGTHS, PACKED, TAILS, name_of_tuple
 from tissue.core.memory_blocks import PackedMemory, unpacked
 from tissue.core.struct_memory import memory_of
 from tissue.core.structs import Arrays
@@ -64,13 +65,14 @@ class _Reader:
         self._taken: set[int] = set()
         self._structs: dict[int, Arrays] = {}
         self._struct_classes = {kind.__name__: kind for kind in _subclasses(Arrays)}
+        self._tuple_classes = _tuple_classes(rules.packages)
 
     def structs(self) -> list[Arrays]:
         """Return the structs in the order in which their memory was packed."""
         return [self._structs[i] for i in range(len(self._structs))]
 
-    def value(self, written: Any, live: Any) -> Any:
-        """Return an object; `live` is what is in its place now."""
+    def value(self, written: Any, live: Any, *, is_in_tuple: bool = False) -> Any:
+        """Return an object; `live` is what is in its place now, as an item of a tuple or not."""
         if not isinstance(written, dict):
             return written
         if "float" in written:
@@ -79,10 +81,10 @@ class _Reader:
             return np.dtype(written["dtype"]).type(written["number"])
         number = written["@"]
         if number not in self._made:
-            self._make(number, live)
+            self._make(number, live, is_in_tuple)
         return self._made[number]
 
-    def _make(self, number: int, live: Any) -> None:
+    def _make(self, number: int, live: Any, is_in_tuple: bool) -> None:
         """Find or make the object of a node."""
         node = self._nodes[number]
         kind = next(iter(node))
@@ -91,12 +93,29 @@ class _Reader:
                 raise _other_version(f"there is no {node['kept']} here")
             self._made[number] = live
         elif kind == "array":
-            self._made[number] = np.array(self._arrays[node["array"]])
+            self._make_array(number, self._arrays[node["array"]], live, is_in_tuple)
         elif kind == "vectors":
             numbers = tuple(self.value(each, None) for each in node["numbers"])
             self._made[number] = self._struct_class(node["vectors"]).of_numbers(numbers)
         else:
             getattr(self, f"_make_{kind}")(number, node, live)
+
+    def _make_array(self, number: int, then: np.ndarray, live: Any, is_in_tuple: bool) -> None:
+        """Take the array that is there, of which others may be views, or make one.
+
+        What owns its memory in a tuple may be a constant of a module: there one is made.
+        """
+        found = then.copy()
+        is_like = isinstance(live, np.ndarray) and (live.shape, live.dtype) == (
+            then.shape,
+            then.dtype,
+        )
+        is_ours = is_like and not (is_in_tuple and live.flags.owndata)
+        if is_ours and live.flags.writeable and id(live) not in self._taken:
+            found = live
+            self._taken.add(id(live))
+            self.changes.append(lambda: live.__setitem__(..., then))
+        self._made[number] = found
 
     def _make_object(self, number: int, node: dict[str, Any], live: Any) -> None:
         name = node["object"]
@@ -144,14 +163,12 @@ class _Reader:
 
     def _make_tuple(self, number: int, node: dict[str, Any], live: Any) -> None:
         name = node["tuple"]
-        now = list(tuple.__iter__(live)) if isinstance(live, tuple) else []
-        items = self._items(node["items"], now)
-        if name == "tuple":
+        now = list(live) if isinstance(live, tuple) else []
+        items = self._items(node["items"], now, are_in_tuple=True)
+        if name == name_of_tuple(tuple):
             self._made[number] = tuple(items)
-        elif type(live).__name__ == name:
-            self._made[number] = tuple.__new__(type(live), items)
-        elif name in self._rules.made:
-            self._made[number] = tuple.__new__(self._rules.made[name], items)
+        elif name in self._tuple_classes:
+            self._made[number] = tuple.__new__(self._tuple_classes[name], items)
         else:
             raise _other_version(f"there is no {name} here")
 
@@ -176,14 +193,17 @@ class _Reader:
         self._taken.add(id(struct))
         self._made[number] = self._structs[node["index"]] = struct
 
-    def _items(self, written: list[Any], live: list[Any]) -> list[Any]:
+    def _items(
+        self, written: list[Any], live: list[Any], *, are_in_tuple: bool = False
+    ) -> list[Any]:
         """Return the items of a list: those with a number are found by it, others by place."""
         numbers = {getattr(item, "number", None): item for item in live}
         found = []
         for i, item in enumerate(written):
             here = live[i] if i < len(live) else None
             number = self._number_of(item)
-            found.append(self.value(item, here if number is None else numbers.get(number)))
+            now = here if number is None else numbers.get(number)
+            found.append(self.value(item, now, is_in_tuple=are_in_tuple))
         return found
 
     def _number_of(self, written: Any) -> Any:
@@ -220,6 +240,12 @@ def _room(shape: tuple[int, ...], dtype: np.dtype) -> np.ndarray:
     memory: np.ndarray = np.zeros(n_bytes + 2 * _PADDING, np.uint8)
     skip = -memory.ctypes.data % _PADDING
     return memory[skip : skip + n_bytes].view(dtype).reshape(shape)
+
+
+def _tuple_classes(packages: Iterable[str]) -> dict[str, type]:
+    """Return the classes of tuples of some packages by their names."""
+    ours = [kind for kind in _subclasses(tuple) if kind.__module__.partition(".")[0] in packages]
+    return {name_of_tuple(kind): plain_class(kind) for kind in ours}
 
 
 def _subclasses(kind: type) -> list[type]:

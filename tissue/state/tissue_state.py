@@ -3,7 +3,9 @@
 import io
 import json
 import zipfile
-from typing import Any, Self
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -21,6 +23,12 @@ from tissue.state.memory_in_use import STRUCTS
 
 _TREE = "tree"
 """Name of the JSON in the bytes of a state."""
+
+_BESIDE = "beside_"
+"""What the names of arrays begin with that are written with a state."""
+
+NOTHING: Mapping[str, np.ndarray] = MappingProxyType({})
+"""No arrays."""
 
 
 def _none() -> None:
@@ -53,6 +61,15 @@ RULES = StateRules(
     },
 )
 """What of a tissue is its state."""
+
+
+class Around(NamedTuple):
+    """A tree of objects that refers to a tissue, and is put to a state with it."""
+
+    root: Any
+    """Its root."""
+    rules: StateRules
+    """What of it is no state; the tissue has rules of its own."""
 
 
 class TissueState:
@@ -92,13 +109,40 @@ class TissueState:
             ) from error
         return cls(identity, None, content)
 
-    def to_bytes(self) -> bytes:
-        """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and one of JSON."""
+    def to_bytes(
+        self, around: Memento | None = None, beside: Mapping[str, np.ndarray] = NOTHING
+    ) -> bytes:
+        """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and one of JSON.
+
+        Args:
+            around: A tree that refers to the tissue, of the same time, which is written with it.
+            beside: Arrays that are written with it, by their names.
+        """
         file = io.BytesIO()
-        np.savez(file, allow_pickle=False, **self._written())
+        others = {f"{_BESIDE}{name}": array for name, array in beside.items()}
+        np.savez(file, allow_pickle=False, **self._written(around), **others)
         return file.getvalue()
 
-    def load_into(self, tissue: Any, identity: Identity) -> None:
+    def beside(self, name: str) -> np.ndarray:
+        """Return an array that was written with a state from bytes.
+
+        Raises:
+            StateError: there is none of that name.
+        """
+        found = None if self._content is None else self._content.get(f"{_BESIDE}{name}")
+        if found is None:
+            raise StateError(f"the state has no part '{name}': it is of a tissue alone")
+        return found
+
+    def expect_of(self, identity: Identity) -> None:
+        """Refuse to be of a tissue with another identity.
+
+        Raises:
+            StateError: the message says what differs.
+        """
+        identity.expect(self._identity)
+
+    def load_into(self, tissue: Any, identity: Identity, around: Around | None = None) -> None:
         """Put a tissue to this state.
 
         Raises:
@@ -107,16 +151,18 @@ class TissueState:
         if self._memento is not None and self._memento.root is tissue:
             self._memento.restore()
             return
-        identity.expect(self._identity)
+        self.expect_of(identity)
         content = self._written()
-        put_to(tissue, json.loads(content[_TREE].tobytes()), content, RULES)
+        root, rules = (tissue, RULES) if around is None else around
+        both = RULES if around is None else rules.with_others(RULES)
+        put_to(root, json.loads(content[_TREE].tobytes()), content, both)
 
-    def _written(self) -> dict[str, np.ndarray]:
+    def _written(self, around: Memento | None = None) -> dict[str, np.ndarray]:
         """Return the state as arrays by their names."""
         if self._content is not None:
             return self._content
         assert self._memento is not None
-        tree, arrays = written(self._memento)
+        tree, arrays = written(self._memento, around)
         tree["identity"] = self._identity._asdict()
         text = json.dumps(tree, allow_nan=False).encode()
         return arrays | {_TREE: np.frombuffer(text, np.uint8)}

@@ -12,8 +12,9 @@ from bridge.tcp.messages.poses import LARGEST_COORDINATE, POSE_BYTES, checked_po
 from bridge.tcp.wire import MessageError
 from tissue import BladeSegment, BladeSweep
 
-_LONGEST_STEP = 1.0
-"""Longest step [s]. A frame is a millisecond; a step of hours would take days to compute."""
+_SHORTEST_STEP, _LONGEST_STEP = 1e-9, 1.0
+"""Shortest and longest step [s]. A frame is a millisecond. A step of hours would take days, and in
+one of 1e-310 s speeds are infinite."""
 _UNIT_TOLERANCE = 1e-6
 """Largest difference of the length of `forward` from 1: the accuracy of single precision."""
 
@@ -89,6 +90,6 @@ def _check_segment(numbers: tuple[float, ...]) -> None:
 
 
 def _checked_step(dt: float) -> float:
-    if not 0.0 < dt <= _LONGEST_STEP:
-        raise MessageError(f"a step of {dt} s; wanted more than 0 and at most {_LONGEST_STEP:g}")
+    if not _SHORTEST_STEP <= dt <= _LONGEST_STEP:
+        raise MessageError(f"a step of {dt} s; wanted {_SHORTEST_STEP:g} to {_LONGEST_STEP:g}")
     return dt

@@ -63,7 +63,7 @@ def recorded(n_frames: int) -> Recording:
     """Return a random recording whose stage times sum to less than the wall time."""
     untimed = COLUMNS.index("cd_s") - 1
     rng = np.random.default_rng(0)
-    recording = Recording(1)
+    recording = Recording()
     for i in range(n_frames):
         recording.append((i * DT, *rng.normal(size=untimed), *rng.uniform(0.0, 1e-5, 6)))
     return recording
@@ -93,7 +93,7 @@ def summary_of(
 
 def test_a_recording_keeps_every_frame_when_it_grows():
     rows = np.arange(3000.0 * len(COLUMNS)).reshape(3000, -1)
-    recording = Recording(1)
+    recording = Recording()
     for row in rows:
         recording.append(row)
     assert np.array_equal(recording.rows, rows)

@@ -219,10 +219,37 @@ def test_the_path_of_a_freed_sample_continues_beside_an_anchored_one_and_else_re
     assert path.known[N - 1] == continues
 
 
-def test_backing_off_is_counted_as_released_energy(held):
-    held.slip(edge_at(0.009 - 0.001))
-    stiffness = 4.0 * STIFF * 0.016
-    assert held.blade.totals.released == pytest.approx(0.5 * stiffness * 0.001**2, rel=1e-9)
+STIFFNESS = 4.0 * STIFF * 0.016
+"""Stiffness of all anchors together [N/m]."""
+
+
+def test_backing_off_releases_what_is_held_aside_and_nothing_else(held):
+    """An edge pushes and does not pull: ahead and along it holds nothing as it backs off."""
+    held.slip(edge_at(0.009 - 0.001, x=0.011 + 0.0005, z=0.001 + 0.0002))
+    assert held.blade.totals.released == pytest.approx(0.5 * STIFFNESS * 0.0005**2, rel=1e-9)
+
+
+def test_backing_off_and_coming_back_leaves_the_account_as_it_was(held):
+    aside = 0.011 + 0.0005
+    held.slip(edge_at(0.009 - 0.001, x=aside))
+    here = edge_at(0.009 + 1e-9, x=aside)
+    held.slip(here)
+    stored = anchors_energy(held.anchors, held.body, pose_at(here, 1.0), held.blade.toughness)
+    assert stored == pytest.approx(0.5 * STIFFNESS * 0.0005**2, rel=1e-5)
+    assert held.blade.totals.released == pytest.approx(0.0, abs=1e-5 * stored)
+
+
+def test_an_anchor_that_is_set_behind_the_edge_is_in_the_account_once_it_pulls(held):
+    behind, ahead = (pose_at(edge_at(0.009 + dy, x=0.0111), 1.0) for dy in (-1e-5, 1e-5))
+    held.anchors.state[0] = FREE
+    anchor_beside(held.blade, held.body, held.visits, behind, 0.001)
+    assert held.anchors.state[0] == ANCHORED
+    assert held.blade.totals.released == 0.0
+    held.anchors.state[1:] = FREE
+    slip_anchors(held.blade, held.body, held.visits, ahead)
+    stored = anchors_energy(held.anchors, held.body, ahead, held.blade.toughness)
+    assert stored > 0.0
+    assert held.blade.totals.released == pytest.approx(-stored, rel=1e-9)
 
 
 def test_a_sample_that_slips_out_through_the_skin_is_marked_as_left(held):

@@ -122,7 +122,7 @@ def test_a_step_with_one_impossible_number_is_refused(place, bad):
         unpack_step(step_numbers(**{f"_{place}": bad}))
 
 
-@pytest.mark.parametrize("dt", [0.0, -1e-3, 1.1, np.nan])
+@pytest.mark.parametrize("dt", [0.0, -1e-3, 5e-324, 1e-310, 1.1, np.nan])
 def test_a_step_of_no_time_or_too_much_is_refused(dt):
     with pytest.raises(MessageError, match="a step of"):
         unpack_step(struct.pack("<d", dt))

@@ -1,0 +1,96 @@
+"""Goes on with a run that was interrupted, as `run --resume FOLDER` asks for it."""
+
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from scalpel_sim.cli.run_setup import PreparedRun, RunOptions, prepared_run
+from scalpel_sim.cli.scripted_run import perform_script
+from scalpel_sim.errors import RunError, UsageError
+from scalpel_sim.output.plot_process import Plotter
+from scalpel_sim.output.resumption import Resumption, resumption_of
+from scalpel_sim.output.run_folder import SCENE, STROKE, check_folder, grasp_file
+from scalpel_sim.output.summary import Summary
+from scalpel_sim.scenes import read_scene
+from scalpel_sim.strokes.led_record import end_record
+
+
+def perform_resumed(
+    folder: Path, options: RunOptions, plotter: Plotter
+) -> tuple[Summary, PreparedRun]:
+    """Go on with a run, and return its summary and what it was.
+
+    A run that a hand led goes on with what the hand did until it was killed, and then rests.
+
+    Args:
+        folder: The folder of its files.
+        options: What the command line asks for.
+        plotter: Draws the plots.
+
+    Raises:
+        UsageError: there is no such run, it is complete, or an option does not go with it.
+        StateError: this is another version of the program, or something that the run reads, such as
+            its mesh, is another one now.
+        Interrupted: the user or the system ended the run.
+        RunError: another run writes there, or the run failed.
+    """
+    _expect_no_options(options)
+    if folder.is_dir():
+        check_folder(folder)  # no run writes there
+    resumption = resumption_of(folder)
+    head = None if resumption.checkpoint is None else resumption.checkpoint.head
+    if head is None or head.seconds is None:
+        _end_records(folder, resumption)
+    exports = options.output.export
+    if head is not None and not exports:
+        exports = tuple(map(Path, head.exports))
+    options = options._replace(output=replace(options.output, out=folder, export=exports))
+    with prepared_run(str(folder / SCENE), options, audits=True) as prepared:
+        return perform_script(prepared, options, plotter, resumption=resumption), prepared
+
+
+def _expect_no_options(options: RunOptions) -> None:
+    """Refuse options that say what is in the folder already.
+
+    Raises:
+        UsageError: one is given; the message names it.
+    """
+    given = [*_given(options.tissue), *_given(options.arm), *_given(options.client)]
+    if options.output.out is not None:
+        given.append("out")
+    if given:
+        name = given[0].replace("_", "-")
+        raise UsageError(
+            f"--{name} is given with --resume, which goes on with what the run was asked for; omit "
+            "one of them"
+        )
+
+
+def _given(group: Any) -> list[str]:
+    """Return the names of the options of a group that are given."""
+    found = []
+    for field in fields(group):
+        value = getattr(group, field.name)
+        if is_dataclass(value):
+            found += _given(value)
+        elif value not in (None, False, ()):
+            found.append("set" if field.name == "settings" else field.name)
+    return found
+
+
+def _end_records(folder: Path, resumption: Resumption) -> None:
+    """End the records of a hand, if one led the run."""
+    times = resumption.recorded.column("time_s")
+    if len(times) < 2:
+        return
+    scene = read_scene(folder / SCENE)
+    names = [STROKE] if any(stroke.kind == "recorded" for stroke in scene.strokes) else []
+    names += [grasp_file(each.name) for each in scene.graspers if each.recorded is not None]
+    t_end = len(times) * float(times[1] - times[0])
+    for path in (folder / name for name in names):
+        try:
+            end_record(path, t_end)
+        except (OSError, ValueError) as error:
+            raise RunError(
+                f"{path}: what the hand did cannot be read ({error}), and the run cannot go on"
+            ) from error

@@ -1,0 +1,87 @@
+"""`RunCheckpoints`: makes the checkpoints of a run from what it is after a frame."""
+
+from typing import Any, Self
+
+from bridge import InProcessLink
+from scalpel_sim.output.checkpoints import Checkpoints
+from scalpel_sim.output.run_folder import FORCES, REPLAY_FRAMES, STROKE, Outputs, grasp_file
+from scalpel_sim.simulation import Simulation
+from scalpel_sim.state.checkpoint import Checkpoint, CheckpointHead
+from scalpel_sim.viewer.replay import ReplayWriter
+
+
+class RunCheckpoints:
+    """Writes the checkpoints of a run. Where the tissue is in another process there are none.
+
+    Args:
+        outputs: Where they are written, and how often.
+        simulation: The run.
+        replay: Its replay.
+        settings: What the summary will say of its settings.
+        seconds: How long it is to last [s]; None: as long as what a hand did, which leads it.
+    """
+
+    def __init__(
+        self,
+        outputs: Outputs,
+        simulation: Simulation,
+        replay: ReplayWriter,
+        settings: dict[str, Any],
+        seconds: float | None,
+    ) -> None:
+        self._outputs, self._simulation, self._replay = outputs, simulation, replay
+        self._settings, self._seconds = settings, seconds
+        every = 0
+        if outputs.checkpoint_seconds > 0.0 and isinstance(simulation.link, InProcessLink):
+            every = max(1, round(outputs.checkpoint_seconds / simulation.dt))
+        grown = (FORCES, REPLAY_FRAMES, STROKE, *(grasp_file(g.name) for g in simulation.graspers))
+        self._checkpoints = Checkpoints(outputs.folder, every, grown)
+        if outputs.resumption is not None:
+            self._checkpoints.read()
+            self._checkpoints.go_on_from(outputs.resumption.n_frames)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._checkpoints.close()
+
+    @property
+    def are_there(self) -> bool:
+        """Whether there is one from which the run could go on."""
+        return self._checkpoints.are_there
+
+    @property
+    def are_due(self) -> bool:
+        """Whether one is to be written now. All rows must be written before."""
+        return self._checkpoints.is_due(len(self._simulation.recording))
+
+    def write(self) -> None:
+        """Write a checkpoint after a frame."""
+        self._checkpoints.write(self._now)
+
+    def write_last(self) -> None:
+        """Write a checkpoint of the present, if any are wanted, and wait until all are written."""
+        if self._checkpoints.are_wanted:
+            self._checkpoints.write(self._now)
+        self._checkpoints.finish()
+
+    def mark(self) -> int:
+        """Return how many frames were done."""
+        return len(self._simulation.recording)
+
+    def cut_back(self, mark: int) -> None:
+        """Remove the checkpoints of what was undone."""
+        self._checkpoints.go_on_from(mark)
+
+    def _now(self) -> Checkpoint:
+        """Return the run as it is."""
+        simulation = self._simulation
+        head = CheckpointHead(
+            n_frames=len(simulation.recording),
+            replay=self._replay.mark(),
+            seconds=self._seconds,
+            exports=[str(path.absolute()) for path in self._outputs.exports],
+            settings=self._settings,
+        )
+        return Checkpoint(head, simulation.save_state().to_bytes())

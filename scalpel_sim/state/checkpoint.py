@@ -1,0 +1,83 @@
+"""`Checkpoint`: all that a run needs to go on in another process, as one file with a checksum."""
+
+import hashlib
+import struct
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import msgspec
+
+from tissue import StateError
+
+_MAGIC = b"scalpel_sim checkpoint 1\n"
+"""The first line of the file; its number rises where the form changes."""
+
+_DIGEST = 32
+"""Length of the checksum [bytes]."""
+
+_LENGTH = struct.Struct("<q")
+
+
+class CheckpointHead(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a checkpoint says beside the state."""
+
+    n_frames: int
+    """Frames that were done."""
+    replay: int
+    """How far the file of the replay's frames had got [bytes]."""
+    seconds: float | None
+    """How long the run is to last [s]; None: as long as what a hand did, which led it."""
+    exports: list[str]
+    """Files for the body's surface after the run."""
+    settings: dict[str, Any]
+    """What the summary says of the settings."""
+
+
+class Checkpoint(NamedTuple):
+    """A run at the end of a frame."""
+
+    head: CheckpointHead
+    state: bytes
+    """See `SimulationState.to_bytes`."""
+
+    def to_bytes(self) -> bytes:
+        """Return the content of its file."""
+        head = msgspec.json.encode(self.head)
+        content = b"".join((_LENGTH.pack(len(head)), head, self.state))
+        return b"".join((_MAGIC, _digest(content), content))
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> Self:
+        """Return the checkpoint in a file.
+
+        Raises:
+            StateError: it is none, or is not whole.
+        """
+        begin = len(_MAGIC) + _DIGEST
+        content = memoryview(data)[begin:]
+        if not data.startswith(_MAGIC) or data[len(_MAGIC) : begin] != _digest(content):
+            raise StateError("it is no checkpoint of this version, or a part is missing or damaged")
+        (n_bytes,) = _LENGTH.unpack_from(content)
+        end = _LENGTH.size + n_bytes
+        head = msgspec.json.decode(content[_LENGTH.size : end], type=CheckpointHead)
+        return cls(head, bytes(content[end:]))
+
+
+def read_checkpoint(path: Path) -> Checkpoint | None:
+    """Return the checkpoint in a file; None where there is none.
+
+    Raises:
+        StateError: it is not whole; the message names the file.
+        OSError: it cannot be read.
+    """
+    try:
+        return Checkpoint.from_bytes(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except StateError as error:
+        raise StateError(f"{path}: {error}") from error
+
+
+def _digest(content: bytes | memoryview) -> bytes:
+    """Return the checksum of a content."""
+    return hashlib.blake2b(content, digest_size=_DIGEST).digest()

@@ -1,0 +1,26 @@
+"""Ends the record of a hand whose run was killed, so that it reads as one that has ended."""
+
+from pathlib import Path
+
+
+def end_record(path: Path, t_end: float) -> None:
+    """Cut off a last line that is not whole, and have the last pose last until a time.
+
+    Until then the hand rested, or it would have left another row.
+
+    Args:
+        path: `stroke.csv`, or the file of a grasper.
+        t_end: Simulated time [s].
+
+    Raises:
+        OSError: the file cannot be read or written.
+    """
+    lines = [line for line in path.read_text("ascii").splitlines(True) if line.endswith("\n")]
+    if len(lines) > 1:
+        last, _, pose = lines[-1].partition(",")
+        if float(last) < t_end:
+            lines.append(f"{t_end!r},{pose}")
+    text = "".join(lines)
+    unfinished = path.with_name(f"{path.name}.part")
+    unfinished.write_text(text, "ascii")
+    unfinished.replace(path)

@@ -1,0 +1,118 @@
+"""`FrameLog`: frames of a replay, in a file that grows with the run."""
+
+import struct
+import tempfile
+from pathlib import Path
+from typing import IO, Any, NamedTuple, Self
+
+import msgspec
+import numpy as np
+
+from scalpel_sim.viewer.messages import SceneState
+
+_HEAD = struct.Struct("<dqq")
+"""Time [s], number of triangles, and length of what follows [bytes]."""
+
+
+class LoggedFrame(NamedTuple):
+    """Where a frame is."""
+
+    time: float
+    """Simulated time [s]."""
+    n_triangles: int
+    """Triangles of its surface."""
+    begin: int
+    """Where it begins in the file [bytes]."""
+    n_bytes: int
+    """Its length there."""
+
+
+class FrameLog:
+    """Frames of a replay, one after the other, as MessagePack.
+
+    Args:
+        path: The file, which is gone on with if it is there; None: a temporary one.
+        n_bytes: How much of a file that is there is gone on with.
+
+    Raises:
+        OSError: the file cannot be made, or is shorter.
+    """
+
+    def __init__(self, path: Path | None = None, n_bytes: int = 0) -> None:
+        self.path = path
+        """Where it is; None: it has no name."""
+        self._file: IO[bytes]
+        if path is None:
+            self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
+        else:
+            self._file = path.open("r+b" if n_bytes else "w+b", buffering=0)
+        self.n_bytes = 0
+        """Its length."""
+        if self._file.seek(0, 2) < n_bytes:
+            raise OSError(f"{path} has fewer than {n_bytes} bytes: a part of it is missing")
+        self.cut_back(n_bytes)
+
+    def add(self, time: float, state: SceneState) -> LoggedFrame:
+        """Add a frame.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        content = _encoder.encode(state)
+        n_triangles = len(state.surface.triangles)
+        data = memoryview(_HEAD.pack(time, n_triangles, len(content)) + content)
+        self._file.seek(self.n_bytes)
+        while data:
+            data = data[self._file.write(data) :]
+        begin = self.n_bytes + _HEAD.size
+        self.n_bytes = begin + len(content)
+        return LoggedFrame(time, n_triangles, begin, len(content))
+
+    def frames(self) -> list[LoggedFrame]:
+        """Return where all frames are."""
+        found, begin = [], 0
+        while begin < self.n_bytes:
+            self._file.seek(begin)
+            time, n_triangles, n_bytes = _HEAD.unpack(self._file.read(_HEAD.size))
+            found.append(LoggedFrame(time, n_triangles, begin + _HEAD.size, n_bytes))
+            begin += _HEAD.size + n_bytes
+        return found
+
+    def read(self, frame: LoggedFrame) -> SceneState:
+        """Return a frame."""
+        self._file.seek(frame.begin)
+        return _decoder.decode(self._file.read(frame.n_bytes))
+
+    def cut_back(self, n_bytes: int) -> None:
+        """Forget what comes after so many bytes."""
+        self._file.truncate(n_bytes)
+        self.n_bytes = n_bytes
+
+    def close(self) -> None:
+        """Close the file, which stays where it has a name. May be called twice."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _plain(value: Any) -> Any:
+    """Return an array in a form that can be written: type, shape, and numbers."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, np.ascontiguousarray(value).data
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a frame of a replay holds a {type(value).__name__}")
+
+
+def _array(kind: type, plain: Any) -> np.ndarray:
+    """Return the array that was written."""
+    dtype, shape, numbers = plain
+    return np.frombuffer(numbers, dtype).reshape(shape)
+
+
+_encoder = msgspec.msgpack.Encoder(enc_hook=_plain)
+_decoder = msgspec.msgpack.Decoder(SceneState, dec_hook=_array)
