@@ -155,7 +155,9 @@ def test_a_run_goes_on_where_another_of_its_files_is_shorter_than_it_was(name, t
 def test_a_frame_that_differs_from_its_row_is_an_error_that_names_it(tmp_path):
     kill_in(tmp_path, SLAB, 333)
     forces = tmp_path / "forces.csv"
-    lines, n = forces.read_text().splitlines(keepends=True), resumption_of(tmp_path).n_frames + 9
+    lines, n = forces.read_text().splitlines(keepends=True), 50
+    for name in CHECKPOINT_FILES:  # so that all frames are done again
+        (tmp_path / name).unlink()
     time, x, rest = lines[n].split(",", 2)
     lines[n] = f"{time},{float(x) * (1.0 + 1e-15)!r},{rest}"
     forces.write_text("".join(lines))
@@ -208,9 +210,9 @@ def led(folder, n_frames, *commands):
 
 
 def test_what_a_hand_did_is_done_again_from_the_last_checkpoint(tmp_path):
-    led(tmp_path, 620)
+    led(tmp_path, 320)
     then = physics(tmp_path)
-    assert len(then) >= 600
+    assert len(then) >= 300
     resume_in(tmp_path)
     assert np.array_equal(physics(tmp_path)[: len(then)], then, equal_nan=True)
     assert json.loads((tmp_path / "summary.json").read_text())["status"] == "complete"
