@@ -135,7 +135,7 @@ class OpenPages:
             return
         if self._opening is None:
             self._opening = self._packets.opening(state.surface, state.body_poses)
-            for page in self._pages:
+            for page in list(self._pages):  # one that is closed goes when it is sent something
                 page.send(self._opening)
         self._newest = self._packets.frame(*state)
         self._shown = state
@@ -242,7 +242,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
 
     def _note_sent(self, sending: "asyncio.Future[None]") -> None:
         self._n_unsent -= 1
-        sending.exception()  # the page is gone, and `on_close` knows
+        if not sending.cancelled():
+            sending.exception()  # the page is gone, and `on_close` knows
 
 
 class Site:

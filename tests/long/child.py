@@ -23,6 +23,9 @@ PATIENCE = 60.0
 """Wall time after which a case that has not come back is ended [s]: on a busy machine a case waits
 for a processor many times as long as it computes."""
 
+PATIENCE_AT_FIRST = 900.0
+"""The same for the first case of a process [s], which may compile the kernels."""
+
 N_FIRST = 500
 """Cases after which memory is looked at for the first time, and again and again: by then caches are
 full."""

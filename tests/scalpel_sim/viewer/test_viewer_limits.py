@@ -9,9 +9,13 @@ import pytest
 from scalpel_sim import Viewer
 from scalpel_sim.viewer import viewer as viewer_module
 from scalpel_sim.viewer.limited_server import MOST_CONNECTIONS
-from scalpel_sim.viewer.server import MOST_PAGES
+from scalpel_sim.viewer.messages import SceneState
+from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
+from scalpel_sim.viewer.scene_packets import ScenePackets
+from scalpel_sim.viewer.server import MOST_PAGES, OpenPages
 from tests.long.viewer_faults import FaultyBrowser, masked_frame
-from tests.scalpel_sim.little_arm import FRAME, little_arm
+from tests.scalpel_sim.little_arm import FRAME, little_arm, readings
+from tests.scalpel_sim.real_cut import cut_tissue
 from tests.scalpel_sim.viewer.test_viewer import Run
 
 PATIENCE = 20.0
@@ -56,6 +60,25 @@ def is_closed(connection):
         return True
     except TimeoutError:
         return False
+
+
+class ClosedPage:
+    """A page that was closed, which is noticed when it is sent something."""
+
+    def __init__(self, pages):
+        self._pages, self.n_undrawn, self.last = pages, 0, None
+        pages.add(self)
+
+    def send(self, packet):
+        self._pages.remove(self)
+
+
+def test_pages_that_were_closed_before_the_first_picture_do_not_end_the_viewer():
+    model, data = little_arm()
+    pages = OpenPages(ScenePackets(shapes_of(model), FRAME))
+    closed = [ClosedPage(pages) for _ in range(3)]
+    pages.show(SceneState(cut_tissue()[0], body_poses(data), readings(0.0)))
+    assert not pages._pages and len(closed) == 3
 
 
 def test_connections_beyond_the_limit_are_closed_and_free_their_places(viewer, opened):
