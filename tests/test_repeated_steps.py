@@ -90,9 +90,12 @@ def test_a_fault_before_a_step_is_gone_after_it(relaxation, where, value, caplog
     assert results[0].wrench.force == pytest.approx(results[1].wrench.force, rel=0.05, abs=0.01)
 
 
-def test_a_body_that_cannot_go_on_stops_as_it_was_and_names_nodes():
+@pytest.mark.parametrize("force", [1e3, 1e9])
+@pytest.mark.parametrize("where", ["middle", "node"])
+def test_a_body_that_cannot_go_on_stops_as_it_was_and_names_nodes(force, where):
     tissue, other = in_mid_cut(), in_mid_cut()
-    tissue.push([MESH.positions.mean(axis=0)], (1e9, 0.0, 0.0))
+    free = np.flatnonzero(~bodies.sides(MESH))[:1]
+    tissue.push([MESH.positions.mean(axis=0)] if where == "middle" else free, (force, 0.0, 0.0))
     named = r"The worst nodes, before this step: \d+ at \(.*\) m, \d+ at"
     with pytest.raises(TissueError, match=named):
         tissue.step(STROKE[MIDDLE], strokes.DT)

@@ -59,6 +59,8 @@ class StepBounds(Arrays):
     """Length of the body at rest [m]."""
     gravity: float
     """Acceleration of free fall [m/s2]."""
+    speed_gained: float
+    """Speed that a node may gain in a step beside that by gravity [m/s]."""
     unexplained: float
     """Energy that may come out of nothing [J]."""
     share_unexplained: float
@@ -139,8 +141,8 @@ def judge_step(
         return NOT_FINITE_NOW
     # The sides of the box move as fast as nodes do; what turns round within the step moves by
     # less than the body is long.
-    fall = bounds.gravity * dt * dt
-    reach = bounds.diagonal + (before[FASTEST_NODE] + after[FASTEST_NODE]) * dt + fall
+    speed = 2.0 * before[FASTEST_NODE] + bounds.speed_gained
+    reach = bounds.diagonal + speed * dt + bounds.gravity * dt * dt
     way = 0.0
     for c in range(3):
         way = max(way, before[LOW + c] - after[LOW + c], after[HIGH + c] - before[HIGH + c])
