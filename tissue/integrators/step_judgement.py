@@ -42,11 +42,11 @@ OUT_OF_NOTHING: Final = 4
 class StepBounds(Arrays):
     """What a step of a body is judged by."""
 
-    total: FloatCell
-    """Energy of the body when counting began: elastic and kinetic, in gravity, and in all that
-    holds and touches it [J]."""
     without_gravity: FloatCell
-    """The part of it that is not in gravity [J]."""
+    """Energy of the body when counting began: elastic and kinetic, and in all that holds and
+    touches it [J]."""
+    potential: FloatCell
+    """Energy in gravity then [J]."""
     work: FloatCell
     """Work done on it until then [J]."""
     dissipated: FloatCell
@@ -149,11 +149,14 @@ def judge_step(
     if not way <= reach:
         bounds.excess = way
         return LEFT_BOX
-    work = after[WORK] + work_of_loads - bounds.work
+    work = abs(after[WORK] + work_of_loads - bounds.work)
     dissipated = after[DISSIPATED] - bounds.dissipated
-    through = abs(bounds.without_gravity) + abs(work) + dissipated
-    allowed = bounds.unexplained + bounds.share_unexplained * through
-    excess = after[KINETIC] + after[POTENTIAL] - (bounds.total + work - dissipated)
+    allowed = bounds.unexplained
+    allowed += bounds.share_unexplained * (abs(bounds.without_gravity) + work + dissipated)
+    # In either direction: a blade that is led backward takes hold of tissue that is bent already,
+    # and what that gives it is not counted as work.
+    given = bounds.without_gravity + (bounds.potential - after[POTENTIAL]) + work
+    excess = after[KINETIC] - given
     if not excess <= allowed:
         bounds.excess = excess
         return TOO_FAST

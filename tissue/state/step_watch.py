@@ -54,8 +54,8 @@ class StepWatch:
         rest = system.body.rest[: system.body.n_nodes]
         mass = float(system.body.masses[: system.body.n_nodes].sum())
         self._bounds = StepBounds(
-            total=0.0,
             without_gravity=0.0,
+            potential=0.0,
             work=0.0,
             dissipated=0.0,
             residual=0.0,
@@ -89,7 +89,7 @@ class StepWatch:
         bounds, now = self._bounds, self._after
         self._write_look.call(system.context, now)
         own = float(now[KINETIC]) + energy_in_springs(system.context, edge, when)
-        bounds.without_gravity, bounds.total = own, own + float(now[POTENTIAL])
+        bounds.without_gravity, bounds.potential = own, float(now[POTENTIAL])
         bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
         bounds.residual = residual
 
