@@ -4,6 +4,7 @@ Usage: PYTHONPATH=. python benchmarks/saved_state.py [SCENE], on an idle machine
 
 "kept" is a state whose memory is new, as each of a hundred that are kept for undo; "again" one that
 takes the memory of an earlier one, as a state that is saved in each frame to go back by a frame.
+"bytes" is what a checkpoint takes of the frame loop: it is saved and made bytes.
 """
 
 import sys
@@ -23,8 +24,8 @@ def main() -> None:
     """Print the times."""
     name = sys.argv[1] if len(sys.argv) > 1 else "organ"
     simulation = prepare(SCENES[name])
-    print(f"{name}, medians of {N_TIMES} [ms]; the last two columns: arm and coupling with it")
-    columns = ("tetrahedra", "kept", "again", "load", "to bytes", "MB", "again", "load")
+    print(f"{name}, medians of {N_TIMES} [ms]; the last three columns: arm and coupling with it")
+    columns = ("tetrahedra", "kept", "again", "load", "to bytes", "MB", "again", "load", "bytes")
     print(" " * 10 + "".join(f"{column:>11s}" for column in columns))
     for when, share in (("at rest", 0.0), ("in mid-cut", 0.5), ("after", 1.0)):
         simulation.run(share * simulation.duration + simulation.dt)
@@ -47,6 +48,7 @@ def figures(simulation: Simulation) -> tuple[float, ...]:
         1e-6 * len(state.to_bytes()),
         milliseconds(simulation.save_state),
         milliseconds(lambda: simulation.load_state(whole)),
+        milliseconds(lambda: simulation.save_state().to_bytes()),
     )
 
 

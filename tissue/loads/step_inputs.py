@@ -43,6 +43,8 @@ def inputs_of(
         system: The body, geoms and supports.
     """
     geoms, supports = system.geoms, None
+    if not (loads.act or attachments.act or geoms.geoms or system.supports.is_moving):
+        return StepInputs(sweep, dt, (), (), None, None)
     if system.supports.is_moving:
         body = system.body
         supports = body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]]

@@ -19,7 +19,6 @@ from tissue.core.array_types import IntArray
 from tissue.core.three_vectors import BladeSweep
 from tissue.cutting.incision import NoRoomError
 from tissue.energy_audit import Audit
-from tissue.integrators.frame_look import FrameLook
 from tissue.integrators.unstable import REMEDY, UnstableError
 from tissue.loads.step_inputs import StepInputs, give_inputs, inputs_of
 from tissue.mesh.body import Body
@@ -77,15 +76,15 @@ class RepeatedSteps(SavedBody):
         """
         self._expect_moving()
         watch, log = self._watch, self._step_log
-        before = watch.look(self._system)
+        is_finite = watch.look(self._system)
         if self._is_changed:
-            if not before.is_finite:
+            if not is_finite:
                 raise self._stop(_BEFORE, _worst_nodes(self._body))
             self._save_step()
         inputs = inputs_of(sweep, dt, self._loads, self._attachments, self._system)
         fault = _BEFORE
-        if before.is_finite:
-            result, fault = self._try(inputs, before)
+        if is_finite:
+            result, fault = self._try(inputs)
             if result is not None:
                 log.add(inputs, result.n_substeps)
                 if log.is_long:
@@ -113,8 +112,8 @@ class RepeatedSteps(SavedBody):
     def _make_more_room(self, lacking: int) -> None:
         """Make twice the room for what lacked it in a cut; see `NoRoomError`."""
 
-    def _try(self, inputs: StepInputs, before: FrameLook) -> tuple[StepResult | None, str]:
-        """Do a step; return its result, or None and what was wrong with it."""
+    def _try(self, inputs: StepInputs) -> tuple[StepResult | None, str]:
+        """Do a step after a look; return its result, or None and what was wrong with it."""
         try:
             result = self._advance(inputs.sweep, inputs.dt)
         except NoRoomError as error:
@@ -123,7 +122,8 @@ class RepeatedSteps(SavedBody):
             self._make_more_room(error.lacking)
             self._save_step()
             self._global_stepper.refinement = refinement
-            return self._try(inputs, before)
+            self._watch.look(self._system)
+            return self._try(inputs)
         except UnstableError as error:
             return None, error.fault
         except ArithmeticError as error:
@@ -131,9 +131,9 @@ class RepeatedSteps(SavedBody):
         except BaseException:
             self._is_changed = True  # what was done of it is not in the log
             raise
-        after, energies = self._watch.look(self._system), result.energies
+        energies = result.energies
         amounts = (self._audit.work_of_loads, 0.0 if energies is None else energies.residual)
-        fault = self._watch.fault(before, after, inputs.dt, *amounts)
+        fault = self._watch.fault(self._system, inputs.dt, *amounts)
         if fault is None and not math.isfinite(sum(result.wrench.numbers)):
             fault = "the force on the blade is not a finite number"
         return (result, "") if fault is None else (None, fault)
@@ -147,10 +147,10 @@ class RepeatedSteps(SavedBody):
         worst = _worst_nodes(self._body)
         self._go_back(inputs)
         state = self._state_now()
-        before = self._watch.look(self._system)
+        self._watch.look(self._system)
         for i in range(1, MOST_REPEATS + 1):
             self._global_stepper.refinement = 2**i
-            result, fault_again = self._try(inputs, before)
+            result, fault_again = self._try(inputs)
             self._global_stepper.refinement = 1
             if result is not None:
                 self._n_repeated += 1

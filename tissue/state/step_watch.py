@@ -1,17 +1,25 @@
 """`StepWatch`: whether a body may move as it did in a time step, by its own laws."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from tissue.blade.edge import Edge
 from tissue.core.jit import SameTypes
-from tissue.integrators.frame_look import (
-    FrameLook,
+from tissue.integrators.step_judgement import (
+    ACCEPTED,
+    DISSIPATED,
+    IS_FINITE,
+    KINETIC,
+    LEFT_BOX,
+    LOOK_NUMBERS,
+    NOT_FINITE_NOW,
+    POTENTIAL,
+    TOO_FAST,
+    WORK,
+    StepBounds,
     energy_in_springs,
-    look_of,
-    room_for_look,
+    judge_step,
     write_look,
 )
 from tissue.integrators.system import System
@@ -28,21 +36,6 @@ account of energy is exact to some percent; the elastic energy now, which is tak
 that a step needs no look at the elements, is what makes the bound wide."""
 
 
-class EnergyGiven(NamedTuple):
-    """The energy of a body at one time, and what it had been given and had lost until then."""
-
-    total: float
-    """Elastic, kinetic, in gravity, and in all that holds and touches it [J]."""
-    without_gravity: float
-    """The part of it that is not in gravity [J]."""
-    work: float
-    """Work done on it [J]."""
-    dissipated: float
-    """Energy taken from it [J]."""
-    residual: float
-    """`Energies.residual`, where an account of energy is kept, else 0 [J]."""
-
-
 class StepWatch:
     """Looks at a body before and after each step.
 
@@ -53,18 +46,26 @@ class StepWatch:
 
     def __init__(self, system: System, wave_speed: float) -> None:
         rest = system.body.rest[: system.body.n_nodes]
-        self._diagonal = float(np.linalg.norm(np.ptp(rest, axis=0)))
         mass = float(system.body.masses[: system.body.n_nodes].sum())
-        self._unexplained = 0.5 * mass * (STRAIN_UNEXPLAINED * wave_speed) ** 2
-        self._gravity = math.hypot(*system.surroundings.gravity)
-        self._numbers = room_for_look()
-        self._write_look = SameTypes(write_look)
-        self._given = EnergyGiven(0.0, 0.0, 0.0, 0.0, 0.0)
+        self._bounds = StepBounds(
+            total=0.0,
+            without_gravity=0.0,
+            work=0.0,
+            dissipated=0.0,
+            residual=0.0,
+            excess=0.0,
+            diagonal=float(np.linalg.norm(np.ptp(rest, axis=0))),
+            gravity=math.hypot(*system.surroundings.gravity),
+            unexplained=0.5 * mass * (STRAIN_UNEXPLAINED * wave_speed) ** 2,
+            share_unexplained=SHARE_UNEXPLAINED,
+        )
+        self._before, self._after = np.zeros((2, LOOK_NUMBERS))
+        self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
 
-    def look(self, system: System) -> FrameLook:
-        """Return how the body moves now."""
-        self._write_look.call(system.context, self._numbers)
-        return look_of(self._numbers)
+    def look(self, system: System) -> bool:
+        """Look at the body before a step; return whether all of its motion is finite."""
+        self._write_look.call(system.context, self._before)
+        return bool(self._before[IS_FINITE] == 1.0)
 
     def begin(
         self, system: System, edge: Edge, when: float, work_of_loads: float, residual: float
@@ -78,50 +79,34 @@ class StepWatch:
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy now, if one is kept, else 0 [J].
         """
-        look = self.look(system)
-        own = look.kinetic + energy_in_springs(system.context, edge, when)
-        work = look.work + work_of_loads
-        self._given = EnergyGiven(own + look.potential, own, work, look.dissipated, residual)
+        bounds, now = self._bounds, self._after
+        self._write_look.call(system.context, now)
+        own = float(now[KINETIC]) + energy_in_springs(system.context, edge, when)
+        bounds.without_gravity, bounds.total = own, own + float(now[POTENTIAL])
+        bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
+        bounds.residual = residual
 
-    def fault(
-        self,
-        before: FrameLook,
-        after: FrameLook,
-        dt: float,
-        work_of_loads: float,
-        residual: float,
-    ) -> str | None:
-        """Return what is wrong with a step; None: nothing.
+    def fault(self, system: System, dt: float, work_of_loads: float, residual: float) -> str | None:
+        """Return what is wrong with a step since the last look; None: nothing.
 
         Args:
-            before: The body before it.
-            after: The body after it.
+            system: The body after it.
             dt: Length of the step [s].
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy after it, if one is kept, else 0 [J].
         """
-        if not after.is_finite:
+        where = (system.context, self._bounds, self._before, self._after)
+        found = self._judge.call(*where, dt, work_of_loads, residual)
+        if found == ACCEPTED:
+            return None
+        if found == NOT_FINITE_NOW:
             return "the position or velocity of a node is not a finite number"
-        # The sides of the box move as fast as nodes do; what turns round within the step moves by
-        # less than the body is long.
-        reach = self._diagonal + (before.fastest + after.fastest) * dt + self._gravity * dt * dt
-        ways = (
-            *(x - y for x, y in zip(before.low, after.low, strict=True)),
-            *(y - x for x, y in zip(before.high, after.high, strict=True)),
-        )
-        if not max(ways) <= reach:
-            return f"a node went {max(ways):.3g} m out of the box around the body"
-        given = self._given
-        work = after.work + work_of_loads - given.work
-        dissipated = after.dissipated - given.dissipated
-        excess = after.kinetic + after.potential - (given.total + work - dissipated)
-        through = abs(given.without_gravity) + abs(work) + dissipated
-        allowed = self._unexplained + SHARE_UNEXPLAINED * through
-        if not excess <= allowed:
+        excess = self._bounds.excess
+        if found == LEFT_BOX:
+            return f"a node went {excess:.3g} m out of the box around the body"
+        if found == TOO_FAST:
             return (
-                f"its nodes have {after.kinetic:.3g} J of kinetic energy, {excess:.3g} J more than "
-                "blade, loads and gravity gave"
+                f"its nodes have {self._after[KINETIC]:.3g} J of kinetic energy, {excess:.3g} J "
+                "more than blade, loads and gravity gave"
             )
-        if not given.residual - residual <= allowed:
-            return f"{given.residual - residual:.3g} J of energy came out of nothing"
-        return None
+        return f"{excess:.3g} J of energy came out of nothing"

@@ -13,8 +13,8 @@ from scalpel_sim.cli.options import (
     BodyOptions,
     ClientOptions,
     MaterialOptions,
-    OutputOptions,
     PrintOptions,
+    RunOutputOptions,
     SolverOptions,
 )
 from scalpel_sim.cli.reference import command_line_reference
@@ -33,7 +33,7 @@ GROUPS = {
     "Solver": SolverOptions,
     "Arm": ArmOptions,
     "Connection": ClientOptions,
-    "Output": (OutputOptions, PrintOptions),
+    "Output": (RunOutputOptions, PrintOptions),
 }
 
 
