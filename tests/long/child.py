@@ -109,9 +109,10 @@ class Child:
             self._start()
         try:
             self._pipe.send(case)
-            if not self._pipe.poll(self._patience):
+            if not self._pipe.poll(self._patience_now):
                 self.close()
                 raise AssertionError(f"case {case} did not come back within {self._patience:g} s")
+            self._patience_now = self._patience
             return self._pipe.recv()
         except (EOFError, ConnectionError) as error:
             process = self._process
@@ -126,6 +127,7 @@ class Child:
         self._process.start()
         theirs.close()
         self._memory = 0
+        self._patience_now = max(self._patience, PATIENCE_AT_FIRST)
 
 
 def _serve(

@@ -27,14 +27,18 @@ _Where = str | list[int] | list[list[float]]
 _Node = Annotated[int, msgspec.Meta(ge=0, le=LARGEST_REPLY)]
 _Coordinate = Annotated[float, msgspec.Meta(ge=-LARGEST_COORDINATE, le=LARGEST_COORDINATE)]
 _Place = tuple[_Coordinate, _Coordinate, _Coordinate]
+_LARGEST_STRENGTH = 1e9
+"""Largest stiffness [N/m], damping [N s/m] and toughness [J/m2], far beyond those of steel: with
+1e308 forces are infinite."""
+_Strength = Annotated[float, msgspec.Meta(ge=-_LARGEST_STRENGTH, le=_LARGEST_STRENGTH)]
 _Places = Annotated[list[_Place], msgspec.Meta(min_length=1)]
 
 
 class _Held(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     """What a frame holds; one of region, nodes and points says it."""
 
-    stiffness: float
-    damping: float = 0.0
+    stiffness: _Strength
+    damping: _Strength = 0.0
     breaks_at: float | None = None
     region: Annotated[str, msgspec.Meta(min_length=1)] | None = None
     nodes: Annotated[list[_Node], msgspec.Meta(min_length=1)] | None = None
@@ -70,9 +74,9 @@ class _FrameTie(_Held, forbid_unknown_fields=True, kw_only=True):
     """A request to tie a frame by strands."""
 
     to: _Places
-    area: float
-    toughness: float
-    rest_length: float | None = None
+    area: _Coordinate
+    toughness: _Strength
+    rest_length: _Coordinate | None = None
 
 
 _hold_decoder = msgspec.json.Decoder(_FrameHold)

@@ -212,3 +212,12 @@ def test_each_client_gets_a_tissue_that_nobody_holds(server):
         with contextlib.closing(link_once_free(server.address)) as link:
             assert isinstance(link, TcpLink) and len(link.loads()) == 0
             link.attach(FrameHold("top", 100.0))
+
+
+@pytest.mark.parametrize("wrong", [1e308, -1e308, 1e10])
+def test_a_frame_that_holds_with_an_impossible_stiffness_is_refused(server, wrong):
+    with contextlib.closing(link_once_free(server.address)) as link:
+        with pytest.raises(LinkError, match="the request to attach a frame cannot be read"):
+            link.attach(FrameHold("top", wrong))
+        assert link.loads() == []
+        assert link.step(None, 1e-3).n_tetrahedra == 72
