@@ -31,7 +31,7 @@ def physics(simulation):
     return simulation.recording.rows[:, [name not in WALL_TIMES for name in columns]]
 
 
-@battery(n_per_change=20, n_long=1000)
+@battery(n_per_change=6, n_long=1_000)
 def test_a_simulation_made_alike_goes_on_from_bytes_at_any_frame(case):
     scene, n_frames = scene_of(np.random.default_rng(case))
     simulation, other = prepare(scene), prepare(scene)

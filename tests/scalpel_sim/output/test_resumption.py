@@ -210,9 +210,9 @@ def led(folder, n_frames, *commands):
 
 
 def test_what_a_hand_did_is_done_again_from_the_last_checkpoint(tmp_path):
-    led(tmp_path, 320)
+    led(tmp_path, 620)
     then = physics(tmp_path)
-    assert len(then) >= 300
+    assert len(then) >= 600
     resume_in(tmp_path)
     assert np.array_equal(physics(tmp_path)[: len(then)], then, equal_nan=True)
     assert json.loads((tmp_path / "summary.json").read_text())["status"] == "complete"
