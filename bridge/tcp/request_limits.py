@@ -27,8 +27,9 @@ MOST_STEPS_ASKED = 1000
 """Steps of the integrator in a request that are always allowed. A frame of the scenes takes 1 to
 20."""
 
-MOST_WORK = 2e7
-"""Steps of the integrator times tetrahedra that are allowed where it is more: some 2 s."""
+MOST_WORK = 4e6
+"""Steps of the integrator times tetrahedra that are allowed where it is more, for a body at rest:
+0.1 s. One that is torn about takes up to 20 times as many (`step_choice.MOST_OF_LONG`)."""
 
 
 class RequestLimits:

@@ -218,7 +218,7 @@ def expect_stable(choice: StepChoice) -> None:
     """Refuse motion that became unstable.
 
     Raises:
-        UnstableError: it takes more than `MOST_STEPS` times as many steps as a body at rest.
+        UnstableError: it takes too many steps: see `step_choice.MOST_STEPS`.
     """
     if choice.is_unstable:
         raise UnstableError(

@@ -63,10 +63,15 @@ LONGEST_MOTION: Final = 0.5
 frequencies holds where the body is; what moves farther may be stiffer before the next bound. With
 less, strokes take more steps; without it, a body far from rest can become unstable."""
 
-MOST_STEPS: Final = 10_000.0
-"""Steps of an increment at most, per step that the body at rest would take. In 160 blocks that
-recovered from random positions of their nodes it was 150. Without a limit, motion that has become
-unstable takes more and more steps and never ends."""
+MOST_STEPS: Final = 5_000.0
+"""Steps of an increment that are always allowed. In 160 blocks that recovered from random positions
+of their nodes it was 150 times as many as at rest, of which a millisecond takes 1 to 20. Without a
+limit, motion that has become unstable takes more and more steps and never ends."""
+
+MOST_OF_LONG: Final = 20.0
+"""Steps of a long increment at most, per step that the body at rest would take. With more, a second
+in which tissue is torn about could take minutes, and nobody would learn why; in shorter time steps
+it can be done."""
 
 _ROUNDING = 1e-9
 """Share by which a frequency stays below that which would take another step."""
@@ -86,7 +91,7 @@ class StepChoice(Arrays):
     is_at_rest: IntCell
     """1 while the body is not moved, as it has been calm and nothing touches it, else 0."""
     is_unstable: IntCell
-    """1 if the motion became unstable: it would take more steps than `MOST_STEPS` allows."""
+    """1 if the motion became unstable: it would take too many steps: see `MOST_STEPS`."""
     dt: FloatCell
     """Length of the time step [s]."""
     begin: FloatCell
@@ -261,7 +266,7 @@ def next_part(choice: StepChoice, context: StepContext) -> bool:
     choice.asked = max(span / step, choice.speed * span / choice.node_size / LONGEST_MOTION)
     choice.at_rest = max(span / longest, 1.0)
     # A comparison with nan is false.
-    if not choice.asked <= MOST_STEPS * choice.at_rest:
+    if not choice.asked <= max(MOST_STEPS, MOST_OF_LONG * choice.at_rest):
         choice.is_unstable = 1
         return False
     n = max(1, math.ceil(choice.refinement * choice.asked))
