@@ -166,3 +166,13 @@ def test_a_frame_that_is_repeated_is_one_frame():
     fallen = [mesh.positions[:, 2].mean() - height for height in heights]
     assert fallen[0] == pytest.approx(fallen[1], rel=1e-9)
     assert fallen[0] == pytest.approx(0.5 * 9.81 * (2 * strokes.DT) ** 2, rel=1e-3)
+
+
+def test_a_cut_in_no_time_is_no_fault_and_neither_is_the_motion_after_it():
+    solver = SolverSettings(audit=True)
+    tissue = Tissue(MESH, SOLID, fixed=bodies.sides(MESH), blade=BladeShape(), solver=solver)
+    for sweep in STROKE:
+        tissue.step(sweep, 0.0)
+    for _ in range(N_AFTER):
+        tissue.step(None, strokes.DT)
+    assert tissue.n_repeated_steps == 0

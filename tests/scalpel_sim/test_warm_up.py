@@ -1,5 +1,6 @@
 """The first run compiles in two processes; later ones, also of a copied cache, compile nothing."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -13,7 +14,8 @@ from msgspec import structs
 import scalpel_sim
 from scalpel_sim import warm_up
 from scalpel_sim.scenes import SCENES
-from scalpel_sim.warm_up import KernelSet, compile_ahead, kernels_are_compiled
+from scalpel_sim.warm_up import USUAL_SETS, KernelSet, compile_ahead, kernels_are_compiled
+from tests.processes import environment
 from tissue import block, cache_directory
 
 SMALL = KernelSet.of(SCENES["grid2"])
@@ -75,6 +77,15 @@ def started(monkeypatch):
     monkeypatch.setattr(subprocess, "Popen", RecordedProcess)
     monkeypatch.setattr(warm_up, "kernels_are_compiled", lambda kernels: False)
     return processes
+
+
+@pytest.mark.parametrize("job", ["cut", "motion"])
+@pytest.mark.parametrize("kernels", [USUAL_SETS[0], SMALL._replace(audit=True)])
+def test_what_is_compiled_ahead_is_done_to_its_end(kernels, job):
+    """Else no run would find its kernels, and each would compile again."""
+    command = [sys.executable, "-m", "scalpel_sim.warm_up", job, json.dumps(kernels)]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment())
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_first_run_compiles_in_two_processes_and_waits_for_them(started):

@@ -139,6 +139,8 @@ def judge_step(
     write_look(context, after)
     if after[IS_FINITE] != 1.0:
         return NOT_FINITE_NOW
+    if dt == 0.0:  # nothing moves, and a blade that cuts is where no motion has led it
+        return ACCEPTED
     # The sides of the box move as fast as nodes do; what turns round within the step moves by
     # less than the body is long.
     speed = 2.0 * before[FASTEST_NODE] + bounds.speed_gained

@@ -87,7 +87,7 @@ class RepeatedSteps(SavedBody):
             result, fault = self._try(inputs)
             if result is not None:
                 log.add(inputs, result.n_substeps)
-                if log.is_long:
+                if log.is_long or dt == 0.0:  # what that changed is in no account
                     self._save_step()
                 return result
         return self._repeat(inputs, fault)
