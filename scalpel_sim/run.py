@@ -133,7 +133,10 @@ def perform(
         is_done = status in (COMPLETE, ENDED_IN_PAGE) and not attempts.unwritten
         if is_done or not checkpoints.are_there:
             outputs.remove_passing_files()
-    _raise_what_ended_it(stop, stopped, simulation.time, failure, attempts, outputs.folder)
+    can_go_on = checkpoints.are_there and not is_done
+    _raise_what_ended_it(
+        stop, stopped, simulation.time, failure, attempts, outputs.folder, can_go_on=can_go_on
+    )
     return summary
 
 
@@ -144,6 +147,8 @@ def _raise_what_ended_it(
     failure: Exception | None,
     attempts: Attempts,
     folder: Path,
+    *,
+    can_go_on: bool,
 ) -> None:
     """Raise the first error of a run, or the signal that came, if there was one.
 
@@ -154,6 +159,7 @@ def _raise_what_ended_it(
         failure: The error that ended the frames.
         attempts: Attempts to write the last files.
         folder: Where they are.
+        can_go_on: Whether `--resume` goes on from there.
 
     Raises:
         Interrupted: the user or the system ended the run, or wanted to when it had ended.
@@ -165,7 +171,8 @@ def _raise_what_ended_it(
     if failure is not None:
         raise RunError(f"after {time:.3f} s: {one_line(failure)}; {kept}") from failure
     if stopped is not None:
-        raise Interrupted(f"{stopped} after {time:.3f} s; {kept}")
+        further = f"; --resume {folder} goes on from there" if can_go_on else ""
+        raise Interrupted(f"{stopped} after {time:.3f} s; {kept}{further}")
     if attempts.errors:
         raise RunError(f"{one_line(attempts.errors[0])}; {kept}") from attempts.errors[0]
     if stop.reason is not None:

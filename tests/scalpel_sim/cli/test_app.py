@@ -429,7 +429,8 @@ def test_an_interrupted_run_keeps_what_it_did(number, tmp_path):
     _, err = program.communicate(timeout=60)
     assert program.returncode == 1
     assert re.match(
-        f"error: interrupted by {number.name} after .* holds what", err.splitlines()[-1]
+        f"error: interrupted by {number.name} after .* holds what .*; --resume .*/run goes on",
+        err.splitlines()[-1],
     )
     summary = json.loads((folder / "summary.json").read_text())
     assert summary["status"] == f"interrupted by {number.name}"
