@@ -1,5 +1,7 @@
 """Fixtures and options shared by the tests of several packages."""
 
+import signal
+
 from tests.battery import (
     pytest_addoption,
     pytest_collection_modifyitems,
@@ -10,6 +12,10 @@ from tests.battery import (
     tally,
 )
 from tests.browser import browser, tab
+
+# A shell that starts the tests in the background has Ctrl-C ignored, by their children too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 __all__ = [
     "browser",

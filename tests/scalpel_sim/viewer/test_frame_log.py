@@ -73,12 +73,13 @@ def test_a_replay_that_is_gone_on_with_is_that_of_a_whole_run(at, tmp_path, monk
             if replay.is_due(0.04 * i):
                 replay.add(0.04 * i, WHOLE, body_poses(data), readings(0.04 * i))
 
-    whole, killed = (ReplayWriter(model, log=FrameLog(tmp_path / name)) for name in ("a", "b"))
+    log = FrameLog(tmp_path / "b")
+    whole, killed = ReplayWriter(model, log=FrameLog(tmp_path / "a")), ReplayWriter(model, log=log)
     play(whole, 0, 100)
     play(killed, 0, at)
     mark = killed.mark()
     play(killed, at, at + 20)
-    killed.close()
+    log.close()
     again = ReplayWriter(model, log=FrameLog(tmp_path / "b", mark))
     play(again, at, 100)
     for name, replay in (("whole", whole), ("again", again)):
