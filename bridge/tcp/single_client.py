@@ -22,11 +22,17 @@ from bridge.tcp.wire import LARGEST_REPLY, READ_BYTES, Frame, MessageError, Mess
 
 _logger = logging.getLogger(__name__)
 
-MAX_STRANGERS = 8
-"""Largest number of open connections of peers that are not the client."""
+MAX_STRANGERS = 64
+"""Largest number of open connections of peers that are not the client. So many newcomers must come
+between the connection of a client and its first message before it loses its place: of 8 it lost it
+when a busy machine let it wait for 80 ms."""
 
-_BACKLOG = 64
-"""Connections that the system keeps until they are accepted, and that are accepted at once."""
+_BACKLOG = 4 * MAX_STRANGERS
+"""Connections that the system keeps until they are accepted. One that finds no room waits for a
+second until the system tries again."""
+
+_ACCEPTED_AT_ONCE = 64
+"""Connections that are accepted before the client is heard again."""
 
 
 class SingleClientServer(abc.ABC):
@@ -126,7 +132,7 @@ class SingleClientServer(abc.ABC):
 
     def _accept(self) -> None:
         """Accept who has connected. Where there are too many, one that is no client has to go."""
-        for _ in range(_BACKLOG):
+        for _ in range(_ACCEPTED_AT_ONCE):
             try:
                 connection, where = self._listener.accept()
                 peer = Peer(connection, format_address(where))
