@@ -1,6 +1,5 @@
 """`Checkpoints`: the checkpoints of a run, which a thread writes beside the frame loop."""
 
-import contextlib
 import logging
 import os
 from collections.abc import Callable, Sequence
@@ -9,16 +8,13 @@ from pathlib import Path
 from typing import Self
 
 from scalpel_sim.state.checkpoint import Checkpoint, read_checkpoint
-from tissue import StateError
+from tissue import StateError, whole_file
 
 CHECKPOINT_SECONDS = 1.0
 """Simulated time between two checkpoints, where nothing is said of it [s]."""
 
 CHECKPOINT_FILES = ("checkpoint_a.bin", "checkpoint_b.bin")
 """Names of the files: each checkpoint replaces the older one."""
-
-_UNFINISHED = "checkpoint.part"
-"""Name of the file that is being written."""
 
 _log = logging.getLogger(__name__)
 
@@ -124,19 +120,13 @@ class Checkpoints:
 
     def _write(self, slot: int, checkpoint: Checkpoint) -> None:
         """Write a checkpoint aside, and put it in its place when it is on the disk."""
-        unfinished = self._folder / _UNFINISHED
         try:
             for name in self._grown:
                 _put_on_disk(self._folder / name)
-            with unfinished.open("wb") as file:
-                file.write(checkpoint.to_bytes())
-                file.flush()
-                os.fsync(file.fileno())
-            unfinished.replace(self._folder / CHECKPOINT_FILES[slot])
+            with whole_file(self._folder / CHECKPOINT_FILES[slot]) as unfinished:
+                unfinished.write_bytes(checkpoint.to_bytes())
             _put_on_disk(self._folder)
         except OSError as error:
-            with contextlib.suppress(OSError):
-                unfinished.unlink(missing_ok=True)
             if not self._has_failed:
                 _log.warning(
                     "%s: a checkpoint cannot be written (%s); the run goes on, and the last one "

@@ -4,12 +4,13 @@ import mmap
 import struct
 import tempfile
 from collections.abc import Iterator, Sequence
+from io import FileIO
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from scalpel_sim.errors import RunError
+from scalpel_sim.output.unnamed_file import unnamed_file
 from tissue import FloatArray
 
 ROWS_IN_MEMORY = 8192
@@ -40,7 +41,7 @@ class RowStore:
         self._shape = (-1, n_columns)
         self._n = self._first = 0
         """Number of rows, and the number of the first that is in memory."""
-        self._file: IO[bytes] | None = None
+        self._file: FileIO | None = None
         self._take_room(ROWS_IN_MEMORY)
 
     def _take_room(self, n_rows: int) -> None:
@@ -109,7 +110,7 @@ class RowStore:
         for begin in range(first, self._n, _ROWS_PER_READ):
             found = part[: min(_ROWS_PER_READ, self._n - begin)]
             self._file.seek(begin * self._row.size)
-            if self._file.readinto(found.data.cast("B")) != found.nbytes:  # type: ignore[attr-defined]
+            if self._file.readinto(found.data.cast("B")) != found.nbytes:
                 raise RunError("the temporary file of the recording cannot be read")
             yield found
 
@@ -118,7 +119,7 @@ class RowStore:
         left = self._memory[: (self._n - self._first) * self._row.size]
         try:
             if self._file is None:
-                self._file = tempfile.TemporaryFile(buffering=0, dir=self.folder)  # noqa: SIM115
+                self._file = unnamed_file(self.folder)
             self._file.seek(self._first * self._row.size)
             while left:
                 left = left[self._file.write(left) :]

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from tissue import whole_file
+
 
 def end_record(path: Path, t_end: float) -> None:
     """Cut off a last line that is not whole, and have the last pose last until a time.
@@ -20,7 +22,5 @@ def end_record(path: Path, t_end: float) -> None:
         last, _, pose = lines[-1].partition(",")
         if float(last) < t_end:
             lines.append(f"{t_end!r},{pose}")
-    text = "".join(lines)
-    unfinished = path.with_name(f"{path.name}.part")
-    unfinished.write_text(text, "ascii")
-    unfinished.replace(path)
+    with whole_file(path) as unfinished:
+        unfinished.write_text("".join(lines), "ascii")

@@ -1,13 +1,13 @@
 """`FrameLog`: frames of a replay, in a file that grows with the run."""
 
 import struct
-import tempfile
 from pathlib import Path
-from typing import IO, Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import msgspec
 import numpy as np
 
+from scalpel_sim.output.unnamed_file import unnamed_file
 from scalpel_sim.viewer.messages import SceneState
 
 _HEAD = struct.Struct("<dqq")
@@ -41,11 +41,8 @@ class FrameLog:
     def __init__(self, path: Path | None = None, n_bytes: int = 0) -> None:
         self.path = path
         """Where it is; None: it has no name."""
-        self._file: IO[bytes]
-        if path is None:
-            self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
-        else:
-            self._file = path.open("r+b" if n_bytes else "w+b", buffering=0)
+        mode = "r+b" if n_bytes else "w+b"
+        self._file = unnamed_file() if path is None else path.open(mode, buffering=0)
         self.n_bytes = 0
         """Its length."""
         if self._file.seek(0, 2) < n_bytes:
