@@ -2,50 +2,31 @@
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 
-import mujoco
 import numpy as np
 
-from bridge import DeviceLimits, Fixture, InProcessLink, TissueFrame, TissueLink
+from bridge import Fixture, InProcessLink, TissueLink
 from scalpel_sim.arm.collision_monitor import floor_below
 from scalpel_sim.arm.geom_coupling import GeomCoupling
-from scalpel_sim.arm.grasper import HALF_PAD
-from scalpel_sim.arm.held_arm import HeldArm
 from scalpel_sim.arm.led_arm import LedArm
-from scalpel_sim.arm.own_arm import move_to_start, move_within, own_arm
-from scalpel_sim.arm.placement import (
-    Placement,
-    PlacementError,
-    place,
-    place_if_reached,
-    stays_in_reach,
-)
-from scalpel_sim.arm.reachable_box import arm_for, grown_within, placed_within, shrunk, tour_of
-from scalpel_sim.arm.scene_graspers import arms_with_graspers, led_graspers, motions_of
-from scalpel_sim.arm.standing import Standing
+from scalpel_sim.arm.scene_arms import ArmSurroundings, own_arm_in, project_arm_in
+from scalpel_sim.arm.scene_graspers import led_graspers, motions_of
 from scalpel_sim.arm.standing_fixture import StandingFixture
 from scalpel_sim.arm.tabletop import Tabletop
-from scalpel_sim.errors import UsageError
-from scalpel_sim.hands.workspace import ROOM_OF_GRASPER, resting_stroke, workspace_in
+from scalpel_sim.hands.workspace import resting_stroke
 from scalpel_sim.scene_body import highest_toughness, make_tissue, tabletop_of
-from scalpel_sim.scene_parts.own_arm_settings import OwnArm
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.simulation import Simulation
 from scalpel_sim.strokes.expected_force import ExpectedForce, expected_force
 from scalpel_sim.strokes.grasp_motion import GraspMotion
 from scalpel_sim.strokes.planning import check_meets
 from scalpel_sim.strokes.scene_stroke import stroke_through
-from scalpel_sim.strokes.sequence import lengthened
 from scalpel_sim.strokes.stroke import Stroke
 from scalpel_sim.tables.grasper import GrasperTable
-from tissue import FloatArray, TetrahedralMesh
+from tissue import TetrahedralMesh
 
 _log = logging.getLogger("scalpel_sim")
-
-_SAME_LENGTH = 1e-9
-"""Share by which two lengths of one blade may differ, by rounding."""
 
 _ON_TABLE = 1e-9
 """How far below a table an edge may be that ends on it [m]: that is rounding, and no warning."""
@@ -91,44 +72,25 @@ def prepare(
     if not stroke.is_led:
         _warn_of_table(stroke, table)
     boxes = bounds[None] if table is None else np.stack([bounds, table.bounds])
-    rooms = [_room_of_grasper(motion, scene, bounds) for motion in motions]
     floor = [] if tissue.floor is None else [floor_below(bounds, tissue.floor)]
-    around = [*fixtures, *floor]
-    others: list[Standing] = []
+    around = ArmSurroundings(boxes, table, [*fixtures, *floor])
     if scene.own_arm is None:
-        placement, held, room = _placed(
-            stroke,
-            boxes,
-            scene,
-            needed,
-            lambda place: _beside(place, stroke, scene, motions, boxes, rooms),
-        )
-        frame = TissueFrame(origin=placement.tissue_origin)
-        others += [*held, *_in_world(table, around, frame)]
-        arm: LedArm = placement.arm(others=others)
+        stands = project_arm_in(scene, stroke, motions, around, needed)
     else:
-        arm, frame = _own(scene.own_arm)
-        stroke = _as_long(stroke, arm.blade.length)
-        room = _moved(arm, stroke, frame, workspace_in(scene, stroke.start, bounds))
-        others += arms_with_graspers(scene.graspers, motions, boxes, frame, None, rooms)
-        others += _in_world(table, around, frame)
-        if others:
-            start = np.array(arm.data.qpos)
-            arm, _ = _own(scene.own_arm, others)
-            arm.reset(start)
-    _warn_of_weakness(needed, arm)
-    standing = [each for each in others if isinstance(each, StandingFixture)]
+        stands = own_arm_in(scene, stroke, motions, around)
+    _warn_of_weakness(needed, stands.arm)
+    standing = [each for each in stands.others if isinstance(each, StandingFixture)]
     simulation = Simulation(
-        arm,
-        stroke,
+        stands.arm,
+        stands.stroke,
         link,
-        frame,
+        stands.frame,
         [each.fixture for each in standing],
         tissue_every=scene.tissue_every,
         coupling=scene.virtual_coupling(),
         passivity=scene.passivity,
     )
-    simulation.workspace = room
+    simulation.workspace = stands.room
     if scene.graspers:
         _add_graspers(simulation, scene.graspers, motions, [each.body for each in standing])
     return simulation
@@ -155,97 +117,6 @@ def _add_graspers(
         simulation.add_grasper(grasper)
 
 
-def _beside(
-    placement: Placement,
-    stroke: Stroke,
-    scene: Scene,
-    motions: Sequence[GraspMotion],
-    boxes: FloatArray,
-    rooms: Sequence[FloatArray | None],
-) -> list[HeldArm]:
-    """Return the arms with graspers beside an arm of the project; see `arms_with_graspers`."""
-    frame = TissueFrame(origin=placement.tissue_origin)
-    # Where a hand will lead it is not known: at the start the arms are clear of each other.
-    known = resting_stroke(stroke.start) if stroke.is_led else stroke
-    first = placement, known
-    return arms_with_graspers(scene.graspers, motions, boxes, frame, first, rooms)
-
-
-def _placed(
-    stroke: Stroke,
-    boxes: FloatArray,
-    scene: Scene,
-    needed: ExpectedForce,
-    beside: Callable[[Placement], list[HeldArm]],
-) -> tuple[Placement, list[HeldArm], FloatArray | None]:
-    """Return where an arm of the project stands, arms beside it, and where a hand may lead it.
-
-    Args:
-        stroke: What it is to reach; of a hand, where it starts.
-        boxes: See `placement.place`.
-        scene: The scene.
-        needed: What the cut will take.
-        beside: Places the arms beside it.
-    """
-    if not stroke.is_led:
-        placement = place(stroke, boxes, scene.arm, force=needed.force)
-        return placement, beside(placement), None
-    start = stroke.start
-    workspace, middle = workspace_in(scene, start, boxes[0]), 0.5 * (start.tip + start.heel)
-
-    def place_for(shares: FloatArray) -> tuple[Placement, list[HeldArm], FloatArray]:
-        box = shrunk(workspace, middle, shares)
-        tour = tour_of(box, middle, start)
-        name = arm_for(scene.arm, shares)
-        found = place_if_reached(tour, boxes, name, force=needed.force)
-        if found is None:
-            raise PlacementError(f"arm {name}")
-        return found, beside(found), box
-
-    def reaches(box: FloatArray) -> bool:
-        return stays_in_reach(placement, tour_of(box, middle, start), boxes)
-
-    try:
-        placement, held, box = placed_within(place_for)
-    except PlacementError as error:
-        raise PlacementError(
-            "no hand can lead the blade here: the arm does not reach around where the blade "
-            "starts, in the direction that it has there. Choose another scene, or a first stroke "
-            f"that begins with the blade upright ({error})"
-        ) from error
-    return placement, held, grown_within(box, workspace, reaches)
-
-
-def _moved(
-    arm: LedArm, stroke: Stroke, frame: TissueFrame, workspace: FloatArray
-) -> FloatArray | None:
-    """Move an arm of the user's own to the start, and return where a hand may lead it."""
-    if stroke.is_led:
-        return move_within(arm, workspace, stroke.start, frame)
-    move_to_start(arm, stroke, frame)
-    return None
-
-
-def _room_of_grasper(motion: GraspMotion, scene: Scene, bounds: FloatArray) -> FloatArray | None:
-    """Return where a hand is to lead a grasper; None where a script leads it."""
-    if not motion.is_led:
-        return None
-    start = motion.stroke(HALF_PAD, HALF_PAD).start
-    return workspace_in(scene, start, bounds, ROOM_OF_GRASPER)
-
-
-def _as_long(stroke: Stroke, length: float) -> Stroke:
-    """Return the stroke of a blade of that length [m].
-
-    A hand has led this very blade where the lengths agree, and what was recorded keeps its bits.
-    """
-    is_same = math.isclose(stroke.blade_length, length, rel_tol=_SAME_LENGTH)
-    if is_same and stroke.is_led:
-        return stroke
-    long = lengthened(stroke, length)
-    return resting_stroke(long.start) if stroke.is_led else long
-
-
 def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForce:
     """Return what the cut will take; nothing for a press, which is not to cut."""
     if stroke.name == "press":
@@ -253,37 +124,6 @@ def _needed(stroke: Stroke, mesh: TetrahedralMesh, scene: Scene) -> ExpectedForc
     if stroke.is_led:  # its whole edge may be in the tissue
         return ExpectedForce(highest_toughness(scene) * stroke.blade_length, stroke.blade_length)
     return expected_force(stroke, mesh, highest_toughness(scene))
-
-
-def _in_world(
-    table: Tabletop | None, fixtures: Sequence[Fixture], frame: TissueFrame
-) -> list[Standing]:
-    """Return a table and fixtures of the tissue's frame where they stand in the world."""
-    world = TissueFrame(
-        frame.rotation.T, frame.points_to_tissue(np.zeros(3))
-    )  # as the tissue sees it
-    found: list[Standing] = [
-        StandingFixture(world.fixture_to_tissue(fixture)) for fixture in fixtures
-    ]
-    return found if table is None else [table._replace(frame=frame), *found]
-
-
-def _own(own: OwnArm, others: Sequence[Standing] = ()) -> tuple[LedArm, TissueFrame]:
-    """Return an arm of the user's own, and where the tissue lies in its world."""
-    limits = DeviceLimits(force=own.force or math.inf, torque=own.torque or math.inf)
-    arm = own_arm(
-        Path(own.model),
-        limits,
-        heel=own.heel,
-        tip=own.tip,
-        forward=own.forward,
-        others=others,
-    )
-    quaternion, axes = np.array(own.quat), np.empty(9)
-    if not quaternion.any():
-        raise UsageError("[world] quat is [0, 0, 0, 0]; it is a rotation: w, x, y, z")
-    mujoco.mju_quat2Mat(axes, quaternion / np.linalg.norm(quaternion))
-    return arm, TissueFrame(axes.reshape(3, 3), np.array(own.pos))
 
 
 def _warn_of_table(stroke: Stroke, table: Tabletop | None) -> None:

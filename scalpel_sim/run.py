@@ -15,7 +15,7 @@ from scalpel_sim.hands.led_hand import LedHand
 from scalpel_sim.hands.run_controls import RunControls
 from scalpel_sim.output.resumption import RepeatedFrames
 from scalpel_sim.output.run_checkpoints import RunCheckpoints
-from scalpel_sim.output.run_end import Attempts, EndedRun, write_end, write_led
+from scalpel_sim.output.run_end import Attempts, EndedRun, RunStart, write_end, write_led
 from scalpel_sim.output.run_folder import (
     INITIAL,
     SCENE,
@@ -33,7 +33,6 @@ from scalpel_sim.tables.stroke import StrokeTable
 from scalpel_sim.tables.view import ViewTable
 from scalpel_sim.viewer.pictures import into_replay
 from scalpel_sim.viewer.replay import ReplayWriter
-from tissue import Snapshot
 
 _log = logging.getLogger(__name__)
 
@@ -96,13 +95,7 @@ def perform(
             views=views,
             log=log,
         )
-        body, title = simulation.link.describe(), simulation.title  # the link may be lost
-        at_first = simulation.link.snapshot()
-        if hand is not None:
-            hand.take_over(simulation)
-        _write_start(outputs, at_first, _scene_to_write(scene, hand, outputs))
-        # What graspers move is elsewhere when the blade comes.
-        asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
+        start = _begin(simulation, outputs, scene, hand)
         simulation.pictures.append(into_replay(replay))
         _warn_if_slow(simulation)
         until = None if hand is not None else seconds
@@ -116,20 +109,8 @@ def perform(
             )
         stopped = stop.reason
         status = _status_of(stopped, failure, controls)
-        summary, attempts = write_end(
-            EndedRun(
-                simulation,
-                outputs,
-                replay,
-                hand,
-                body,
-                title,
-                asked,
-                settings,
-                status,
-                failure,
-            )
-        )
+        ended = EndedRun(simulation, outputs, replay, hand, start, settings, status, failure)
+        summary, attempts = write_end(ended)
         is_done = status in (COMPLETE, ENDED_IN_PAGE) and not attempts.unwritten
         if is_done or not checkpoints.are_there:
             outputs.remove_passing_files()
@@ -179,17 +160,26 @@ def _raise_what_ended_it(
         raise Interrupted(f"{stop.reason} when the run was complete; {kept}")
 
 
-def _write_start(outputs: Outputs, at_first: Snapshot, scene: Scene | None) -> None:
+def _begin(
+    simulation: Simulation, outputs: Outputs, scene: Scene | None, hand: LedHand | None
+) -> RunStart:
     """Write what is known before the first frame, and keep space for what comes after the last.
 
     Raises:
         RunError: the system refuses, or there is no room for a run.
     """
+    body, title, at_first = simulation.link.describe(), simulation.title, simulation.link.snapshot()
+    if hand is not None:
+        hand.take_over(simulation)
+    scene = _scene_to_write(scene, hand, outputs)
     text = None if scene is None else scene_text(scene, outputs.path(SCENE))
     if text is not None:
         outputs.write_scene(text)
     outputs.write_mesh(INITIAL, at_first)
     outputs.keep_reserve()
+    # What graspers move is elsewhere when the blade comes.
+    asked = None if simulation.graspers else asked_area(simulation.stroke, at_first)
+    return RunStart(body, title, asked)
 
 
 def _run_frames(

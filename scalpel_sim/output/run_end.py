@@ -20,6 +20,16 @@ _log = logging.getLogger(__name__)
 _LED = "what the hands did"
 
 
+class RunStart(NamedTuple):
+    """What is known of a run before its first frame: later the link may be lost."""
+
+    body: TissueDescription
+    title: str
+    """Heading of the plots."""
+    asked: float | None
+    """The area that the stroke is to cut [m2]; None where that is not known."""
+
+
 class EndedRun(NamedTuple):
     """A run whose last frame is done."""
 
@@ -28,12 +38,7 @@ class EndedRun(NamedTuple):
     replay: ReplayWriter
     hand: LedHand | None
     """What led the blade, or None for a script."""
-    body: TissueDescription
-    """The body at the start: the link may be lost."""
-    title: str
-    """Heading of the plots."""
-    asked: float | None
-    """The area that the stroke was to cut [m2]; None where that is not known."""
+    start: RunStart
     settings: dict[str, Any]
     """Settings to keep in the summary."""
     status: str
@@ -100,7 +105,7 @@ def write_end(run: EndedRun) -> tuple[Summary, Attempts]:
     with attempts.of(SUMMARY):
         outputs.write_summary(summary)
     with attempts.of(PLOT):
-        outputs.start_plots(run.title)  # by another process, while this one writes the replay
+        outputs.start_plots(run.start.title)  # by another process, while this one writes the replay
     with attempts.of("the last picture"):
         add_to(run.replay, simulation)
     with attempts.of(REPLAY):
@@ -143,15 +148,15 @@ def _facts(run: EndedRun, attempts: Attempts) -> RunFacts:
         with attempts.of("the quality of the cut"):
             quality = link.cut_report()
     return RunFacts(
-        scene=run.body.scene,
+        scene=run.start.body.scene,
         status=run.status,
         dt=simulation.dt,
         wall_seconds=simulation.wall_seconds,
-        tetrahedra_initial=run.body.n_tetrahedra,
-        tetrahedra_final=(bridge.result or run.body).n_tetrahedra,
+        tetrahedra_initial=run.start.body.n_tetrahedra,
+        tetrahedra_final=(bridge.result or run.start.body).n_tetrahedra,
         pieces=pieces,
         quality=quality,
-        asked_area=run.asked,
+        asked_area=run.start.asked,
         counters=bridge.counters.as_numbers(),
         touched=simulation.touching.frames,
         settings=run.settings,
