@@ -170,7 +170,7 @@ class Simulation:
         for grasper in self.graspers:
             grasper.lead(now)
         arm.step1()
-        arm.check()  # the tissue is asked only where a blade can be
+        arm.check_if_set()  # the tissue is asked only where a blade can be
         self.touching.check()
         segment = blade.segment()
         for partner in self.partners:

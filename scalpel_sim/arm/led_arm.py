@@ -171,6 +171,15 @@ class LedArm:
             text = mujoco.mju_warningText(kind, int(data.warning.lastinfo[kind]))
             raise ArmError(f"at t = {data.time:.4f} s MuJoCo warned: {text}")
 
+    def check_if_set(self) -> None:
+        """Check the state again if its angles are not those of the last check: others set them.
+
+        Raises:
+            ArmError: see `check`.
+        """
+        if self._qpos.tolist() != self._angles:
+            self.check()
+
     def _refuse_motion(self, ways: FloatArray, joints: FloatArray) -> NoReturn:
         """Raise the error of a joint that moves too far in a step.
 
