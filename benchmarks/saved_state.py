@@ -8,16 +8,13 @@ takes the memory of an earlier one, as a state that is saved in each frame to go
 """
 
 import sys
-import time
-from collections.abc import Callable
-from statistics import median
 
 from bridge import InProcessLink
 from scalpel_sim import SCENES, Simulation, prepare
+from scalpel_sim.bench.timing import median_milliseconds
 from tissue import TissueState
 
 N_TIMES = 50
-MILLISECONDS = 1e3
 
 
 def main() -> None:
@@ -41,25 +38,15 @@ def figures(simulation: Simulation) -> tuple[float, ...]:
     states: list[TissueState] = []
     return (
         tissue.n_tetrahedra,
-        milliseconds(lambda: states.append(tissue.save_state())),
-        milliseconds(tissue.save_state),
-        milliseconds(lambda: tissue.load_state(state)),
-        milliseconds(state.to_bytes),
+        median_milliseconds(lambda: states.append(tissue.save_state()), N_TIMES),
+        median_milliseconds(tissue.save_state, N_TIMES),
+        median_milliseconds(lambda: tissue.load_state(state), N_TIMES),
+        median_milliseconds(state.to_bytes, N_TIMES),
         1e-6 * len(state.to_bytes()),
-        milliseconds(simulation.save_state),
-        milliseconds(lambda: simulation.load_state(whole)),
-        milliseconds(lambda: simulation.save_state().to_bytes()),
+        median_milliseconds(simulation.save_state, N_TIMES),
+        median_milliseconds(lambda: simulation.load_state(whole), N_TIMES),
+        median_milliseconds(lambda: simulation.save_state().to_bytes(), N_TIMES),
     )
-
-
-def milliseconds(do: Callable[[], object]) -> float:
-    """Return how long a call takes, the median of several [ms]."""
-    times = []
-    for _ in range(N_TIMES):
-        start = time.perf_counter()
-        do()
-        times.append(time.perf_counter() - start)
-    return MILLISECONDS * median(times)
 
 
 if __name__ == "__main__":

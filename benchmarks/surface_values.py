@@ -4,17 +4,14 @@ Usage: PYTHONPATH=. python benchmarks/surface_values.py [SCENE], on an idle mach
 """
 
 import sys
-import time
-from collections.abc import Callable
-from statistics import median
 from typing import get_args
 
 from bridge import InProcessLink
 from scalpel_sim import SCENES, prepare
+from scalpel_sim.bench.timing import median_milliseconds
 from tissue import SurfaceQuantity
 
 N_TIMES = 100
-MILLISECONDS = 1e3
 
 
 def main() -> None:
@@ -26,19 +23,10 @@ def main() -> None:
     assert isinstance(link, InProcessLink)
     tissue = link.tissue
     print(f"{name}, {tissue.n_tetrahedra} tetrahedra, in mid-cut, medians of {N_TIMES} [ms]")
-    print(f"{'surface':14s}{milliseconds(tissue.surface):8.3f}")
+    print(f"{'surface':14s}{median_milliseconds(tissue.surface, N_TIMES):8.3f}")
     for quantity in get_args(SurfaceQuantity):
-        print(f"{quantity:14s}{milliseconds(lambda q=quantity: tissue.surface_values(q)):8.3f}")
-
-
-def milliseconds(do: Callable[[], object]) -> float:
-    """Return how long a call takes, the median of several [ms]."""
-    times = []
-    for _ in range(N_TIMES):
-        start = time.perf_counter()
-        do()
-        times.append(time.perf_counter() - start)
-    return MILLISECONDS * median(times)
+        taken = median_milliseconds(lambda q=quantity: tissue.surface_values(q), N_TIMES)
+        print(f"{quantity:14s}{taken:8.3f}")
 
 
 if __name__ == "__main__":

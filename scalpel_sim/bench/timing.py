@@ -105,3 +105,13 @@ def time_turn(run: Callable[[int], None], n_calls: int, clock: Clock, turn: floa
         samples.append((end - start) / n_calls)
         if end - begin >= turn and len(samples) >= LEAST_SAMPLES:
             return np.array(samples)
+
+
+def median_milliseconds(do: Callable[[], object], n_times: int) -> float:
+    """Return how long a call takes, the median of several [ms]: for one whose state stays."""
+    times = []
+    for _ in range(n_times):
+        start = time.perf_counter()
+        do()
+        times.append(time.perf_counter() - start)
+    return 1e3 * float(np.median(times))

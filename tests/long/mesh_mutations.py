@@ -48,8 +48,14 @@ WRITERS: dict[str, Callable[[TetrahedralMesh], bytes]] = {
 }
 
 
-def read_one(case: int, folder: str) -> None:
+REFUSED, READ = "refused", "read whole"
+"""What comes of a file."""
+
+
+def read_one(case: int, folder: str) -> str:
     """Read one file that is damaged: it must be refused by name, or give a sound mesh.
+
+    Return which of the two, `REFUSED` or `READ`.
 
     In three cases of four a good file is damaged; in the others a broken mesh is written.
     """
@@ -67,10 +73,11 @@ def read_one(case: int, folder: str) -> None:
         message = str(error)
         assert message.startswith(f"{path}: "), message
         assert "\n" not in message and message.isprintable(), message
-        return
+        return REFUSED
     expect_sound(mesh)
     n = len(mesh.tetrahedra)
     assert n >= n_tetrahedra, f"{n} of {n_tetrahedra} tetrahedra are left of {name}"
+    return READ
 
 
 @cache

@@ -151,8 +151,11 @@ def masked_frame(payload: bytes) -> bytes:
     return bytes([0x81, 0x80 | len(payload), 0, 0, 0, 0]) + payload
 
 
-def harass(case: int) -> None:
-    """Do `N_FAULTS` things to the server of a page; the run goes on, and a good page sees it."""
+def harass(case: int) -> float:
+    """Do `N_FAULTS` things to the server of a page; the run goes on, and a good page sees it.
+
+    Return how long the run waited for a picture at most [s].
+    """
     from collections import deque
 
     random = np.random.default_rng(case)
@@ -189,7 +192,7 @@ def harass(case: int) -> None:
             os.kill(viewer._process.pid, signal.SIGSTOP)
         show(200)
     assert not viewer.is_running
-    assert longest < NO_WAIT, f"a picture took {longest:.2f} s"
+    return longest
 
 
 def vars_of(command: object) -> list:
