@@ -6,7 +6,8 @@ cut.
 """
 
 import itertools
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import coo_array
@@ -33,7 +34,8 @@ CHILDREN = np.array(  # corners 0 to 3, then the middles of edges 01, 02, 03, 12
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
-class Parts(NamedTuple):
+@dataclass(frozen=True)
+class Parts:
     """The equal parts of a body, and the ways between neighbours."""
 
     volumes: FloatArray
@@ -46,6 +48,16 @@ class Parts(NamedTuple):
     """Centroid of the part on either side of each inner face [m], shape (2 n_faces, 3)."""
     stop: FloatArray
     """Centroid of the face [m], shape (2 n_faces, 3)."""
+
+    @cached_property
+    def low(self) -> FloatArray:
+        """Lowest corner of the box around each way [m], shape (2 n_faces, 3)."""
+        return np.minimum(self.start, self.stop)
+
+    @cached_property
+    def high(self) -> FloatArray:
+        """Highest corner of the box around each way [m], shape (2 n_faces, 3)."""
+        return np.maximum(self.start, self.stop)
 
 
 def divided(mesh: TetrahedralMesh, times: int) -> Parts:
@@ -89,22 +101,10 @@ class ExactPieces:
         self.parts = parts
         self.crumb = crumb
         self.is_open = np.zeros(len(parts.pairs), dtype=bool)
-        self._low = np.minimum(parts.start, parts.stop)
-        self._high = np.maximum(parts.start, parts.stop)
 
     def cut(self, edges: FloatArray) -> None:
         """Cut along the ruled surface of an edge [m], shape (n_positions, 2, 3)."""
-        crossed = np.zeros(len(self.parts.start), dtype=bool)
-        for before, after in itertools.pairwise(edges):
-            corners = np.array([*before, *after])
-            near = (self._low <= corners.max(axis=0)).all(axis=1)
-            near &= (self._high >= corners.min(axis=0)).all(axis=1)
-            (near,) = np.nonzero(near & ~crossed)
-            start, stop = self.parts.start[near], self.parts.stop[near]
-            hit = _crosses(start, stop, before[0], before[1], after[0])
-            hit |= _crosses(start, stop, before[1], after[1], after[0])
-            crossed[near[hit]] = True
-        new = crossed.reshape(2, -1).any(axis=0) & ~self.is_open
+        new = crossed_faces(self.parts, edges) & ~self.is_open
         self.is_open |= new
         self._keep_crumbs(new)
 
@@ -136,6 +136,26 @@ class ExactPieces:
             most = np.zeros(len(contacts), dtype=bool)
             most[by_area[is_last]] = True
             self.is_open[faces[most[of_face.ravel()]]] = False
+
+
+def crossed_faces(parts: Parts, edges: FloatArray) -> np.ndarray:
+    """Return which inner faces lie on a way that a ruled surface crosses, shape (n_faces,).
+
+    Args:
+        parts: The parts of a body.
+        edges: Positions of the edge [m], shape (n_positions, 2, 3).
+    """
+    crossed = np.zeros(len(parts.start), dtype=bool)
+    for before, after in itertools.pairwise(edges):
+        corners = np.array([*before, *after])
+        near = (parts.low <= corners.max(axis=0)).all(axis=1)
+        near &= (parts.high >= corners.min(axis=0)).all(axis=1)
+        (near,) = np.nonzero(near & ~crossed)
+        start, stop = parts.start[near], parts.stop[near]
+        hit = _crosses(start, stop, before[0], before[1], after[0])
+        hit |= _crosses(start, stop, before[1], after[1], after[0])
+        crossed[near[hit]] = True
+    return crossed.reshape(2, -1).any(axis=0)
 
 
 def _crosses(
