@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, cast
 
@@ -49,7 +50,8 @@ class Plotter:
         """
         self._forces = forces
         paths = {"recorded": recorded, "forces": forces, "energies": energies}
-        request = json.dumps({"title": title} | {key: str(path) for key, path in paths.items()})
+        said = {"title": title, "owner": os.getpid()}
+        request = json.dumps(said | {key: str(path) for key, path in paths.items()})
         stdin = cast(IO[str], self._process.stdin)
         with contextlib.suppress(BrokenPipeError):  # `finish` says why
             stdin.write(request + "\n")
@@ -95,8 +97,20 @@ def draw_requested_plots() -> None:
     if text:
         request = json.loads(text)
         recording = read_forces(Path(request["recorded"]))
-        with whole_file(request["forces"]) as unfinished:
+        with _file_of(request["owner"], request["forces"]) as unfinished:
             plot_forces(recording, request["title"], unfinished)
         if recording.is_audited:
-            with whole_file(request["energies"]) as unfinished:
+            with _file_of(request["owner"], request["energies"]) as unfinished:
                 plot_energies(recording, request["title"], unfinished)
+
+
+@contextlib.contextmanager
+def _file_of(owner: int, path: str) -> Iterator[Path]:
+    """Yield a name to draw at, which replaces `path` if the process that asked for it still runs.
+
+    The folder of one that was killed may be that of another run by now.
+    """
+    with whole_file(path) as unfinished:
+        yield unfinished
+        if os.getppid() != owner:
+            sys.exit("the run that asked for the plot has ended")
