@@ -13,12 +13,13 @@ from tissue import FloatArray
 if TYPE_CHECKING:  # only the function that makes a tissue loads the compiler
     from tissue import BladeSweep, Tissue
 
-FARTHEST_IN_A_REQUEST = 250.0
+FARTHEST_IN_A_REQUEST = 100.0
 """How far the edge, or a frame that is led, may move in a request, in mean node sizes of the body.
-The edge is followed in quarters of a node size, so that these are a thousand increments. In a frame
-of a millisecond a scalpel moves by a hundredth of a node size."""
+The edge is followed in quarters of a node size, so that these are 400 increments, and 15 times as
+many where the step goes wrong and is repeated. In a frame of a millisecond a scalpel moves by a
+hundredth of a node size."""
 
-LARGEST_SWEEP = 2500.0
+LARGEST_SWEEP = 1000.0
 """Area that the edge may sweep in a request, as its length times how far it moves, in squares of
 the mean node size; also its length, in node sizes. Points along the edge, some to a node size, are
 followed in each increment."""

@@ -89,6 +89,8 @@ class Child:
             AssertionError: it failed, took too long, took memory, or ended the process.
         """
         outcome = self._outcome(case)
+        if outcome.failure:
+            self.close()  # what it left undone would fail the next case too
         assert not outcome.failure, outcome.failure
         assert outcome.seconds < self._longest, f"case {case} took {outcome.seconds:.1f} s"
         self._memory = self._memory or outcome.memory

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from bridge import FrameHold, FramePose, LinkError
+from bridge.led_geoms import GeomPoses
 from tests.bridge.bits import bits
 from tests.bridge.tcp.bare_sockets import DT, link_once_free
-from tissue import BladeSweep
+from tissue import BladeSweep, Geom
 
 NODE_SIZE = 5.609e-3
-FARTHEST = 250.0 * NODE_SIZE
+FARTHEST = 100.0 * NODE_SIZE
 
 
 @pytest.fixture
@@ -33,7 +34,7 @@ def expect_refusal(link, message, *step):
 
 def test_a_blade_that_moves_a_kilometre_in_a_step_is_refused(link, upright):
     far, near = upright(0.009, -500.0), upright(0.009, 0.01)
-    match = r"the tip of the blade moves by 500 m in one step; at most 1\.4 m are allowed"
+    match = r"the tip of the blade moves by 500 m in one step; at most 0\.561 m are allowed"
     expect_refusal(link, match, BladeSweep(far, near), DT)
 
 
@@ -45,11 +46,11 @@ def test_a_blade_that_turns_its_heel_too_far_is_refused(link, upright):
 
 def test_a_long_blade_that_moves_far_is_refused(link, upright):
     after = upright(0.009, 0.01)
-    long = after._replace(heel=after.heel + np.array([0.0, 0.0, 1.0]))
-    match = "an edge of 1.03 m moves by 1 m in one step; .* times travel at most 0.0787 m2, 2500"
+    long = after._replace(heel=after.heel + np.array([0.0, 0.0, 0.5]))
+    match = "an edge of 0.53 m moves by 0.5 m in one step; .* times travel at most 0.0315 m2, 1000"
     expect_refusal(link, match, BladeSweep(after, long), DT)
     longer = after._replace(heel=after.heel + np.array([0.0, 0.0, 20.0]))
-    expect_refusal(link, "the length is at most 14 m", BladeSweep(longer, longer), DT)
+    expect_refusal(link, "the length is at most 5.61 m", BladeSweep(longer, longer), DT)
 
 
 def test_a_blade_that_moves_as_far_as_is_allowed_is_served(link, upright):
@@ -66,6 +67,15 @@ def test_a_frame_that_is_led_too_far_is_refused(link):
     match = "frame 0 moves by 900 m in one step; at most"
     expect_refusal(link, match, None, DT, [FramePose(far, np.eye(3))])
     assert link.step(None, DT, near).n_tetrahedra == 72
+
+
+def test_a_geom_that_moves_so_far_that_it_takes_seconds_to_follow_is_refused(link):
+    ball = Geom("ball", "sphere", (4e-3,))
+    far, near = (GeomPoses(np.array([[0.02, 0.03, z]]), np.eye(3)[None]) for z in (7.0, 0.05))
+    link.collide_with([ball], far)
+    match = "geom 'ball' moves so far in one step, .* more than 500 increments"
+    expect_refusal(link, match, None, DT, (), near)
+    assert link.step(None, DT, (), far).n_tetrahedra == 72
 
 
 def test_a_step_of_more_integrator_steps_than_are_allowed_is_refused(monkeypatch):
