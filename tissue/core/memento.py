@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.core.attributes import attributes_of, set_attributes
 from tissue.core.memory_blocks import PackedMemory, packed, unpacked
 from tissue.core.struct_memory import StructMemory, StructRules, memory_of
 from tissue.core.structs import Arrays, Vectors
@@ -141,7 +142,7 @@ class Memento:
             if value.flags.writeable:
                 self.arrays.append((value, value.copy()))
         elif kind == _OBJECT:
-            attributes = dict(vars(value))
+            attributes = attributes_of(value)
             for name in self._kinds.own(type(value)):
                 attributes.pop(name, None)
             self.objects.append((value, attributes))
@@ -162,10 +163,7 @@ class Memento:
         """Put the tree back to what it was."""
         kinds = _kinds_under(self.rules)
         for owner, attributes in self.objects:
-            now = vars(owner)
-            for name in now.keys() - attributes.keys() - kinds.own(type(owner)):
-                del now[name]
-            now.update(attributes)
+            set_attributes(owner, attributes, kinds.own(type(owner)))
         for each, items in self.lists:
             each[:] = items
         for table, entries in self.dicts:

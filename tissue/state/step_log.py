@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tissue.core.attributes import attributes_of, set_attributes
 from tissue.core.memento import Memento, Spares, attributes_in
 from tissue.loads.step_inputs import StepInputs
 from tissue.state.tissue_state import RULES
@@ -29,17 +30,15 @@ class StepState:
     def __init__(self, tissue: Any, spares: Spares) -> None:
         own = attributes_in(RULES.own, type(tissue))
         derived = attributes_in(RULES.derived, type(tissue))
-        self._attributes = {k: value for k, value in vars(tissue).items() if k not in own}
+        now = attributes_of(tissue)
+        self._attributes = {name: value for name, value in now.items() if name not in own}
         walked = {k: value for k, value in self._attributes.items() if k not in derived}
         self._memento = Memento(walked, RULES, spares)
 
     def restore(self, tissue: Any) -> None:
         """Put the tissue back to what it was."""
         self._memento.restore()
-        now, own = vars(tissue), attributes_in(RULES.own, type(tissue))
-        for name in now.keys() - self._attributes.keys() - own:
-            del now[name]
-        now.update(self._attributes)
+        set_attributes(tissue, self._attributes, attributes_in(RULES.own, type(tissue)))
 
 
 class StepLog:
