@@ -16,13 +16,13 @@ class StepInputs(NamedTuple):
     """Motion of the blade."""
     dt: float
     """Length of the step [s]."""
-    forces: tuple[FloatArray, ...]
+    forces: tuple[FloatArray, ...] = ()
     """Forces of the loads on their points [N]."""
-    frames: tuple[tuple[Any, ...], ...]
+    frames: tuple[tuple[Any, ...], ...] = ()
     """Where the frames of attachments go."""
-    geoms: tuple[FloatArray, FloatArray, IntArray] | None
+    geoms: tuple[FloatArray, FloatArray, IntArray] | None = None
     """Where geoms go, and which of them may be touched; None where there are none."""
-    supports: FloatArray | None
+    supports: FloatArray | None = None
     """Velocities of the fixed nodes [m/s]; None where all stand still."""
 
 
@@ -44,7 +44,7 @@ def inputs_of(
     """
     geoms, supports = system.geoms, None
     if not (loads.act or attachments.act or geoms.geoms or system.supports.is_moving):
-        return StepInputs(sweep, dt, (), (), None, None)
+        return StepInputs(sweep, dt)
     if system.supports.is_moving:
         body = system.body
         supports = body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]]

@@ -59,12 +59,11 @@ class StepLog:
         self.inputs.clear()
         self._n_substeps = 0
 
-    def add(self, inputs: StepInputs, n_substeps: int) -> None:
-        """Note a step that was done, of that many steps of the integrator."""
+    def add(self, inputs: StepInputs, n_substeps: int) -> bool:
+        """Note a step that was done, of that many steps of the integrator.
+
+        Returns whether a state should be saved.
+        """
         self.inputs.append(inputs)
         self._n_substeps += n_substeps
-
-    @property
-    def is_long(self) -> bool:
-        """Whether a state should be saved."""
         return self._n_substeps >= STEPS_BETWEEN_STATES or len(self.inputs) >= MOST_FRAMES
