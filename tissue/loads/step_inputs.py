@@ -42,19 +42,16 @@ def inputs_of(
         attachments: Those of the body.
         system: The body, geoms and supports.
     """
-    geoms, supports = system.geoms, None
-    if not (loads.act or attachments.act or geoms.geoms or system.supports.is_moving):
+    geoms, supports, body = system.geoms, system.supports, system.body
+    if not (loads.act or attachments.act or geoms.geoms or supports.is_moving):
         return StepInputs(sweep, dt)
-    if system.supports.is_moving:
-        body = system.body
-        supports = body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]]
     return StepInputs(
         sweep,
         dt,
-        loads.forces,
-        tuple(each.way for each in attachments.all),
+        loads.forces if loads.act else (),
+        tuple([each.way for each in attachments.all]) if attachments.act else (),
         geoms.way if geoms.geoms else None,
-        supports,
+        body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]] if supports.is_moving else None,
     )
 
 
