@@ -159,9 +159,16 @@ class LedArm:
                 f"at t = {data.time:.4f} s the arm's state is not finite (joints: {names})"
             )
         before, self._angles = self._angles or angles, angles
-        if max(map(abs, speeds), default=0.0) * self._dt > LARGEST_JOINT_STEP:
+        # Norms are at least as large as what each joint does, and cost a third as much.
+        if (
+            math.hypot(*speeds) * self._dt > LARGEST_JOINT_STEP
+            and max(map(abs, speeds)) * self._dt > LARGEST_JOINT_STEP
+        ):
             self._refuse_motion(self._dt * data.qvel, self.model.dof_jntid)
-        if max(map(abs, map(operator.sub, angles, before)), default=0.0) > LARGEST_JOINT_STEP:
+        if (
+            math.dist(angles, before) > LARGEST_JOINT_STEP
+            and max(map(abs, map(operator.sub, angles, before))) > LARGEST_JOINT_STEP
+        ):
             joints = np.repeat(
                 np.arange(self.model.njnt), np.diff(self.model.jnt_qposadr, append=self.model.nq)
             )

@@ -15,8 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tissue.core.array_types import IntArray
+from tissue.core.attributes import attributes_of, set_attributes
 from tissue.core.memory_blocks import PackedMemory, packed, unpacked
-from tissue.core.struct_memory import StructMemory, StructRules, memory_of
+from tissue.core.struct_memory import (
+    StructMemory,
+    StructPart,
+    StructRules,
+    memory_of,
+    parts_of,
+)
 from tissue.core.structs import Arrays, Vectors
 
 
@@ -59,14 +66,21 @@ class Spares:
 
     def __init__(self) -> None:
         self._structs: list[Arrays] = []
+        self._parts: list[list[StructPart]] = []
         self._memory: StructMemory | None = None
         self._room = np.empty(0, np.int64)
 
     def memory(self, structs: list[Arrays], rules: StructRules) -> StructMemory:
         """Return the memory of structs, which mostly are those of the last call."""
-        is_same = [*map(id, structs)] == [*map(id, self._structs)]
-        if self._memory is None or not is_same:
-            self._structs, self._memory = structs, memory_of(structs, rules)
+        ids, known = [*map(id, structs)], [*map(id, self._structs)]
+        if self._memory is None or ids != known:
+            # Of 70 structs a cut replaces one or two: to look at the arrays of all takes 1 ms.
+            parts = dict(zip(known, self._parts, strict=True))
+            self._parts = [
+                parts[i] if i in parts else parts_of(struct, rules)
+                for i, struct in zip(ids, structs, strict=True)
+            ]
+            self._structs, self._memory = structs, memory_of(structs, rules, self._parts)
         return self._memory
 
     def room(self) -> IntArray:
@@ -141,7 +155,7 @@ class Memento:
             if value.flags.writeable:
                 self.arrays.append((value, value.copy()))
         elif kind == _OBJECT:
-            attributes = dict(vars(value))
+            attributes = attributes_of(value)
             for name in self._kinds.own(type(value)):
                 attributes.pop(name, None)
             self.objects.append((value, attributes))
@@ -162,10 +176,7 @@ class Memento:
         """Put the tree back to what it was."""
         kinds = _kinds_under(self.rules)
         for owner, attributes in self.objects:
-            now = vars(owner)
-            for name in now.keys() - attributes.keys() - kinds.own(type(owner)):
-                del now[name]
-            now.update(attributes)
+            set_attributes(owner, attributes, kinds.own(type(owner)))
         for each, items in self.lists:
             each[:] = items
         for table, entries in self.dicts:

@@ -90,18 +90,18 @@ def packed(spans: IntArray, room: IntArray) -> PackedMemory:
 
     Args:
         spans: See `ADDRESS`, shape (n_spans, 7).
-        room: Taken for the words, if there is enough; else more is made.
+        room: Taken for the words, if all in use have room; else more is made. What is not
+            written of it takes no memory.
     """
     n = len(spans)
     in_use, rest = np.empty(n, np.int64), np.empty(n, np.int64)
     n_blocks = measure_memory(spans, in_use, rest)
     is_filled, value = np.empty(n_blocks, np.bool_), np.empty(n_blocks, np.int64)
-    n_words = find_filled_blocks(spans, in_use, is_filled, value)
-    if len(room) < n_words:
-        room = np.empty(n_words + n_words // SPARE_SHARE, np.int64)
-    words = room[:n_words]
-    pack_memory(spans, in_use, is_filled, words)
-    return PackedMemory(in_use, rest, is_filled, value, words)
+    most = int(in_use.sum())
+    if len(room) < most:
+        room = np.empty(most + most // SPARE_SHARE, np.int64)
+    n_words = pack_memory(spans, in_use, is_filled, value, room)
+    return PackedMemory(in_use, rest, is_filled, value, room[:n_words])
 
 
 def unpacked(spans: IntArray, memory: PackedMemory, *, is_new: bool = False) -> None:
@@ -134,11 +134,24 @@ def measure_memory(spans: IntArray, in_use: IntArray, rest: IntArray) -> int:
 
 
 @kernel
-def find_filled_blocks(
-    spans: IntArray, in_use: IntArray, is_filled: BoolArray, value: IntArray
+def pack_memory(
+    spans: IntArray, in_use: IntArray, is_filled: BoolArray, value: IntArray, words: IntArray
 ) -> int:
-    """Find the blocks that hold one value, and that; return how many words the others have."""
-    block = n_words = 0
+    """Find the blocks in use that hold one value, and that; write the words of all others.
+
+    In one pass: to look at each block before any is copied takes as long as to copy them.
+
+    Args:
+        spans: See `ADDRESS`, shape (n_spans, 7).
+        in_use: See `PackedMemory`, as the rest.
+        is_filled: Written.
+        value: Written.
+        words: Written; as long as all that is in use.
+
+    Returns:
+        Number of words written.
+    """
+    block = at = 0
     for i in range(len(spans)):
         n = in_use[i]
         memory = words_at(spans[i, ADDRESS], n)
@@ -146,25 +159,12 @@ def find_filled_blocks(
             end = min(begin + BLOCK, n)
             is_filled[block] = _holds_one_value(memory, begin, end)
             value[block] = memory[begin]
-            n_words += 0 if is_filled[block] else end - begin
-            block += 1
-    return n_words
-
-
-@kernel
-def pack_memory(spans: IntArray, in_use: IntArray, is_filled: BoolArray, words: IntArray) -> None:
-    """Write the blocks in use that hold more than one value."""
-    block = at = 0
-    for i in range(len(spans)):
-        n = in_use[i]
-        memory = words_at(spans[i, ADDRESS], n)
-        for begin in range(0, n, BLOCK):
-            end = min(begin + BLOCK, n)
             if not is_filled[block]:
                 for k in range(end - begin):
                     words[at + k] = memory[begin + k]
                 at += end - begin
             block += 1
+    return at
 
 
 @kernel

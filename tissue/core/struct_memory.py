@@ -36,17 +36,35 @@ class StructRules(NamedTuple):
     """Returns what is in use in some of these structs; of others all is."""
 
 
-def own_arrays(struct: Arrays, rules: StructRules) -> list[tuple[str, np.ndarray]]:
-    """Return the arrays of a struct that are state, with their names; none of structs in it."""
+class StructPart(NamedTuple):
+    """An array of a struct that is state."""
+
+    name: str
+    """Its field."""
+    array: np.ndarray
+    """The array."""
+    address: int
+    """Where it begins."""
+    n_words: int
+    """Whole words of it; 0 where it does not begin with one."""
+    tail: np.ndarray
+    """View of the bytes behind those."""
+
+
+def parts_of(struct: Arrays, rules: StructRules) -> list[StructPart]:
+    """Return the arrays of a struct that are state; none of structs in it. They never change."""
     kind = type(struct).__name__
     if kind in rules.scratch:
         return []
-    fields = ((name, getattr(struct, name)) for name in type(struct).__annotations__)
-    return [
-        (name, value)
-        for name, value in fields
-        if isinstance(value, np.ndarray) and f"{kind}.{name}" not in rules.scratch
-    ]
+    parts = []
+    for name in type(struct).__annotations__:
+        array = getattr(struct, name)
+        if isinstance(array, np.ndarray) and f"{kind}.{name}" not in rules.scratch:
+            address = array.ctypes.data
+            n_words = array.nbytes // WORD if address % WORD == 0 else 0
+            tail = array.reshape(-1).view(np.uint8)[WORD * n_words :]
+            parts.append(StructPart(name, array, address, n_words, tail))
+    return parts
 
 
 class StructMemory(NamedTuple):
@@ -58,22 +76,33 @@ class StructMemory(NamedTuple):
     """Views of the bytes behind the whole words of arrays."""
 
 
-def memory_of(structs: Sequence[Arrays], rules: StructRules) -> StructMemory:
-    """Return the memory of structs that is state, in their order."""
+def memory_of(
+    structs: Sequence[Arrays],
+    rules: StructRules,
+    parts: Sequence[list[StructPart]] | None = None,
+) -> StructMemory:
+    """Return the memory of structs that is state, in their order.
+
+    Args:
+        structs: The structs.
+        rules: What of them is state.
+        parts: What `parts_of` returned for each, where that is known.
+    """
+    if parts is None:
+        parts = [parts_of(struct, rules) for struct in structs]
     uses = {(id(use.struct), use.field): use for use in rules.in_use(structs)}
     spans: list[list[int]] = []
     tails: list[np.ndarray] = []
-    for struct in structs:
+    for struct, own in zip(structs, parts, strict=True):
         if struct._cells and type(struct).__name__ not in rules.scratch:
             spans.append([struct.address, len(struct._cells), 0, 1, 0, 0, 0])
-        for name, array in own_arrays(struct, rules):
-            address = array.ctypes.data
-            n_words = array.nbytes // WORD if address % WORD == 0 else 0
+        for name, array, address, n_words, tail in own:
             if n_words:
-                spans.append([address, n_words, *_use(array, uses.get((id(struct), name)))])
-            if array.nbytes % WORD or not n_words:
-                tails.append(array.reshape(-1).view(np.uint8)[WORD * n_words :])
-    return StructMemory(np.array(spans, np.int64).reshape(-1, 7), [t for t in tails if t.size])
+                use = uses.get((id(struct), name))
+                spans.append([address, n_words, *_use(array, use)])
+            if tail.size:
+                tails.append(tail)
+    return StructMemory(np.array(spans, np.int64).reshape(-1, 7), tails)
 
 
 def _use(array: np.ndarray, use: RowsInUse | None) -> list[int]:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from tissue.cutting.blade_path import Path, new_path, path_travel
 from tissue.cutting.scheme import Scheme
@@ -165,8 +165,10 @@ class Incision:
         while True:
             body, visits = hooks.mesh()
             one_pass(body, visits, self.path)
-            self._expect_room(visits)
-            is_full = bool(self.scheme.change.is_full)
+            change = self.scheme.change
+            if change.lacks_room or visits.is_full:
+                self._refuse(visits)
+            is_full = bool(change.is_full)
             hooks.after_pass()
             if not is_full:
                 break
@@ -180,9 +182,10 @@ class Incision:
             NoRoomError: there are more than there is room for.
         """
         self.scheme.detect(body, visits, self.path)
-        self._expect_room(visits)
+        if self.scheme.change.lacks_room or visits.is_full:
+            self._refuse(visits)
 
-    def _expect_room(self, visits: Visits) -> None:
+    def _refuse(self, visits: Visits) -> NoReturn:
         """Refuse what is not complete.
 
         Raises:
@@ -191,10 +194,8 @@ class Incision:
         """
         if self.scheme.change.lacks_room:
             raise NoRoomError(int(self.scheme.change.lacks_room))
-        if visits.is_full:
-            visits.is_full = 0
-            raise TissueError(
-                f"a node has more than {LARGEST_STAR} tetrahedra around it, which is more than a "
-                "cut can divide. Use a mesh without such nodes, or a larger guard "
-                "(`CutSettings.guard`)"
-            )
+        visits.is_full = 0
+        raise TissueError(
+            f"a node has more than {LARGEST_STAR} tetrahedra around it, which is more than a cut "
+            "can divide. Use a mesh without such nodes, or a larger guard (`CutSettings.guard`)"
+        )

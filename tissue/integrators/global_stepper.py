@@ -86,9 +86,7 @@ class GlobalStepper:
 
     moved = None
     moving = None
-    refinement = 1
-    """Into how many times as many increments, and these into how many times as many steps, a time
-    step is divided: 1, but where one is repeated."""
+    _refinement = 1
 
     def __init__(self, method: Method, threads: int = 1) -> None:
         self.method = method
@@ -96,6 +94,20 @@ class GlobalStepper:
         self._threads = Threads(threads) if threads > 1 else None
         self._choice: StepChoice | None = None
         self._relaxation: Relaxation | None = None
+
+    @property
+    def refinement(self) -> int:
+        """Into how many times as many increments, and these into steps, a time step is divided.
+
+        It is 1, but where a step is repeated.
+        """
+        return self._refinement
+
+    @refinement.setter
+    def refinement(self, refinement: int) -> None:
+        self._refinement = refinement
+        if self._choice is not None:
+            self._choice.refinement = refinement
 
     def relax(
         self, system: System, blade: BladeContext, increment: Increment, has_blade: bool
@@ -164,7 +176,7 @@ class GlobalStepper:
         if choice is None or len(choice.no_frequency) != n_nodes:
             where = (system.node_size, system.surroundings, n_nodes)
             self._choice = choice = new_step_choice(self.method.limit, *where)
-        choice.refinement = self.refinement
+            choice.refinement = self._refinement
         choice.of_contact = system.contact.added_frequency_squared + system.added_by_attachments
         return choice
 

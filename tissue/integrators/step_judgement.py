@@ -37,11 +37,17 @@ TOO_FAST: Final = 3
 """The nodes have more energy than the body was given."""
 OUT_OF_NOTHING: Final = 4
 """The account of energy says that there is more than was given."""
+FORCE_NOT_FINITE: Final = 5
+"""The force on the blade is not a finite number."""
 
 
 class StepBounds(Arrays):
     """What a step of a body is judged by."""
 
+    before: FloatArray
+    """What `write_look` wrote before the step, shape (`LOOK_NUMBERS`,)."""
+    after: FloatArray
+    """What it wrote after the step that was judged last, shape (`LOOK_NUMBERS`,)."""
     without_gravity: FloatCell
     """Energy of the body when counting began: elastic and kinetic, and in all that holds and
     touches it [J]."""
@@ -119,28 +125,42 @@ def energy_in_springs(context: StepContext, edge: Edge, when: float) -> float:
 def judge_step(
     context: StepContext,
     bounds: StepBounds,
-    before: FloatArray,
-    after: FloatArray,
     dt: float,
     work_of_loads: float,
     residual: float,
+    force: float,
 ) -> int:
     """Return ACCEPTED, or what is wrong with a step.
 
+    What is seen after a step that is accepted is what is there before the next one.
+
     Args:
         context: The body after the step, and all that acts on it.
-        bounds: What it is judged by; `excess` is written.
-        before: What `write_look` wrote before the step.
-        after: What it writes now.
+        bounds: What it is judged by; `before`, `after` and `excess` are written.
         dt: Length of the step [s].
         work_of_loads: Work of loads so far [J].
         residual: `Energies.residual`, where an account of energy is kept, else 0 [J].
+        force: A sum of what the blade feels: finite, or not.
     """
+    before, after = bounds.before, bounds.after
     write_look(context, after)
     if after[IS_FINITE] != 1.0:
         return NOT_FINITE_NOW
-    if dt == 0.0:  # nothing moves, and a blade that cuts is where no motion has led it
-        return ACCEPTED
+    # In no time nothing moves, and a blade that cuts is where no motion has led it.
+    found = ACCEPTED if dt == 0.0 else _fault(bounds, dt, work_of_loads, residual)
+    if found != ACCEPTED:
+        return found
+    if not math.isfinite(force):
+        return FORCE_NOT_FINITE
+    for i in range(LOOK_NUMBERS):
+        before[i] = after[i]
+    return ACCEPTED
+
+
+@kernel
+def _fault(bounds: StepBounds, dt: float, work_of_loads: float, residual: float) -> int:
+    """Return ACCEPTED, or which law the motion in a step breaks; see `judge_step`."""
+    before, after = bounds.before, bounds.after
     # The sides of the box move as fast as nodes do; what turns round within the step moves by
     # less than the body is long.
     speed = 2.0 * before[FASTEST_NODE] + bounds.speed_gained

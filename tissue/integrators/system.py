@@ -33,7 +33,7 @@ from tissue.material import Material
 from tissue.mesh.body import Body, grown_body
 from tissue.mesh.changes import Change
 from tissue.mesh.cut_error import inverted_share, lowest_altitude
-from tissue.mesh.loose_pieces import loose_pieces_of, no_loose_pieces
+from tissue.mesh.loose_pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 from tissue.mesh.star import LARGEST_STAR, Visits, mean_node_size, no_visits
 
 INCREMENTS_TO_PIECES = 50
@@ -174,9 +174,14 @@ class System:
         self.contact.prepare(self.body, by_node, highest, room, seconds)
 
     def find_loose_pieces(self) -> None:
-        """Find the pieces that are not held."""
+        """Find the pieces that are not held; where they are those of before, keep the struct.
+
+        With another one the next saved state looks up where all of the memory is, in a millisecond.
+        """
         if self.surroundings.drag > 0.0:
-            self.loose = loose_pieces_of(self.body)
+            found = loose_pieces_of(self.body)
+            if not are_same_pieces(found, self.loose):
+                self.loose = found
         self._increments_to_pieces = 0
 
     def find_new_loose_pieces(self) -> None:

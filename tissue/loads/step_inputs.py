@@ -16,13 +16,13 @@ class StepInputs(NamedTuple):
     """Motion of the blade."""
     dt: float
     """Length of the step [s]."""
-    forces: tuple[FloatArray, ...]
+    forces: tuple[FloatArray, ...] = ()
     """Forces of the loads on their points [N]."""
-    frames: tuple[tuple[Any, ...], ...]
+    frames: tuple[tuple[Any, ...], ...] = ()
     """Where the frames of attachments go."""
-    geoms: tuple[FloatArray, FloatArray, IntArray] | None
+    geoms: tuple[FloatArray, FloatArray, IntArray] | None = None
     """Where geoms go, and which of them may be touched; None where there are none."""
-    supports: FloatArray | None
+    supports: FloatArray | None = None
     """Velocities of the fixed nodes [m/s]; None where all stand still."""
 
 
@@ -42,19 +42,16 @@ def inputs_of(
         attachments: Those of the body.
         system: The body, geoms and supports.
     """
-    geoms, supports = system.geoms, None
-    if not (loads.act or attachments.act or geoms.geoms or system.supports.is_moving):
-        return StepInputs(sweep, dt, (), (), None, None)
-    if system.supports.is_moving:
-        body = system.body
-        supports = body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]]
+    geoms, supports, body = system.geoms, system.supports, system.body
+    if not (loads.act or attachments.act or geoms.geoms or supports.is_moving):
+        return StepInputs(sweep, dt)
     return StepInputs(
         sweep,
         dt,
-        loads.forces,
-        tuple(each.way for each in attachments.all),
+        loads.forces if loads.act else (),
+        tuple([each.way for each in attachments.all]) if attachments.act else (),
         geoms.way if geoms.geoms else None,
-        supports,
+        body.velocities[: body.n_nodes][body.fixed[: body.n_nodes]] if supports.is_moving else None,
     )
 
 

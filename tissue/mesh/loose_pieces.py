@@ -38,3 +38,8 @@ def loose_pieces_of(body: Body) -> LoosePieces:
     nodes = nodes[np.argsort(of_node[nodes], kind="stable")]
     _, begin = np.unique(of_node[nodes], return_index=True)
     return LoosePieces(node=nodes, begin=np.append(begin, len(nodes)).astype(np.int64))
+
+
+def are_same_pieces(one: LoosePieces, other: LoosePieces) -> bool:
+    """Return whether two are the same nodes, in the same pieces."""
+    return np.array_equal(one.begin, other.begin) and np.array_equal(one.node, other.node)

@@ -7,7 +7,6 @@ and stops.
 """
 
 import logging
-import math
 from abc import abstractmethod
 from collections.abc import Callable
 from typing import TypeVar
@@ -74,23 +73,25 @@ class RepeatedSteps(SavedBody):
                 not finite.
             TissueError: the motion of the tissue became unstable, now or before; it names nodes.
         """
-        self._expect_moving()
+        if self._stopped is not None:
+            self._expect_moving()
         watch, log = self._watch, self._step_log
-        is_finite = watch.look(self._system)
+        is_finite = watch.is_finite(self._system)
         if self._is_changed:
             if not is_finite:
                 raise self._stop(_BEFORE, _worst_nodes(self._body))
             self._save_step()
         inputs = inputs_of(sweep, dt, self._loads, self._attachments, self._system)
-        fault = _BEFORE
-        if is_finite:
-            result, fault = self._try(inputs)
-            if result is not None:
-                log.add(inputs, result.n_substeps)
-                if log.is_long or dt == 0.0:  # what that changed is in no account
-                    self._save_step()
-                return result
-        return self._repeat(inputs, fault)
+        if not is_finite:
+            return self._repeat(inputs, _BEFORE)
+        if inputs.supports is not None:  # nodes may have got other velocities
+            watch.look(self._system)
+        result, fault = self._try(inputs)
+        if result is None:
+            return self._repeat(inputs, fault)
+        if log.add(inputs, result.n_substeps) or dt == 0.0:  # what that changed is in no account
+            self._save_step()
+        return result
 
     def _begin_state(self) -> None:
         """Begin to watch this body, before any cut."""
@@ -122,7 +123,6 @@ class RepeatedSteps(SavedBody):
             self._make_more_room(error.lacking)
             self._save_step()
             self._global_stepper.refinement = refinement
-            self._watch.look(self._system)
             return self._try(inputs)
         except UnstableError as error:
             return None, error.fault
@@ -132,10 +132,9 @@ class RepeatedSteps(SavedBody):
             self._is_changed = True  # what was done of it is not in the log
             raise
         energies = result.energies
-        amounts = (self._audit.work_of_loads, 0.0 if energies is None else energies.residual)
-        fault = self._watch.fault(self._system, inputs.dt, *amounts)
-        if fault is None and not math.isfinite(sum(result.wrench.numbers)):
-            fault = "the force on the blade is not a finite number"
+        residual = 0.0 if energies is None else energies.residual
+        amounts = (self._audit.work_of_loads, residual, sum(result.wrench.numbers))
+        fault = self._watch.fault(self._system, float(inputs.dt), *amounts)
         return (result, "") if fault is None else (None, fault)
 
     def _repeat(self, inputs: StepInputs, fault: str) -> StepResult:

@@ -9,7 +9,7 @@ from tissue.core.jit import SameTypes
 from tissue.integrators.step_judgement import (
     ACCEPTED,
     DISSIPATED,
-    IS_FINITE,
+    FORCE_NOT_FINITE,
     KINETIC,
     LEFT_BOX,
     LOOK_NUMBERS,
@@ -23,6 +23,7 @@ from tissue.integrators.step_judgement import (
     write_look,
 )
 from tissue.integrators.system import System
+from tissue.mesh.finite_motion import is_motion_finite
 
 STRAIN_UNEXPLAINED = 0.1
 """Energy that may come out of nothing, as a strain of the whole body: a tenth of the speed of waves
@@ -43,7 +44,7 @@ flies off, before its motion becomes unstable. Scenes stay at 3 % of the way tha
 
 
 class StepWatch:
-    """Looks at a body before and after each step.
+    """Looks at a body after each step, and before one where it was not left as it was then.
 
     Args:
         system: The body.
@@ -54,6 +55,8 @@ class StepWatch:
         rest = system.body.rest[: system.body.n_nodes]
         mass = float(system.body.masses[: system.body.n_nodes].sum())
         self._bounds = StepBounds(
+            before=np.zeros(LOOK_NUMBERS),
+            after=np.zeros(LOOK_NUMBERS),
             without_gravity=0.0,
             potential=0.0,
             work=0.0,
@@ -66,18 +69,21 @@ class StepWatch:
             unexplained=0.5 * mass * (STRAIN_UNEXPLAINED * wave_speed) ** 2,
             share_unexplained=SHARE_UNEXPLAINED,
         )
-        self._before, self._after = np.zeros((2, LOOK_NUMBERS))
         self._write_look, self._judge = SameTypes(write_look), SameTypes(judge_step)
+        self._is_finite = SameTypes(is_motion_finite)
 
-    def look(self, system: System) -> bool:
-        """Look at the body before a step; return whether all of its motion is finite."""
-        self._write_look.call(system.context, self._before)
-        return bool(self._before[IS_FINITE] == 1.0)
+    def is_finite(self, system: System) -> bool:
+        """Return whether all of the motion of the body is finite."""
+        return self._is_finite.call(system.body)
+
+    def look(self, system: System) -> None:
+        """Look at the body before a step."""
+        self._write_look.call(system.context, self._bounds.before)
 
     def begin(
         self, system: System, edge: Edge, when: float, work_of_loads: float, residual: float
     ) -> None:
-        """Count from now on what the body is given.
+        """Look at the body before a step, and count from now on what it is given.
 
         Args:
             system: The body.
@@ -86,14 +92,16 @@ class StepWatch:
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy now, if one is kept, else 0 [J].
         """
-        bounds, now = self._bounds, self._after
-        self._write_look.call(system.context, now)
+        bounds, now = self._bounds, self._bounds.before
+        self.look(system)
         own = float(now[KINETIC]) + energy_in_springs(system.context, edge, when)
         bounds.without_gravity, bounds.potential = own, float(now[POTENTIAL])
         bounds.work, bounds.dissipated = float(now[WORK]) + work_of_loads, float(now[DISSIPATED])
         bounds.residual = residual
 
-    def fault(self, system: System, dt: float, work_of_loads: float, residual: float) -> str | None:
+    def fault(
+        self, system: System, dt: float, work_of_loads: float, residual: float, force: float
+    ) -> str | None:
         """Return what is wrong with a step since the last look; None: nothing.
 
         Args:
@@ -101,19 +109,24 @@ class StepWatch:
             dt: Length of the step [s].
             work_of_loads: Work of loads so far [J].
             residual: That of the account of energy after it, if one is kept, else 0 [J].
+            force: A sum of what the blade feels: finite, or not.
         """
-        where = (system.context, self._bounds, self._before, self._after)
-        found = self._judge.call(*where, dt, work_of_loads, residual)
-        if found == ACCEPTED:
-            return None
+        bounds = self._bounds
+        found = self._judge.call(system.context, bounds, dt, work_of_loads, residual, force)
+        return None if found == ACCEPTED else self._named(found)
+
+    def _named(self, found: int) -> str:
+        """Return what is wrong with a step, of which `judge_step` found this."""
         if found == NOT_FINITE_NOW:
             return "the position or velocity of a node is not a finite number"
+        if found == FORCE_NOT_FINITE:
+            return "the force on the blade is not a finite number"
         excess = self._bounds.excess
         if found == LEFT_BOX:
             return f"a node went {excess:.3g} m out of the box around the body"
         if found == TOO_FAST:
             return (
-                f"its nodes have {self._after[KINETIC]:.3g} J of kinetic energy, {excess:.3g} J "
-                "more than blade, loads and gravity gave"
+                f"its nodes have {self._bounds.after[KINETIC]:.3g} J of kinetic energy, "
+                f"{excess:.3g} J more than blade, loads and gravity gave"
             )
         return f"{excess:.3g} J of energy came out of nothing"

@@ -4,7 +4,7 @@ import numpy as np
 
 from tissue import TetrahedralMesh, block
 from tissue.mesh.body import build_body
-from tissue.mesh.loose_pieces import loose_pieces_of
+from tissue.mesh.loose_pieces import are_same_pieces, loose_pieces_of, no_loose_pieces
 
 CELL = block((1, 1, 1), (0.01,) * 3)
 N = len(CELL.positions)
@@ -36,3 +36,11 @@ def test_a_body_that_is_held_everywhere_has_no_loose_piece():
 def test_a_body_that_is_held_nowhere_is_one_loose_piece():
     loose = loose_pieces_of(build_body(CELL, None, None))
     assert loose.begin.tolist() == [0, N] and loose.node.tolist() == [*range(N)]
+
+
+def test_the_same_pieces_found_again_are_the_same():
+    found = [loose_pieces_of(three_blocks(*held)) for held in ((1,), (1,), (2,), (0, 1, 2))]
+    assert are_same_pieces(found[0], found[1])
+    assert not are_same_pieces(found[0], found[2])
+    assert not are_same_pieces(found[0], found[3])
+    assert are_same_pieces(found[3], no_loose_pieces())
