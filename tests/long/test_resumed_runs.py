@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from scalpel_sim.output.recording import WALL_TIMES, read_forces
+from scalpel_sim.output.summary import COMPLETE
 from tests.battery import battery
 from tests.processes import start
 
@@ -45,7 +46,7 @@ def whole(tmp_path_factory) -> Path:
 
 
 def killed_after(folder, n_bytes, seconds, every):
-    """Begin a run, and kill it some time after its table has some length."""
+    """Begin a run, and kill it some time after its table has some length; return whether it was."""
     program = start(*RUN, str(folder), "--checkpoint", f"{every:.3f}")
     forces = folder / "forces.csv"
     for _ in range(round(LONGEST_WAIT / 0.005)):
@@ -55,7 +56,13 @@ def killed_after(folder, n_bytes, seconds, every):
     sleep(seconds)
     program.send_signal(signal.SIGKILL)
     program.communicate()
-    return program.returncode == -signal.SIGKILL
+    return program.returncode == -signal.SIGKILL and not is_complete(folder)
+
+
+def is_complete(folder):
+    """Return whether a run had written all of its files, and only its process was there yet."""
+    summary = folder / "summary.json"
+    return summary.exists() and json.loads(summary.read_text())["status"] == COMPLETE
 
 
 @battery(n_per_change=2, n_long=100)
