@@ -21,6 +21,9 @@ STEPS_OF_DRAG = 30
 PAUSE = 0.03
 """Between two of them [s]."""
 
+LONGEST_LAG = 30.0
+"""Time in which a picture shows what was done on a machine that is very busy [s]."""
+
 PIXELS_TO = """(way) => {
     // The drag that moves the blade by that much along x and y of the world.
     const right = hand.inWorld([1, 0, 0]), up = hand.inWorld([0, 1, 0]);
@@ -50,11 +53,12 @@ def view(tmp_path, request, browser):
         context.close()
 
 
-def opened(browser, view):
-    """Return a tab that shows the start."""
+def opened(browser, view, leads=True):
+    """Return a tab that shows the start, and that leads the blade or does not."""
     tab = new_tab(browser)
     tab.goto(view.url)
-    tab.wait_for_function("hand.tip !== null && run.socket !== null")
+    is_told = "run.leads" if leads else "run.socket !== null"
+    tab.wait_for_function(f"hand.tip !== null && {is_told}")
     return tab
 
 
@@ -171,13 +175,17 @@ def test_the_view_is_turned_by_the_right_button_by_ctrl_and_with_the_clutch_open
 @pytest.mark.browser
 @pytest.mark.parametrize("view", ["grid2"], indirect=True)
 def test_a_gamepad_keys_and_wheel_lead_the_blade_and_the_clutch_holds_it(view, browser):
-    tab, other = opened(browser, view), opened(browser, view)
+    tab, other = opened(browser, view), opened(browser, view, leads=False)
     at_first = tip(tab)
 
     def moves(action, least):
-        before = tip(tab)
+        before, patience = tip(tab), time.monotonic() + LONGEST_LAG
         action()
         until_it_rests(tab)
+        while least > 0.0 and time.monotonic() < patience:  # until a slow machine shows it
+            if np.linalg.norm(tip(tab) - before) > least:
+                return True
+            time.sleep(0.1)
         return np.linalg.norm(tip(tab) - before) > least
 
     def press(key, n):
