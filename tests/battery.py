@@ -11,6 +11,8 @@ The test is called once for each case; fixtures are made once for some hundred o
 adds to the fixture `tally`, a Counter, is printed at the end.
 """
 
+from __future__ import annotations  # pytest 8 does not name its reporter
+
 import shlex
 from collections import Counter, defaultdict
 from collections.abc import Iterator
