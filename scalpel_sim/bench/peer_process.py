@@ -8,13 +8,13 @@ import os
 import select
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from scalpel_sim.output.unnamed_file import unnamed_file
 from tissue import FloatArray
 
 _ADAPTERS = Path(__file__).parent / "peers"
@@ -67,7 +67,7 @@ class PeerProcess:
     """
 
     def __init__(self, adapter: str, case: str, body: Path, python: Path, core: int) -> None:
-        self._errors: IO[bytes] = tempfile.TemporaryFile()  # noqa: SIM115 (`close` closes it)
+        self._errors = unnamed_file()
         self._process = subprocess.Popen(
             [python, _ADAPTERS / "__main__.py", adapter, body, case, str(core)],
             stdin=subprocess.PIPE,

@@ -16,6 +16,7 @@ import tempfile
 from pathlib import Path
 from types import TracebackType
 from typing import Self
+from unittest.mock import patch
 
 from tests.processes import environment
 
@@ -127,7 +128,7 @@ def _run(request: dict) -> None:
         COUNT.pack_into(memory, 0, len(simulation.recording))
         return done
 
-    Simulation.step = counted  # type: ignore[method-assign, assignment]
+    patch.object(Simulation, "step", counted).start()
     sys.argv = ["scalpel-sim", *request["words"]]
     code = 1
     try:
