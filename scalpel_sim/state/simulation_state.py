@@ -17,6 +17,14 @@ if TYPE_CHECKING:
 _SPEC = mujoco.mjtState.mjSTATE_INTEGRATION
 """What MuJoCo's next step depends on: joints, hand, wrenches, and where its solver ended."""
 
+_PLACES = (
+    *("xpos", "xquat", "xmat", "xipos", "ximat", "xanchor", "xaxis"),
+    *("geom_xpos", "geom_xmat", "site_xpos", "site_xmat"),
+    *("cam_xpos", "cam_xmat", "light_xpos", "light_xdir"),
+)
+"""MuJoCo's arrays of where all is in the world. At the end of a frame they are those of its first
+half, as the tissue met the blade, and the joints have moved on: so they do not follow from them."""
+
 
 def _none() -> None:
     return None
@@ -34,8 +42,8 @@ _RULES = StateRules(
 )
 """What of arm and bridge is state; the tissue has its own."""
 
-_CONTENT, _ARM = "simulation", "arm"
-"""Names of arrays beside the tissue's in the bytes of a state: JSON, and MuJoCo's state."""
+_CONTENT, _ARM, _WHERE = "simulation", "arm", "places"
+"""Names of arrays beside the tissue's in the bytes of a state: JSON, MuJoCo's state, `_PLACES`."""
 
 
 class _Elsewhere(NamedTuple):
@@ -57,10 +65,12 @@ class SimulationState:
         self,
         source: Memento | _Elsewhere,
         arm: FloatArray,
+        places: FloatArray,
         tissue: TissueState,
         n_frames: int,
     ) -> None:
         self._source, self._arm, self._tissue = source, arm, tissue
+        self._places = places
         self.n_frames = n_frames
         """Number of frames that were done."""
 
@@ -80,7 +90,8 @@ class SimulationState:
         arm = np.empty(mujoco.mj_stateSize(model, _SPEC))
         mujoco.mj_getState(model, data, arm, _SPEC)
         tissue, memento = link.tissue.save_state(), Memento(simulation, _RULES)
-        return cls(memento, arm, tissue, len(simulation.recording))
+        places = np.concatenate([getattr(data, name).ravel() for name in _PLACES])
+        return cls(memento, arm, places, tissue, len(simulation.recording))
 
     @classmethod
     def from_bytes(cls, data: bytes) -> Self:
@@ -92,7 +103,8 @@ class SimulationState:
         tissue = TissueState.from_bytes(data)
         content = json.loads(tissue.beside(_CONTENT).tobytes())
         source = _Elsewhere(content["settings"], content["wall_seconds"])
-        return cls(source, tissue.beside(_ARM), tissue, content["n_frames"])
+        arm, places = tissue.beside(_ARM), tissue.beside(_WHERE)
+        return cls(source, arm, places, tissue, content["n_frames"])
 
     def to_bytes(self) -> bytes:
         """Return the state as bytes: a NumPy archive (`.npz`) of plain arrays and of JSON.
@@ -112,7 +124,8 @@ class SimulationState:
             "n_frames": self.n_frames,
         }
         text = np.frombuffer(json.dumps(content, allow_nan=False).encode(), np.uint8)
-        return self._tissue.to_bytes(self._source, {_CONTENT: text, _ARM: self._arm})
+        beside: dict[str, np.ndarray] = {_CONTENT: text, _ARM: self._arm, _WHERE: self._places}
+        return self._tissue.to_bytes(self._source, beside)
 
     def load_into(self, simulation: "Simulation") -> None:
         """Put a simulation to this state.
@@ -150,9 +163,20 @@ class SimulationState:
         mujoco.mj_setState(model, data, self._arm, _SPEC)
         mujoco.mj_forward(model, data)  # for whoever looks at the arm before the next frame
         mujoco.mj_setState(model, data, self._arm, _SPEC)  # it has moved its solver on
+        _put_at(data, self._places)
         simulation.recording.cut_back(self.n_frames)
 
 
 def _mujoco_of(simulation: "Simulation") -> tuple[Any, Any]:
     """Return MuJoCo's model and data."""
     return simulation.arm.model, simulation.arm.data
+
+
+def _put_at(data: Any, places: FloatArray) -> None:
+    """Put what is in the world to where it was."""
+    begin = 0
+    for name in _PLACES:
+        array = getattr(data, name)
+        end = begin + array.size
+        array[:] = places[begin:end].reshape(array.shape)
+        begin = end

@@ -2,6 +2,7 @@
 
 import threading
 from contextlib import closing
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,7 +11,10 @@ from bridge import TcpLink
 from bridge.tcp.server import TissueServer
 from scalpel_sim import SCENES, prepare
 from scalpel_sim.scene_body import make_tissue
-from tissue import StateError
+from scalpel_sim.viewer.model_shapes import body_poses, shapes_of
+from scalpel_sim.viewer.pictures import readings, values_in
+from scalpel_sim.viewer.scene_packets import ScenePackets
+from tissue import StateError, SurfaceQuantity
 
 WALL_TIMES = ("cd_s", "gc_s", "rx_s", "rd_s", "frame_s", "recording_s")
 N_AFTER = 60
@@ -44,6 +48,24 @@ def test_a_simulation_that_is_put_back_does_the_same_frames_again(scene, seconds
         found, counters = go_on(simulation)
         assert np.array_equal(found, expected, equal_nan=True)
         assert counters == counted
+
+
+def picture(simulation):
+    """Return what a page is told to show of a simulation."""
+    packets = ScenePackets(shapes_of(simulation.arm.model), simulation.frame)
+    values = values_in(simulation, get_args(SurfaceQuantity))
+    surface, poses = simulation.link.surface(), body_poses(simulation.arm.data)
+    return packets.frame(surface, poses, readings(simulation), None, values)
+
+
+def test_a_simulation_that_is_put_back_looks_as_it_did():
+    simulation = prepare(SCENES["retract"])
+    simulation.run(0.9)
+    state, expected = simulation.save_state(), picture(simulation)
+    go_on(simulation)
+    assert picture(simulation) != expected
+    simulation.load_state(state)
+    assert picture(simulation) == expected
 
 
 def test_a_hand_that_closed_after_a_state_is_open_once_it_is_loaded():

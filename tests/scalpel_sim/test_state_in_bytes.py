@@ -7,7 +7,7 @@ import pytest
 
 from scalpel_sim import SCENES, SimulationState, prepare
 from scalpel_sim.scene_parts.scene import changed
-from tests.scalpel_sim.test_saved_simulation import go_on
+from tests.scalpel_sim.test_saved_simulation import go_on, picture
 from tissue import StateError, TissueState
 
 SLAB = SCENES["slab"]
@@ -30,8 +30,10 @@ def test_another_simulation_goes_on_from_the_bytes_of_a_state(scene, seconds):
     simulation.run(seconds)
     data = simulation.save_state().to_bytes()
     other = with_rows_of(simulation, SCENES[scene])
+    shown = picture(simulation)
     expected, counted = go_on(simulation)
     other.load_state(SimulationState.from_bytes(data))
+    assert picture(other) == shown
     found, counters = go_on(other)
     assert np.array_equal(found, expected, equal_nan=True)
     assert counters == counted
