@@ -51,13 +51,13 @@ class Parts:
 
     @cached_property
     def low(self) -> FloatArray:
-        """Lowest corner of the box around each way [m], shape (2 n_faces, 3)."""
-        return np.minimum(self.start, self.stop)
+        """Lowest corner of the box around each way [m], shape (3, 2 n_faces)."""
+        return np.ascontiguousarray(np.minimum(self.start, self.stop).T)
 
     @cached_property
     def high(self) -> FloatArray:
-        """Highest corner of the box around each way [m], shape (2 n_faces, 3)."""
-        return np.maximum(self.start, self.stop)
+        """Highest corner of the box around each way [m], shape (3, 2 n_faces)."""
+        return np.ascontiguousarray(np.maximum(self.start, self.stop).T)
 
 
 def divided(mesh: TetrahedralMesh, times: int) -> Parts:
@@ -148,9 +148,10 @@ def crossed_faces(parts: Parts, edges: FloatArray) -> np.ndarray:
     crossed = np.zeros(len(parts.start), dtype=bool)
     for before, after in itertools.pairwise(edges):
         corners = np.array([*before, *after])
-        near = (parts.low <= corners.max(axis=0)).all(axis=1)
-        near &= (parts.high >= corners.min(axis=0)).all(axis=1)
-        (near,) = np.nonzero(near & ~crossed)
+        is_near = ~crossed
+        for low, high, place in zip(parts.low, parts.high, corners.T, strict=True):
+            is_near &= (low <= place.max()) & (high >= place.min())
+        (near,) = np.nonzero(is_near)
         start, stop = parts.start[near], parts.stop[near]
         hit = _crosses(start, stop, before[0], before[1], after[0])
         hit |= _crosses(start, stop, before[1], after[1], after[0])

@@ -29,10 +29,22 @@ class Faces(NamedTuple):
 
 def faces_of(tetrahedra: IntArray) -> Faces:
     nodes = tetrahedra[:, OUTWARD].reshape(-1, 3)
-    _, group, count = np.unique(
-        np.sort(nodes, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    return Faces(nodes, group.ravel(), count)
+    _, group, count = np.unique(numbers(nodes), return_inverse=True, return_counts=True)
+    return Faces(nodes, group, count)
+
+
+def numbers(sets: IntArray) -> IntArray:
+    """Return a number for each set of two or three nodes, in their order, shape (n_sets,).
+
+    NumPy sorts numbers ten times as fast as rows.
+    """
+    ordered = np.sort(sets, axis=1).astype(np.int64)
+    n = int(ordered.max(initial=0)) + 1
+    assert n ** ordered.shape[1] <= np.iinfo(np.int64).max
+    number = ordered[:, 0]
+    for column in ordered.T[1:]:
+        number = n * number + column
+    return number
 
 
 def volumes(rest: FloatArray, tetrahedra: IntArray) -> FloatArray:
@@ -50,9 +62,9 @@ def triangle_areas(rest: FloatArray, triangles: IntArray) -> FloatArray:
 def is_closed(triangles: IntArray) -> bool:
     """Return whether as many triangles run along each edge in one direction as in the other."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    signs, ends = np.where(edges[:, 0] < edges[:, 1], 1, -1), np.sort(edges, axis=1)
-    _, group = np.unique(ends, axis=0, return_inverse=True)
-    return not np.bincount(group.ravel(), weights=signs).any()
+    signs = np.where(edges[:, 0] < edges[:, 1], 1, -1)
+    _, group = np.unique(numbers(edges), return_inverse=True)
+    return not np.bincount(group, weights=signs).any()
 
 
 def n_pieces(tetrahedra: IntArray) -> int:
