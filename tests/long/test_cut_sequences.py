@@ -12,8 +12,12 @@ LONGEST, PATIENCE = 120.0, 900.0
 
 
 def sequences(module):
-    """Return a process that makes the sequences of a module; caches of bodies fill its memory."""
-    return Child(module, "run", longest=LONGEST, patience=PATIENCE, growth=math.inf)
+    """Return a process that makes the sequences of a module.
+
+    Caches of bodies fill its memory, and after some hundred sequences 512 MB did not suffice.
+    """
+    limits = {"longest": LONGEST, "patience": PATIENCE, "growth": math.inf, "room": None}
+    return Child(module, "run", **limits)
 
 
 @pytest.fixture(scope="module")
