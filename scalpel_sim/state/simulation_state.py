@@ -173,7 +173,7 @@ def _mujoco_of(simulation: "Simulation") -> tuple[Any, Any]:
 
 
 def _put_at(data: Any, places: FloatArray) -> None:
-    """Put what is in the world to where it was."""
+    """Put what is in the world to where it was: `_PLACES` in a row, in the frame of the world."""
     begin = 0
     for name in _PLACES:
         array = getattr(data, name)

@@ -16,8 +16,7 @@ def sequences(module):
 
     Caches of bodies fill its memory, and after some hundred sequences 512 MB did not suffice.
     """
-    limits = {"longest": LONGEST, "patience": PATIENCE, "growth": math.inf, "room": None}
-    return Child(module, "run", **limits)
+    return Child(module, "run", longest=LONGEST, patience=PATIENCE, growth=math.inf, room=None)
 
 
 @pytest.fixture(scope="module")
