@@ -79,7 +79,7 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
     """
     c, s = np.cos(mount_angle), np.sin(mount_angle)
     stylus = axes @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-    x, y, z = np.moveaxis(positions - arm.neck * stylus[..., 1], -1, 0)
+    x, y, z = components(positions - arm.neck * stylus[..., 1])
     waist = np.arctan2(-x, y)
     out, up = np.hypot(x, y), z - arm.shoulder
     stretch = (out**2 + up**2 - arm.upper**2 - arm.forearm**2) / (2.0 * arm.upper * arm.forearm)
@@ -97,12 +97,25 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
         [cw, -sw * cf, sw * sf, sw, cw * cf, -cw * sf, zero, sf, cf], axis=-1
     ).reshape((*np.shape(cw), 3, 3))
     wrist = np.swapaxes(forearm, -1, -2) @ (stylus * np.array([-1.0, -1.0, 1.0]))
-    yaw = np.arctan2(wrist[..., 0, 1], wrist[..., 2, 1])
-    pitch = np.arccos(np.clip(wrist[..., 1, 1], -1.0, 1.0))
-    roll = -np.arctan2(wrist[..., 1, 0], -wrist[..., 1, 2])
+    along_x, along_y, along_z = (components(wrist[..., i, :]) for i in range(3))
+    yaw = np.arctan2(along_x[1], along_z[1])
+    pitch = np.arccos(np.clip(along_y[1], -1.0, 1.0))
+    roll = -np.arctan2(along_y[0], -along_y[2])
     angles = np.stack([waist, shoulder, arm.bend - fold, yaw, pitch, roll], axis=-1)
     watched = np.concatenate([angles, (shoulder + arm.bend - fold)[..., None]], axis=-1)
     return Reach(angles, _margin(watched, arm.ranges) - beyond)
+
+
+def components(vectors: FloatArray) -> FloatArray:
+    """Return the components of vectors, each without gaps in memory, shape (n, ...).
+
+    NumPy's functions take an array with gaps to reach beyond its end. Where the result happens to
+    lie there, they go another way, of which the last bit differs: 2.0 does so in `arctan2`.
+
+    Args:
+        vectors: Shape (..., n).
+    """
+    return np.ascontiguousarray(np.moveaxis(vectors, -1, 0))
 
 
 def _margin(angles: FloatArray, ranges: FloatArray) -> FloatArray:
