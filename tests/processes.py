@@ -1,11 +1,14 @@
 """The program in a process of its own."""
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import sleep
+
+from scalpel_sim.stop_signals import SIGNALS
 
 PROGRAM = (sys.executable, "-m", "scalpel_sim")
 
@@ -18,15 +21,25 @@ def environment() -> dict[str, str]:
 def start(
     *words: str, stdin: int = subprocess.DEVNULL, program: Sequence[str] = PROGRAM
 ) -> subprocess.Popen[str]:
-    """Start `scalpel-sim` with these words; its output is read by the caller."""
-    return subprocess.Popen(
-        [*program, *words],
-        stdin=stdin,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
+    """Start `scalpel-sim` with these words; its output is read by the caller.
+
+    It hears signals also where these tests do not: under `nohup`, in the background of a shell.
+    """
+    ignored = [each for each in SIGNALS if signal.getsignal(each) is signal.SIG_IGN]
+    for each in ignored:
+        signal.signal(each, signal.SIG_DFL)
+    try:
+        return subprocess.Popen(
+            [*program, *words],
+            stdin=stdin,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env=environment(),
+        )
+    finally:
+        for each in ignored:
+            signal.signal(each, signal.SIG_IGN)
 
 
 def wait_for_rows(program: subprocess.Popen[str], forces: Path) -> None:
