@@ -40,6 +40,7 @@ from tissue.integrators.equilibrium import SETTLED, settle
 from tissue.integrators.equilibrium_checks import expect_support, warn_of_motion
 from tissue.integrators.global_stepper import GlobalStepper, method_of
 from tissue.integrators.integrator import integrator_of
+from tissue.integrators.options import Hierarchical
 from tissue.integrators.step_context import Increment
 from tissue.integrators.system import Numerics, assembled
 from tissue.loads.attachment_list import AttachmentList
@@ -122,7 +123,8 @@ class Tissue(RepeatedSteps):
         method = method_of(options, self.material.law)
         single = solver.precision == "single"
         contact = checked_contact(solver.contact, options)
-        how = Numerics(contact, solver.mass_scaling, method.damps_between_steps, single)
+        together = not isinstance(options, Hierarchical)
+        how = Numerics(contact, solver.mass_scaling, method.damps_between_steps, single, together)
         self._system = assembled(body, self.material, surroundings, blade, floor, how)
         self.node_size = self._system.node_size
         warn_of_toughness(self.material, self.node_size)

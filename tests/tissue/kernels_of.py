@@ -16,6 +16,7 @@ from tissue.core.vec3 import Vec3
 from tissue.cutting.blade_path import new_path
 from tissue.cutting.cut_surface import new_sheet
 from tissue.cutting.workspace import Cut, SnapLimits, new_cut_scratch
+from tissue.elasticity.collapse import no_collapse
 from tissue.elasticity.energy_density import volume_term
 from tissue.elasticity.finite_elements import no_solid, room_for_stars
 from tissue.elasticity.internal_forces import Elastic, Surroundings
@@ -114,6 +115,7 @@ def elastic_of(springs: Springs, n_nodes: int = 0) -> Elastic:
     return Elastic(
         springs=springs,
         solid=solid,
+        collapsing=no_collapse(0, 0, 0.0),
         has_springs=1,
         has_tetrahedra=0,
         highest=0.0,

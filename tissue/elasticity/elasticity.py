@@ -6,6 +6,7 @@ import numpy as np
 
 from tissue.core.array_types import IntArray
 from tissue.elasticity.changed_frequencies import forget_added_mass, update_frequencies
+from tissue.elasticity.collapse import grown_collapse, no_collapse, renew_collapsing
 from tissue.elasticity.energy_density import EnergyDensity, neo_hookean, stiffening, volume_term
 from tissue.elasticity.finite_elements import (
     build_stars,
@@ -44,6 +45,8 @@ class Elasticity:
             shear; None for no added mass. Where the uncut body has a higher one, that: only what a
             cut makes faster gets mass.
         is_single: Whether forces of tetrahedra are computed in single precision.
+        resists_collapse: Whether tetrahedra are kept from turning inside out where springs alone
+            are elastic.
     """
 
     def __init__(
@@ -54,6 +57,7 @@ class Elasticity:
         *,
         mass_scaling: float | None = None,
         is_single: bool = False,
+        resists_collapse: bool = True,
     ) -> None:
         self._material = material
         self.is_single = is_single
@@ -62,6 +66,7 @@ class Elasticity:
         n_nodes, n_tetrahedra = len(body.rest), len(body.tetrahedra)
         law = _law_of(material)
         room = (n_nodes, n_tetrahedra) if law else (0, 0)
+        self._may_collapse = law is None and resists_collapse
         self.arrays = Elastic(
             springs=no_springs(n_nodes, 20 * n_nodes + ROOM_FOR_SPRINGS),
             solid=no_solid(
@@ -70,6 +75,11 @@ class Elasticity:
                 room_for_stars(*room),
                 prony=material.prony,
                 is_single=is_single,
+            ),
+            collapsing=(
+                no_collapse(n_nodes, n_tetrahedra, material.young_modulus)
+                if self._may_collapse
+                else no_collapse(0, 0, 0.0)
             ),
             has_springs=int(material.law == "springs"),
             has_tetrahedra=int(law is not None),
@@ -143,7 +153,11 @@ class Elasticity:
             solid = grown_solid(solid, n_nodes, n_tetrahedra, pool)
         frequencies = np.zeros(n_nodes)
         frequencies[: len(arrays.frequency_squared)] = arrays.frequency_squared
+        collapsing = arrays.collapsing
+        if self._may_collapse:
+            collapsing = grown_collapse(collapsing, n_nodes, n_tetrahedra)
         self.arrays = arrays.replaced(
+            collapsing=collapsing,
             springs=grown_springs(arrays.springs, n_nodes, len(arrays.springs.neighbour)),
             solid=solid,
             frequency_squared=frequencies,
@@ -157,6 +171,8 @@ class Elasticity:
             build_tetrahedra(self.arrays.solid, body, tetrahedra, len(tetrahedra))
             self._write_stars(body, visits, nodes)
         update_frequencies(self.arrays, body, visits, nodes, n)
+        collapsing, highest = self.arrays.collapsing, self.arrays.highest
+        renew_collapsing(collapsing, body, tetrahedra, len(tetrahedra), highest)
 
     def _write_springs(self, body: Body, visits: Visits, nodes: IntArray) -> None:
         density, modulus = self._material.density, self._material.spring_modulus

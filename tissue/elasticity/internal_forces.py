@@ -9,6 +9,7 @@ from tissue.core.jit import inlined, kernel
 from tissue.core.simd import Point, point_of
 from tissue.core.structs import Arrays, FloatCell, IntCell
 from tissue.core.vec3 import Vec3
+from tissue.elasticity.collapse import Collapsing, collapse_energy
 from tissue.elasticity.finite_elements import Solid, n_blocks
 from tissue.elasticity.mass_scaling import MassScaling
 from tissue.elasticity.neo_hookean import solid_force, solid_forces
@@ -25,6 +26,8 @@ class Elastic(Arrays, two_precisions=True):
     """Springs along the edges; the dampers have their stiffness."""
     solid: Solid
     """Tetrahedra as elements; empty where springs alone are elastic."""
+    collapsing: Collapsing
+    """What keeps tetrahedra from turning inside out where springs alone are elastic."""
     has_springs: IntCell
     """1 if springs along the edges pull, else 0."""
     has_tetrahedra: IntCell
@@ -135,6 +138,7 @@ def elastic_energy(elastic: Elastic, body: Body) -> float:
     energy = 0.0
     if elastic.has_springs:
         energy += spring_energy(elastic.springs, body)
+        energy += collapse_energy(elastic.collapsing, body)
     if elastic.has_tetrahedra:
         energy += solid_energy(elastic.solid, body, body.positions)
     return energy

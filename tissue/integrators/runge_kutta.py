@@ -23,6 +23,7 @@ from tissue.contact.penalty.contact_forces import add_contact_forces, clear_cont
 from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import store_point
+from tissue.elasticity.collapse import add_collapse_forces, clear_collapse_forces
 from tissue.elasticity.internal_forces import deform
 from tissue.integrators.attachments import add_attachment_forces, clear_attachment_forces
 from tissue.integrators.geom_reactions import add_geom_reactions
@@ -96,6 +97,8 @@ def apply_outer_forces(
 ) -> None:
     """Write the forces of blade, contact and attachments on nodes; count impulses and work.
 
+    Those of tetrahedra that are flat are among them.
+
     Args:
         context: Forces on the nodes are written to its stages.
         edge: The cutting edge over the time step.
@@ -106,13 +109,15 @@ def apply_outer_forces(
         dt: Length of the time step [s].
     """
     external = context.stages.external
-    attachments = context.attachments
+    attachments, collapsing = context.attachments, context.elastic.collapsing
     clear_contact_forces(context.contacts, external)
     clear_attachment_forces(attachments, external)
     clear_geom_forces(context.geoms, external)
+    clear_collapse_forces(collapsing, context.body, external)
     apply_blade_forces(context.blade, context.body, edge, positions, when, share, dt, external)
     add_contact_forces(context.contacts, positions, velocities, share * dt, external)
     add_attachment_forces(attachments, positions, velocities, when, share, dt, external)
+    add_collapse_forces(collapsing, context.body, positions, external)
     if attachments.n_caught > 0:
         add_caught_forces(context, edge, positions, velocities, when, share, dt)
 
@@ -124,8 +129,10 @@ def accelerations(context: StepContext, out: FloatArray) -> None:
     x, v = body.positions, body.velocities
     deform(context.elastic, body, x)
     add_attachment_forces(context.attachments, x, v, 1.0, 0.0, 1.0, external)
+    add_collapse_forces(context.elastic.collapsing, body, x, external)
     add_geom_reactions(context, x, v, 0.0, 1.0)
     for i in range(body.n_nodes):
         store_point(out, i, acceleration(context, i, x, v))
     clear_attachment_forces(context.attachments, external)
     clear_geom_forces(context.geoms, external)
+    clear_collapse_forces(context.elastic.collapsing, body, external)

@@ -15,6 +15,7 @@ from tissue.core.array_types import FloatArray
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point, times
 from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.elasticity.collapse import find_collapsing
 from tissue.elasticity.finite_elements import Solid
 from tissue.elasticity.internal_forces import Surroundings
 from tissue.elasticity.neo_hookean import keeps_gradients
@@ -214,7 +215,9 @@ def begin_increment(
     _limit_mass(choice, context)
     near = limit_frequency_at_blade(context.blade, elastic, body, external)
     added = choice.of_contact
-    choice.least = max(elastic.highest, near) + added
+    by_node, fastest = elastic.frequency_squared, choice.speed / choice.node_size
+    find_collapsing(elastic.collapsing, body, by_node, elastic.highest, fastest, choice.span)
+    choice.least = max(elastic.highest, near, elastic.collapsing.highest) + added
     if stiffens(elastic.solid.law):
         # Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
         added += frequency_with_blade(context.blade, body, choice.no_frequency, external)

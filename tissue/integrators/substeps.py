@@ -9,6 +9,7 @@ from tissue.contact.resolve import note_all_positions, resolve
 from tissue.contact.state import ContactState
 from tissue.core.jit import kernel
 from tissue.core.simd import point, store_point
+from tissue.elasticity.collapse import clear_collapse_forces
 from tissue.elasticity.energy import body_energy
 from tissue.integrators.attachments import clear_attachment_forces
 from tissue.integrators.damping import change_velocities
@@ -269,6 +270,7 @@ def _end_with_forces(
     end_contact_substep(context.contacts, body.positions, body.velocities, external)
     clear_attachment_forces(context.attachments, external)
     clear_geom_forces(context.geoms, external)
+    clear_collapse_forces(context.elastic.collapsing, body, external)
     end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, external, when, seconds)
     if context.attachments.n_caught > 0:
@@ -305,6 +307,7 @@ def end_substep(
             _count_loss(context, edge, when)
     clear_attachment_forces(context.attachments, stages.external)
     clear_geom_forces(context.geoms, stages.external)
+    clear_collapse_forces(context.elastic.collapsing, body, stages.external)
     end_geom_substep(context.geoms, body, seconds, when, dt)
     apply_slip(context.blade, body, context.visits, edge, stages.external, when, seconds)
     if context.attachments.n_caught > 0:

@@ -259,6 +259,8 @@ class Numerics(NamedTuple):
     """Whether damping acts between steps; if not, in every stage of them."""
     is_single: bool
     """Whether forces of tetrahedra are computed in single precision."""
+    moves_together: bool
+    """Whether all nodes are moved together; if not, as the paper does."""
 
 
 def assembled(
@@ -286,6 +288,7 @@ def assembled(
         visits,
         mass_scaling=numerics.mass_scaling,
         is_single=numerics.is_single,
+        resists_collapse=numerics.moves_together,
     )
     node_size = mean_node_size(body, visits, np.zeros(LARGEST_STAR, dtype=np.int64))
     interaction = BladeInteraction(blade, material, node_size, body.n_tetrahedra)

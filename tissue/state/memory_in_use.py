@@ -33,6 +33,7 @@ SCRATCH = frozenset(
         *(f"Stages.{name}" for name in ("a1", "a2", "start_positions", "start_velocities")),
         # Evaluations of forces and frequencies.
         *(f"Solid.{name}" for name in ("forces", "ring", "ring_nodes", "fast_blocks")),
+        "Collapsing.added",
         # Searches of one pass of a cut.
         *(f"CutScratch.{name}" for name in ("around", "around_too", "parents", "parent_links")),
         *(f"CutScratch.{name}" for name in ("children", "place")),
@@ -56,6 +57,7 @@ _LISTS: Mapping[str, Mapping[str, str]] = {
         "order": "n_crossings",
     },
     "GeomSearch": {"touched": "n_touched"},
+    "Collapsing": {"listed": "n"},
 }
 """Lists with their counts: what is behind their ends means nothing."""
 
@@ -98,6 +100,7 @@ _OF_NODES = {
 
 _OF_TETRAHEDRA = {
     "Body": ("tetrahedra", "links"),
+    "Collapsing": ("stiffness", "limit", "per_volume"),
     "CutSheet": ("tetrahedron_stamp", "tetrahedron_side"),
     "Faces": ("place", "piece"),
 }

@@ -7,6 +7,7 @@ from tests import bodies, incisions
 from tests.tissue.solids import LAWS, SolidBody, highest_frequency, law_of, solid_of
 from tissue import Material, SolverSettings, Tissue, block
 from tissue.core.jit import is_compiling
+from tissue.elasticity.collapse import no_collapse
 from tissue.elasticity.internal_forces import Elastic
 from tissue.elasticity.mass_scaling import no_mass_scaling
 from tissue.elasticity.springs import no_springs
@@ -32,6 +33,7 @@ def elastic_of(solid):
     """Return the elastic arrays of a solid without springs."""
     n = len(solid.body.rest)
     elastic = Elastic(
+        collapsing=no_collapse(0, 0, 0.0),
         springs=no_springs(n, 0),
         solid=solid.solid,
         has_springs=0,

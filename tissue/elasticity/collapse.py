@@ -1,0 +1,364 @@
+"""What keeps tetrahedra from turning inside out under law springs, whose springs do not.
+
+The springs along the edges of a tetrahedron are at rest in its mirror image, too. One that is
+pressed flat may come out on the other side and stays there: in a block that was held at two sides,
+after 20 random strokes of a blade, 139 of 945 were inside out. Lips on such tetrahedra meet from
+the wrong side, so that a body trembled for ever, and cuts of what is nearly flat set free energy
+that no step of the integrator follows. Where J, the volume over that at rest, falls below a limit,
+
+    W = k/2 (J_limit - J)^2,     f_i = k (J_limit - J) dJ/dx_i,     k = E V
+
+is added, as much as Young's modulus E resists elsewhere; above the limit springs are as they were.
+W is zero with its slope where it begins, so that nothing jumps.
+
+Teschner et al. (2004), A versatile and robust model for geometrically complex deformable solids,
+keep the volume of tetrahedra by such a term; here it acts on one side.
+"""
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from tissue.core.array_types import FloatArray, IntArray
+from tissue.core.jit import kernel
+from tissue.core.structs import Arrays, FloatCell, IntCell
+from tissue.core.vec3 import Vec3, add, axpy, cross, dot, norm, scale, store, sub, vec3
+from tissue.geometry.tetrahedron import tetrahedron_volume
+from tissue.mesh.body import Body, grown
+
+J_LIMIT: Final = 0.3
+"""J below which a tetrahedron resists. Larger: tissue that is merely pressed is no more that of the
+springs; smaller: the term must be stiffer to turn what moves at the same speed."""
+
+J_LISTED: Final = 0.5
+"""J below which it is listed, now or by how it moves, as it may come to the limit before the next
+increment. Smaller: what is listed too late gets energy from nowhere; larger: more
+of what never comes to the limit is listed."""
+
+FASTEST_CHANGE: Final = 6.0
+"""How fast J changes at most, in speeds of the fastest node over the node size: three altitudes,
+each between nodes that go opposite ways. What cannot be flat so soon is not looked at."""
+
+INCREMENTS_AHEAD: Final = 2.0
+"""For how long J is taken to change as fast as it does [increments]: it may become faster."""
+
+LARGEST_ADDED_SHARE: Final = 2.0
+"""What one tetrahedron may add to w^2 of its nodes, as a share of the bound of the body at rest.
+Larger: slivers, whose altitudes are small, make steps short; smaller: slivers turn over."""
+
+
+_UNKNOWN: Final = -1.0
+"""`slack` before the first search: there must be one."""
+
+
+class Collapsing(Arrays):
+    """The tetrahedra that are pressed flat, and how much they resist."""
+
+    modulus: float
+    """Young's modulus [Pa]; 0 where tetrahedra do not need this."""
+    n: IntCell
+    """Number of tetrahedra that are listed."""
+    slack: FloatCell
+    """How far J of those that are not listed may fall until one may be listed."""
+    highest: FloatCell
+    """Bound on w^2 at their nodes, with that of the springs [1/s2]; 0 where none is listed."""
+    listed: IntArray
+    """The tetrahedra, shape (tetrahedron capacity,)."""
+    stiffness: FloatArray
+    """k of each tetrahedron that is listed [J], 0 of others; shape (tetrahedron capacity,)."""
+    limit: FloatArray
+    """J below which each of them resists, shape (tetrahedron capacity,)."""
+    per_volume: FloatArray
+    """1 / (6 V) of each tetrahedron at rest [1/m3], shape (tetrahedron capacity,)."""
+    added: FloatArray
+    """Scratch: what they add to w^2 of a node [1/s2], shape (node capacity,)."""
+
+
+def no_collapse(n_nodes: int, n_tetrahedra: int, modulus: float) -> Collapsing:
+    """Return that nothing is flat, with room for that many nodes and tetrahedra.
+
+    Args:
+        n_nodes: Room for nodes.
+        n_tetrahedra: Room for tetrahedra.
+        modulus: Young's modulus [Pa]; 0 where tetrahedra do not need this.
+    """
+    return Collapsing(
+        modulus=float(modulus),
+        n=0,
+        slack=_UNKNOWN,
+        highest=0.0,
+        listed=np.zeros(n_tetrahedra, np.int64),
+        stiffness=np.zeros(n_tetrahedra),
+        limit=np.zeros(n_tetrahedra),
+        per_volume=np.zeros(n_tetrahedra),
+        added=np.zeros(n_nodes),
+    )
+
+
+def grown_collapse(collapsing: Collapsing, n_nodes: int, n_tetrahedra: int) -> Collapsing:
+    """Return the same tetrahedra with room for that many nodes and tetrahedra."""
+    of_tetrahedra = ("listed", "stiffness", "limit", "per_volume")
+    larger = {name: grown(getattr(collapsing, name), n_tetrahedra) for name in of_tetrahedra}
+    return collapsing.replaced(added=np.zeros(n_nodes), **larger)
+
+
+class _Shape(NamedTuple):
+    """A tetrahedron as it is deformed."""
+
+    j: float
+    """Its volume over that at rest."""
+    a: Vec3
+    """dJ/dx of its first node [1/m]."""
+    b: Vec3
+    """That of its second."""
+    c: Vec3
+    """That of its third."""
+    d: Vec3
+    """That of its fourth."""
+
+
+@kernel
+def _shape(collapsing: Collapsing, body: Body, positions: FloatArray, t: int) -> _Shape:
+    """Return J of tetrahedron `t` at `positions` [m], and its derivatives."""
+    nodes, per_volume = body.tetrahedra, collapsing.per_volume[t]
+    origin = vec3(positions, nodes[t, 0])
+    ab = sub(vec3(positions, nodes[t, 1]), origin)
+    ac = sub(vec3(positions, nodes[t, 2]), origin)
+    ad = sub(vec3(positions, nodes[t, 3]), origin)
+    b = scale(per_volume, cross(ac, ad))
+    c = scale(per_volume, cross(ad, ab))
+    d = scale(per_volume, cross(ab, ac))
+    return _Shape(dot(ab, b), scale(-1.0, add(add(b, c), d)), b, c, d)
+
+
+@kernel
+def renew_collapsing(
+    collapsing: Collapsing, body: Body, tetrahedra: IntArray, n: int, highest: float
+) -> None:
+    """Measure tetrahedra whose shape at rest has changed, and list those of them that are flat.
+
+    Args:
+        collapsing: Written, if tetrahedra need this.
+        body: The body.
+        tetrahedra: Tetrahedra, of which the first `n` are new or another.
+        n: How many these are.
+        highest: Bound on w^2 of the body at rest [1/s2].
+    """
+    if collapsing.modulus == 0.0:
+        return
+    for i in range(n):
+        t = tetrahedra[i]
+        was_listed = collapsing.stiffness[t] > 0.0
+        collapsing.per_volume[t] = 1.0 / (6.0 * tetrahedron_volume(body.rest, body.tetrahedra, t))
+        collapsing.stiffness[t] = 0.0
+        shape = _shape(collapsing, body, body.positions, t)
+        if was_listed or shape.j < J_LISTED:
+            collapsing.stiffness[t] = _stiffness(collapsing, body, shape, t, highest)
+            collapsing.limit[t] = J_LIMIT
+            if not was_listed:
+                collapsing.listed[collapsing.n] = t
+                collapsing.n += 1
+        else:
+            collapsing.slack = min(collapsing.slack, shape.j - J_LISTED)
+
+
+@kernel
+def find_collapsing(
+    collapsing: Collapsing,
+    body: Body,
+    frequency_squared: FloatArray,
+    highest: float,
+    fastest: float,
+    seconds: float,
+) -> None:
+    """List the tetrahedra that are flat, and bound the frequencies at their nodes.
+
+    All are looked at only where nodes have moved so far that one may have become flat. One keeps
+    its stiffness as long as it is listed. What was flat before it was listed begins to resist where
+    it is, and its limit goes back with it, so that nothing gets energy from nowhere.
+
+    Args:
+        collapsing: Written, if tetrahedra need this.
+        body: The body.
+        frequency_squared: Bound on w^2 of each node by the springs [1/s2].
+        highest: Bound on w^2 of the body at rest [1/s2].
+        fastest: Speed of the fastest node, over the node size [1/s].
+        seconds: Length of the increment [s].
+    """
+    if collapsing.modulus == 0.0:
+        return
+    ahead = FASTEST_CHANGE * fastest * INCREMENTS_AHEAD * seconds
+    collapsing.slack -= ahead
+    if collapsing.slack < 0.0:
+        _search(collapsing, body, highest, ahead, INCREMENTS_AHEAD * seconds)
+    else:
+        for i in range(collapsing.n):
+            t = collapsing.listed[i]
+            _raise_limit(collapsing, t, _j(collapsing, body, t))
+    _bound_frequencies(collapsing, body, frequency_squared)
+
+
+@kernel
+def _search(
+    collapsing: Collapsing, body: Body, highest: float, ahead: float, seconds: float
+) -> None:
+    """List all tetrahedra that are flat.
+
+    Args:
+        collapsing: Written.
+        body: The body.
+        highest: Bound on w^2 of the body at rest [1/s2].
+        ahead: How far J falls at most until it is looked at again.
+        seconds: For how long it is taken to change as fast as it does [s].
+    """
+    n, least = 0, 1.0
+    for t in range(body.n_tetrahedra):
+        j = _j(collapsing, body, t)
+        flat = j < J_LISTED
+        if not flat and j < J_LISTED + ahead:
+            flat = _will_be_flat(collapsing, body, t, seconds)
+        if not flat:
+            collapsing.stiffness[t] = 0.0
+            least = min(least, j)
+            continue
+        if collapsing.stiffness[t] == 0.0:
+            shape = _shape(collapsing, body, body.positions, t)
+            collapsing.stiffness[t] = _stiffness(collapsing, body, shape, t, highest)
+            collapsing.limit[t] = min(j, J_LIMIT)
+        _raise_limit(collapsing, t, j)
+        collapsing.listed[n] = t
+        n += 1
+    collapsing.n = n
+    collapsing.slack = least - J_LISTED - ahead
+
+
+@kernel
+def _j(collapsing: Collapsing, body: Body, t: int) -> float:
+    """Return J of tetrahedron `t`."""
+    volume = tetrahedron_volume(body.positions, body.tetrahedra, t)
+    j: float = 6.0 * volume * collapsing.per_volume[t]
+    return j
+
+
+@kernel
+def _raise_limit(collapsing: Collapsing, t: int, j: float) -> None:
+    """Move the limit of a tetrahedron, of which J is `j`, back to `J_LIMIT` as it goes there."""
+    collapsing.limit[t] = min(max(j, collapsing.limit[t]), J_LIMIT)
+
+
+@kernel
+def _will_be_flat(collapsing: Collapsing, body: Body, t: int, seconds: float) -> bool:
+    """Whether J of tetrahedron `t` falls to `J_LISTED` in that time [s], as fast as it does now."""
+    shape, nodes, v = _shape(collapsing, body, body.positions, t), body.tetrahedra, body.velocities
+    rate = dot(shape.a, vec3(v, nodes[t, 0])) + dot(shape.b, vec3(v, nodes[t, 1]))
+    rate += dot(shape.c, vec3(v, nodes[t, 2])) + dot(shape.d, vec3(v, nodes[t, 3]))
+    return bool(shape.j + seconds * rate < J_LISTED)
+
+
+@kernel
+def _stiffness(collapsing: Collapsing, body: Body, shape: _Shape, t: int, highest: float) -> float:
+    """Return k of tetrahedron `t` [J]: E V, or what its nodes bear."""
+    most = 0.0
+    for q in range(4):
+        most = max(most, _frequency_at(collapsing, body, shape, t, q))
+    k = collapsing.modulus / (6.0 * abs(collapsing.per_volume[t]))
+    if k * most > LARGEST_ADDED_SHARE * highest:  # not where all of its nodes are fixed
+        k = LARGEST_ADDED_SHARE * highest / most
+    stiffness: float = k
+    return stiffness
+
+
+@kernel
+def _frequency_at(collapsing: Collapsing, body: Body, shape: _Shape, t: int, q: int) -> float:
+    """Return what tetrahedron `t` adds to w^2 of its node `q`, per k [1/(J s2)]; 0 if it is fixed.
+
+    The second derivatives of W are k g g^T, g those of J, of which the only frequency is
+    k sum(g_i^2 / m_i), and k (J - J_limit) times the second derivatives of J: for two nodes the
+    edge between the other two, over 6 V.
+    """
+    nodes, x, masses = body.tetrahedra, body.positions, body.masses
+    if body.fixed[nodes[t, q]]:
+        return 0.0
+    alone, edges = 0.0, 0.0
+    for i in range(4):
+        node = nodes[t, i]
+        if body.fixed[node]:
+            continue
+        g = shape.a if i == 0 else shape.b if i == 1 else shape.c if i == 2 else shape.d
+        alone += dot(g, g) / masses[node]
+        if i != q:
+            j, k = _others(i, q)
+            edges += norm(sub(vec3(x, nodes[t, j]), vec3(x, nodes[t, k])))
+    depth = max(J_LIMIT - shape.j, J_LIMIT)
+    bent = depth * edges * abs(collapsing.per_volume[t]) / masses[nodes[t, q]]
+    frequency_squared: float = alone + bent
+    return frequency_squared
+
+
+@kernel
+def _others(i: int, q: int) -> tuple[int, int]:
+    """Return the two corners of a tetrahedron beside two."""
+    first = 0
+    while first in (i, q):
+        first += 1
+    return first, 6 - i - q - first
+
+
+@kernel
+def _bound_frequencies(collapsing: Collapsing, body: Body, frequency_squared: FloatArray) -> None:
+    """Write the bound on w^2 at the nodes of what is listed, springs and all."""
+    x, nodes, added = body.positions, body.tetrahedra, collapsing.added
+    for i in range(collapsing.n):
+        for q in range(4):
+            added[nodes[collapsing.listed[i], q]] = 0.0
+    highest = 0.0
+    for i in range(collapsing.n):
+        t = collapsing.listed[i]
+        shape = _shape(collapsing, body, x, t)
+        for q in range(4):
+            node = nodes[t, q]
+            added[node] += collapsing.stiffness[t] * _frequency_at(collapsing, body, shape, t, q)
+            highest = max(highest, frequency_squared[node] + added[node])
+    collapsing.highest = highest
+
+
+@kernel
+def clear_collapse_forces(collapsing: Collapsing, body: Body, external: FloatArray) -> None:
+    """Set the forces on the nodes of what is listed to zero."""
+    for i in range(collapsing.n):
+        for q in range(4):
+            store(external, body.tetrahedra[collapsing.listed[i], q], Vec3(0.0, 0.0, 0.0))
+
+
+@kernel
+def add_collapse_forces(
+    collapsing: Collapsing, body: Body, positions: FloatArray, external: FloatArray
+) -> None:
+    """Add the forces of what is flat at `positions` [m] to those on the nodes [N]."""
+    nodes = body.tetrahedra
+    for i in range(collapsing.n):
+        t = collapsing.listed[i]
+        shape = _shape(collapsing, body, positions, t)
+        if shape.j < collapsing.limit[t]:
+            push = collapsing.stiffness[t] * (collapsing.limit[t] - shape.j)
+            _push(external, nodes[t, 0], push, shape.a)
+            _push(external, nodes[t, 1], push, shape.b)
+            _push(external, nodes[t, 2], push, shape.c)
+            _push(external, nodes[t, 3], push, shape.d)
+
+
+@kernel
+def _push(external: FloatArray, node: int, push: float, gradient: Vec3) -> None:
+    store(external, node, axpy(push, gradient, vec3(external, node)))
+
+
+@kernel
+def collapse_energy(collapsing: Collapsing, body: Body) -> float:
+    """Return the energy in what is flat [J]."""
+    energy = 0.0
+    for i in range(collapsing.n):
+        t = collapsing.listed[i]
+        depth = collapsing.limit[t] - _shape(collapsing, body, body.positions, t).j
+        if depth > 0.0:
+            energy += 0.5 * collapsing.stiffness[t] * depth * depth
+    return energy
