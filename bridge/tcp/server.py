@@ -170,14 +170,16 @@ class TissueServer(SingleClientServer):
         """Do a step, and return its result.
 
         Raises:
-            MessageError: the request is malformed, or would take too long; nothing has moved then.
+            MessageError: the request is malformed, or would take too long, or the tissue refuses
+                it; nothing has moved then.
         """
         link = self._link
         sweep, dt, poses, geoms = unpack_step(payload, link.n_led, link.n_geoms)
         self._limits.check_step(sweep, dt, link.tissue.n_tetrahedra)
         if poses:
             self._limits.check_poses(poses, link.loads()[-link.n_led :])
-        result = link.step(sweep, dt, poses, geoms)
+        with _refusals():
+            result = link.step(sweep, dt, poses, geoms)
         return pack_result(result, link.loads(), link.geom_loads())
 
     def _added(self, add: Callable[[], int]) -> bytes:
@@ -188,10 +190,8 @@ class TissueServer(SingleClientServer):
         """
         if len(self._link.loads()) == MAX_FRAMES:
             raise MessageError(f"there are {MAX_FRAMES} frames, and there may be no more")
-        try:
+        with _refusals():
             number = add()
-        except ValueError as error:
-            raise MessageError(str(error)) from error
         return pack_loads(self._link.loads()[number:])
 
     def _touched(self, payload: bytes) -> bytes:
@@ -201,11 +201,18 @@ class TissueServer(SingleClientServer):
             MessageError: the request is malformed, or the tissue cannot touch them.
         """
         geoms, poses = unpack_geoms(payload)
-        try:
+        with _refusals():
             self._link.collide_with(geoms, poses)
-        except ValueError as error:
-            raise MessageError(str(error)) from error
         return b""
+
+
+@contextlib.contextmanager
+def _refusals() -> Iterator[None]:
+    """Have what the tissue refuses be a request that is refused, and no failure of the server."""
+    try:
+        yield
+    except ValueError as error:
+        raise MessageError(str(error)) from error
 
 
 @contextlib.contextmanager
