@@ -31,6 +31,15 @@ async def lead(view):
     await files
 
 
+async def lead_until(view, stroke, n_rows):
+    """Engage the hand, and move it forwards until so many rows of what it did are written."""
+    page = await page_of(view.url, view.url.rstrip("/"), token_in(view.url))
+    await page.write_message('{"type":"engage"}')
+    while not stroke.exists() or len(stroke.read_text().splitlines()) < n_rows:
+        await page.write_message('{"type":"move","by":[0,0.001,0],"stamp":1}')
+        await asyncio.sleep(0.03)
+
+
 def test_a_stroke_that_was_led_for_some_seconds_is_repeated_by_name_to_the_bit(tmp_path):
     led, again = tmp_path / "led", tmp_path / "again"
     with LedView("grid2", led, "--seconds", str(SECONDS)) as view:
@@ -52,6 +61,23 @@ def test_a_scripted_run_keeps_the_stroke_that_it_repeats(tmp_path):
     stroke = (tmp_path / STROKE).read_bytes()
     assert command_line(["run", str(tmp_path / "scene.toml"), "-q", "--out", str(tmp_path)]) == 0
     assert (tmp_path / STROKE).read_bytes() == stroke
+
+
+def test_a_led_run_that_was_killed_goes_on_as_a_run_of_what_the_hand_had_done(tmp_path):
+    led, again = tmp_path / "led", tmp_path / "again"
+    with LedView("grid2", led, "--checkpoint", "0.1") as view:
+        asyncio.run(lead_until(view, led / STROKE, n_rows=300))
+        view.process.kill()
+    assert not (led / FINAL).exists()
+    assert command_line(["run", "--resume", str(led), "-q"]) == 0
+    summary = json.loads((led / SUMMARY).read_text())
+    assert summary["status"] == "complete"
+    stroke = ["--relaxation", "verlet", "--stroke", str(led / STROKE)]
+    assert command_line(["run", "grid2", *stroke, "-q", "--out", str(again)]) == 0
+    assert (led / FINAL).read_bytes() == (again / FINAL).read_bytes()
+    assert summary["simulated_seconds"] == pytest.approx(
+        json.loads((again / SUMMARY).read_text())["simulated_seconds"]
+    )
 
 
 def test_an_interrupted_run_that_waits_for_a_hand_ends(tmp_path):
