@@ -79,7 +79,7 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
     """
     c, s = np.cos(mount_angle), np.sin(mount_angle)
     stylus = axes @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-    x, y, z = components(positions - arm.neck * stylus[..., 1])
+    x, y, z = separate_components(positions - arm.neck * stylus[..., 1])
     waist = np.arctan2(-x, y)
     out, up = np.hypot(x, y), z - arm.shoulder
     stretch = (out**2 + up**2 - arm.upper**2 - arm.forearm**2) / (2.0 * arm.upper * arm.forearm)
@@ -97,7 +97,7 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
         [cw, -sw * cf, sw * sf, sw, cw * cf, -cw * sf, zero, sf, cf], axis=-1
     ).reshape((*np.shape(cw), 3, 3))
     wrist = np.swapaxes(forearm, -1, -2) @ (stylus * np.array([-1.0, -1.0, 1.0]))
-    along_x, along_y, along_z = (components(wrist[..., i, :]) for i in range(3))
+    along_x, along_y, along_z = (separate_components(wrist[..., i, :]) for i in range(3))
     yaw = np.arctan2(along_x[1], along_z[1])
     pitch = np.arccos(np.clip(along_y[1], -1.0, 1.0))
     roll = -np.arctan2(along_y[0], -along_y[2])
@@ -106,7 +106,7 @@ def reach(arm: Geometry, positions: FloatArray, axes: FloatArray, mount_angle: f
     return Reach(angles, _margin(watched, arm.ranges) - beyond)
 
 
-def components(vectors: FloatArray) -> FloatArray:
+def separate_components(vectors: FloatArray) -> FloatArray:
     """Return the components of vectors, each without gaps in memory, shape (n, ...).
 
     NumPy's functions take an array with gaps to reach beyond its end. Where the result happens to

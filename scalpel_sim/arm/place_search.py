@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scalpel_sim.arm.inverse_kinematics import Geometry, components, reach
+from scalpel_sim.arm.inverse_kinematics import Geometry, reach, separate_components
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import BoolArray, FloatArray
 
@@ -299,7 +299,7 @@ def _turns(yaws: FloatArray) -> FloatArray:
 
 def _links(measures: Geometry, angles: FloatArray) -> FloatArray:
     """Return points along upper arm and forearm in the frame of the base, shape (..., 8, 3)."""
-    waist, shoulder, elbow, *_ = components(angles)[..., None]
+    waist, shoulder, elbow, *_ = separate_components(angles)[..., None]
     level = shoulder + elbow - measures.bend
     upper = measures.upper * np.array([0.25, 0.5, 0.75, 1.0, 1.0, 1.0, 1.0, 1.0])
     forearm = measures.forearm * np.array([0.0, 0.0, 0.0, 0.0, 0.25, 0.5, 0.75, 1.0])

@@ -70,8 +70,8 @@ class Collapsing(Arrays):
     """J below which each of them resists, shape (tetrahedron capacity,)."""
     per_volume: FloatArray
     """1 / (6 V) of each tetrahedron at rest [1/m3], shape (tetrahedron capacity,)."""
-    added: FloatArray
-    """Scratch: what they add to w^2 of a node [1/s2], shape (node capacity,)."""
+    scratch: FloatArray
+    """For a search and for what they add to w^2 of a node, shape (node capacity,)."""
 
 
 def no_collapse(n_nodes: int, n_tetrahedra: int, modulus: float) -> Collapsing:
@@ -91,7 +91,7 @@ def no_collapse(n_nodes: int, n_tetrahedra: int, modulus: float) -> Collapsing:
         stiffness=np.zeros(n_tetrahedra),
         limit=np.zeros(n_tetrahedra),
         per_volume=np.zeros(n_tetrahedra),
-        added=np.zeros(n_nodes),
+        scratch=np.zeros(n_nodes),
     )
 
 
@@ -99,7 +99,7 @@ def grown_collapse(collapsing: Collapsing, n_nodes: int, n_tetrahedra: int) -> C
     """Return the same tetrahedra with room for that many nodes and tetrahedra."""
     of_tetrahedra = ("listed", "stiffness", "limit", "per_volume")
     larger = {name: grown(getattr(collapsing, name), n_tetrahedra) for name in of_tetrahedra}
-    return collapsing.replaced(added=np.zeros(n_nodes), **larger)
+    return collapsing.replaced(scratch=np.zeros(n_nodes), **larger)
 
 
 class _Shape(NamedTuple):
@@ -169,6 +169,7 @@ def find_collapsing(
     frequency_squared: FloatArray,
     highest: float,
     fastest: float,
+    node_size: float,
     seconds: float,
 ) -> None:
     """List the tetrahedra that are flat, and bound the frequencies at their nodes.
@@ -182,15 +183,18 @@ def find_collapsing(
         body: The body.
         frequency_squared: Bound on w^2 of each node by the springs [1/s2].
         highest: Bound on w^2 of the body at rest [1/s2].
-        fastest: Speed of the fastest node, over the node size [1/s].
+        fastest: Speed of the fastest node [m/s].
+        node_size: Of the smallest node [m].
         seconds: Length of the increment [s].
     """
     if collapsing.modulus == 0.0:
         return
-    ahead = FASTEST_CHANGE * fastest * INCREMENTS_AHEAD * seconds
-    collapsing.slack -= ahead
+    seconds *= INCREMENTS_AHEAD
+    fall = FASTEST_CHANGE / node_size * seconds
+    collapsing.slack -= fall * fastest
     if collapsing.slack < 0.0:
-        _search(collapsing, body, highest, ahead, INCREMENTS_AHEAD * seconds)
+        _search(collapsing, body, highest, fall, seconds)
+        collapsing.slack -= fall * fastest
     else:
         for i in range(collapsing.n):
             t = collapsing.listed[i]
@@ -200,7 +204,7 @@ def find_collapsing(
 
 @kernel
 def _search(
-    collapsing: Collapsing, body: Body, highest: float, ahead: float, seconds: float
+    collapsing: Collapsing, body: Body, highest: float, fall: float, seconds: float
 ) -> None:
     """List all tetrahedra that are flat.
 
@@ -208,14 +212,17 @@ def _search(
         collapsing: Written.
         body: The body.
         highest: Bound on w^2 of the body at rest [1/s2].
-        ahead: How far J falls at most until it is looked at again.
+        fall: How far J falls at most, over the speed of its fastest node [s/m].
         seconds: For how long it is taken to change as fast as it does [s].
     """
-    n, least = 0, 1.0
+    n, least, speeds_squared = 0, 1.0, collapsing.scratch
+    for i in range(body.n_nodes):
+        v = vec3(body.velocities, i)
+        speeds_squared[i] = dot(v, v)
     for t in range(body.n_tetrahedra):
         j = _j(collapsing, body, t)
         flat = j < J_LISTED
-        if not flat and j < J_LISTED + ahead:
+        if not flat and fall * fall * _fastest(body, speeds_squared, t) > (j - J_LISTED) ** 2:
             flat = _will_be_flat(collapsing, body, t, seconds)
         if not flat:
             collapsing.stiffness[t] = 0.0
@@ -229,7 +236,16 @@ def _search(
         collapsing.listed[n] = t
         n += 1
     collapsing.n = n
-    collapsing.slack = least - J_LISTED - ahead
+    collapsing.slack = least - J_LISTED
+
+
+@kernel
+def _fastest(body: Body, speeds_squared: FloatArray, t: int) -> float:
+    """Return the square of the speed of the fastest node of tetrahedron `t` [m2/s2]."""
+    nodes, fastest = body.tetrahedra, 0.0
+    for q in range(4):
+        fastest = max(fastest, speeds_squared[nodes[t, q]])
+    return fastest
 
 
 @kernel
@@ -307,7 +323,7 @@ def _others(i: int, q: int) -> tuple[int, int]:
 @kernel
 def _bound_frequencies(collapsing: Collapsing, body: Body, frequency_squared: FloatArray) -> None:
     """Write the bound on w^2 at the nodes of what is listed, springs and all."""
-    x, nodes, added = body.positions, body.tetrahedra, collapsing.added
+    x, nodes, added = body.positions, body.tetrahedra, collapsing.scratch
     for i in range(collapsing.n):
         for q in range(4):
             added[nodes[collapsing.listed[i], q]] = 0.0

@@ -215,9 +215,10 @@ def begin_increment(
     _limit_mass(choice, context)
     near = limit_frequency_at_blade(context.blade, elastic, body, external)
     added = choice.of_contact
-    by_node, fastest = elastic.frequency_squared, choice.speed / choice.node_size
-    find_collapsing(elastic.collapsing, body, by_node, elastic.highest, fastest, choice.span)
-    choice.least = max(elastic.highest, near, elastic.collapsing.highest) + added
+    highest, collapsing = elastic.highest, elastic.collapsing
+    motion = choice.speed, choice.node_size, choice.span
+    find_collapsing(collapsing, body, elastic.frequency_squared, highest, *motion)
+    choice.least = max(highest, near, collapsing.highest) + added
     if stiffens(elastic.solid.law):
         # Tissue that stiffens is stiffest where the blade holds it, and resists together with it.
         added += frequency_with_blade(context.blade, body, choice.no_frequency, external)

@@ -33,7 +33,7 @@ SCRATCH = frozenset(
         *(f"Stages.{name}" for name in ("a1", "a2", "start_positions", "start_velocities")),
         # Evaluations of forces and frequencies.
         *(f"Solid.{name}" for name in ("forces", "ring", "ring_nodes", "fast_blocks")),
-        "Collapsing.added",
+        "Collapsing.scratch",
         # Searches of one pass of a cut.
         *(f"CutScratch.{name}" for name in ("around", "around_too", "parents", "parent_links")),
         *(f"CutScratch.{name}" for name in ("children", "place")),

@@ -30,8 +30,8 @@ TWO = TetrahedralMesh(
 )
 
 
-MOVED = 1e3, 1.0
-"""Speed of the fastest node over the node size [1/s], and a time [s], in which all may be flat."""
+MOVED = 1e3, SIZE, 1.0
+"""Speed of the fastest node [m/s], node size [m], and a time [s], in which all may be flat."""
 
 
 def flat(mesh: TetrahedralMesh, positions: FloatArray, fixed=None) -> tuple[Collapsing, Body]:
@@ -42,7 +42,7 @@ def flat(mesh: TetrahedralMesh, positions: FloatArray, fixed=None) -> tuple[Coll
     collapsing = no_collapse(n_nodes, n_tetrahedra, SPRINGS.young_modulus)
     highest = float(springs.frequency_squared[: body.n_nodes].max())
     renew_collapsing(collapsing, body, np.arange(body.n_tetrahedra), body.n_tetrahedra, highest)
-    find_collapsing(collapsing, body, springs.frequency_squared, highest, 0.0, 0.0)
+    find_collapsing(collapsing, body, springs.frequency_squared, highest, 0.0, SIZE, 1e-3)
     return collapsing, body
 
 
@@ -181,9 +181,9 @@ def test_what_is_found_flat_late_gets_no_energy_and_its_limit_goes_back_with_it(
 def test_what_moves_fast_towards_the_limit_is_listed_before_it_is_there():
     collapsing, body = flat(ONE, CORNERS)
     body.velocities[3, 2] = -10.0 * 0.8 * SIZE  # J falls by 10 a second
-    fastest = 8.0
+    fastest = 8.0 * SIZE
     for seconds, n in ((0.01, 0), (0.03, 1)):
-        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, fastest, seconds)
+        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, fastest, SIZE, seconds)
         assert collapsing.n == n
 
 
@@ -195,9 +195,9 @@ def test_what_becomes_flat_is_listed_though_not_all_is_looked_at_each_time(seed)
     collapsing, body = flat(mesh, mesh.positions)
     velocities = random.normal(0.0, 1.0, mesh.positions.shape)
     body.velocities[: body.n_nodes] = velocities
-    fastest = np.linalg.norm(velocities, axis=1).max() / SIZE
+    fastest = np.linalg.norm(velocities, axis=1).max()
     for _ in range(8):
-        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, fastest, dt)
+        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, fastest, SIZE, dt)
         body.positions[: body.n_nodes] += dt * velocities
         j = volumes(body.positions, mesh.tetrahedra) / volumes(mesh.positions, mesh.tetrahedra)
         assert set(np.flatnonzero(j < J_LISTED)) <= set(collapsing.listed[: collapsing.n])
@@ -209,7 +209,7 @@ def test_a_body_at_rest_is_looked_at_once():
     slack = collapsing.slack
     assert slack == pytest.approx(1.0 - J_LISTED)
     for _ in range(3):
-        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, 0.0, 1e-3)
+        find_collapsing(collapsing, body, np.ones(len(body.rest)), 1e9, 0.0, SIZE, 1e-3)
         assert collapsing.slack == slack
 
 
