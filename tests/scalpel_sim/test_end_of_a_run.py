@@ -6,6 +6,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import pytest
@@ -53,6 +54,16 @@ def test_a_signal_while_the_program_is_loaded_is_said_in_one_line(number, tmp_pa
     assert program.returncode == 1
     assert err.splitlines()[-1].startswith(f"error: interrupted by {number.name}")
     assert not (tmp_path / "run" / "initial.vtu").exists()
+
+
+def test_the_program_loads_no_library_of_windows_whose_process_a_signal_would_leave_alone(tmp_path):
+    code = (
+        "import atexit, sys; atexit.register(lambda: print('glfw' in sys.modules)); "
+        "from scalpel_sim.__main__ import main; main()"
+    )
+    words = ("run", "grid2", "-q", "--seconds", "0.01", "--out", str(tmp_path / "run"))
+    out, err = start(*words, program=(sys.executable, "-c", code)).communicate(timeout=120)
+    assert out.splitlines()[-1] == "False", err
 
 
 def test_ctrl_c_pressed_twice_in_a_moment_is_pressed_once(tmp_path):
