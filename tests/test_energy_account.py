@@ -138,9 +138,9 @@ def test_a_cut_adds_little_to_the_anchors_whose_tetrahedra_it_divides(account):
 
 
 def test_nothing_breaks_where_the_skin_is_as_tough_as_the_rest(account):
-    """Slip in distorted tissue gains 0.17 % of the work, under springs up to 1.3 % in
-    the strokes of six seeds, most of it in one stroke through what others had distorted. It was 8 %
-    where anchors slipped from lip to lip."""
+    """Slip in distorted tissue gains 0.17 % of the work, under springs up to 1.3 % in the strokes
+    of six seeds, most of it in one stroke through what others had distorted. It was 8 % where
+    anchors slipped from lip to lip."""
     breaking = account.steps("breaking")
     assert abs(breaking.sum()) < (0.015 if account.is_of_springs else 3e-3)
     assert breaking[breaking < 0.0].sum() > (-0.02 if account.is_of_springs else -5e-3)

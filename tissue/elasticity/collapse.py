@@ -32,8 +32,8 @@ springs; smaller: the term must be stiffer to turn what moves at the same speed.
 
 J_LISTED: Final = 0.5
 """J below which it is listed, now or by how it moves, as it may come to the limit before the next
-increment. Smaller: what is listed too late gets energy from nowhere; larger: more
-of what never comes to the limit is listed."""
+increment. Smaller: more is listed so late that it begins to resist where it is, below the limit;
+larger: more of what never comes to the limit is listed."""
 
 FASTEST_CHANGE: Final = 6.0
 """How fast J changes at most, in speeds of the fastest node over the node size: three altitudes,
@@ -45,7 +45,6 @@ INCREMENTS_AHEAD: Final = 2.0
 LARGEST_ADDED_SHARE: Final = 2.0
 """What one tetrahedron may add to w^2 of its nodes, as a share of the bound of the body at rest.
 Larger: slivers, whose altitudes are small, make steps short; smaller: slivers turn over."""
-
 
 _UNKNOWN: Final = -1.0
 """`slack` before the first search: there must be one."""
