@@ -21,7 +21,7 @@ thin to be seen. The table has it."""
 OPACITY = 0.85
 """Opacity of the stacked terms: the grid is seen through them."""
 
-_MARGINS = {"left": 0.1, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
+_MARGINS = {"left": 0.14, "right": 0.985, "bottom": 0.08, "top": 0.86, "hspace": 0.12}
 """Fixed margins, for the reason given in `scalpel_sim.output.force_plot`."""
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.image import imread
 from rich.console import Console
 
 from scalpel_sim.errors import RunError, UsageError
@@ -207,6 +208,15 @@ def test_heights_in_the_energy_plot_are_energies(tmp_path):
     )
     assert cutting > 10_000
     assert cutting == pytest.approx(2 * damping, rel=0.1)
+
+
+def test_the_labels_of_the_energy_plot_are_whole_however_small_the_residual_is(tmp_path):
+    recording = zero_recording()
+    recording.column("work_of_blade_j")[:] = 1.0
+    recording.column("residual_j")[:] = np.linspace(0.0, -4e-5, 100)  # ticks such as -0.004 %
+    plot_energies(recording, "block", tmp_path / ENERGY_PLOT)
+    picture = imread(tmp_path / ENERGY_PLOT)
+    assert (picture[:, :4] == 1.0).all(), "the left edge is white"
 
 
 def test_without_an_account_there_is_no_energy_plot(tmp_path):
