@@ -12,7 +12,7 @@ from scalpel_sim.stop_signals import ignore_signals, interrupt_on_signals, raise
 def main() -> None:
     """Run the command line, and end the process with its exit code.
 
-    Signals are waited for before the command line is loaded, which takes most of a second.
+    Signals are obeyed before the command line is loaded, which takes most of a second.
     """
     interrupt_on_signals()
     # The program opens no window. To have one, MuJoCo loads glfw, which starts a process that looks
@@ -21,15 +21,9 @@ def main() -> None:
     # What is loaded lives as long as the process: to look for cycles in it took 0.13 s of a start.
     # `load_kernels` enables the collector again.
     gc.disable()
-    try:
-        from scalpel_sim.cli.app import command_line
+    from scalpel_sim.cli.app import command_line
 
-        code = command_line(sys.argv[1:])
-    except KeyboardInterrupt as error:
-        from scalpel_sim.errors import EXIT_RUN_FAILED
-
-        print(f"error: {error}", file=sys.stderr)
-        code = EXIT_RUN_FAILED
+    code = command_line(sys.argv[1:])
     ignore_signals()  # all is done, and a signal would change the code
     if raised_signal() is not None:
         _end_at_once(code)
@@ -39,8 +33,7 @@ def main() -> None:
 def _end_at_once(code: int) -> NoReturn:
     """End the process without taking down what was loaded.
 
-    A signal may have come while a library was being loaded. To take down half of one has crashed:
-    the exit code was -11, once in 1,000 kills.
+    What a signal has interrupted stays as it is: see `scalpel_sim.stop_signals`.
     """
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError):  # nobody reads it any more

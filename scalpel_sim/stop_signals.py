@@ -1,10 +1,15 @@
 """Ctrl-C and the system's requests to end: a run obeys them between two frames."""
 
+import contextlib
+import os
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from types import FrameType, TracebackType
 from typing import Any
+
+from scalpel_sim.errors import EXIT_RUN_FAILED
 
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -15,8 +20,11 @@ SAME_WISH = 1.0
 """Time within which further signals mean the same wish [s]: a terminal and a launcher, such as
 `uv run`, may both pass on one Ctrl-C, and people press it twice."""
 
-_raised: str | None = None
-"""What `raised_signal` returns."""
+_STDERR = 2
+"""File descriptor of the standard error."""
+
+_SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
+"""Clears the line of a progress bar on a terminal, and shows the cursor that it hides."""
 
 
 class SignalInterrupt(KeyboardInterrupt):
@@ -25,6 +33,14 @@ class SignalInterrupt(KeyboardInterrupt):
     No plain KeyboardInterrupt: where one passes through `exec`, as in the making of a dataclass,
     Python ends by SIGINT although it was caught.
     """
+
+
+_raised: SignalInterrupt | None = None
+"""The one that was raised last. It keeps alive all that was interrupted: llvmlite frees twice what
+it is freeing when an exception comes, if that is taken down."""
+
+_is_loading = True
+"""Whether the program loads libraries or kernels, as it does first."""
 
 
 class StopSignals:
@@ -36,7 +52,7 @@ class StopSignals:
     """
 
     def __init__(self) -> None:
-        self.reason: str | None = _raised
+        self.reason: str | None = raised_signal()
         """Which signal came, or None."""
         self._noted_at = time.monotonic()
         self._before: dict[signal.Signals, Any] = {}
@@ -72,13 +88,27 @@ class StopSignals:
 
 
 def interrupt_on_signals() -> None:
-    """Have every signal of `SIGNALS` raise `SignalInterrupt`, unless it is ignored.
+    """Have every signal of `SIGNALS` stop the work at once, unless it is ignored.
 
-    For the start of a program: where nobody waits for a signal, the work stops at once.
+    For a program where nobody waits for a signal. While it loads (`loading`), the process ends with
+    one line; afterwards `SignalInterrupt` is raised. An exception that passes through a library
+    that is half loaded has crashed the process, and Python drops one that comes in a callback and
+    prints its traceback. Nothing is lost: what has been written until then was written aside.
     """
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _raise)
+            signal.signal(number, _stop)
+
+
+@contextlib.contextmanager
+def loading() -> Iterator[None]:
+    """Load libraries or kernels. With the first time that this is left, the program has loaded."""
+    global _is_loading
+    _is_loading = True
+    try:
+        yield
+    finally:
+        _is_loading = False
 
 
 def ignore_signals() -> None:
@@ -92,7 +122,7 @@ def raised_signal() -> str | None:
 
     Python drops an exception that is raised in a callback, and extensions replace it by another.
     """
-    return _raised
+    return None if _raised is None else str(_raised)
 
 
 def interruption(number: int) -> str:
@@ -100,7 +130,17 @@ def interruption(number: int) -> str:
     return f"interrupted by {signal.Signals(number).name}"
 
 
-def _raise(number: int, frame: FrameType | None) -> None:
+def _stop(number: int, frame: FrameType | None) -> None:
     global _raised
-    _raised = interruption(number)
-    raise SignalInterrupt(_raised)
+    if _is_loading:
+        _end(number)
+    _raised = SignalInterrupt(interruption(number))
+    raise _raised
+
+
+def _end(number: int) -> None:
+    # Not by `sys.stderr`, in the midst of whose writing it may be.
+    with contextlib.suppress(OSError):  # nobody reads it any more
+        shown = _SHOW_CURSOR if os.isatty(_STDERR) else ""
+        os.write(_STDERR, f"{shown}error: {interruption(number)}\n".encode())
+    os._exit(EXIT_RUN_FAILED)

@@ -26,6 +26,7 @@ from scalpel_sim.output.force_parts import force_parts
 from scalpel_sim.output.frame_row import FrameRows, WallTimes
 from scalpel_sim.scene_parts.scene import Scene
 from scalpel_sim.scenes import PARENCHYMA, PHANTOM
+from scalpel_sim.stop_signals import SignalInterrupt, StopSignals
 from scalpel_sim.strokes.stroke import Stroke
 from tissue import (
     BladeSegment,
@@ -138,8 +139,10 @@ def compile_ahead(kernels: KernelSet, on_progress: Progress = lambda n, n_all: N
     """
     if kernels_are_compiled(kernels) or not is_compiling():
         return
-    with _processes(kernels) as processes:
+    with _processes(kernels) as processes, StopSignals() as stop:
         while any(process.poll() is None for process in processes):
+            if stop.reason is not None:
+                raise SignalInterrupt(stop.reason)
             found = n_compiled_kernels()
             on_progress(found, max(found, USUAL_NUMBER))
             time.sleep(_SECONDS_PER_LOOK)

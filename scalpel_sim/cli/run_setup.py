@@ -29,6 +29,7 @@ from scalpel_sim.scene_body import check_scene, make_tissue
 from scalpel_sim.scene_parts.scene import Scene, changed
 from scalpel_sim.scenes import scene_of
 from scalpel_sim.simulation import Simulation
+from scalpel_sim.stop_signals import loading
 from scalpel_sim.tables.toml import is_toml_file
 from scalpel_sim.warm_up import USUAL_SETS, KernelSet, prepare_kernels
 
@@ -228,7 +229,7 @@ def load_kernels(options: PrintOptions, scene: Scene | None = None) -> None:
         options: Whether to show it.
         scene: Whose kernels; None: those of the default scene, with and without an account.
     """
-    with compiling(options) as on_progress:
+    with compiling(options) as on_progress, loading():
         prepare_kernels(USUAL_SETS if scene is None else [KernelSet.of(scene)], on_progress)
     gc.enable()
 

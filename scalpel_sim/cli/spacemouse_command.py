@@ -9,6 +9,7 @@ from bridge import DEFAULT_DEVICE_PORT, DEFAULT_HOST
 from scalpel_sim.cli.console import log_to_stderr, say
 from scalpel_sim.cli.options import CONNECTION, PrintOptions
 from scalpel_sim.errors import RunError
+from scalpel_sim.stop_signals import loading
 
 
 def spacemouse(
@@ -37,8 +38,9 @@ def spacemouse(
     """
     with log_to_stderr(printing):
         try:
-            import pyspacemouse
-            from easyhid import HIDException
+            with loading():
+                import pyspacemouse
+                from easyhid import HIDException
         except ImportError as cause:
             raise RunError(
                 "a SpaceMouse is read by pyspacemouse, which cannot be loaded "

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pty
 import re
 import shutil
 import signal
@@ -14,7 +15,7 @@ import pytest
 from scalpel_sim.cli.app import command_line
 from scalpel_sim.output.recording import read_forces
 from scalpel_sim.output.run_folder import RUN_FILES, STROKE
-from tests.processes import environment, start, wait_for_rows
+from tests.processes import PROGRAM, environment, start, wait_for_rows
 from tests.run_files import names_in
 from tests.small_disk import run_on_a_small_disk, small_disks_are_allowed
 from tests.whole_runs import broken_files
@@ -52,8 +53,47 @@ def test_a_signal_while_the_program_is_loaded_is_said_in_one_line(number, tmp_pa
     program.send_signal(number)
     _, err = program.communicate(timeout=60)
     assert program.returncode == 1
-    assert err.splitlines()[-1].startswith(f"error: interrupted by {number.name}")
+    assert err == f"error: interrupted by {number.name}\n"
     assert not (tmp_path / "run" / "initial.vtu").exists()
+
+
+def test_a_signal_while_the_program_is_loaded_leaves_a_terminal_with_its_cursor():
+    ours, theirs = pty.openpty()
+    with os.fdopen(ours, "rb", buffering=0) as terminal:
+        program = subprocess.Popen([*PROGRAM, "run"], stderr=theirs, env=environment())
+        os.close(theirs)
+        time.sleep(0.3)
+        program.terminate()
+        assert program.wait(timeout=60) == 1
+        assert terminal.read(1000).endswith(b"\x1b[?25herror: interrupted by SIGTERM\r\n")
+
+
+def test_what_a_signal_interrupts_is_not_taken_down():
+    """llvmlite frees twice what it is freeing just then."""
+    code = """if True:
+        import os, time
+        from scalpel_sim.stop_signals import SIGNALS, interrupt_on_signals, loading
+
+        class Owner:
+            def __del__(self):
+                print("taken down", flush=True)
+
+        def work():
+            owner = Owner()
+            os.kill(os.getpid(), SIGNALS[0])
+            time.sleep(60.0)
+
+        interrupt_on_signals()
+        with loading():
+            pass
+        try:
+            work()
+        except KeyboardInterrupt as error:
+            print(error, flush=True)
+        os._exit(0)
+    """
+    out, err = start(program=(sys.executable, "-c", code)).communicate(timeout=60)
+    assert out == "interrupted by SIGINT\n", err
 
 
 def test_the_program_loads_no_library_of_windows_whose_process_a_signal_would_leave_alone(tmp_path):
