@@ -102,7 +102,7 @@ def interrupt_on_signals() -> None:
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:
-    """Load libraries or kernels. With the first time that this is left, the program has loaded."""
+    """Load libraries or kernels. The program has loaded when this is left for the first time."""
     global _is_loading
     _is_loading = True
     try:
